@@ -59,10 +59,12 @@ def test() -> None:
     notebooks = [
         str(path.relative_to(CLONE)) for path in sorted([*folder.glob("*.ipynb"), *folder.glob("deeper/*.ipynb")])
     ]
-    # Three processes for two cores: one waits for a kernel, a subprocess or the disk most of the time.
-    pool = ("-n", "3", "--dist", "loadfile", "-p", "no:cacheprovider")
+    # Three processes for two cores: one waits for a kernel, a subprocess or the disk most of the time. The files that
+    # take minutes come first, so that no process ends long before the others.
+    pool = ("-n", "3", "--dist", "loadfile", "--no-loadscope-reorder", "-p", "no:cacheprovider")
     nbval = ("--nbval", "--nbval-current-env", "--nbval-cell-timeout=300")
-    _pytest(*pool, *nbval, "--doctest-modules", "semgrid_edu", "tests", "--ignore=tests/browser", *notebooks)
+    files = (*notebooks, "tests/graders", "tests", "semgrid_edu")
+    _pytest(*pool, *nbval, "--doctest-modules", "--ignore=tests/browser", *files)
 
 
 def test_browser() -> None:

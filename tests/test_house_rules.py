@@ -145,10 +145,10 @@ def test_the_house_stays_small():
         storey = "workshop" if module.startswith(("workshop/", "__main__")) else "book"
         modules[storey] += not module.endswith("__init__.py")
         lines[storey] += code_lines(module)
-    assert modules["book"] <= 163
-    assert modules["workshop"] <= 130
-    assert lines["book"] <= 11_460
-    assert lines["workshop"] <= 10_860
+    assert modules["book"] <= 172
+    assert modules["workshop"] <= 127
+    assert lines["book"] <= 12_310
+    assert lines["workshop"] <= 10_890
 
 
 def test_no_folder_has_more_than_18_modules():

@@ -2,68 +2,198 @@
 # # 06 · Sampling that learns: equation (2) and its gradient
 #
 # **In one sentence.** A point of a plane reads the four pixels around it with four weights, and on the way back each
-# pixel gets its share of the blame by the same four weights; so a mistake on the map can teach the image network.
+# pixel receives its share of the gradient by the same four weights; so an error on the map can train the image network.
 #
 # **You will be able to**
 # - compute a bilinear sample by hand, and its gradient in the scores and in u and v;
-# - write equation (2) as a sparse matrix, and say why its transpose carries the gradient;
-# - check any gradient by finite differences, and know where that check must fail;
-# - say what a shift of half a pixel costs on the ground, in metres, and find it with a ramp;
-# - say of each pixel whether it learns at all, and from which cells.
+# - write equation (2) as a sparse matrix, and say why its transpose (the *adjoint*) carries the gradient;
+# - check any gradient by finite differences;
+# - calibrate a camera by gradient descent, and say what it finds when the ground isn't flat;
+# - find an error of half a pixel with a ramp, and say what it costs on the ground, in metres.
 #
-# **Prerequisites.** Lecture 05: equation (1) gives a pixel (u, v) to each point of each plane. Derivatives and the
-# chain rule; a matrix times a vector.
+# **Prerequisites.** Lecture [05](05_pixels.ipynb): equation (1) gives a pixel (u, v) to each point of each plane.
+# Derivatives and the chain rule; a matrix times a vector.
 #
-# **Time.** 120 minutes, best in two sittings; the computer needs less than one.
+# **Time.** 75 minutes; the computer needs less than one.
 #
 # **Paper.** Section 3.3, equation (2), after Jaderberg et al. (2015).
-#
-# ```
-#                         ┌── pixel of each point, eq. (1)
-#                         ▼
-# scores s (C, h, w) ── eq. (2) ──▶ planes p (C, D, H, W) ── fusion ──▶ map ──▶ loss
-#    s̄ (C, h, w)     ◀── transposed ──  p̄ (C, D, H, W)  ◀──────────────────────┘
-# ```
 
-# %%
-from time import process_time
-
+# %% jupyter={"source_hidden": true}
 import matplotlib.pyplot as plt
 import numpy as np
 import torch
 import torch.nn.functional as F
+from IPython.display import Markdown
 from ipywidgets import FloatSlider, interact
 from matplotlib.colors import LogNorm
 
 from semgrid_edu import plotting
-from semgrid_edu.camera import Camera, rigid_transform, transform_points
+from semgrid_edu.camera import transform_points
 from semgrid_edu.datasets.readers.frames import resize_labels
 from semgrid_edu.datasets.training_arrays import resize_image
-from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
+from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.networks import load_net
-from semgrid_edu.pipeline import network_image
 from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
+from semgrid_edu.stage_models import ledger, ledger_table, shared_pixel
+from semgrid_edu.stage_models.pixel_ray import believed_by_readers
 
-plt.rcParams["figure.dpi"] = 72
+# %% jupyter={"source_hidden": true}
+plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 torch.set_num_threads(1)
+drive, spec, heights = sample_drive(), GridSpec.compact(), plane_heights()
+frame = drive[0]
+camera = frame.camera.resized((96, 320))
+camera_height = camera.T_camera_from_grid[1, 3]
+pixels, visible = plane_pixels(spec, heights, camera)
+image = resize_image(frame.image, camera.size)
+true_labels = resize_labels(frame.labels.image, camera.size)
+flat = [KITTI_14.index(name) for name in ("road", "sidewalk")]
+x_cells = spec.centers()[..., 0]
+
+# %% jupyter={"source_hidden": true}
+
+
+def ground_heights(frame, from_lidar):
+    """Return the height of the ground in each cell: 0, or a curved surface fitted to the scan's lowest returns."""
+    if not from_lidar:
+        return np.zeros(spec.shape)
+    x, y, z = frame.points_grid[:, :3].T.astype(float)
+    near = (x > 5) & (x < 30) & (np.abs(y) < 6)
+    terms, z = np.stack([np.ones(near.sum()), x[near], y[near], x[near] ** 2], axis=1), z[near]
+    keep = np.abs(z) < 0.6
+    for _ in range(10):
+        surface = np.linalg.lstsq(terms[keep], z[keep])[0]
+        keep = np.abs(terms @ surface - z) < 0.12
+    x, y = np.moveaxis(spec.centers(), -1, 0)
+    return surface[0] + surface[1] * x + surface[2] * y + surface[3] * x**2
+
+
+# %% jupyter={"source_hidden": true}
+
+
+def lesson(frame, from_lidar=False):
+    """Return labels of an image (C, h, w), classes of ground cells that it sees (C, J), their places (J, 3)."""
+    truth = frame.labels.birdseye_on(spec)
+    cells = frame.labels.visible_on(spec) & np.isin(truth, flat) & (x_cells > 8) & (x_cells < 25)
+    on_ground = np.dstack([spec.centers(), ground_heights(frame, from_lidar)])[cells]
+    points = torch.from_numpy(transform_points(camera.T_camera_from_grid, on_ground))
+    labels = resize_labels(frame.labels.image, camera.size)
+    return [torch.from_numpy(np.stack([a == c for c in flat])).double() for a in (labels, truth[cells])] + [points]
+
+
+def pixels_at(points, pitch):
+    """Return u and v of points seen by the camera turned down by `pitch`, radians: equation (1)."""
+    X, Y, Z = points.T
+    Y, Z = torch.cos(pitch) * Y - torch.sin(pitch) * Z, torch.sin(pitch) * Y + torch.cos(pitch) * Z
+    K = torch.from_numpy(camera.K)
+    return K[0, 0] * X / Z + K[0, 2], K[1, 1] * Y / Z + K[1, 2]
+
+
+def read_points(s, u, v):
+    """Return what points read, equation (2) by PyTorch: (C, h, w) scores, (J,) pixels -> (C, J)."""
+    where = torch.stack([2 * u / (s.shape[2] - 1) - 1, 2 * v / (s.shape[1] - 1) - 1], dim=-1)
+    return F.grid_sample(s[None], where[None, None], align_corners=True)[0, :, 0]
+
+
+# %% jupyter={"source_hidden": true}
+
+
+def loss_at(pitch, lessons):
+    """Return the mean squared difference between what the points read and the map."""
+    return sum(((read_points(s, *pixels_at(points, pitch)) - t) ** 2).mean() for s, t, points in lessons) / len(lessons)
+
+
+def descend(degrees, lessons, steps=20):
+    """Return pitch (degrees) and loss along a descent, (steps, 2)."""
+    pitch, path = torch.tensor(np.radians(degrees), requires_grad=True), []
+    for _ in range(steps):
+        loss = loss_at(pitch, lessons)
+        path.append((np.degrees(pitch.item()), loss.item()))
+        (gradient,) = torch.autograd.grad(loss, pitch)
+        with torch.no_grad():
+            pitch -= 0.002 * gradient
+    return np.array(path)
+
+
+chosen = (0, 5, 10, 15, 19)
+on_zero, on_lidar = ([lesson(drive[k], from_lidar) for k in chosen] for from_lidar in (False, True))
 
 # %% [markdown]
-# New symbols, beside those of lecture 00:
+# ## A calibration that converges on the image
 #
-# | symbol | meaning | shape | name in code |
-# |---|---|---|---|
-# | $n, m$ | row and column of a pixel | | `n`, `m` |
-# | $d, j$ | a plane, and one of its points | | |
-# | $k(t)$ | sampling kernel | | `kernel` |
-# | $A$ | equation (2) as a matrix: a row a point, a column a pixel | (DHW, hw) | `A` |
-# | $\bar p$ | blame of a value on a plane: $\partial\,\text{loss} / \partial p$ | (C, D, H, W) | `p_bar` |
-# | $\bar s$ | blame of a score: $\partial\,\text{loss} / \partial s$ | (C, h, w) | `s_bar` |
-#
-# (The paper numbers planes by $i$; in this course $i$ is the image.)
+# Suppose that the drive's camera points two degrees lower than we believe. Nobody tells the program. It has a map of
+# road and sidewalk, the labels of five images, and the derivative of what it reads. Watch:
+
+# %% jupyter={"source_hidden": true} alt="animation: A, dots of road and sidewalk lie too high in the image and slide down within four steps until the border between them lies on the kerb; B, the pitch over the steps falls from two degrees to near zero"
+path = descend(2.0, on_lidar, steps=12)
+
+
+def converging():
+    """Yield the figure with the points at each step."""
+    fig = plt.figure(figsize=(8.2, 2.7), layout="constrained")
+    _, t, points = on_lidar[0]
+    for step, (degrees, _) in enumerate(path):
+        fig.clear()
+        left, right = fig.subplots(1, 2, width_ratios=(3, 1))
+        left.imshow(130 + image.mean(axis=2) // 16 * 7, cmap="gray", vmin=0, vmax=255)
+        u, v = (a.numpy() for a in pixels_at(points, torch.tensor(np.radians(degrees))))
+        for c, colour in ((0, "tab:purple"), (1, "tab:orange")):
+            left.plot(u[t[c] > 0], v[t[c] > 0], ".", color=colour, markersize=2, label=KITTI_14.names[flat[c]])
+        left.set(ylim=(95.5, 30), xlim=(60, 319.5), title=f"A: the map's cells in the image, step {step}")
+        left.legend(loc="upper left", fontsize="small", markerscale=4)
+        right.plot(path[: step + 1, 0], ".-", color="black")
+        right.axhline(0, color="0.6", linewidth=1)
+        right.set(xlim=(-0.5, 11.5), ylim=(-0.7, 2.2), xlabel="step", ylabel="pitch [degrees]", title="B")
+        yield fig
+
+
+plotting.animate(converging(), period=0.5, alt="the map's cells slide onto road and sidewalk as the pitch is learnt")
 
 # %% [markdown]
+# A: each dot is a cell that the map calls road or sidewalk, at the pixel that equation (1) gives to it with the pitch
+# learnt so far. B: that pitch. After four steps the border between the colours lies on the kerb. What made this
+# possible is that *reading a pixel has a derivative*: the loss on the map says in which direction each dot should move,
+# and the chain rule collects that into one number. The same derivative, in the scores instead of the place, trains the
+# whole image network (lecture 08). This lecture builds both, from four numbers on.
+#
+# ### The graph
+#
+# One thing first that no derivative repairs. $m$ is what lies on a patch of ground, $a$ the label of the pixel that
+# shows it, and $x_1, x_2, \dots$ are the cells that read this pixel:
+
+# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: the patch m, below it the pixel a, below it four observed cells x1 to x4 that all depend on the pixel"
+stage = shared_pixel()
+fig, ax = plt.subplots(figsize=(5.4, 3.2), layout="constrained")
+stage.draw(ax)
+plt.show()
+
+# %% [markdown]
+# **Predict before you run.** The pixel is right with 0.8, and all four cells read *car*. How probable is a car? How
+# probable would it be if each cell had read a pixel of its own? Given $m$, are $x_1$ and $x_2$ independent?
+#
+# <details><summary>Answer</summary>
+#
+# 0.80, for one cell, four or a hundred: they all repeat the same reading. With a pixel each it would be 0.996. Given
+# $m$ they are dependent, because the pixel's error reaches both; given $a$ they are independent.
+#
+# </details>
+
+# %% jupyter={"outputs_hidden": true}
+for n in (1, 2, 4, 10):
+    exact, independent = believed_by_readers(n)
+    print(f"{n:>2} cells say car: exact {exact:.2f}, as if independent {independent:.3f}")
+assert not d_separated(stage.model, "x1", "x2", given=("m",))
+assert d_separated(stage.model, "x1", "x2", given=("a",))
+for near, far in ((6, 20), (20, 40), (40, 71)):
+    read_by = pixels[0][visible[0] & (x_cells >= near) & (x_cells < far)].round()
+    print(f"on the drive, {near} to {far} m ahead: {len(read_by) / len(np.unique(read_by, axis=0)):.1f} cells a pixel")
+
+# %% [markdown]
+# The cut edge is the pixel's shared error. A network that looks at neighbouring cells can learn to allow for it; a rule
+# that multiplies their probabilities can't.
+#
 # ## A value between four pixels
 #
 # Take an image of 3 x 3 pixels and one class. Its scores:
@@ -80,9 +210,13 @@ torch.set_num_threads(1)
 # **Predict before you run.** Interpolate: first along row 0, then along row 1, then between the two. What does the
 # point read, and how much of it comes from each pixel?
 #
-# <details><summary>Answer</summary>Row 0: 3/4 · 4 + 1/4 · 8 = 5. Row 1: 3/4 · 6 + 1/4 · 0 = 4.5. Half-way between:
+# <details><summary>Answer</summary>
+#
+# Row 0: 3/4 · 4 + 1/4 · 8 = 5. Row 1: 3/4 · 6 + 1/4 · 0 = 4.5. Half-way between:
 # 4.75. Multiply the fractions and each pixel has a weight: 3/8 for the 4 and for the 6, 1/8 for the 8 and for the 0.
-# They sum to 1. The other five pixels count nothing.</details>
+# They sum to 1. The other five pixels count nothing.
+#
+# </details>
 #
 # One rule for all nine pixels: a pixel's weight falls from 1 to 0 as the point moves away by one pixel, across and
 # down alike. That is a kernel, $k(t) = \max(0, 1 - |t|)$, and the interpolation is the paper's equation:
@@ -90,7 +224,7 @@ torch.set_num_threads(1)
 # $$ p_{c,d,j} = \sum_n \sum_m s_{c,n,m}\; k(u_j - m)\; k(v_j - n) \qquad (2) $$
 
 
-# %% tags=["eq-2"]
+# %% tags=["eq-2"] jupyter={"outputs_hidden": true}
 def kernel(t):
     """Return the bilinear kernel: 1 at the pixel, 0 from one pixel away on."""
     return max(0.0, 1 - abs(t))
@@ -116,7 +250,7 @@ for u, v in points:
 # On a pixel's centre the point reads that pixel alone; on the last row it reads two. All agree with the package.
 
 
-# %%
+# %% jupyter={"source_hidden": true} alt="left, nine pixels with their scores and a cross between four of them, whose weights are 3/8, 3/8, 1/8 and 1/8; right, the triangular kernel with the weights of three columns on it"
 def draw_point(ax, u, v):
     """Draw the image, a point on it, and the weights of its pixels."""
     ax.imshow(s, cmap="Blues", vmin=0, vmax=14)
@@ -130,7 +264,7 @@ def draw_point(ax, u, v):
     ax.set_title(f"the point at ({u:.2f}, {v:.2f}) reads {read(s, u, v):.2f}", fontsize="medium")
 
 
-fig, axes = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
+fig, axes = plt.subplots(1, 2, figsize=(8, 3.3), layout="constrained")
 draw_point(axes[0], 1.25, 0.5)
 t = np.linspace(-1.6, 1.6, 321)
 axes[1].plot(t, [kernel(x) for x in t], color="black")
@@ -145,23 +279,11 @@ plt.show()
 # down. Right, the one across: the point is 0.25 from column 1 (weight 0.75), -0.75 from column 2 (0.25) and too far
 # from column 0.
 #
-# On the drive, equation (1) has found the pixels. Here are three small pieces of one image, magnified, with the
-# points of the ground plane on them.
-#
-# **Predict before you run.** Cells are 0.5 m wide and deep. Which of the three pieces has the most points in it: 8, 20
-# or 45 m ahead? In which do two points share the same four pixels?
-#
-# <details><summary>Answer</summary>The farther, the more: perspective draws the cells together. At 8 m most pixels are
-# read by nobody. At 20 m, straight ahead, neighbours begin to share their four pixels; at 45 m about seven points do.
-# Both will matter.</details>
+# On the drive, equation (1) has found the pixels. Here are three small pieces of one image, magnified, with the points
+# of the ground plane on them. Near by, most pixels are read by nobody; far ahead, many points share the same four.
 
-# %%
-drive, spec, heights = sample_drive(), GridSpec.compact(), plane_heights()
-frame = drive[0]
-camera = frame.camera.resized((96, 320))
-pixels, visible = plane_pixels(spec, heights, camera)
-image = resize_image(frame.image, camera.size)
-fig, axes = plt.subplots(1, 3, figsize=(10, 3.6), layout="constrained")
+# %% jupyter={"source_hidden": true} alt="three magnified pieces of the image with yellow dots: far apart 8 m ahead, a dense lattice at 20 m, lines of dots that run into each other at 45 m"
+fig, axes = plt.subplots(1, 3, figsize=(8, 2.9), layout="constrained")
 for ax, ahead in zip(axes, (8, 20, 45), strict=True):
     (row,), (col,), _ = spec.cells(np.array([[ahead, -0.2]]))
     u, v = pixels[0, row, col]
@@ -172,12 +294,9 @@ axes[0].set_ylabel("v [pixels]")
 plt.show()
 
 # %% [markdown]
-# Each yellow dot takes its 14 scores from the four pixels around it, by weights that depend on nothing but the
-# calibration.
+# ## The way back: backpropagation
 #
-# ## Back again: what each pixel gets
-#
-# Now learn. The loss sits at the far end, on the map; suppose that it asks the point at (1.25, 0.5) for a higher value
+# Now learn. (The gradient of the loss in a value is written with a bar: $\bar p = \partial\,\text{loss} / \partial p$.) The loss sits at the far end, on the map; suppose that it asks the point at (1.25, 0.5) for a higher value
 # and a second point, at (1, 1.5), for a lower one: $\bar p = (-1, +2)$.
 #
 # Nudge the pixel with the 6 by a small amount $\varepsilon$. The first point reads it with weight 3/8 and the second
@@ -187,20 +306,24 @@ plt.show()
 # **Predict before you run.** And that of its neighbour, the 8? Of the 2 in the lower right corner? Which pixels don't
 # learn?
 #
-# <details><summary>Answer</summary>The 8 is read by the first point alone, with 1/8: -0.125. The lower right corner is
+# <details><summary>Answer</summary>
+#
+# The 8 is read by the first point alone, with 1/8: -0.125. The lower right corner is
 # read by nobody: 0, and so are the three pixels of column 0. A pixel gets back what it gave: the same weight, times
-# what the loss says of the reader, **added up** over all readers.</details>
+# the gradient of the reader, **added up** over all readers.
+#
+# </details>
 #
 # $$ \bar s_{c,n,m} = \sum_d \sum_j \bar p_{c,d,j}\; k(u_j - m)\; k(v_j - n) $$
 
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 def give_back(p_bar, points, shape):
     """Return the gradient of the loss in the scores of one class, literally."""
     s_bar = np.zeros(shape)
-    for blame, (u, v) in zip(p_bar, points, strict=True):
+    for gradient, (u, v) in zip(p_bar, points, strict=True):
         for n, m in np.ndindex(shape):
-            s_bar[n, m] += blame * kernel(u - m) * kernel(v - n)
+            s_bar[n, m] += gradient * kernel(u - m) * kernel(v - n)
     return s_bar
 
 
@@ -225,7 +348,7 @@ print(give_back(p_bar, two, s.shape))
 # %%
 def loss_of(s):
     """Return a loss whose gradient in p is p_bar."""
-    return sum(blame * read(s, u, v) for blame, (u, v) in zip(p_bar, two, strict=True))
+    return sum(gradient * read(s, u, v) for gradient, (u, v) in zip(p_bar, two, strict=True))
 
 
 epsilon, by_differences = 1e-4, np.zeros(s.shape)
@@ -239,28 +362,24 @@ print("largest difference is below 1e-9:", np.abs(by_differences - scores.grad[0
 
 # %% [markdown]
 # On the drive, let every point of every plane send back 1. What arrives at a pixel is then the sum of the weights with
-# which it is read: its voice in the map.
+# which it is read: how strongly the map will train it.
 
-# %%
+# %% jupyter={"source_hidden": true} alt="the image with the sum of weights per pixel: bright along the horizon in the middle, dark below, white at the lower and upper border where no point reads"
 sampler = PlaneSampler(pixels, visible, camera.size)
 scores = torch.zeros(1, 1, *camera.size, requires_grad=True)
 sampler(scores).sum().backward()
-voice = np.ma.masked_equal(scores.grad[0, 0].numpy(), 0)
-_, ax = plt.subplots(figsize=(8, 2.5), layout="constrained")
+weight = np.ma.masked_equal(scores.grad[0, 0].numpy(), 0)
+_, ax = plt.subplots(figsize=(7.5, 2.4), layout="constrained")
 style = {"norm": LogNorm(0.1, 1000), "cmap": "viridis", "interpolation": "nearest"}
-plotting.image_values(voice, "sum of weights", ax=ax, **style)
+plotting.image_values(weight, "sum of weights", ax=ax, **style)
 plt.show()
-print(f"{100 * voice.mask.mean():.0f} % of the pixels are read by no point, so they never learn from the map")
+print(f"{100 * weight.mask.mean():.0f} % of the pixels are read by no point, so they never learn from the map")
 left, middle, right = np.split(scores.grad[0, 0, round(camera.K[1, 2])].numpy(), (107, 213))  # the horizon's row
 print(f"on the horizon: left {left.mean():.0f}, in the middle {middle.mean():.0f}, right {right.mean():.0f}")
 
 # %% [markdown]
-# The frame is the image's; white pixels have no voice. They lie at the lower and the upper border, where the points
-# nearest to the vehicle go, and fall so far apart that they miss most pixels. The white streaks are what you see
-# between the trees of an orchard: directions in which no cell's centre lies near by, whatever its height. Along the
-# horizon a pixel of the middle third answers for more than sixty points, on average, and a pixel to either side of it
-# for fewer than ten. At the lower border it is less than one. So what the network learns from the map, it learns mostly
-# in the middle.
+# White pixels are read by nobody. Along the horizon a pixel of the middle third is read with a weight that is many
+# times that of a pixel at its side. So what the network learns from the map, it learns mostly in the middle.
 #
 # ## The whole of equation (2) is one matrix
 #
@@ -270,10 +389,15 @@ print(f"on the horizon: left {left.mean():.0f}, in the middle {middle.mean():.0f
 # **Predict before you run.** How many of the 27 entries aren't zero, for the points (1.25, 0.5), (1, 1.5) and (0, 0)?
 # And what does the *column* of the pixel with the 6 say?
 #
-# <details><summary>Answer</summary>4 + 2 + 1 = 7. A row says what a point reads; a column says by whom a pixel is read:
-# 3/8, 1/2, 0. The gradient above was that column times what the loss says.</details>
+# <details><summary>Answer</summary>
 #
-# So with $A$ for the matrix, forward is $A$ and backward is its transpose:
+# 4 + 2 + 1 = 7. A row says what a point reads; a column says by whom a pixel is read:
+# 3/8, 1/2, 0. The gradient above was that column times the gradients of the readers.
+#
+# </details>
+#
+# So with $A$ for the matrix, forward is $A$ and backward is its transpose, the **adjoint** of $A$ (the map that moves
+# to the other side of a scalar product):
 #
 # $$ p = A s, \qquad \bar s = A^T \bar p, \qquad \bar p \cdot (A s) = (A^T \bar p) \cdot s $$
 #
@@ -281,7 +405,7 @@ print(f"on the horizon: left {left.mean():.0f}, in the middle {middle.mean():.0f
 # $\bar p$, so a few random ones find nearly every mistake.
 
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 def matrix_of(points, shape):
     """Return equation (2) as a matrix, (points, pixels)."""
     h, w = shape
@@ -302,94 +426,46 @@ some_s, some_p_bar = rng.normal(size=9), rng.normal(size=3)
 np.testing.assert_allclose(some_p_bar @ (A @ some_s), (A.T @ some_p_bar) @ some_s)
 print(f"p_bar . (A s) = {p_bar @ (A @ s.ravel()):.3f},  (A^T p_bar) . s = {(A.T @ p_bar) @ s.ravel():.3f}")
 
+# %% [markdown]
+# Forward, each row has at most four weights. Backward, a row of $A^T$ may have none or any number of them. The usual
+# backward pass *scatters*: each point adds its gradient to four pixels, and points that share a pixel must wait for
+# each other. With the transpose built once, each pixel *gathers* from its readers. The package's `PlaneSampler` is
+# that: two sparse matrices for a calibration, and one product for each direction. It passes the same test:
+
 # %%
-fig, axes = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained", width_ratios=(2.4, 1))
-for ax, matrix, names in ((axes[0], A, ("pixel", "point")), (axes[1], A.T, ("point", "pixel"))):
-    ax.imshow(matrix, cmap="Blues", vmin=0, vmax=1.6, aspect="auto")
-    for (row, column), weight in np.ndenumerate(matrix):
-        if weight:
-            ax.text(column, row, f"{weight:.3g}", ha="center", va="center", fontsize=8)
-    ax.set(xticks=range(matrix.shape[1]), yticks=range(matrix.shape[0]), xlabel=names[0], ylabel=names[1])
-axes[0].set_title("A: scores to points", fontsize="medium")
-axes[1].set_title("transposed: blame to pixels", fontsize="medium")
-plt.show()
+s_some = torch.from_numpy(rng.normal(size=(1, 3, *camera.size)).astype(np.float32)).requires_grad_()
+planes = sampler(s_some)
+p_some = torch.from_numpy(rng.normal(size=planes.shape).astype(np.float32))
+planes.backward(p_some)
+there, back = (p_some * planes).double().sum(), (s_some.grad * s_some).double().sum()
+torch.testing.assert_close(there, back, rtol=1e-4, atol=0.1)
+one = np.s_[:, ::20, ::20]  # the literal twin takes its time
+literal = sample_planes_naive(s_some[0].detach().numpy(), pixels[one], visible[one])
+np.testing.assert_allclose(planes[0].detach().numpy()[:, *one], literal, atol=1e-4)
+shares = sampler.operator.nbytes / 1e6, 4 * visible.size * np.prod(camera.size) / 1e9
+print("fast == literal; sparse, with its transpose, {:.0f} MB, as a full matrix {:.0f} GB".format(*shares))
 
 # %% [markdown]
-# Left: at most four weights a row, wherever the point lies. Right: a row may have none (pixels 3, 6 and 8) or any
-# number of them. That is why the usual backward pass *scatters*: each point adds its blame to four pixels, and points
-# that share a pixel must wait for each other. Build the transpose once, and each pixel *gathers* from its readers
-# instead. `PlaneSampler` is that: two sparse matrices, built once for a calibration, and the same fast product for both
-# directions.
+# [The companion](deeper/06_sampling.ipynb) compares times, and shows what reading the whole area of a cell would bring.
 #
-# On the drive: twenty planes of 142 x 62 cells, 96 x 320 pixels.
-
-# %%
-n_points, n_pixels = visible.size, np.prod(camera.size)
-bytes_sparse = sampler.operator.nbytes
-print(f"A: {n_points:,} x {n_pixels:,}, {100 * visible.mean():.0f} % of its rows have weights")
-print(
-    f"as a full matrix {4 * n_points * n_pixels / 1e9:.0f} GB; sparse, with its transpose, {bytes_sparse / 1e6:.0f} MB"
-)
-
-# %%
-net = load_net(sample_image_stage(), drive.camera)
-with torch.inference_mode():
-    scores = net.segmenter(network_image(frame, camera.size)[None])
-    planes = sampler(scores)[0].numpy()
-some = np.s_[:, ::10, ::10]  # the literal twin takes its time: every tenth row and column of cells
-literal = sample_planes_naive(scores[0].numpy(), pixels[some], visible[some])
-np.testing.assert_allclose(planes[:, *some], literal, atol=1e-4)
-leaf = scores.clone().requires_grad_()
-blame = torch.from_numpy(rng.normal(size=(1, *planes.shape)).astype(np.float32))
-sampler(leaf).backward(blame)
-forward, backward = (blame[0].double().numpy() * planes).sum(), (leaf.grad.double() * scores).sum()
-np.testing.assert_allclose(forward, backward, atol=1e-6 * np.abs(blame[0].numpy() * planes).sum())
-print("fast == literal, and the transpose is the adjoint")
-
-
-# %% [markdown]
-# And the times? The literal twin goes from point to point. The usual way in PyTorch is `F.grid_sample`: as fast as its
-# authors could make it for points that may move, so it works out the four weights again at each call, and scatters on
-# the way back. (It wants u and v scaled to -1 .. 1, of which more below.)
-
-
-# %% tags=["nbval-ignore-output"]
-def seconds(run, repeats=5):
-    """Return the shortest computing time of several runs."""
-    times = []
-    for _ in range(repeats):
-        start = process_time()
-        run()
-        times.append(process_time() - start)
-    return min(times)
-
-
-last = np.array(camera.size)[::-1] - 1
-where = torch.from_numpy(np.where(visible[..., None], 2 * pixels / last - 1, -2)).float().reshape(1, 1, -1, 2)
-usual = F.grid_sample(leaf, where, align_corners=True)
-np.testing.assert_allclose(usual.detach().numpy().ravel(), planes.ravel(), atol=1e-3)
-slow = seconds(lambda: sample_planes_naive(scores[0].numpy(), pixels[some], visible[some]), repeats=1)
-slow *= visible.sum() / visible[some].sum()
-print(f"literal, forward: {slow:.0f} s; PlaneSampler, forward: {1000 * seconds(lambda: sampler(scores)):.0f} ms")
-scatter = seconds(lambda: F.grid_sample(leaf, where, align_corners=True).sum().backward())
-print(f"there and back: grid_sample {1000 * scatter:.0f} ms", end=", ")
-print(f"PlaneSampler {1000 * seconds(lambda: sampler(leaf).sum().backward()):.0f} ms")
-
-# %% [markdown]
 # ## Pixels that learn from the map alone
 #
-# Here is what that buys. Forget the network: let every score of the image be a free number, all zero at first. Nobody
+# Forget the network: let every score of the image be a free number, all zero at first. Nobody
 # labels a pixel. Someone gives you the *map* instead, the class of each ground cell that the camera sees. Sample the
-# scores on the ground plane, compare with the map (cross-entropy, as in training), send the blame back, take a step.
+# scores on the ground plane, compare with the map (cross-entropy, as in training), send the gradient back, take a step.
 #
 # **Predict before you run.** After twenty steps, which pixels of the image have got a class? Think of the pieces at 8,
 # 20 and 45 m. And what will the pixels of a picket fence learn, when the cell *behind* it is lawn?
 #
-# <details><summary>Answer</summary>Those that are read: a lattice of dots near by, a closed carpet far away, nothing
+# <details><summary>Answer</summary>
+#
+# Those that are read: a lattice of dots near by, a closed carpet far away, nothing
 # above the horizon. The fence's pixels are read by the ground behind it, so they learn *vegetation*: equation (2) knows
-# no depth.</details>
+# no depth.
+#
+# </details>
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 truth, seen = frame.labels.birdseye_on(spec), frame.labels.visible_on(spec)
 ground = PlaneSampler(pixels[:1], visible[:1], camera.size)
 taught = torch.from_numpy(seen & visible[0])
@@ -404,8 +480,7 @@ for _ in range(20):
 heard = (s_bar != 0).any(dim=1)[0].numpy()
 learnt = np.where(heard, free_scores.detach().argmax(dim=1)[0].numpy(), 255)
 
-# %%
-true_labels = resize_labels(frame.labels.image, camera.size)
+# %% jupyter={"outputs_hidden": true}
 below = np.arange(96) > camera.K[1, 2]
 print(f"{100 * heard[below].mean():.0f} % of the pixels below the horizon have learnt, {heard[~below].sum()} above it")
 flat = [KITTI_14.index(name) for name in ("road", "sidewalk")]
@@ -419,8 +494,8 @@ print(f"of the wrong ones {100 * (learnt == KITTI_14.index('car'))[wrong].mean()
 print(f"everything else that is read: {100 * is_right[heard & ~is_flat].mean():.0f} % are right", end=", ")
 print(f"of the fence {100 * is_right[heard & (true_labels == KITTI_14.index('fence'))].mean():.0f} %")
 
-# %%
-fig, axes = plt.subplots(2, 1, figsize=(8, 4), layout="constrained")
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="above, the classes that pixels have learnt from the map, dots near by and a closed area far ahead, with nothing above the horizon; below, the true labels"
+fig, axes = plt.subplots(2, 1, figsize=(7.5, 3.8), layout="constrained")
 plotting.image_labels(image, learnt, KITTI_14, ax=axes[0], opacity=1).set_title("learnt from the map")
 plotting.image_labels(image, true_labels, KITTI_14, ax=axes[1]).set_title("truth, which nobody has shown to it")
 for ax in axes:
@@ -429,27 +504,28 @@ for ax in axes:
 plt.show()
 
 # %% [markdown]
-# Top: where the photograph shines through, nobody asked. On road and sidewalk the map reads a third of the pixels. Of
-# these nine in ten are right, and none of them was ever labelled: this is end-to-end training in miniature. (Half of
-# the wrong ones have learnt *car*: they lie at the foot of one.) The other two thirds have learnt nothing. Wrong is,
-# above all, what stands up. No pixel of the fence has learnt *fence*, nearly all say vegetation, and the foot of the
-# sign's post says sidewalk: from where the camera stands, the lawn and the pavement *behind* them have the same pixels.
-# With twenty planes, an occupancy grid and a network that shares its weights over all pixels, the real training has a
-# way out of both, dots and blame (lecture 08).
+# Top: where the photograph shines through, no point reads. On road and sidewalk the map reads part of the pixels, and
+# most of what it reads is right, although no pixel was ever labelled: this is end-to-end training in miniature. Wrong
+# is, above all, what stands up. Of the fence's pixels 1 % have learnt *fence*, because the lawn *behind* it has the same
+# pixels. This is lecture 05's cut edge, occlusion, at work in the gradient.
 
 # %% [markdown]
 # ## If the point moves: the gradient in u and v
 #
 # So far the scores learnt, and the weights stood still. For that alone no slope is needed: let each point read its
-# *nearest* pixel, and the pixel gets all the blame. But what if the calibration should learn, or the height of a plane?
+# *nearest* pixel, and the pixel gets the whole gradient. But what if the calibration should learn, or the height of a plane?
 # Then the point moves, and the question is how $p$ changes with $u$.
 #
 # **Predict before you run.** Move the point of (1.25, 0.5) by a tiny step to the right. How much does $p$ change a
 # pixel? And down? And if it reads the nearest pixel instead?
 #
-# <details><summary>Answer</summary>To the right the value rises along row 0, by 8 - 4 a pixel, and falls along row 1,
+# <details><summary>Answer</summary>
+#
+# To the right the value rises along row 0, by 8 - 4 a pixel, and falls along row 1,
 # by 6; the point is half in each: 1/2 · 4 - 1/2 · 6 = -1. Down: 3/4 · (6 - 4) + 1/4 · (0 - 8) = -0.5. With the
-# nearest pixel a tiny step changes nothing, so it has nothing to learn from.</details>
+# nearest pixel a tiny step changes nothing, so there is nothing to learn from.
+#
+# </details>
 #
 # The kernel's slope is -1 on the right of its pixel and +1 on the left, so between pixels the gradient is a difference
 # of neighbours:
@@ -458,7 +534,7 @@ plt.show()
 #    k'(t) = \begin{cases} -\operatorname{sign}(t) & |t| < 1 \\ 0 & |t| > 1 \end{cases} $$
 
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 def slope(t):
     """Return the derivative of the kernel, where it has one."""
     return -np.sign(t) if abs(t) < 1 else 0.0
@@ -478,9 +554,9 @@ by_steps = (read(s, 1.26, 0.5) - read(s, 1.24, 0.5)) / 0.02, (read(s, 1.25, 0.51
 np.testing.assert_allclose((in_u, in_v), by_steps)
 print(f"in u {in_u:.2f}, in v {in_v:.2f}")
 
-# %%
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, the value along a row of pixels: stairs for the nearest pixel, connected lines for bilinear; right, the slopes: zero for the stairs, plus 4 and minus 6 for the lines"
 across = np.linspace(0, 2, 401)
-fig, axes = plt.subplots(1, 2, figsize=(9, 3), layout="constrained")
+fig, axes = plt.subplots(1, 2, figsize=(8, 2.8), layout="constrained")
 axes[0].plot(across, s[1, np.floor(across + 0.5).astype(int)], color="0.6", label="nearest pixel")
 axes[0].plot(across, [read(s, u, 1.0) for u in across], color="tab:red", label="bilinear")
 axes[0].plot(range(3), s[1], "o", color="black", label="scores of row 1")
@@ -495,214 +571,124 @@ plt.show()
 # %% [markdown]
 # Left, grey: stairs, flat except where they jump. Red: connected lines. Right: the slope of the stairs is 0 everywhere;
 # that of the lines is +4 up to the middle pixel and -6 after it. Towards a high score you can feel your way; on the
-# stairs you can't. (The assertion compares with finite differences and finds no error: a straight line has none.)
-#
-# ### On a pixel's centre there is a kink
-#
-# At u = 1 the slope is +4 on one side and -6 on the other. No number is right there, and each program gives its own.
-
-
-# %%
-def read_torch(s, u, v):
-    """Return what points read, equation (2) for autograd: (C, h, w) scores, (J,) pixels -> (C, J)."""
-    n, m = torch.arange(s.shape[1]), torch.arange(s.shape[2])
-    across = torch.relu(1 - (u[:, None] - m).abs())
-    down = torch.relu(1 - (v[:, None] - n).abs())
-    return torch.einsum("cnm,jn,jm->cj", s, down, across)
-
-
-def by_grid_sample(s, u, v):
-    """Do the same by PyTorch's own sampler."""
-    where = torch.stack([2 * u / (s.shape[2] - 1) - 1, 2 * v / (s.shape[1] - 1) - 1], dim=-1)
-    return F.grid_sample(s[None], where[None, None], align_corners=True)[0, :, 0]
-
-
-one_class, v = torch.tensor(s)[None], torch.tensor([1.0], dtype=torch.float64)
-for at in (1.25, 1.0):
-    u = torch.tensor([at], dtype=torch.float64, requires_grad=True)
-    answers = [torch.autograd.grad(way(one_class, u, v).sum(), u)[0].item() for way in (read_torch, by_grid_sample)]
-    central = (read(s, at + 1e-6, 1.0) - read(s, at - 1e-6, 1.0)) / 2e-6
-    agree = torch.autograd.gradcheck(lambda u: read_torch(one_class, u, v), u, raise_exception=False)
-    print(f"u = {at:.2f}: autograd {answers[0]:.0f}, grid_sample {answers[1]:.0f}", end=", ")
-    print(f"finite differences {central:.0f}; gradcheck passes: {agree}")
-
-# %% [markdown]
-# Between pixels all agree. On the kink autograd says 0, `grid_sample` takes the slope on the right, finite differences
-# the mean of both sides. A `gradcheck` that fails now and then may just have landed on a kink: look there first. (It
-# must run in double precision: in single, nudges of a millionth drown in rounding.)
+# stairs you can't. On a pixel's centre the slope jumps: there is a *kink*, and each program returns a number of its own
+# ([companion](deeper/06_sampling.ipynb)).
 #
 # ## A calibration that learns
 #
-# A toy first. The point stands at (1.25, 1), where it reads 4.5; the map says that it should read 6. The loss is
-# $\tfrac12 (p - 6)^2$, so $\bar p = p - 6 = -1.5$. The slope in u is -6. By the chain rule the loss has the slope $-1.5
-# \cdot -6 = 9$, and a step of 0.02 against it moves the point to $u = 1.25 - 0.02 \cdot 9 = 1.07$: towards the 6.
-
-# %%
-u = 1.25
-for _ in range(4):
-    print(f"u = {u:.3f} reads {read(s, u, 1.0):.2f}")
-    u -= 0.02 * (read(s, u, 1.0) - 6) * slopes(s, u, 1.0)[0]
-
-# %% [markdown]
-# On the drive, suppose that the calibration is two degrees off: the camera points lower, or higher, than we believe.
-# What we have is labels of its images, and a map of road and sidewalk, 8 to 25 m ahead. Turn the ground's points by an
-# unknown *pitch*, equation (1), read the labels there, equation (2), compare with the map, and let the chain rule run
-# all the way back to one number:
+# Now the animation of the beginning. A toy first: the point stands at (1.25, 1), where it reads 4.5; the map says that
+# it should read 6. The loss is $\tfrac12 (p - 6)^2$, so $\bar p = p - 6 = -1.5$. The slope in u is -6. By the chain
+# rule the loss has the slope $-1.5 \cdot -6 = 9$, and a step of 0.02 against it moves the point to $u = 1.25 - 0.02
+# \cdot 9 = 1.07$: towards the 6. A *pitch* moves all points at once, so the slopes add up:
 #
-# $$ \frac{\partial\,\text{loss}}{\partial\,\text{pitch}} = \sum_{c,d,j} \bar p_{c,d,j} \left(
+# $$ \frac{\partial\,\text{loss}}{\partial\,\text{pitch}} = \sum_{c,j} \bar p_{c,j} \left(
 #    \frac{\partial p}{\partial u} \frac{\partial u}{\partial\,\text{pitch}} +
 #    \frac{\partial p}{\partial v} \frac{\partial v}{\partial\,\text{pitch}} \right) $$
 
 
 # %%
-def lesson(frame):
-    """Return labels of an image (C, h, w), classes of ground cells that it sees (C, J), their places (J, 3)."""
-    truth, x = frame.labels.birdseye_on(spec), spec.centers()[..., 0]
-    cells = frame.labels.visible_on(spec) & np.isin(truth, flat) & (x > 8) & (x < 25)
-    on_ground = np.concatenate([spec.centers()[cells], np.zeros((cells.sum(), 1))], axis=1)
-    points = torch.from_numpy(transform_points(camera.T_camera_from_grid, on_ground))
-    labels = resize_labels(frame.labels.image, camera.size)
-    return [torch.from_numpy(np.stack([a == c for c in flat])).double() for a in (labels, truth[cells])] + [points]
+def gradient_by_hand(pitch, s, t, points):
+    """Return d loss / d pitch of one image, literally; loss as in `loss_at`, derivatives of u and v by a tiny step."""
+    (u, v), (u_later, v_later) = (
+        [a.numpy() for a in pixels_at(points, torch.tensor(angle, dtype=torch.float64))]
+        for angle in (pitch, pitch + 1e-6)
+    )
+    total = 0.0
+    for c, j in np.ndindex(*t.shape):
+        n, m = int(v[j]), int(u[j])
+        four = s[c, n : n + 2, m : m + 2].numpy()  # the four pixels around the point
+        p_bar = 2 * (read(four, u[j] - m, v[j] - n) - t[c, j].item()) / t.numel()
+        in_u, in_v = slopes(four, u[j] - m, v[j] - n)
+        total += p_bar * (in_u * (u_later[j] - u[j]) + in_v * (v_later[j] - v[j])) / 1e-6
+    return total
 
 
-def pixels_at(points, pitch):
-    """Return u and v of points seen by the camera turned down by `pitch`, radians: equation (1)."""
-    X, Y, Z = points.T
-    Y, Z = torch.cos(pitch) * Y - torch.sin(pitch) * Z, torch.sin(pitch) * Y + torch.cos(pitch) * Z
-    K = torch.from_numpy(camera.K)
-    return K[0, 0] * X / Z + K[0, 2], K[1, 1] * Y / Z + K[1, 2]
-
-
-# %%
-lessons = [lesson(drive[k]) for k in (0, 5, 10, 15, 19)]
-
-
-def loss_at(pitch, way=read_torch):
-    """Return the mean squared difference between what the points read and the map."""
-    return sum(((way(s, *pixels_at(points, pitch)) - t) ** 2).mean() for s, t, points in lessons) / len(lessons)
-
-
+s_one, t_one, some_points = on_zero[0]
+inner = (some_points[:, 0].abs() < 0.5 * some_points[:, 2]) & (torch.arange(len(some_points)) % 5 == 0)  # a few cells
+t_one, some_points = t_one[:, inner], some_points[inner]
 pitch = torch.tensor(0.02, dtype=torch.float64, requires_grad=True)
-(gradient,) = torch.autograd.grad(loss_at(pitch), pitch)
-by_differences = (loss_at(pitch + 1e-8) - loss_at(pitch - 1e-8)) / 2e-8
-torch.testing.assert_close(gradient, by_differences, rtol=1e-4, atol=1e-4)
+(gradient,) = torch.autograd.grad(loss_at(pitch, [(s_one, t_one, some_points)]), pitch)
+by_hand = gradient_by_hand(0.02, s_one, t_one, some_points)
+np.testing.assert_allclose(by_hand, gradient.item(), rtol=1e-3)
+print(f"by hand {by_hand:.3f}, by PyTorch {gradient.item():.3f}")
 
+# %% [markdown]
+# **Predict before you run.** The true pitch error is 0. With all cells at height 0, from +2 and from -2 degrees, does
+# the descent end at 0? Remember the crest of lecture 05.
+#
+# <details><summary>Answer</summary>
+#
+# No. From +2° it ends at -0.1°, from -2° at -0.7° after twenty steps, and taken one by one the five images have
+# their minima between -0.7° and +0.2°: the loss explains the slope of the road by a pitch of the camera. With heights
+# of the ground from the LIDAR, both descents end at -0.3°, less than a pixel from the truth.
+#
+# </details>
 
-# %%
-def nearest(s, u, v):
-    """Read the nearest pixel."""
-    u, v = u.round().long().clamp(0, s.shape[2] - 1), v.round().long().clamp(0, s.shape[1] - 1)
-    return s[:, v, u]
-
-
-def descend(degrees, steps=20):
-    """Return pitch and loss along a descent, degrees."""
-    pitch, path = torch.tensor(np.radians(degrees), requires_grad=True), []
-    for _ in range(steps):
-        loss = loss_at(pitch)
-        path.append((np.degrees(pitch.item()), loss.item()))
-        (gradient,) = torch.autograd.grad(loss, pitch)
-        with torch.no_grad():
-            pitch -= 0.002 * gradient
-    return np.array(path)
-
-
-paths = [descend(start) for start in (2.0, -2.0)]
-for path in paths:
-    print("pitch [degrees]:", *(np.round(path[[0, 2, 4, 8, 12, 19], 0], 1) + 0.0))
-    assert abs(path[-1, 0]) < 0.1
-print("nearest pixel: is there a gradient?", loss_at(torch.tensor(0.03, requires_grad=True), nearest).requires_grad)
-
-# %%
+# %% jupyter={"outputs_hidden": true}
+paths = {
+    name: [descend(start, lessons) for start in (2.0, -2.0)]
+    for name, lessons in (("height 0", on_zero), ("height from LIDAR", on_lidar))
+}
 degrees = np.linspace(-3, 3, 61)
 with torch.inference_mode():
-    ways = {way: [loss_at(torch.tensor(np.radians(a)), way).item() for a in degrees] for way in (nearest, read_torch)}
-fig, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained", width_ratios=(1.4, 1))
-axes[0].plot(degrees, ways[nearest], color="0.6", label="nearest pixel")
-axes[0].plot(degrees, ways[read_torch], color="tab:red", label="bilinear")
-for path in paths:
-    axes[0].plot(*path.T, ".-", color="black", label="descent" if path is paths[0] else None)
-axes[0].set(xlabel="pitch [degrees]", ylabel="loss")
-axes[0].legend()
-for path in paths:
-    axes[1].plot(path[:, 0], ".-", color="black")
-axes[1].axhline(0, color="0.6", linewidth=1)
-axes[1].set(xlabel="step", ylabel="pitch [degrees]", xticks=range(0, 20, 5))
+    losses = {
+        name: np.array([[loss_at(torch.tensor(np.radians(a)), [one]).item() for a in degrees] for one in lessons])
+        for name, lessons in (("height 0", on_zero), ("height from LIDAR", on_lidar))
+    }
+for name, (down, up) in paths.items():
+    single = degrees[losses[name].argmin(axis=1)]
+    print(f"{name}: from +2 to {down[-1, 0]:+.1f}, from -2 to {up[-1, 0]:+.1f} degrees", end="; ")
+    print("single images:", *(f"{a:+.1f}" for a in single))
+assert max(abs(path[-1, 0]) for path in paths["height from LIDAR"]) < 0.35
+assert abs(paths["height 0"][0][-1, 0] - paths["height 0"][1][-1, 0]) > 0.4
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="loss over pitch with two descents: on the left, with the ground at height 0, a wide flat valley between minus 0.7 and minus 0.1 degrees in which the descents end apart; on the right, with the LIDAR's heights, one valley where both end together"
+fig, axes = plt.subplots(1, 2, figsize=(8, 3), layout="constrained", sharey=True)
+for ax, name in zip(axes, paths, strict=True):
+    ax.plot(degrees, losses[name].T, color="0.85", linewidth=1)
+    ax.plot(degrees, losses[name].mean(axis=0), color="tab:red", label="loss, five images")
+    for path in paths[name]:
+        ax.plot(*path.T, ".-", color="black")
+    ax.axvline(0, color="0.6", linewidth=1)
+    ax.set(xlabel="pitch [degrees]", title=name)
+axes[0].set_ylabel("loss")
+axes[0].legend(fontsize="small")
 plt.show()
 
 # %% [markdown]
-# Left: the loss over pitch, and two descents, one from each side; right: the same, step by step. Both end within a
-# tenth of a degree of the truth, 0, which is a third of a pixel: five images are enough to calibrate the camera to the
-# map, and nobody measured anything. Read by its nearest pixel the loss has nearly the same valley, but ask autograd for
-# the way down and it has none to give.
-#
+# Grey: single images; red: their mean; black: the descents. On the left the loss has no single lowest point, because
+# each image was taken on another slope. On the right it has, 0.3° from the truth: 0.9 pixels in this image. So the
+# descent works, and it found what the model says and the world doesn't: height 0. A gradient corrects *whatever may
+# move*; when the wrong thing is held fixed, it bends another. (The map used here is the simulator's, so this is a
+# demonstration, not a calibration without measurements.) Read by the nearest pixel, the loss has no slope at all:
+
+# %%
+u, v = pixels_at(on_zero[0][2], torch.tensor(0.03, requires_grad=True))
+nearest = on_zero[0][0][:, v.round().long().clamp(0, 95), u.round().long().clamp(0, 319)]
+print("nearest pixel: is there a gradient?", nearest.requires_grad)
+
+# %% [markdown]
 # ## Half a pixel
 #
 # All this stands on one convention: **the centre of the first pixel is (0, 0)**. Its area then reaches from -0.5 to
 # 0.5, and an image of $w$ pixels from $-0.5$ to $w - 0.5$. Others put (0, 0) on the *corner* of the first pixel. Both
-# are fine; mixing them isn't.
-#
-# Take a row of four pixels, and average it down to two. The first new pixel covers the old pixels 0 and 1, so its
-# centre, 0, lies at the old u = 0.5.
-#
-# **Predict before you run.** Where in the new row is the old u = 0.5? The old u = 3? Why not multiply by 1/2?
-#
-# <details><summary>Answer</summary>0 and 1.25: add 1/2 to count from the image's edge, scale, and take 1/2 off again.
-# Multiplying alone gives 0.25 and 1.5, always a quarter of a pixel too far to the right: it scales about the centre of
-# the first pixel instead of the edge of the image.</details>
-#
-# $$ u' = \left(u + \tfrac12\right) \frac{w'}{w} - \tfrac12 $$
-#
-# Lecture 05 made the calibration of a smaller image by this rule: that is where its halves come from.
-
-
-# %%
-def resized(u, w, new_w):
-    """Return where a place of a row of w pixels lies in a row of new_w."""
-    return (u + 0.5) * new_w / w - 0.5
-
-
-wide = Camera(np.array([[100.0, 0, 30], [0, 100, 20], [0, 0, 1]]), np.eye(4), size=(40, 64))
-small = wide.resized((20, 16))
-np.testing.assert_allclose(small.K[:2, 2], (resized(30, 64, 16), resized(20, 40, 20)))
-mistakes = {
-    "right": lambda u: resized(u, 4, 2),
-    "scaled about the first centre": lambda u: u * 2 / 4,
-    "align_corners: last centre on last centre": lambda u: u * (2 - 1) / (4 - 1),
-}
-for name, place in mistakes.items():
-    print(f"{name:<42} old 0.5 -> {place(0.5):+.3f}   old 3 -> {place(3.0):+.3f}")
-
-# %%
-fig, axes = plt.subplots(1, 3, figsize=(10, 2), layout="constrained")
-for ax, (name, place) in zip(axes, mistakes.items(), strict=True):
-    for m in range(4):
-        ax.add_patch(plt.Rectangle((m - 0.5, 1), 1, 0.6, facecolor="0.9", edgecolor="black"))
-        ax.plot(m, 1.3, ".", color="black")
-    for m in range(2):  # where the new pixels really lie, and where the formula believes the new centres to be
-        ax.add_patch(plt.Rectangle((2 * m - 0.5, 0), 2, 0.6, facecolor="0.9", edgecolor="black"))
-        ax.plot(np.interp(m, place(np.arange(-2, 7)), np.arange(-2, 7)), 0.3, "x", color="tab:red", markersize=9)
-    ax.set(xlim=(-0.8, 3.8), ylim=(-0.2, 1.8), yticks=[0.3, 1.3], yticklabels=["new", "old"], xticks=range(4))
-    ax.set_title(name, fontsize="small")
-    ax.set_xlabel("old u [pixels]")
-plt.show()
-
-# %% [markdown]
-# Each box is a pixel; the red crosses are where each rule believes the centres of the two new pixels to be. Only on the
-# left do they lie in the middle of their boxes.
-#
-# `align_corners` is PyTorch's name for the third rule. It shows up twice: in `F.interpolate`, as drawn, and in
-# `F.grid_sample`, which wants places scaled to -1 .. 1. With `align_corners=True`, -1 and 1 are the centres of the
-# first and the last pixel; with `False`, the default, they are the edges of the image:
+# are fine; mixing them isn't. PyTorch's `F.grid_sample` wants places scaled to -1 .. 1. With `align_corners=True`, -1
+# and 1 are the centres of the first and the last pixel; with `False`, the default, they are the edges of the image:
 #
 # $$ \text{True:} \quad \frac{2u}{w - 1} - 1, \qquad \text{False:} \quad \frac{2u + 1}{w} - 1 $$
 #
-# Scale for one and call the other, and you are off by half a pixel at either border, in opposite directions, and by
-# nothing in the middle: no picture shows it.
+# **Predict before you run.** Somebody scales for one and calls the other. How large is the error at the borders, and in
+# the middle of the image? Which image would you feed to a sampler to find out which convention it has?
 #
-# A **ramp** shows it. Let each pixel's score be its own v. Then the value read *is* the place that it was read from.
+# <details><summary>Answer</summary>
+#
+# Half a pixel at either border, in opposite directions, and nothing in the middle: no picture shows it. A **ramp**
+# shows it: let each pixel's score be its own v. Then the value read *is* the place that it was read from.
+#
+# </details>
 
-# %%
+# %% jupyter={"outputs_hidden": true}
+last = np.array(camera.size)[::-1] - 1
 v_ramp = torch.arange(96.0)[:, None].expand(camera.size)[None, None]
 asked, in_view = pixels[0, ..., 1], visible[0]
 centres = torch.from_numpy(2 * pixels[:1] / last - 1).float().nan_to_num(-2)
@@ -720,16 +706,12 @@ readings = {
     "edges, align_corners=False": read_ramp(edges, False),
     "centres, align_corners=False": read_ramp(centres, False),
 }
-blind = camera.K[1, 2] - frame.camera.K[1, 2] * 96 / frame.image.shape[0]
 assert np.abs(readings["PlaneSampler"] - asked)[in_view].max() < 1e-3
 for name, reading in readings.items():
     off = np.abs(reading - asked)[in_view]
-    print(f"{name:<34} off by {off.min():.2f} to {off.max():.2f} pixels")
-print(f"a K that was multiplied, not resized: off by {np.abs(blind):.2f} pixels everywhere")
+    print(f"{name:<29} off by {off.min():.2f} to {off.max():.2f} pixels")
 
 # %% [markdown]
-# (The last line is the drive's own camera, made smaller from 188 to 96 rows.)
-#
 # ### In metres
 #
 # What is half a pixel on the ground? A toy camera: $z_\text{cam}$ = 1.5 m above it, $f_v$ = 200 pixels. A point of the
@@ -739,168 +721,47 @@ print(f"a K that was multiplied, not resized: off by {np.abs(blind):.2f} pixels 
 # **Predict before you run.** Read half a pixel too low, at 30.5, 10.5 and 5.5. Which ground do you get, instead of that
 # at 10, 30 and 60 m?
 #
-# <details><summary>Answer</summary>300 / 30.5 = 9.8, 300 / 10.5 = 28.6, 300 / 5.5 = 54.5 m: off by 0.2, 1.4 and 5.5
-# metres. Eleven cells.</details>
+# <details><summary>Answer</summary>
+#
+# 300 / 30.5 = 9.8, 300 / 10.5 = 28.6, 300 / 5.5 = 54.5 m: off by 0.2, 1.4 and 5.5 metres. Eleven cells.
+#
+# </details>
 #
 # $$ Z = \frac{f_v\, z_\text{cam}}{v - c_v}, \qquad
 #    \left|\frac{\partial Z}{\partial v}\right| = \frac{Z^2}{f_v\, z_\text{cam}} $$
 
-
-# %%
-def ground_at(v, camera):
-    """Return how far ahead a level camera meets the ground along row v, metres."""
-    return camera.K[1, 1] * camera_height / (v - camera.K[1, 2])
-
-
-camera_height = camera.T_camera_from_grid[1, 3]
-for Z in (10.0, 30.0, 60.0):
-    v = camera.K[1, 2] + camera.K[1, 1] * camera_height / Z
-    np.testing.assert_allclose(ground_at(v, camera), Z)
-    slip = np.abs(ground_at(v + np.array([1e-3, 0.5]), camera) - Z)
-    np.testing.assert_allclose(slip[0] / 1e-3, Z**2 / (camera.K[1, 1] * camera_height), rtol=1e-3)
-    print(
-        f"{Z:.0f} m ahead, half a pixel is {slip[1]:.1f} m of ground ahead, {0.5 * Z / camera.K[0, 0]:.2f} m sideways"
-    )
-
-# %%
-tenths = np.arange(camera.size[0] * 10) / 10 - 0.45  # ten thin rows in each row of pixels
-depth = np.where(tenths > camera.K[1, 2] + 2, ground_at(tenths, camera), np.inf)
-bands = np.searchsorted((10, 30, 60), depth) % 2  # a road painted dark from 10 to 30 m and beyond 60 m ...
-bands = bands.reshape(-1, 10).mean(axis=1)  # ... as the pixels see it
-bands = torch.from_numpy(np.tile(bands[:, None], (1, camera.size[1]))).float()[None, None]
+# %% jupyter={"outputs_hidden": true}
+below_horizon = camera.K[1, 1] * camera_height / np.array([10.0, 30.0, 60.0])  # rows, of the drive's camera
+for Z, rows in zip((10, 30, 60), below_horizon, strict=True):
+    off = Z - camera.K[1, 1] * camera_height / (rows + 0.5)
+    print(f"{Z} m ahead, half a pixel is {off:.1f} m of ground ahead, {0.5 * Z / camera.K[0, 0]:.2f} m sideways")
+low = PlaneSampler(np.minimum(pixels[:1] + np.array([0, 0.5]), (np.inf, 95)), visible[:1], camera.size)
 one_hot = torch.from_numpy(np.stack([true_labels == c for c in range(len(KITTI_14))])).float()[None]
-low = np.minimum(pixels[:1] + np.array([0, 0.5]), (np.inf, camera.size[0] - 1))
-samplers = ground, PlaneSampler(low, visible[:1], camera.size)
-painted = [np.where(in_view, sampled(bands)[0, 0, 0], np.nan) for sampled in samplers]
-labels = [np.where(in_view, sampled(one_hot)[0, :, 0].argmax(dim=0), 255) for sampled in samplers]
-fig, axes = plt.subplots(1, 3, figsize=(10, 5), layout="compressed")
-for ax, picture, title in zip(axes, painted, ("read where it is", "half a pixel too low"), strict=False):
-    ax.imshow(picture, extent=(spec.y_max, spec.y_min, spec.x_min, spec.x_max), cmap="Greys", vmin=-0.4, vmax=1.6)
-    ax.hlines((10, 30, 60), -15.5, 15.5, color="tab:red", linewidth=1)
-    ax.set(title=title, xlabel="y, to the left [m]", ylabel="x, forward [m]")
-changed = np.where(labels[0] == labels[1], 255, labels[1])
-plotting.grid_labels(spec, changed, KITTI_14, ax=axes[2]).set_title("the drive: cells that changed")
-plt.show()
-x = spec.centers()[..., 0]
+labels = [np.where(in_view, sampled(one_hot)[0, :, 0].argmax(dim=0), 255) for sampled in (ground, low)]
 for near, far in ((6, 20), (20, 40), (40, 71)):
-    band = in_view & (x > near) & (x < far)
-    print(f"{near} to {far} m ahead: {100 * (changed != 255)[band].mean():.0f} % of the cells have another class")
+    band = in_view & (x_cells > near) & (x_cells < far)
+    print(f"{near} to {far} m ahead: {100 * (labels[0] != labels[1])[band].mean():.0f} % of cells read another class")
 
-# %% [markdown]
-# Left and middle, a road painted light and dark: its colour must change on the red lines, at 10, 30 and 60 m. Half a
-# pixel too low, and what lies at 54 m is drawn at 60. (The far edges are soft even on the left: there one row of pixels
-# covers ten metres.) Right, the drive's true labels: coloured are the cells that now read another class, and the colour
-# says which. The farther, the more of them, most of all beside edges and thin things. A network that *learns* with the
-# shift learns to undo it, until somebody corrects the bug.
-#
-# ## No depth is used
-#
-# A pixel is a ray. Every plane cuts that ray somewhere, and there it reads this pixel. The toy camera again, 1.5 m
-# above the ground, $f_v$ = 200; one single bright pixel, ten rows below the horizon.
-#
-# **Predict before you run.** How far ahead is the bright spot on the ground plane? On a plane at 0.5 m? At 1 m? And on
-# one at 1.5 m?
-#
-# <details><summary>Answer</summary>200 · 1.5 / 10 = 30 m, 200 · 1.0 / 10 = 20 m and 10 m. At 1.5 m, the height of the
-# camera, never: the ray points down, so it only sinks.</details>
-#
-# $$ Z_d = \frac{f_v\,(z_\text{cam} - \delta_d)}{v - c_v} $$
-
-# %%
-axes_of_camera = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])  # X right is -y, Y down is -z, Z ahead is x
-K = np.array([[200.0, 0, 160], [0, 200, 48], [0, 0, 1]])
-toy_camera = Camera(K, rigid_transform(axes_of_camera, np.zeros(3)), size=(96, 320), lidar_height=1.5)
-column = GridSpec(x_min=4.5, x_max=40.5, y_min=-0.5, y_max=0.5, cell=1)
-toy_heights = np.array([0.0, 0.5, 1.0, 1.5])
-toy_pixels, toy_visible = plane_pixels(column, toy_heights, toy_camera)
-bright = torch.zeros(1, 1, 96, 320)
-bright[..., 58, :] = 1
-toy_planes = PlaneSampler(toy_pixels, toy_visible, toy_camera.size)(bright)[0, 0, :, :, 0].numpy()
-x_column = column.centers()[:, 0, 0]
-for height, values in zip(toy_heights[:3], toy_planes, strict=False):
-    np.testing.assert_allclose(x_column[values.argmax()], 200 * (1.5 - height) / 10)
-    print(f"plane at {height:.1f} m: brightest {x_column[values.argmax()]:.0f} m ahead, {(values > 0).sum()} cells lit")
-assert not toy_planes[3].any()
-
-# %%
-fig, ax = plt.subplots(figsize=(9, 2.6), layout="constrained")
-for slope_v in (9, 10, 11):
-    style = {"color": "tab:red", "linewidth": 1, "linestyle": "-" if slope_v == 10 else ":"}
-    ax.plot([0, 200 * 1.5 / slope_v], [1.5, 0], **style)
-for height, values in zip(toy_heights, toy_planes, strict=True):
-    ax.plot([0, 40], [height] * 2, color="0.8", linewidth=1, zorder=0)
-    ax.scatter(x_column, np.full(36, height), c=values, cmap="Blues", vmin=-0.3, vmax=1, s=40, edgecolors="0.7")
-ax.plot(0, 1.5, "ks", markersize=8)
-ax.set(xlim=(-1, 41), ylim=(-0.2, 1.8), yticks=toy_heights, xlabel="x, forward [m]", ylabel="height [m]")
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="two maps: the classes that the ground plane reads, and, coloured, the cells that read another class half a pixel lower: few near by, many far ahead and along edges"
+changed = np.where(labels[0] == labels[1], 255, labels[1])
+fig = plotting.label_maps(spec, {"read where it is": labels[0], "changed, half a pixel too low": changed}, KITTI_14)
 plt.show()
 
 # %% [markdown]
-# A side view; grey lines are planes, dots the cells, darker where they read the bright pixel. The solid red line is its
-# ray; dotted, where its weight ends. One thing in the image is on every plane, each time elsewhere, and the lower the
-# plane, the longer it is smeared. If it is a spot on the road, the ground plane is right. If it is the bumper of a car,
-# half a metre up, the second one is. **Equation (2) doesn't choose.** It lays all answers out, side by side in every
-# cell, and leaves the choice to what is learnt after it.
-#
-# On the drive, look at the cars. With the true labels of the image, which plane puts them where they are?
-
-# %%
-car = KITTI_14.index("car")
-found, called, there = np.zeros(20), np.zeros(20), 0
-for k in range(len(drive)):
-    labels = drive[k].labels
-    cars = labels.visible_on(spec) & (labels.birdseye_on(spec) == car) & (x < 40)
-    mask = torch.from_numpy(resize_labels(labels.image, camera.size) == car).float()
-    on_planes = (sampler(mask[None, None])[0, 0].numpy() > 0.5) & (x < 40)
-    found, called, there = found + (on_planes & cars).sum((1, 2)), called + on_planes.sum((1, 2)), there + cars.sum()
-right = found / np.maximum(called, 1)
-for d in (0, 2, 5, 8, 10, 11, 12):
-    share = f"{100 * found[d] / there:3.0f} % of the cars' cells read car"
-    print(f"plane at {heights[d]:.1f} m: {share}; of the cells that read car {100 * right[d]:.0f} % are one")
-assert right.argmax() == 11
-assert right.max() < 0.35
-assert called.argmax() == 6
-
-# %%
-with torch.inference_mode():
-    likely = scores.softmax(dim=1)
-    on_planes = sampler(likely)[0, car].numpy()
-    cars = torch.from_numpy(true_labels == car).float()[None, None]
-    truly = sampler(cars)[0, 0].numpy()
-outline = (truth == car) & seen
-fig, axes = plt.subplots(2, 4, figsize=(7.5, 6.4), layout="compressed", sharex=True, sharey=True)
-for column_axes, d in zip(axes.T, (0, 3, 6, 10), strict=True):
-    for ax, values in zip(column_axes, (truly[d], on_planes[d]), strict=True):
-        shown = np.where(visible[d], values, np.nan)
-        ax.imshow(shown, extent=(spec.y_max, spec.y_min, 0, 71), cmap="Blues", vmin=0, vmax=1, interpolation="nearest")
-        ax.contour(*spec.centers()[0, :, 1:].T, spec.centers()[:, 0, 0], outline, [0.5], colors="tab:red")
-        ax.set_ylim(0, 45)
-    column_axes[0].set_title(f"plane at {heights[d]:.1f} m", fontsize="medium")
-    column_axes[1].set_xlabel("y, to the left [m]")
-axes[0, 0].set_ylabel("true labels\nx, forward [m]")
-axes[1, 0].set_ylabel("network's P(car)\nx, forward [m]")
-plt.show()
-
-# %% [markdown]
-# Red: where the cars that the camera sees stand. Blue: how much a cell reads *car*, from 0, white, to 1, dark. Top:
-# perfect labels; bottom: those of the network, softer, but the same smear. On the ground plane a car lies *behind* its
-# place, thrown away from the camera like a shadow: only its wheels land where they are. On the plane at 0.6 m what is
-# lower falls short, what is higher overshoots, and the bodywork at that height is right. At 1.2 m the smear is longest.
-# At 2 m, above the camera, rays rise, and only what towers over it is left: the roof of a van. Of all twenty planes the
-# one at 2.2 m is the purest: three in ten of its cells that read *car* are one. But it finds only a quarter of the
-# cars' cells. Of the planes below the camera, the one at 0.4 m is the purest: a quarter. No plane is right, each is
-# right for something, and it takes the LIDAR's occupancy to say where along the smear the car stands: lecture 08.
+# Right: coloured are the cells that now read another class, and the colour says which: more beyond 20 m than nearer.
+# Nothing fails, no picture looks wrong, and a network that is trained with the shift may learn to live with it, until
+# somebody corrects the bug.
 #
 # ## Play with it
 #
 # Move the point. Where do two pixels have the weight 1/2, where do four have 1/4? Cross a column of pixels: which of
-# the two slopes jumps, and does the value? Find the largest slope in u of this image, and say from the nine numbers why
-# it must be there. (Without a running kernel there are no dials; the figure below shows three places.)
+# the two slopes jumps, and does the value? (Without a running kernel there are no dials; the second section shows one place.)
 
 
-# %% tags=["nbval-ignore-output"]
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="the nine pixels with the point, its weights and its slopes"
 def show(u, v):
     """Show the weights and slopes at the dials' point."""
-    _, ax = plt.subplots(figsize=(4, 4), layout="constrained")
+    _, ax = plt.subplots(figsize=(3.6, 3.6), layout="constrained")
     draw_point(ax, u, v)
     ax.set_xlabel("u [pixels]\nslope in u {:+.2f}, in v {:+.2f}".format(*slopes(s, u, v)))
     plt.show()
@@ -912,91 +773,44 @@ _ = interact(
     v=FloatSlider(value=0.5, min=0, max=2, step=0.05, description="v"),
 )
 
-# %%
-fig, axes = plt.subplots(1, 3, figsize=(10, 3.8), layout="constrained")
-for ax, place in zip(axes, ((0.5, 0.5), (1.0, 0.5), (1.95, 0.05)), strict=True):
-    draw_point(ax, *place)
-    ax.set_xlabel("u [pixels]\nslope in u {:+.2f}, in v {:+.2f}".format(*slopes(s, *place)))
-plt.show()
-
 # %% [markdown]
-# Left, the middle of four pixels: their mean. In the middle, on a column's centre, only two pixels count, and the slope
-# in u that is written there, 0, is neither the one on its left, +4, nor that on its right, -1 (`sign(0)` is 0). On the
-# right, nearly on the corner, one pixel has nine tenths.
-#
 # ## Where this breaks
 #
-# **Four pixels are the right number at one distance only.** A cell of 0.5 m is a patch of the image. Sideways it is
-# $f_u \cdot 0.5 / Z$ pixels wide, ahead $f_v\, z_\text{cam} \cdot 0.5 / Z^2$ pixels high. With 185 for both $f$ and a
-# camera at 1.65 m that is, by hand, 13 x 3, so about 40 pixels at 7 m, 4 at 15 m, 1 at 24 m, and at 60 m a sixteenth.
-#
-# **Predict before you run.** Equation (2) reads four pixels, always. What is lost at 7 m? What is wrong at 60 m?
-#
-# <details><summary>Answer</summary>At 7 m, 36 of 40 pixels have no say: a line of the road or a thin leg shows up if it
-# happens to lie under the cell's centre, and flickers from frame to frame. That is aliasing. At 60 m, sixteen cells
-# share a pixel, so they all say the same, and no learning can make them differ.</details>
-#
-# $$ \text{pixels a cell} = f_u f_v\, z_\text{cam}\, \frac{\text{cell}^2}{Z^3} $$
+# **A slope is felt only near by.** The gradient in u and v knows four pixels. How far off may the calibration start?
 
 # %%
-distance = x[:, 31]  # the column of cells just right of the middle
-patch = camera.K[0, 0] * camera.K[1, 1] * camera_height * spec.cell**2 / distance**3
-corners = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, spec.cell / 2)  # quarter cells: their centres
-quarters, _ = plane_pixels(corners, [0.0], camera)
-q = quarters[0].reshape(spec.shape[0], 2, spec.shape[1], 2, 2)[:, :, 31]
-across, along = q[:, 1, 1] - q[:, 1, 0], q[:, 1, 0] - q[:, 0, 0]
-measured = 4 * np.abs(across[:, 0] * along[:, 1] - across[:, 1] * along[:, 0])
-far = distance > 7
-np.testing.assert_allclose(measured[far], patch[far], rtol=0.15)
-fig, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
-ax.semilogy(distance[far], measured[far], color="black")
-ax.axhline(4, color="tab:red", linewidth=1, label="what equation (2) reads")
-ax.axhspan(4, 60, color="tab:red", alpha=0.1, label="pixels without a say")
-ax.axhspan(0.02, 1, color="tab:blue", alpha=0.1, label="cells share a pixel")
-ax.set(xlabel="x, forward [m]", ylabel="pixels a cell", xlim=(7, 71), ylim=(0.03, 60))
-ax.legend(fontsize="small")
-plt.show()
-for ahead in (7.25, 15.25, 24.25, 60.25):
-    print(f"{ahead:5.2f} m ahead: {measured[distance == ahead][0]:.2g} pixels a cell")
+for start in (4.0, -4.0, 6.0, -6.0, 8.0, -8.0):
+    path = descend(start, on_lidar, steps=30)
+    print(f"starts at {start:+.0f} degrees, after 30 steps at {path[-1, 0]:+.1f}")
 
 # %% [markdown]
-# Near by, read more: the mean over the patch (a blurred image for near cells, as computer graphics does with mip-maps),
-# or several points a cell. The other nineteen planes help a little, since their points fall between those of the
-# ground. Far away, nothing helps but more pixels: the paper's 375 rows and its focal length of 720 move the point where
-# cells begin to share pixels from 24 to 60 m, and its smaller cells move it back to 33.
+# From six degrees it arrives. From eight degrees up it is still far away: there the cells read trees, houses and sky,
+# where no direction leads to a road. That is why registration starts with small, blurred images, where one pixel is wide, and
+# refines.
 #
-# **A slope is felt only near by.** The gradient in u and v knows four pixels. Turn the camera of our calibration not by
-# two degrees but by eight, to either side:
+# **Four pixels are the right number at one distance only.** A cell of 0.5 m covers about 40 pixels at 7 m and a
+# sixteenth at 60 m. Near by, most of them have no say (*aliasing*); far away, cells share one. The
+# [companion](deeper/06_sampling.ipynb) measures both.
+#
+# **The gradient goes to whatever was read.** A cell whose view is blocked reads the thing in front, and trains it
+# towards the class of the cell. Points outside the image and behind the camera read zero, and train nothing.
+#
+# ## The ledger
+#
+# One edge is cut here, with its price on the toy world:
 
-# %%
-for start in (8.0, -8.0):
-    lost = descend(start)
-    print(f"starts at {start:+.0f} degrees, after {len(lost)} steps at {lost[-1, 0]:+.1f}", end=": ")
-    v = torch.cat([pixels_at(points, torch.tensor(np.radians(start)))[1] for _, _, points in lessons])
-    above, below_image = (v < camera.K[1, 2]).double().mean(), (v > camera.size[0] - 1).double().mean()
-    print(f"{100 * above:.0f} % of the points read above the horizon, {100 * below_image:.0f} % below the image")
+# %% jupyter={"source_hidden": true}
+Markdown(ledger_table(ledger("planes")))
 
 # %% [markdown]
-# On the one side the ground reads trees, houses and sky, where there is no road in any direction. On the other it reads
-# the road just before the vehicle, where everything is road, or falls below the image. Either way the gradient is
-# nearly zero, or worse, points at something else. That is why registration starts with small, blurred images, where one
-# pixel is wide, and refines.
-#
-# **Blame goes to whoever was read.** You have seen the fence learn the lawn behind it. A cell whose view is blocked
-# reads the thing in front, and teaches it its own class. Points outside the image and behind the camera read zero, and
-# teach nobody.
-#
-# **Kinks.** On a pixel's centre there is no derivative. In training that never matters, since the calibration is fixed
-# there; in a gradient check it does.
-#
 # ## In five lines
 #
 # 1. A point reads the four pixels around it; the weights are a kernel across times a kernel down, and sum to 1.
-# 2. That is one fixed sparse matrix. Its transpose carries the gradient back: who was read gets the blame, added up.
-# 3. In u and v the gradient is a difference of neighbouring pixels: enough to learn a calibration from close by, and
-#    nothing at all if you read the nearest pixel.
+# 2. That is one fixed sparse matrix. Its transpose, the adjoint, carries the gradient back, added up over readers.
+# 3. In u and v the gradient is a difference of neighbouring pixels: enough to learn a calibration from close by, if
+#    the heights are right, and nothing at all if you read the nearest pixel.
 # 4. Half a pixel is 5 m of ground at 60 m. State where the centre of the first pixel is, and check it with a ramp.
-# 5. No depth is used: a pixel is repeated along its ray on every plane, and what comes after must choose.
+# 5. Cells that read one pixel share its error: 0.80, not 0.996.
 #
 # ## Further reading
 #
@@ -1004,12 +818,10 @@ for start in (8.0, -8.0):
 #   gradient in u and v.
 # - Lucas, Kanade, *An iterative image registration technique with an application to stereo vision*, IJCAI 1981:
 #   calibrating by the slope of an image, long before networks.
-# - Jiang, Sun, Tagliasacchi, Trulls, Yi, *Linearized multi-sampling for differentiable image transformation*, ICCV
-#   2019: what to do about a gradient that sees four pixels.
-# - Williams, *Pyramidal parametrics*, SIGGRAPH 1983: mip-maps.
 # - Griewank, Walther, *Evaluating Derivatives*, SIAM 2008: why the transpose, for any program.
 #
 # ## Exercise
 #
-# [Exercise 06](exercises/06_planes.ipynb): four pixels and their weights, a plane, the way back, slopes, a resized
-# calibration, and one question. Next: lecture 07, three networks for segmentation.
+# [Exercise 06](exercises/06_planes.ipynb): four pixels and their weights, a plane, the way back, the slope of a loss in
+# the pitch, which convention a black box has, and one question. Next: lecture [07](07_segmentation.ipynb), three
+# networks for segmentation.

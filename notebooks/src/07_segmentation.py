@@ -2,7 +2,7 @@
 # # 07 · Three networks for segmentation
 #
 # **In one sentence.** To call a pixel *pole*, a network must know what is around it, and exactly where it is; halving
-# the image buys the first and sells the second, and three networks get it back in three ways: indices, skips, atrous
+# the image gains the first and loses the second, and three networks get it back in three ways: indices, skips, atrous
 # convolutions.
 #
 # **You will be able to**
@@ -180,7 +180,9 @@ assert torch.allclose(P.sum(dim=0), torch.ones(SIZE), atol=1e-5)
 print("image", images[8].shape, "-> scores", tuple(s.shape))
 
 # %% [markdown]
-# One score by itself says nothing, as your prediction showed: any number may be added to all of them. What counts is
+# Under a soft-max one score by itself says nothing, as your prediction showed: any number may be added to all of a
+# pixel's scores. On the planes of lecture 08 that no longer holds, because a point that no pixel shows gets zeros, so
+# the scores carry a zero there: "nobody looked". What counts is
 # the *lead* of a class, its score minus the largest of the others.
 
 
@@ -559,9 +561,9 @@ for ax, name, part in zip(axes, ("rate 2", "rate 4", "rate 6", "rate 8", "sum"),
 plt.show()
 
 # %% [markdown]
-# The class with the largest score in each cell of 8 pixels; colours as above. No rate by itself is right: rate 2 sees
-# signs all over, rate 4 a fence along the whole street, rate 8 signs in the sky. None was ever asked to be right but
-# as a part of the sum, and the sum is the street.
+# The class with the largest score in each cell of 8 pixels; colours as above. No rate by itself is right: the
+# pictures of single rates show signs, fences and trees where there are none. Training asked only that the sum be right,
+# so constants may move from one addend to another, and the largest score of a single one means nothing.
 #
 # ### Gridding
 #
@@ -698,8 +700,8 @@ plt.show()
 #
 # Two things for the sake of honesty. Atrous pays: it computes nearly three times as much as the networks that pool,
 # and eight times as much as strided. And training closes a part of the gap: with 250 steps instead of 150, indices
-# come to 83 to 89 % and bilinear to 62 to 78 %. A mechanism doesn't decide what can be learnt; it decides what
-# needn't be.
+# come to 83 to 89 % and bilinear to 62 to 78 %. Strided is the exception: it stays below 50 %
+# with ten times the steps. A mechanism decides what needn't be learnt, and sometimes what can't be.
 
 # %% [markdown]
 # ## The package's networks
@@ -768,10 +770,11 @@ for ax, name in zip(axes, TRAINED, strict=True):
 plt.show()
 
 # %% [markdown]
-# A field is a limit, not a habit. SegNet's ends where you computed it, 56 pixels to either side, and half of what
-# moves its score lies much nearer, between the dotted lines. FCN and DeepLab could see the whole width, and half of
-# what moves theirs lies within a fifth of it. DeepLab's picture is made of blocks of 8 pixels, the cells of its map:
-# one cell may count a lot and its neighbour hardly at all, for kernels with holes leap from cell to cell.
+# A field says how far a score can see, not how far it looks. SegNet's ends where you computed it, 56 pixels to either
+# side, and half of what moves its score lies much nearer, between the dotted lines. FCN and DeepLab could see the whole
+# width, and half of what moves theirs lies within a fifth of it. DeepLab's picture is made of blocks of 8 pixels, the
+# cells of its map: one cell may count a lot and its neighbour hardly at all, for kernels with holes leap from cell to
+# cell.
 #
 # ### Before the first label: ImageNet
 #
@@ -862,9 +865,9 @@ print(
 # DeepLab when images are few, is put to the test in lecture [12](12_experiments.ipynb).
 #
 # The pictures differ more than the numbers. SegNet's borders are detailed and ragged, with specks; FCN and DeepLab,
-# which score every eighth pixel, draw smooth blobs. Sharp isn't right, though: of the pixels of signage each
-# finds about a third at best, and most of what they call signage is something else. Of pedestrians more is found, at
-# a price: several times as many pixels are called pedestrian as there are (area).
+# which score every eighth pixel, draw smooth blobs. Sharp isn't right, though: of the pixels of signage
+# SegNet and DeepLab find less than a half and FCN about a half, and most of what they call signage is something else.
+# Of pedestrians more is found, at a price: several times as many pixels are called pedestrian as there are (area).
 #
 # So where are the three mechanisms, if no network draws the post? Above, they decided how well a task was solved that
 # had nothing but poles. On this drive two pixels in a hundred are signage and three in a thousand pedestrian. The
@@ -946,12 +949,12 @@ for change, changed in changes.items():
     print(f"{change:<22}", *(f"{100 * share:12.0f}" for share in right))
 
 # %% [markdown]
-# Half the light costs some points: training varied brightness, though by a fifth only. Noise that a human hardly
-# minds costs the two that pool maxima dearly, and DeepLab little. Its first layer sums over 7x7 pixels before
-# anything else is done, while a maximum of noisy values is the noisiest; that may be why. Two colours swapped, a
-# common bug (OpenCV reads blue first), cost more than half the light and raise no error. Upside down, the networks
-# are worse than a program that calls everything vegetation (23 %): they know where sky and road *belong*, not only
-# what they look like. Real images are further away than most of these: lecture 13.
+# Half the light costs FCN two points, SegNet seven and DeepLab eighteen: training varied brightness by a fifth only.
+# Noise that a human hardly minds costs the two that pool maxima dearly, and DeepLab little. Its first layer sums over
+# 7x7 pixels before anything else is done, while a maximum of noisy values is the noisiest; that may be why. Two colours
+# swapped, a common bug (OpenCV reads blue first), cost more than half the light and raise no error. Upside down, the
+# networks are worse than a program that calls everything vegetation (23 %): they know where sky and road *belong*, not
+# only what they look like. Real images are further away than most of these: lecture 13.
 #
 # **Small classes.** Pixel accuracy doesn't see them. Take from SegNet all that it calls signage, pedestrian or
 # bicycle, and let it say the second best:

@@ -15,7 +15,7 @@
 # **Prerequisites.** Lectures 05 and 06 (equations (1) and (2), the adjoint of sampling) and 07 (image networks,
 # pooling indices, skips). The chain rule.
 #
-# **Time.** 135 minutes, best in two sittings; the computer needs one.
+# **Time.** 140 minutes, best in two sittings; the computer needs one.
 #
 # **Paper.** Sections 3.4 and 4.1, figures 4 and 5; claims 6, 7 and 9.
 #
@@ -228,8 +228,8 @@ plt.show()
 # | beside the road | sidewalk | FREE | sidewalk |
 #
 # The image can't tell the second row from the third, the occupancy grid not the first from the fourth. Together no
-# two rows are alike. So the four maps of $o$ are put on top of the 16, $[\tilde p; o]$, 20 numbers a cell, and
-# everything after it sees both:
+# two of these four rows are alike. So the four maps of $o$ are put on top of the 16, $[\tilde p; o]$, 20 numbers a
+# cell, and everything after it sees both:
 
 # %% tags=["fusion"]
 rows = [
@@ -254,8 +254,37 @@ with torch.inference_mode():
     np.testing.assert_allclose(fuse(planes[:1], o[:1], fusion), fusion(planes[:1], o[:1]), atol=1e-4)
 
 # %% [markdown]
-# Does the trained network use them so? Put it to the test on the drive: give it, in place of $o$, the mean of $o$
-# over all cells, the same in each; then the same with the planes, over the cells that the camera sees.
+# On the drive two numbers per cell don't settle it. Take the true label of the pixel that the ground plane reads, and
+# the most probable state of $o$. How many bits of the true class are still open, and how often would a table be right
+# that knows the best class for each pair of the two?
+
+
+# %%
+def bits(*columns):
+    """Return the entropy of what stands in columns of whole numbers, side by side, bits."""
+    counts = np.unique(np.stack(columns), axis=1, return_counts=True)[1]
+    return -(counts / counts.sum() * np.log2(counts / counts.sum())).sum()
+
+
+ground, visible = (part[0] for part in plane_pixels(spec, heights[:1], drive.camera))
+u, v = np.rint(np.where(visible[..., None], ground, 0)).astype(int).transpose(2, 0, 1)
+counted = truth != IGNORE
+label = np.stack([np.where(visible, frame.labels.image[v, u], IGNORE) for frame in frames])[counted].astype(int)
+state, is_class = o.numpy().argmax(axis=1)[counted], truth[counted].astype(int)
+left_open = [bits(is_class, *know) - bits(*know) for know in ((label,), (state,), (label, state))]
+table = np.zeros((IGNORE + 1, 4, 14))
+np.add.at(table, (label, state, is_class), 1)
+best_table = 100 * table.max(axis=2).sum() / counted.sum()
+print(f"class: {bits(is_class):.2f} bits; left open by label {left_open[0]:.2f}, state {left_open[1]:.2f}", end=", ")
+print(f"both {left_open[2]:.2f}; the best table is right in {best_table:.0f} % of the cells")
+
+# %% [markdown]
+# So the pair leaves a whole bit open, and the best table of the two, fitted on this very drive, is the number that a
+# network has to beat. A pixel on the ground plane shows what stands *in front of* a cell, and beyond the crest of this
+# street the road lies below the plane. That is why the network gets all planes, and neighbours.
+#
+# Does the trained network use $p$ and $o$ so? Put it to the test on the drive: give it, in place of $o$, the mean of
+# $o$ over all cells, the same in each; then the same with the planes, over the cells that the camera sees.
 #
 # **Predict before you run.** Which of road, sidewalk, car, building suffers most when $o$ says nothing? Which when
 # the image says nothing?
@@ -313,9 +342,12 @@ road, sidewalk, vegetation, car, building = (
 )
 lost = {name: shares["image and o"] - shares[name] for name in ("without o", "without image")}
 bicycle, fence, signage, pedestrian = (KITTI_14.index(name) for name in ("bicycle", "fence", "signage", "pedestrian"))
-assert max(shares["without o"][[building, fence, signage, pedestrian]]) < 5
-assert min(lost["without o"][[building, fence, bicycle]]) > max(lost["without o"][[road, sidewalk, car]])
-assert min(lost["without image"][[building, vegetation, sidewalk, bicycle]]) > lost["without image"][car]
+assert max(shares["without o"][[building, car, fence, bicycle, signage, pedestrian]]) < 5
+assert lost["without o"][vegetation] < 0 < lost["without o"][road] < lost["without o"][sidewalk]
+assert min(lost["without image"][[building, vegetation, sidewalk, bicycle]]) > lost["without image"][car] > 0
+network = 100 * (whole == truth)[counted].mean()
+print(f"all cells: the network with image and o {network:.0f} %, the best table {best_table:.0f} %")
+assert network > best_table
 
 # %% tags=["nbval-ignore-output"]
 for name, points in lost.items():
@@ -323,11 +355,11 @@ for name, points in lost.items():
     print(f"{name:<14} loses, points:", ", ".join(f"{KITTI_14.names[c]} {points[c]:.0f}" for c in order))
 
 # %% [markdown]
-# Dark: what the network finds. Orange: without $o$ most of what stands goes. Of buildings, fences, signage and
-# pedestrians next to nothing is left, of bicycles and cars less than half. Road stays, and half of the sidewalk;
-# vegetation even gains. Blue: without the image building, vegetation, sidewalk and bicycles lose most, cars and
-# pedestrians about half of what was found, and the fence a third; road stays as a good guess, for what is free in front
-# of a car mostly is road; and the last four classes stay, because $o$ says them. Two cautions. The network has never
+# Dark: what the network finds. Orange: without $o$ everything that stands is lost: of buildings, cars, bicycles,
+# fences, signage and pedestrians nothing is left. Road stays, and a third of the sidewalk; vegetation even gains. Blue:
+# without the image building, vegetation and bicycles lose most; the sidewalk loses less than a third, cars a fifth,
+# pedestrians a tenth of what was found, fences nothing. Road stays as a good guess, because what is free in front of a
+# car mostly is road; and the last four classes stay, because $o$ says them. Two cautions. The network has never
 # learnt with a silent input; one trained without $o$ would make more of the image. And a high bar of a small class
 # means little by itself: signage is found more often without the image than with it, but look at the numbers above the
 # figure. A network at a loss calls many things so.
@@ -460,12 +492,19 @@ for ax, (name, alpha) in zip(axes, columns.items(), strict=True):
     ax.set(xlabel="share of the loss's weight [%]", xlim=(0, 50), title=name)
 axes[0].invert_yaxis()
 plt.show()
+kept = {name: 100 * alpha * cells / (alpha * cells).sum() for name, alpha in columns.items()}
+largest = np.argsort(cells)[-3:]
+print("the three largest classes:", ", ".join(f"{name} {share[largest].sum():.0f} %" for name, share in kept.items()))
+assert [round(kept[name][largest].sum()) for name in ("no weights", "limit 4")] == [71, 54]
+assert kept["limit 4"][KITTI_14.index("pedestrian")].round(1) == 2.8
 
 # %% [markdown]
-# Behind each name stands the number of its cells, behind each bar the weight $\alpha_c$. On the left unobserved and
-# road have most of the say. In the middle every class that is in all six frames has the same say. But then one cell
-# of unknown-dynamic weighs as much as 300 unobserved ones, and training depends on 25 cells. So the package keeps
-# weights between 1/4 and 4 (`weight_limit`); the paper has no such limit. On the right is the compromise.
+# Behind each name stands the number of its cells, behind each bar the weight $\alpha_c$. On the left unobserved, road
+# and unknown-free have 71 % of the say. In the middle every class that is in all six frames has the same say; bicycles
+# and fences, which are missing in some frames, have less. But then one cell of unknown-dynamic weighs as much as 780
+# unobserved ones, and a twelfth of the loss hangs on 25 cells. So the package keeps weights between 1/4 and 4
+# (`weight_limit`); the paper has no such limit. On the right is what training uses. It is a compromise, and nearer to
+# the left than to the middle: the three largest classes keep 54 % of the say, pedestrians have 2.8 % and signage 1.4 %.
 #
 # ## One step downhill, with momentum
 #
@@ -778,7 +817,7 @@ fig = plotting.label_maps(spec, {"learnt by heart": recited[0], "truth": four[0]
 plt.show()
 
 # %% [markdown]
-# A frame recited. Large areas are there, and so are most cars; edges and single cells take longest. With 400 steps,
+# A frame recited. Large areas are there; edges and single cells take longest. With 400 steps,
 # from random weights on and every cell counting alike, all four image networks get them too (`semgrid-edu reproduce
 # overfit`):
 
@@ -805,7 +844,7 @@ with TemporaryDirectory() as folder:
 # %% [markdown]
 # ### Then load what a real training has learnt
 #
-# The shipped weights come from the same code (`semgrid-edu train`), in 23 minutes on two cores that others used too.
+# The shipped weights come from the same code (`semgrid-edu train`), in 34 minutes on two cores that others used too.
 # The log lies beside them:
 
 # %%
@@ -857,8 +896,9 @@ assert scores["four frames by heart"][0][0] > scores["four frames by heart"][1][
 # Pixel accuracy and class accuracy over cells whose truth is a class with a meaning; the numbers of the first two rows
 # differ from machine to machine by some points. Learnt by heart: good at home, poor on the drive. Twenty seconds with
 # six frames are no match on the drive either, and know their own frames less well: large areas come first, small
-# classes last. With 142 frames and 4000 steps, class accuracy on the drive more than doubles. (The six frames
-# are among the 142, so the first pair of its row is no test.)
+# classes last. The shipped network has seen 142 frames in 4000 steps, and its class accuracy on the drive is half as
+# high again as that of either, or more. (Frames and steps changed together, so this table doesn't say which did it. The
+# six frames are among the 142, so the first pair of its row is no test.)
 #
 # ## Which plane does the reduction listen to, and is it the right height?
 #
@@ -868,9 +908,14 @@ assert scores["four frames by heart"][0][0] > scores["four frames by heart"][1][
 #
 # **Predict before you run.** Right for road, for a car, for a building beyond a row of parked cars: which heights?
 #
-# <details><summary>Answer</summary>Road: 0 m, and less with every plane above. Car: from 0.2 m to 1.4 m; on the
-# ground plane only half of a car's cells, since many of the rays there pass below the bumper. Building: from 2 m up,
-# over the roofs of the cars; lower, fences and cars are in the way.</details>
+# <details><summary>Answer</summary>
+#
+# Road: 0 m, and less with every plane above; but even at 0 m only in 56 of 100 cells, because beyond the crest of this
+# street the road lies below the plane, and because things stand in the way. Car: best at 0.2 m, nine in ten; at 1 m
+# two in three, at 1.4 m two in five. Building: from 2 m up, over the roofs of the cars; lower, fences and cars are in
+# the way.
+#
+# </details>
 
 
 # %%
@@ -897,10 +942,9 @@ def heard(keep, planes=planes, net=net):
 # %% tags=["nbval-ignore-output"]
 tops = (0, 1, 2, 3, 5, 7, 10, 19)
 up_to = np.array([found(heard(np.arange(20) <= top), truth) for top in tops])
-for c in (car, bicycle):
-    ground, metre, every = up_to[[0, tops.index(5), -1], c]
-    print(f"{KITTI_14.names[c]:<8} ground {ground:.0f} %, up to 1 m {metre:.0f} %, all {every:.0f} %", end=": ")
-    print(f"{100 * (metre - ground) / (every - ground):.0f} % of the gain up to 1 m")
+for c in (car, bicycle, building):
+    at_ground, metre, every = up_to[[0, tops.index(5), -1], c]
+    print(f"{KITTI_14.names[c]:<8} ground {at_ground:.0f} %, up to 1 m {metre:.0f} %, all {every:.0f} %")
 
 # %%
 size = np.linalg.norm(fusion.reduce[0].weight[..., 0, 0], axis=0).mean(axis=0)
@@ -922,26 +966,35 @@ for ax in axes:
 for ax in axes[:2]:
     ax.legend(frameon=False, fontsize="small")
 plt.show()
-assert truly[car, heights < 1.5].min() == truly[car, 0]
-assert truly[car, heights > 2.5].max() < 1
+
+
+# %%
 at_foot, at_two, every = up_to[[tops.index(3), tops.index(10), -1], building]
-assert at_two < at_foot < every
+assert truly[car].argmax() == 1
+assert truly[car, heights > 2.3].max() < 1
+assert 35 < at_foot < at_two - 20 < every - 30
 assert truly[building, :4].max() < 25
+assert up_to[-1, car] < up_to[:-1, car].max()
+first = fresh[..., 0, 0].numpy()
+changed = np.linalg.norm(fusion.reduce[0].weight.detach()[..., 0, 0].numpy() - first, axis=(0, 1))
+changed = changed / np.linalg.norm(first, axis=(0, 1))
+print(f"change of the weights over their first norm: lowest two {changed[0]:.1f} and {changed[1]:.1f}", end=", ")
+print(f"others {changed[2:].min():.1f} to {changed[2:].max():.1f}")
 
 # %% [markdown]
-# Left: where each class is right. Middle: the weights. From 1 m up they have hardly changed since they were drawn at
-# random: so a large weight there says nothing (nothing pulls unused weights to zero). The lowest two have learnt
-# most. Right: the class's cells that are found when all higher planes fall silent, as the image did above.
+# Left: where each class is right. Middle: the norms of the weights. From 1 m up they look as they did when they were
+# drawn at random. But the weights themselves have changed there too, as the line above says: a norm tells nothing about
+# what was learnt. The lowest two planes have changed most. Right: the class's cells that are found when all higher
+# planes fall silent, as the image did above.
 #
-# So: is it the right height? For road, yes. Bicycles gain all from the planes up to 1 m, and there they are right. Of
-# what cars gain over the ground plane alone, the planes up to 1 m give half, and those above it the other half: up to
-# 1.4 m they are as right for a car as the lower ones, above 2.4 m they never show one. Buildings are a surprise. With
-# the planes up to 0.6 m alone, half of their cells are found, where by the truth at most one of their points in four is
-# right! What there is to listen to, down there, is the foot of the wall, and fence, lawn and cars before it; $o$ knows
-# where the wall stands. The planes from there up to 2 m make it worse, though between 1.4 and 2 m more and more
-# points are right; only those above 2 m, which are right, bring the share to 63 %. In short: this network listens
-# mostly to the ground and the first metre and reads much from context. Our guess in the toy, the roof at 1.4 m, is
-# right as geometry and wrong as a description of what was learnt.
+# So: does it listen to the right height? For road, yes. Bicycles gain most from the planes up to 1 m, which are right
+# for them. Cars gain a little from the planes up to 1.4 m; all planes together find fewer of them than the planes up to
+# 2 m, and those above 2.4 m never show a car. Buildings are a surprise. With the planes up to 0.6 m alone two in five
+# of their cells are found, where by the truth at most one of their points in four is right. What there is to listen to,
+# down there, is the foot of the wall, and fence, lawn and cars before it; $o$ knows where the wall stands. From there
+# on every higher plane helps, and with all of them 85 % are found. In short: this network takes road, sidewalk and cars
+# from the lowest planes, walls from the high ones, and reads much from context. Our guess in the toy, the roof at 1.4
+# m, is right as geometry and wrong as a description of what was learnt.
 #
 # One network is one sample. The same test on the three shipped ones, which differ in image network alone:
 
@@ -961,10 +1014,11 @@ for name in ("segnet", "fcn", "deeplab"):
     assert rows[2][1] < rows[0][1] - 10
 
 # %% [markdown]
-# The third number is the share of the road that is found. All three do nearly as well with the six lowest planes: FCN's
-# map is even better without the others. The reverse isn't true, but differs. Without the first metre FCN loses the
-# road, SegNet and DeepLab keep most of it. We don't know why: coarse scores, which blur the road upwards,
-# don't explain it, for FCN's are as coarse as DeepLab's. Would a network with six planes *learn* as much, and faster?
+# The third number is the share of the road that is found. All three do nearly as well with the six lowest planes: they
+# lose up to four points of pixel accuracy and two to seven of class accuracy. Without these six they lose much more,
+# but not alike: FCN loses two fifths of its road, SegNet and DeepLab keep nearly all of it. We don't know why: coarse
+# scores, which blur the road upwards, don't explain it, for FCN's are as coarse as DeepLab's. Would a network with six
+# planes *learn* as much, and faster?
 # That takes new training runs: lecture [12](12_experiments.ipynb) has networks with 1, 2, 5 and 10 planes.
 #
 # ## End to end, or in two stages?
@@ -1010,10 +1064,10 @@ Markdown(seeds_table(both_ways))
 # counts that large areas decide, and no further.
 #
 # The last two rows say what end to end *does*: of the pixels that the image network called right, 83 in a hundred, 64
-# to 71 are left, the seeds far apart. Its scores no longer name what a pixel shows. They have become whatever helps the
-# map. And they have forgotten what the map hardly asks for: stage one saw thousands of pixels of pedestrians and signs,
-# the grids hold a few cells of them. That may be why class accuracy falls; we haven't tested it. Mind also that our
-# stage one is a strong one: it learns from true labels of every pixel of the same 142 images. The paper's came from
+# to 71 are left, the seeds far apart. Its scores name what a pixel shows less often. They drift towards whatever helps
+# the map. And they have forgotten what the map hardly asks for: stage one saw thousands of pixels of pedestrians and
+# signs, the grids hold a few cells of them. That may be why class accuracy falls; we haven't tested it. Mind also that
+# our stage one is a strong one: it learns from true labels of every pixel of the same 142 images. The paper's came from
 # ImageNet, so there was more for end to end to gain.
 #
 # ## Play with it
@@ -1023,8 +1077,12 @@ Markdown(seeds_table(both_ways))
 # **Predict before you run.** Which band draws the road best with fewest planes? What is left with the planes above 1
 # m alone?
 #
-# <details><summary>Answer</summary>0 to 0.2 m: road, lawn and sidewalk are nearly complete. Above 1 m the road frays
-# and the sidewalk is nearly gone; what stands and what nobody sees is drawn by o.</details>
+# <details><summary>Answer</summary>
+#
+# 0 to 0.2 m: of road and sidewalk as much is found as with all planes, of buildings less than half as much. Above 1 m
+# half of the sidewalk and two thirds of the vegetation are gone; what stands and what nobody sees is drawn by o.
+#
+# </details>
 
 
 # %%
@@ -1058,8 +1116,8 @@ for ax in axes[1:]:
 plt.show()
 
 # %% [markdown]
-# From left to right: all planes; the two lowest; up to 1 m, hardly different from all; above 1 m, where the road frays
-# and the sidewalk is nearly gone.
+# From left to right: all planes; the two lowest; up to 1 m, where on the whole drive one semantic cell in ten has
+# another class than with all planes, buildings above all; above 1 m, where the sidewalk and the lawns fray.
 #
 # ## Where this breaks
 #
@@ -1081,13 +1139,15 @@ for c in present:
 axes[1].set(xscale="log", xlim=(15, 3e5), xlabel="cells in six training frames", title="classes")
 plt.show()
 assert far[0] > far[2] > far[-1]
+missed = (truth == car) & (whole != car)
+print(f"{100 * missed[:, x >= 40].sum() / missed.sum():.0f} % of the missed cells of cars are 40 m away or more")
 
 # %% [markdown]
 # Left: from 20 m on, the farther, the worse; 40 m ahead ten cells, one behind the other, share one row of pixels
-# (lecture 05). Right: of signage and pedestrians, which are rare to learn from, less than half is found.
-# Unknown-dynamic is rarer still, but it, unknown-static and building do better than their numbers, since $o$ helps
-# them, and so do bicycles, which ride near us on this drive. Cars do worse than theirs: most of them are far away or
-# half hidden.
+# (lecture 05), and beyond the crest the road falls below every plane. Right: of signage and pedestrians, which are rare
+# to learn from, half is found. Unknown-dynamic is rarer still, but it, unknown-static and building do better than their
+# numbers, because $o$ helps them. Cars do worse than theirs, because many are far away: of the missed cells two thirds
+# are 40 m away or more.
 #
 # **Outside of what it has learnt.** Less light, fog, red and blue swapped; and a camera that points one degree higher,
 # or lower, than its calibration says.
@@ -1095,10 +1155,14 @@ assert far[0] > far[2] > far[-1]
 # **Predict before you run.** One degree is three pixels of this image. Is that worse than a third of the light? And is
 # it the same whether the camera points too high or too low?
 #
-# <details><summary>Answer</summary>It isn't the same. When the camera points too high, each cell reads the ground too
-# far ahead: the cell at 30 m that at 44 m (lecture 05). SegNet and FCN then lose more than in the dark, in both
-# numbers, DeepLab only in class accuracy. When it points too low, the cell at 30 m reads the ground at 23 m. That costs
-# less, for all three, and FCN's and DeepLab's maps even get better.</details>
+# <details><summary>Answer</summary>
+#
+# It isn't the same. When the camera points too high, each cell reads the ground too far ahead: the cell at 30 m that at
+# 44 m (lecture 05). That costs every network 4 to 14 points of pixel accuracy; a third of the light costs as much or
+# more. When it points too low, the cell at 30 m reads the ground at 23 m, and all three maps get as good as before or
+# *better*.
+#
+# </details>
 
 
 # %% tags=["nbval-ignore-output"]
@@ -1127,19 +1191,19 @@ for world, looks in (("fog", 0.4 * image + 0.5), ("red and blue swapped", image.
 
 # %%
 usual, in_the_dark, too_high, too_low = bears.values()
-assert (too_high < too_low).all()
-assert (too_high[:2] < in_the_dark[:2]).all()  # SegNet and FCN, both numbers
-assert too_high[2, 1] < in_the_dark[2, 1]  # DeepLab's class accuracy
-assert too_high[2, 0] > in_the_dark[2, 0]  # but not its pixel accuracy
-assert (too_low[1:] > usual[1:]).all()  # FCN and DeepLab get better
-assert min((usual - in_the_dark)[:, 0].min(), (usual - too_high)[:, 0].min()) > 6
+assert (too_high < usual).all()
+assert (too_low > usual - 0.5).all()
+assert (in_the_dark < too_high + 1).all()
+assert (usual - in_the_dark)[:, 0].min() > 6
+assert (usual - too_high)[:, 0].min() > 3
 
 # %% [markdown]
 # Each pair is pixel accuracy and class accuracy; fog and swapped colours we tried with SegNet alone, where fog costs
-# little and swapped colours somewhat more than the dark. The dark, and a camera that points too high, cost each network
-# more than 6 points of pixel accuracy. Why is too low so much better than too high? A cell that reads too near mostly
-# reads more of the same street; one that reads too far soon reads what stands on it. That is a guess, we haven't tested
-# it. Claim 9 says that learning repairs errors of calibration: those that were there in training.
+# little and swapped colours nearly as much as the dark. Why is too low so much better than too high, and even better
+# than right? Two things speak for it. This street falls away by 2 % beyond its crest, which is 1.1 degrees: with a
+# camera that points one degree too low, the planes follow the road there. And a cell that reads too near mostly reads
+# more of the same street, while one that reads too far soon reads what stands on it. We haven't told the two apart.
+# Claim 9 says that learning repairs errors of calibration: those that were there in training.
 #
 # Training varied brightness and contrast by a fifth and nothing else. What a network hasn't met, it can't be expected
 # to bear; and nothing in the map says that it is lost.
@@ -1155,26 +1219,34 @@ camera_only = dark & semantic
 print(f"cells that nobody sees: {100 * named[nobody].mean():.0f} % get a name all the same")
 right, unknown = (whole == truth)[camera_only].mean(), (~named)[camera_only].mean()
 print(f"cells that the camera alone sees: {100 * right:.0f} % right, {100 * unknown:.0f} % called unknown")
+with torch.inference_mode():
+    sure = np.stack(
+        [net.fusion(p[None], q[None])[0].softmax(dim=0).amax(dim=0) for p, q in zip(planes, o, strict=True)]
+    )
+guessed, sighted = sure[nobody & named], sure[semantic & ~dark]
+print(f"mean confidence where nobody sees: {guessed.mean():.2f}, where a beam has been: {sighted.mean():.2f}")
+assert guessed.mean() < sighted.mean() - 0.1
 made_up = np.where(nobody & named, whole, IGNORE)
 given_up = np.where(camera_only & ~named, truth, IGNORE)
 plotting.label_maps(spec, {"named, seen by nobody": made_up[shown], "seen, called unknown": given_up[shown]}, KITTI_14)
 plt.show()
 
 # %% [markdown]
-# On the left: cells that neither beam nor camera has seen, and the name that they get. Most continue what is next to
-# them, behind a car or beyond the last beam: a good guess and no observation. On the right the opposite: the camera
-# sees what is there, the network says *unknown*; drawn is the truth. A planner would want to tell a guess from a
-# sight. This map doesn't.
+# On the left: cells that neither beam nor camera has seen, and the name that they get: one in twenty gets one. Most
+# continue what is next to them, behind a car or beyond the last beam: a guess, not an observation. On the right the
+# opposite: the camera sees what is there, the network says *unknown*; drawn is the truth. A planner would want to tell
+# a guess from a sight. The map of names doesn't, but the probabilities do on average: they are lower for a guess.
 #
 # ## In five lines
 #
 # 1. A 1x1 convolution is a matrix product in each cell: it picks classes and heights from 280 maps, 16 are left.
 # 2. The image says what, $o$ says where; together they name what neither can. A small conv-deconv network brings in the
 #    neighbours.
-# 3. Median frequency balancing gives every class the same say; the limit keeps single cells from having too much.
+# 3. Median frequency balancing gives every class that is in all frames the same say; with the limit that training uses,
+#    the three largest classes keep half of it.
 # 4. Everything is differentiable: a wrong cell blames pixels, through $\theta^T$ and $A^T$, and no pixel needs a label.
-# 5. Learning by heart is the first test and proves little. The network listens mostly to the lowest metre, right or
-#    not. End to end, scores serve the map and not the pixels; here that buys little.
+# 5. Learning by heart is the first test and proves little. The network takes the road from the lowest planes and walls
+#    from the high ones. End to end, scores serve the map and not the pixels; here the map gains little by it.
 #
 # ## Further reading
 #

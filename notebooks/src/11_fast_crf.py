@@ -30,6 +30,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from IPython.display import Markdown
 from ipywidgets import FloatLogSlider, IntSlider, interact
 from scipy.spatial.distance import cdist
 from scipy.special import softmax
@@ -169,7 +170,8 @@ for height, width in ((20, 15), (40, 30), (60, 40)):
     print(f", so the paper's grid would take {took * (55_025 / (height * width)) ** 2 / 60:5.0f} minutes")
 
 # %% [markdown]
-# The LIDAR delivers ten scans a second, so a map has a tenth of a second. A faster loop won't get us there, because the
+# The LIDAR delivers ten scans a second, so a map has a tenth of a second; at the end we shall see whether we keep to it.
+# A faster loop won't get us there, because the
 # number of pairs stays the same. We need another way to compute the sum.
 #
 # ## Message passing is filtering
@@ -183,7 +185,12 @@ for height, width in ((20, 15), (40, 30), (60, 40)):
 # $$ \log Q_i(l) \leftarrow -\phi_i(l) + \sum_{j \ne i} k_{ij}\, Q_j(l) + \text{const}
 #    \;=\; -\phi_i(l) + \underbrace{\sum_{j} k_{ij}\, Q_j(l)}_{\text{the blurred map}} - \underbrace{k_{ii}\, Q_i(l)}_{\text{the cell itself}} + \text{const} $$
 #
-# with $k_{ij}$ the bracket of equation (4): the sum over both kernels, with weights and normalisation. (Lecture 10 sums
+# where $k_{ij}$ is the bracket of equation (4), with $r_i$ the row and column of cell $i$ and $o_i$ its occupancy:
+#
+# $$ k_{ij} = w_1 \exp\!\Big(\!-\frac{|r_i - r_j|^2}{2\sigma_\alpha^2} - \frac{|o_i - o_j|^2}{2\sigma_\beta^2}\Big) + w_2 \exp\!\Big(\!-\frac{|r_i - r_j|^2}{2\sigma_\gamma^2}\Big) \tag{4} $$
+#
+# The first kernel is *bilateral*: it asks for nearness in place and in occupancy. The second is *spatial*. Each is
+# normalised as in lecture 10. (Lecture 10 sums
 # $1 - Q_j(l)$ with a minus sign. The difference, $\sum_j k_{ij}$, is the same for all classes and cancels in the
 # soft-max.) So mean field needs no matrix. It needs a function that blurs, and the numbers $k_{ii}$:
 
@@ -256,7 +263,7 @@ over_all_pairs = np.exp(-0.5 * cdist(place, place, "sqeuclidean") / params.sigma
 two_passes = blur_rows_and_columns(car, params.sigma_gamma)
 np.testing.assert_allclose(two_passes.ravel(), over_all_pairs, atol=1e-5)
 package = SeparableGaussian.build(car.shape, params.sigma_gamma, weight=1, normalization="none")
-np.testing.assert_allclose(package(car.reshape(-1, 1).astype(np.float32))[:, 0], over_all_pairs, rtol=1e-4)
+np.testing.assert_allclose(package(car.reshape(-1, 1).astype(np.float32))[:, 0], over_all_pairs, rtol=1e-4, atol=1e-7)
 for way, products in (
     ("over all pairs", 55_025),
     ("in a window", (2 * 16 + 1) ** 2),
@@ -442,6 +449,29 @@ plt.show()
 #   lattice, one after the other.
 # - **Slice.** Each cell takes the weighted mean of its $d + 1$ corners, with the same weights as before.
 #
+# In one picture:
+
+# %% jupyter={"source_hidden": true} alt="schematic: a row of six cells above, four vertices below; grey arrows lead from two cells down to their vertices, splat; orange double arrows join neighbouring vertices, blur; blue arrows lead from the vertices up to the same cells, slice"
+fig, ax = plt.subplots(figsize=(9, 2.9), layout="constrained")
+cell_x, vertex_x = np.array([0.4, 1.1, 1.8, 4.3, 5.2, 5.9]), np.array([0, 1.5, 3, 4.5, 6.0])
+for step, start in (("splat", 0), ("blur", 7.5), ("slice", 15)):
+    ax.plot(start + cell_x, np.ones(6), "o", color="#fc7200", markeredgecolor="k", markersize=10)
+    ax.plot(start + vertex_x, np.zeros(5), "s", color="0.35", markersize=9)
+    arrows = [((x, 1), (v, 0)) for x in cell_x for v in vertex_x if abs(x - v) < 1.5]
+    if step == "blur":
+        arrows = [((a, 0), (b, 0)) for a, b in itertools.pairwise(vertex_x)]
+    for a, b in arrows:
+        (tail, head) = (b, a) if step == "slice" else (a, b)
+        style = {"arrowstyle": "<->" if step == "blur" else "->", "shrinkA": 7, "shrinkB": 7, "color": "0.3"}
+        ax.annotate("", np.add(head, (start, 0)), np.add(tail, (start, 0)), arrowprops=style)
+    ax.text(start + 3, 1.45, step, ha="center", fontsize=12)
+ax.text(-0.5, 1, "cells", ha="right", va="center")
+ax.text(-0.5, 0, "vertices", ha="right", va="center")
+ax.set(xlim=(-2.5, 21.5), ylim=(-0.4, 1.8))
+ax.set_axis_off()
+plt.show()
+
+# %% [markdown]
 # Take the plane of triangles, put a 1 on one vertex and 0 on all others, and blur. After the first direction a row of
 # three vertices holds (1/4, 1/2, 1/4). After all three directions the 1 has spread over a hexagon.
 #
@@ -521,7 +551,7 @@ street = np.column_stack([np.arange(36) / 4, p_free / 0.2])  # in widths of 4 ce
 # %% jupyter={"source_hidden": true} alt="animation: 36 points in two groups give their colours to corners of triangles, the corners blur along three directions, and the points take smoothed colours back; the groups don't mix"
 def pictures(between, hold):
     """Yield the frames of the animation on one figure."""
-    fig, ax = plt.subplots(figsize=(7, 4.9), dpi=100)
+    fig, ax = plt.subplots(figsize=(6.4, 4.5), dpi=plotting.FIGURE_DPI)
     fig.subplots_adjust(left=0.08, right=0.98, bottom=0.1, top=0.94)
     story = list(plotting.lattice_story(street, p_road, between))
     for frame, following in zip(story, [*story[1:], story[0]], strict=True):
@@ -572,7 +602,7 @@ plt.show()
 # ## A cell is no pair with itself
 #
 # The filter adds up all cells, also the cell that listens. In equation (3) a cell is no pair with itself, so
-# $k_{ii}\,Q_i(l)$ must be subtracted. A Gaussian has $k_{ii} = 1$ before weight and normalisation. What has the lattice?
+# $k_{ii}\,Q_i(l)$ must be subtracted. A Gaussian has $k_{ii} = 1$ before weight and normalisation. What is $k_{ii}$ of the lattice?
 #
 # **Predict before you run.** Take two features, and suppose that all vertices exist. A point that lies on a vertex
 # gives everything to it, 10/64 remain after the blur, and the point reads them. With the factor $\frac{4\pi}{3}\sqrt 3
@@ -625,8 +655,8 @@ print(
 # %% [markdown]
 # A cell that counts itself confirms its own opinion. Among many similar cells that hardly matters, because after
 # normalisation a cell's own share is a few per cent. But a cell whose occupancy is unlike that of all cells around it
-# hears nearly nothing but itself: its share goes up to 1. In such cells a forgotten self-response changes probabilities
-# by up to 0.66, although only 30 labels of 8804 differ in the end.
+# hears nearly nothing but itself: its share goes up to 1. In such cells a forgotten self-response changes a probability by
+# more than a half at most, although only some twenty of 8804 labels differ in the end.
 #
 # ## What kernel is it really?
 #
@@ -662,9 +692,9 @@ plt.show()
 # similar cells around it hears less than it should. Here are both errors together, after normalisation:
 
 
-# %% tags=["nbval-ignore-output"]
-def relative_error(features, some):
-    """Compare the lattice's kernel with the Gaussian, both normalised, on the columns of some points (Frobenius)."""
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
+def both_kernels(features, some):
+    """Return the lattice's kernel and the Gaussian, both normalised, on the columns of some points."""
     exact = np.exp(-0.5 * cdist(features, features[some], "sqeuclidean"))
     degree = np.exp(-0.5 * cdist(features, features, "sqeuclidean")).sum(axis=1)
     lattice = PermutohedralLattice.build(features)
@@ -672,26 +702,40 @@ def relative_error(features, some):
     ones[some, np.arange(len(some))] = 1
     nearly, sums = lattice(ones), lattice(np.ones((len(features), 1), np.float32))[:, 0]
     exact = exact / np.sqrt(np.outer(degree, degree[some]))
-    return np.linalg.norm(nearly / np.sqrt(np.outer(sums, sums[some])) - exact) / np.linalg.norm(exact)
+    return nearly / np.sqrt(np.outer(sums, sums[some])), exact
 
 
-part = features_of(o[:, 60:120, 8:48], params)
-on_drive = relative_error(part, np.arange(0, 2400, 24))
-print(f"error of the kernel on the drive: {100 * on_drive:.0f} %")
-assert 0.2 < on_drive < 0.3
+def length(nearly, exact):
+    """Return the length of the difference, divided by that of the exact one (Frobenius)."""
+    return np.linalg.norm(nearly - exact) / np.linalg.norm(exact)
+
+
+# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
+nearly, exact = both_kernels(features_of(o[:, 60:120, 8:48], params), np.arange(2400))
+own_share = (np.diag(nearly - exact) ** 2).sum() / ((nearly - exact) ** 2).sum()
+off_diagonal = [K - np.diag(np.diag(K)) for K in (nearly, exact)]
+said_there = softmax(-unary[:, 60:120, 8:48].reshape(14, -1), axis=0).T
+heard = length(*(K @ said_there for K in off_diagonal))
+print(
+    f"error of the kernel on the drive: {100 * length(nearly, exact):.0f} %, of its square {own_share:.0%} on the diagonal"
+)
+print(f"what a cell hears from the others is off by {100 * heard:.1f} %")
+assert own_share > 0.5
+assert heard < 0.1 < length(nearly, exact)
 for d in (1, 2, 3, 5, 7):
     cloud = np.random.default_rng(d).normal(size=(2000, d))
-    print(f"a cloud of 2000 points in {d} dimensions: {100 * relative_error(cloud, np.arange(100)):.0f} %")
+    print(f"a cloud of 2000 points in {d} dimensions: {100 * length(*both_kernels(cloud, np.arange(100))):.0f} %")
 
 # %% [markdown]
 # The number is the length of the difference of the two kernels, entry by entry, divided by the length of the Gaussian
-# (the Frobenius norm). On the drive it is about a quarter. In a cloud of 2000 points it grows with the number of
+# (the Frobenius norm). On the drive more than half of its square lies on the diagonal: it is the self-response, which mean
+# field subtracts. What a cell hears from the *others* is off by a few per cent only. In a cloud of 2000 points it grows with the number of
 # dimensions, because the same points fill the space more and more thinly, and more vertices are missing. In 7
 # dimensions the difference is as large as the kernel itself.
 #
 # ## Speed and error of each way
 #
-# Does an error of a quarter in the kernel spoil the map? To answer that, we have to tell apart three errors of a refined
+# Does such an error of the kernel spoil the map? To answer that, we have to tell apart three errors of a refined
 # map, which are easily mixed up:
 #
 # - the **kernel error**: another kernel, and the same number of iterations;
@@ -717,7 +761,7 @@ for n in ROUNDS:
     kernel_error, stop_error = compare(mean_field(*cells, params, n), exactly[n]), compare(exactly[n], settled)
     print("{:6d} {:21.4f} {:8.1f} %".format(n, *kernel_error), "{:22.4f} {:8.1f} %".format(*stop_error))
     if n == 10:
-        assert kernel_error[0] < 0.002 < stop_error[0] < 0.004
+        assert max(kernel_error[0], stop_error[0]) < 0.002
         assert min(kernel_error[1], stop_error[1]) > 97
 assert kernel_error[0] > stop_error[0]  # after forty
 
@@ -738,7 +782,7 @@ repeated = [enlarged(unary, (n, *spec.shape)) for n in numbers]
 class_times = [seconds(lambda r=r: mean_field(r, o, params), 15) for r in repeated]
 of_lattice = [compare(mean_field(*cells, params, n), settled)[0] for n in ROUNDS]
 behind = {n: error / compare(exactly[n], settled)[0] for n, error in zip(ROUNDS, of_lattice, strict=True)}
-assert behind[20] < 1.1 < behind[40]
+assert behind[1] < 1.3 < behind[40]
 
 # %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="left: error against iterations, both ways fall alike up to twenty iterations, at forty the lattice lags behind; middle: time against the number of cells on logarithmic axes, the naive way steeper than the lattice; right: time against classes, which grows a few times from 2 to 48 classes"
 fig, axes = plt.subplots(1, 3, figsize=(13, 3.7), layout="constrained")
@@ -758,7 +802,11 @@ plt.show()
 slope = np.polyfit(np.log([h * w for h, w in grids[1:]]), np.log(fast_times[1:]), 1)[0]
 naive_slope = np.polyfit(np.log([h * w for h, w in sizes]), np.log(naive_times), 1)[0]
 print(f"time grows with the number of cells to the power of {naive_slope:.1f} (all pairs), {slope:.1f} (lattice)")
-print(f"the paper's grid, 14 classes, 10 iterations: {1000 * fast_times[-2]:.0f} ms on this machine")
+print(
+    f"10 iterations, 14 classes, on this machine: {1000 * fast_times[2]:.0f} ms for the 8804 cells of the drive,",
+    end=" ",
+)
+print(f"{1000 * fast_times[-2]:.0f} ms for the 55,025 of the paper's grid")
 print("10 iterations     60 x 40 cells   142 x 62 cells   kernel error")
 for infer in (mean_field_naive, mean_field_accurate, mean_field):
     large = f"{1000 * seconds(lambda f=infer: f(unary, o, params)):.0f} ms" if infer is not mean_field_naive else "-"
@@ -767,16 +815,20 @@ for infer in (mean_field_naive, mean_field_accurate, mean_field):
 
 # %% [markdown]
 # **Error** (left, and the first table). "Settled" is the map after 100 iterations with all pairs. With all pairs, each
-# iteration brings us nearer to it. The lattice keeps up for about twenty iterations. At forty it has begun to fall
-# behind, because then its kernel error is larger than what is left to converge. At ten iterations the kernel error is
-# one thousandth and the other about three; 97 % of the labels or more agree. So up to some twenty iterations the error
-# comes from stopping early and not from the lattice. How can the map be so good when the kernel is off by a quarter? A cell hears a *sum* over dozens of cells. In it, errors of both signs cancel, and an error that all
-# cells share is taken out by the normalisation.
+# iteration brings us nearer to it. The lattice keeps up for about five iterations. At forty it has fallen behind, because
+# then its kernel error is larger than what is left to converge. At ten iterations both errors are below two thousandths,
+# and 97 % of the labels or more agree. So at the package's ten iterations neither spoils the map. How can the map be so good when the kernel is off by so
+# much more? Most of that is the diagonal, which is subtracted, and an error that all cells share is taken out by the
+# normalisation.
 #
 # **Time** (middle and right). Both axes of the middle picture are logarithmic. Twice the cells cost the lattice about
 # twice the time, and all pairs about four times. With the classes, time grows slowly: 48 of them cost two to four times
 # as much as 2, by the kind of processor. One reason is that the package fills them up to a multiple of 16. On a quiet
 # machine you see steps after 16 and after 32; in a picture made on a busy one, chance hides them.
+#
+# **The tenth of a second.** The last but one output gives the balance on the machine that built this page: the CRF of the
+# drive's map, and of the paper's grid. On a quiet machine the paper's grid took 127 ms, so the CRF alone misses a tenth
+# of a second there; five iterations in place of ten would meet it. The drive's coarser map meets it.
 #
 # **A third way** is in the last table. `mean_field_accurate` computes the Gaussian exactly for all cells in a window of
 # four widths around each cell, without writing a matrix down. Its kernel error is far smaller. Its time is proportional
@@ -819,7 +871,7 @@ _ = interact(
     iterations=IntSlider(value=10, min=0, max=30),
 )
 
-# %% jupyter={"source_hidden": true} alt="four maps of the street: the network's, and refined with occupancy widths 0.03, 0.2 and 2; cars shrink from map to map"
+# %% jupyter={"source_hidden": true} alt="four maps of the street: the network's, and refined with occupancy widths 0.03, 0.2 and 2; cars shrink a little"
 fig, axes = plt.subplots(1, 4, figsize=(12, 5), layout="compressed", sharey=True)
 for ax, (sigma_beta, iterations) in zip(axes, ((0.2, 0), (0.03, 10), (0.2, 10), (2.0, 10)), strict=True):
     refine_with(sigma_beta, 4, 3, iterations, ax)
@@ -829,9 +881,20 @@ plt.show()
 
 # %% [markdown]
 # With zero iterations (left) you see the network's map. The three refined maps are more alike than one might expect:
-# each changes about a tenth of the labels. But the wider `sigma_beta`, the fewer cells are called car: 297 in the
-# network's map, then 242, 208 and 186. With a wide kernel the free cells around a car count as similar to it, and they
-# say *road*.
+# each changes about a tenth of the labels. With each of them fewer cells are called car than in the network's map. Is it
+# because the free cells around a car count as similar to it? Look at the occupancy of the car cells that get lost:
+
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
+CAR = KITTI_14.index("car")
+for sigma_beta in (0.03, 0.2, 2.0):
+    labels = mean_field(unary, o, replace(params, sigma_beta=sigma_beta)).argmax(axis=0)
+    lost = (log_g.argmax(axis=0) == CAR) & (labels != CAR)
+    print(f"sigma_beta {sigma_beta:4}: {lost.sum()} car cells lost, {(o.argmax(axis=0)[lost] == 0).sum()} of them FREE")
+    assert 0.2 < (o.argmax(axis=0)[lost] == 0).mean() < 0.8
+
+# %% [markdown]
+# A third to a half of them are FREE themselves: cells that the network called car although a beam has passed through
+# them. For these, "similar cells around" are free ones, with any width. So the width explains only a part.
 #
 # ## Where this breaks
 #
@@ -869,9 +932,8 @@ for widths in ((0.3, 0.2), (1, 0.2), (3.2, 0.2), (10, 0.2), (3.2, 0.02), (3.2, 2
 
 # %% [markdown]
 # For each of these widths, what a typical cell hears from all cells is between six and nine tenths of what it should be.
-# In four of the six rows the error of the map is two to five times as large without normalisation as with it. The mean
-# also hides the worst cell. With the package's defaults (the row 3.2, 0.20) the mean error is 0.001, but in one cell a
-# probability is off by 0.26. And one thing didn't happen: a width of 0.3 cells, far below a cell, does no harm, because
+# In each row the error of the map is larger without normalisation than with it. The mean also hides the worst cell: see
+# the columns "worst". And one thing didn't happen: a width of 0.3 cells, far below a cell, does no harm, because
 # then the kernel is so narrow that cells hardly hear each other in either way.
 #
 # **Many dimensions.** A cell has only $d + 1$ corners, but the kernel gets worse with each dimension, as you have seen
@@ -899,7 +961,7 @@ print(f"{'':<14}", *(f"{name:>9}" for name in ways))
 for name in ("road", "sidewalk", "building", "car", "pedestrian", "signage"):
     c = KITTI_14.index(name)
     found = [n[c, c] / n[c].sum() for n in ways.values()]
-    assert abs(found[1] - found[2]) < 0.015
+    assert abs(found[1] - found[2]) < 0.02
     print(f"{name:<14}", *(f"{100 * share:7.0f} %" for share in found))
 pixels, classes = ([metric(n) for n in ways.values()] for metric in (pixel_accuracy, class_accuracy))
 print(f"{'pixel accuracy':<14}", *(f"{100 * share:7.1f} %" for share in pixels))
@@ -908,112 +970,36 @@ assert min(pixels[1:]) > pixels[0]
 assert max(classes[1:]) < classes[0] - 0.05
 
 # %% [markdown]
-# The CRF finds more of road and sidewalk, and less of building, car, pedestrian and signage. Lattice and window differ by
-# one point at most, so **the lattice isn't to blame**. The model is: a pedestrian is a few cells among hundreds that
-# say something else, and with these weights the many win. Pixel accuracy rises by about one point, since most cells
-# belong to large classes, and class accuracy falls by more than five. The paper's Table 1 shows the same pattern (claim
-# 2). A better kernel can't mend this. Other weights and widths might.
+# The CRF finds more of the road, and less of sidewalk, building, car, pedestrian and signage. Lattice and window differ by
+# about one point at most. So a better filter doesn't bring them back: it is the model that loses them, because a
+# pedestrian is a few cells among hundreds that say something else, and with these weights the many win.
+#
+# On these ten frames pixel accuracy rises by about one point, and class accuracy falls by more than five. Is that the
+# rule? Here is the same difference on 110 frames of streets that no network has seen, with 95 % intervals over drives
+# (measured on the earlier simulator, whose scanner had fewer columns), and beside it what other weights bring:
+
+# %% jupyter={"source_hidden": true} tags=["crf-table"]
+rows = ["| trained on 142 simulated frames, judged by true labels of 110 | weights | pixel accuracy | class accuracy |"]
+rows.append("|---|---|---|---|")
+signs = []
+for name, file in {"SegNet": "crf_search", "FCN": "crf_search_fcn", "DeepLab": "crf_search_deeplab"}.items():
+    gains = json.loads(Path(f"../docs/results/{file}.json").read_text(encoding="utf-8"))["test"]["gains"]
+    for weights, key in (("default", "CRF"), ("searched", "calibrated, CRF for pixel accuracy")):
+        cells_ = (
+            "{1:+.2f} ({0:+.2f} to {2:+.2f})".format(*(100 * np.array(gains[key][m]))) for m in list(gains[key])[:2]
+        )
+        rows.append(f"| {name} | {weights} | {' | '.join(cells_)} |")
+        assert gains[key]["class accuracy"][2] < 0
+    signs.append(gains["CRF"]["pixel accuracy"][1] > 0)
+assert signs == [False, False, True]
+Markdown("\n".join(rows))
 
 # %% [markdown]
-# ## Can other weights and widths mend it?
-#
-# So far weights and widths were the package's defaults. Better ones must not be chosen on the test frames, because
-# whatever is chosen on some frames looks better on them than it is. Two ways were tried on 72 other simulated drives,
-# from which no network has learned (*validation data*):
-#
-# - **Search** (`semgrid-edu search-crf`). First the scores are divided by a temperature, 1.16 for SegNet, chosen such
-#   that of the cells called with 80 % certainty about 80 % are right (*calibration*). Then 120 settings of two weights
-#   and three widths are tried. The left picture shows them. None is best in both metrics, so two are chosen.
-# - **Learning** (`semgrid-edu reproduce learned-crf`). Five iterations of mean field are a chain of differentiable
-#   steps, so gradient descent can learn weights, widths and label costs like any other layer. Eight variants differ in
-#   what they learn, from which drives, and by which loss.
-
-
-# %% jupyter={"source_hidden": true}
-METRIC_NAMES = ("class accuracy", "pixel accuracy")
-FILES = {"SegNet": "crf_search", "FCN": "crf_search_fcn", "DeepLab": "crf_search_deeplab"}
-MARKS = {"pixel accuracy": "^", "class accuracy": "v"}
-
-
-def kept(name):
-    """Return a committed result."""
-    return json.loads(Path(f"../docs/results/{name}.json").read_text(encoding="utf-8"))
-
-
-def points(scores):
-    """Return what a CRF changes on the validation frames, in points: class accuracy, pixel accuracy."""
-    return [100 * (scores["all"][metric] - search["unrefined"]["all"][metric]) for metric in METRIC_NAMES]
-
-
-def cross(ax, gains, mark, color, label=None):
-    """Draw mean gains with their intervals: of class accuracy to the side, of pixel accuracy upward."""
-    low, (x, y), high = 100 * np.array([gains[m] for m in METRIC_NAMES]).T
-    (left, down), (right, up) = (x, y) - low, high - (x, y)
-    ax.errorbar(x, y, [[down], [up]], [[left], [right]], fmt=mark, color=color, ms=6, lw=1, label=label)
-
-
-# %% jupyter={"source_hidden": true}
-def draw_search(ax):
-    """Draw the settings of the search, on the validation frames."""
-    tried = np.array([points(trial["scores"]) for trial in search["trials"]])
-    front = tried[search["pareto"]]
-    ax.plot(*tried.T, ".", color="0.5", label="setting tried")
-    ax.plot(*front[np.argsort(front[:, 0])].T, "-", color="C0", label="no setting beats these in both metrics")
-    ax.plot(*tried[0], "s", color="C0", label="default")
-    for goal, mark in MARKS.items():
-        ax.plot(*tried[search["chosen"][goal]["trial"]], mark, color="C0", ms=9, label=f"chosen for {goal}")
-    outside = (~((tried > (-9, -1.3)) & (tried < (1, 1.3))).all(axis=1)).sum()
-    ax.set(
-        title=f"SegNet, 72 validation frames ({outside} of 120 lie outside)", ylabel="pixel accuracy: change [points]"
-    )
-
-
-def draw_test(ax):
-    """Draw default, searched and learned CRFs, on the test frames."""
-    for color, (name, file) in zip(("C0", "C1", "C2"), FILES.items(), strict=True):
-        gains = kept(file)["test"]["gains"]
-        cross(ax, gains["CRF"], "s", color, f"{name}, marks as on the left")
-        for goal, mark in MARKS.items():
-            cross(ax, gains[f"calibrated, CRF for {goal}"], mark, color)
-    for k, name in enumerate(learned["learnt"]):
-        cross(ax, learned["gains"][name], "o", "C3", None if k else "SegNet, learned in eight ways")
-    ax.set(title="110 test frames, 95 % intervals over drives", xlim=(-9, 1), ylim=(-1.3, 1.3))
-
-
-# %% jupyter={"source_hidden": true} alt="left: settings of the search as dots, change in pixel accuracy against change in class accuracy; those above zero in pixel accuracy lie left of zero in class accuracy. Right: default, chosen and learned CRFs on test frames, with intervals; none gains in both"
-search, learned = kept("crf_search"), kept("learned_crf")
-fig, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="compressed", sharex=True, sharey=True)
-for ax, draw_on in zip(axes, (draw_search, draw_test), strict=True):
-    draw_on(ax)
-    ax.axhline(0, color="0.7", lw=0.8)
-    ax.axvline(0, color="0.7", lw=0.8)
-    ax.set_xlabel("class accuracy: change [points]")
-    ax.legend(loc="lower right", fontsize=8)
-plt.show()
-
-# %% jupyter={"source_hidden": true}
-print(f"{'points gained over the network alone, test frames':<57}    pixel accuracy    class accuracy      w1      w2")
-for name, file in FILES.items():
-    result = kept(file)
-    for goal in METRIC_NAMES[::-1]:
-        gains, found = result["test"]["gains"][f"calibrated, CRF for {goal}"], result["chosen"][goal]["params"]
-        row = "".join(f"{100 * gains[m][1]:+18.2f}" for m in METRIC_NAMES[::-1])
-        assert min(gains[m][1] for m in METRIC_NAMES) < 0
-        print(f"{name + ', searched for ' + goal:<57}{row}{found['w_bilateral']:8.2f}{found['w_spatial']:8.2f}")
-for name, values in learned["learnt"].items():
-    row = "".join(f"{100 * learned['gains'][name][m][1]:+18.2f}" for m in METRIC_NAMES[::-1])
-    assert min(learned["gains"][name][m][1] for m in METRIC_NAMES) < 0
-    print(f"{name.replace('learnt', 'learned').replace(', ', ' · '):<57}{row}{values['w1']:8.2f}{values['w2']:8.2f}")
-
-# %% [markdown]
-# **A searched CRF gains pixel accuracy and still costs class accuracy.** Chosen for pixel accuracy, it gains 0.4 to 0.7
-# points of it for each of the three networks, and loses 2.2 to 3.4 points of class accuracy, a third to a bit more than
-# half of what the default loses. Chosen for class accuracy, it hardly does anything: all changes are below 0.1 point,
-# and the weights are below a tenth. **Learning ends in the same place**: all weights shrink from 4 and 3 to below 0.3.
-# The variant that gains most class accuracy, 0.24 points, has learned which labels may stand beside each other, and
-# pays 0.15 points of pixel accuracy. None of these fourteen CRFs gains in both metrics. (One search for each network
-# and one training run for each variant, on simulated streets. The ranges of the search were changed once, after we had
-# looked at the scores of an earlier search.)
+# With the default weights pixel accuracy falls for two networks and rises for one, so the rise on our ten frames isn't the
+# rule; class accuracy falls for all three. Judged by labels made from LIDAR instead of true ones, pixel accuracy rises
+# for all three (lecture [12](12_experiments.ipynb)). So whether a CRF "helps" depends on the network, the metric and the
+# judge. Weights searched for pixel accuracy raise it for all three, and still cost class accuracy. The companion
+# [the CRF, measured](deeper/11_crf_measured.ipynb) shows the search, and weights that are learned.
 #
 # ## In five lines
 #

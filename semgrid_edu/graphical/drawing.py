@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical.dashed import Dashed, bounding_box, curve, render_dashed
 from semgrid_edu.graphical.factor import as_names, check_name
 from semgrid_edu.graphical.layout import Place, arrange
 from semgrid_edu.graphical.model import GraphicalModel
@@ -33,6 +34,8 @@ def draw(
     labels: Mapping[str, str] | None = None,
     equations: Mapping[str, str] | None = None,
     plates: Mapping[str, Iterable[str]] | None = None,
+    dashed: Iterable[Dashed] = (),
+    ghosts: Mapping[str, Place] | None = None,
 ) -> "Axes":
     r"""Draw a model: arrows from parents to children, or the factor graph of an undirected model.
 
@@ -56,6 +59,10 @@ def draw(
         Text to the right of a variable or factor, by name or label.
     plates : dict of str to iterable of str, optional
         What is repeated: {"$k = 1 \ldots K$": ("m", "z")} draws a box around m and z.
+    dashed : iterable of Dashed
+        Edges between any two nodes, drawn dashed; a straight one stands for the arrow between the same two.
+    ghosts : dict of str to (float, float), optional
+        Nodes that the model doesn't have, by name, and where they stand; drawn grey, with a dashed outline.
 
     Returns
     -------
@@ -75,12 +82,15 @@ def draw(
     """
     from semgrid_edu.graphical.rendering import render
 
-    positions, labels, equations = positions or {}, labels or {}, equations or {}
+    positions, labels, equations, ghosts = positions or {}, labels or {}, equations or {}, ghosts or {}
     plates = {text: as_names(of) for text, of in (plates or {}).items()}
     observed, highlight = as_names(observed), as_names(highlight)
-    _check(model, positions, equations, observed, highlight, labels, *plates.values())
-    where = arrange(model, positions, labels, equations, plates)
-    low, high = where.corners
+    texts = {name: text for name, text in labels.items() if name not in ghosts}
+    _check(model, positions, equations, observed, highlight, texts, *plates.values())
+    where = arrange(model, positions, labels, equations, plates, ghosts)
+    curves = {edge: curve(edge, where.places, where.said) for edge in dashed}
+    corners = np.concatenate([where.corners, *(bounding_box(*one) for one in curves.items())])
+    low, high = corners.min(axis=0), corners.max(axis=0)
     if ax is None:
         import matplotlib.pyplot as plt
 
@@ -88,7 +98,9 @@ def draw(
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     ax.set_axis_off()
     size = _font_size(ax, high - low)
-    render(model, where, ax, size, observed, highlight)
+    render(model, where, ax, size, observed, highlight, {frozenset(edge.ends) for edge in curves if not edge.bend})
+    for edge, points in curves.items():
+        render_dashed(edge, points, ax, size)
     for text, place in where.texts:
         ax.text(*place, text, fontsize=size, ha="left", va="center")
     return ax

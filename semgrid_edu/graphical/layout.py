@@ -153,10 +153,11 @@ def arrange(
     labels: Mapping[str, str],
     equations: Mapping[str, str],
     plates: Mapping[str, tuple[str, ...]],
+    ghosts: Mapping[str, Place],
 ) -> Arrangement:
     """Find a place for everything that `draw` draws. Parameters are those of `draw`."""
-    places = _places(model, positions)
-    said = {name: _said(name, labels) for name in model.names}
+    places = _places(model, positions) | dict(ghosts)
+    said = {name: _said(name, labels) for name in (*model.names, *ghosts)}
     texts = {name: (text, _beside(name, places, said)) for name, text in equations.items()}
     boxes = {text: _box(text, of, places, said, texts) for text, of in plates.items()}
     reach = np.array([(max(MARGIN, half_width(said.get(name, "")) + 0.05), MARGIN) for name in places])

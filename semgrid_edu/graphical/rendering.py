@@ -15,6 +15,10 @@ HIGHLIGHT = {"ec": "#d95f02", "lw": 3.0}
 """Outline of a highlighted node, three times as thick as the others: colour isn't the only mark."""
 
 
+GHOST = {"ec": "0.55", "ls": (0, (2, 2)), "fc": "0.97"}
+"""Look of a node that the model doesn't have."""
+
+
 def render(
     model: GraphicalModel,
     where: Arrangement,
@@ -22,6 +26,7 @@ def render(
     size: float,
     observed: Collection[str],
     highlight: Collection[str],
+    without: Collection[frozenset[str]] = (),
 ) -> None:
     """Draw plates, then edges, then nodes.
 
@@ -33,7 +38,10 @@ def render(
         Where everything stands.
     size : float
         Size of the texts, points.
+    without : collection of frozenset of str
+        Pairs of variables whose arrow is left out.
     """
+    look = dict.fromkeys(where.said.keys() - set(model.names), GHOST) | dict.fromkeys(highlight, HIGHLIGHT)
     nodes = {
         name: daft.Node(
             name,
@@ -42,7 +50,7 @@ def render(
             aspect=2 * half_width(text) / NODE,
             observed=name in observed,
             fontsize=size,
-            plot_params=HIGHLIGHT if name in highlight else {},
+            plot_params=look.get(name, {}),
         )
         for name, text in where.said.items()
     }
@@ -50,17 +58,18 @@ def render(
         daft.Plate([*low, *(high - low)], label=text, fontsize=size, rect_params={"fc": "none"})
         for text, (low, high) in where.boxes.items()
     ]
-    edges = _arrows(model, nodes) if model.directed else _factors(model, where, nodes)
+    edges = _arrows(model, nodes, without) if model.directed else _factors(model, where, nodes)
     context = daft.PGM(grid_unit=1.0, node_unit=NODE)._ctx  # `PGM.render` would open a figure of its own
     context._ax = ax
     for thing in (*plates, *edges, *nodes.values()):
         thing.render(context)
 
 
-def _arrows(model: GraphicalModel, nodes: dict[str, daft.Node]) -> list[daft.Edge]:
+def _arrows(model: GraphicalModel, nodes: dict[str, daft.Node], without: Collection) -> list[daft.Edge]:
     arrow = {"head_length": 0.14, "head_width": 0.1}
     pairs = [(above, child) for child, parents in model.parents.items() for above in parents]
-    return [daft.Edge(nodes[above], nodes[child], plot_params=arrow) for above, child in pairs]
+    kept = [pair for pair in pairs if frozenset(pair) not in without]
+    return [daft.Edge(nodes[above], nodes[child], plot_params=arrow) for above, child in kept]
 
 
 def _factors(model: GraphicalModel, where: Arrangement, nodes: dict[str, daft.Node]) -> list:

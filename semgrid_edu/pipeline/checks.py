@@ -32,7 +32,7 @@ class StageCheck:
     Parameters
     ----------
     stage : str
-        Name of the stage: "track", "segment", "sample", "fuse" or "refine".
+        Name of the stage: "track", "segment", "sample", "fuse", "refine" or "remember".
     function : callable
         The stage, the package's own or a student's.
     frame : int

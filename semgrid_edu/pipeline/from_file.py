@@ -7,14 +7,14 @@ from types import ModuleType
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.pipeline.hints import in_short
-from semgrid_edu.pipeline.stages import STAGES, Stages
+from semgrid_edu.pipeline.stages import REMEMBER, STAGES, Stages
 
-NAMES = ", ".join(STAGES)
+NAMES = ", ".join(STAGES | REMEMBER)
 """The names of the stages, for messages."""
 
 
 def load_stages(path: str | Path) -> Stages:
-    """Read stages from a Python file: its functions named track, segment, sample, fuse and refine.
+    """Read stages from a Python file: its functions named track, segment, sample, fuse, refine and remember.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def load_stages(path: str | Path) -> Stages:
         found = "another file" if path.is_file() else "a folder" if path.is_dir() else "no such file"
         raise DataError(path, f"a Python file with functions named {NAMES}", found)
     module = _imported(path)
-    found = {name: getattr(module, name) for name in STAGES if hasattr(module, name)}
+    found = {name: getattr(module, name) for name in STAGES | REMEMBER if hasattr(module, name)}
     if not found:
         others = [name for name, value in vars(module).items() if callable(value) and not name.startswith("_")]
         raise DataError(path, f"at least one function named {NAMES}", ", ".join(others) or "no function at all")

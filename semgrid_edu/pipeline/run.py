@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
@@ -17,11 +17,12 @@ from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import LABEL_SETS
+from semgrid_edu.memory import MemoryParams, View
 from semgrid_edu.networks import Architecture, SemanticGridNet, unit_image
 from semgrid_edu.occupancy import Belief, CmcdotParams
 from semgrid_edu.pipeline.checks import StageCheck, StageError
 from semgrid_edu.pipeline.stages import STAGES, Stages
-from semgrid_edu.pipeline.tracker_adapter import TrackerAdapter
+from semgrid_edu.pipeline.tracker_adapter import MemoryAdapter, TrackerAdapter
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,10 @@ class FrameResult:
         The semantic grid after refinement.
     seconds : dict of str to float
         How long each stage took, seconds, without the checks between them; by the names "track", "segment", "sample",
-        "fuse" and "refine".
+        "fuse" and "refine", and "remember" with memory.
+    remembered : (C, H, W) float32, or None
+        The semantic grid of this frame joined with what earlier frames said of its cells; None without memory. The CRF
+        doesn't refine it.
     """
 
     frame: Frame
@@ -51,6 +55,7 @@ class FrameResult:
     grid: NDArray[np.float32]
     refined: NDArray[np.float32]
     seconds: dict[str, float]
+    remembered: NDArray[np.float32] | None = None
 
 
 def run_pipeline(
@@ -59,6 +64,7 @@ def run_pipeline(
     occupancy: CmcdotParams | None = None,
     crf: CrfParams | None = None,
     seed: int = 0,
+    memory: bool | MemoryParams = False,
 ) -> Iterator[FrameResult]:
     """Send the frames of a drive through every stage, one after the other, and check what each stage hands on.
 
@@ -79,6 +85,9 @@ def run_pipeline(
         Parameters of the package's refinement; `CrfParams.for_cells` when left out.
     seed : int
         Seed for the particles of the package's filter.
+    memory : bool or MemoryParams
+        Whether class beliefs are carried over frames, or the parameters with which they are: then the results carry
+        `remembered`. A `remember` of your own stages takes the place of the package's.
 
     Yields
     ------
@@ -107,7 +116,7 @@ def run_pipeline(
         raise ArgumentError("frames", "the frames of a drive", repr(first)[:100])
     for doubt in frame_doubts(known if isinstance(known, Sequence) else [first]):
         warnings.warn(doubt, stacklevel=2)
-    complete = _complete(stages, first.camera, occupancy, crf, seed)
+    complete = _complete(stages, first.camera, occupancy, crf, seed, memory)
     for (result,) in run_side_by_side(chain([first], frames), complete):
         yield result
 
@@ -139,26 +148,41 @@ def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tupl
     """
     architecture = several[0].architecture
     for stages in several:
-        if stages.given != tuple(STAGES):
+        if not set(STAGES) <= set(stages.given):
             raise ArgumentError("several", "complete sets of stages, see `Stages.over`", f"only {stages.given}")
         if stages.architecture is None or stages.architecture != architecture:
             raise ArgumentError("several", f"one architecture, such as {architecture}", stages.architecture)
     trackers = {id(stages.track): TrackerAdapter(stages.track, architecture.grid) for stages in several}
+    memories = [MemoryAdapter(stages.remember, architecture.grid) if stages.remember else None for stages in several]
     for number, frame in enumerate(frames):
         work = FrameRunner(number, frame, architecture)
         beliefs = {key: tracker.belief(frame, number) for key, tracker in trackers.items()}
-        yield tuple(work.result(stages, *beliefs[id(stages.track)]) for stages in several)
-    for tracker in trackers.values():
-        tracker.finish()
+        results = [work.result(stages, *beliefs[id(stages.track)]) for stages in several]
+        yield tuple(_remembering(result, memory, number) for result, memory in zip(results, memories, strict=True))
+    for adapter in (*trackers.values(), *filter(None, memories)):
+        adapter.finish()
+
+
+def _remembering(result: FrameResult, memory: MemoryAdapter | None, number: int) -> FrameResult:
+    """Return a frame's result with what the memory makes of it."""
+    if memory is None:
+        return result
+    remembered, seconds = memory.grid(View(result.frame, result.belief, result.grid), number)
+    return replace(result, remembered=remembered, seconds=result.seconds | {"remember": seconds})
 
 
 def _complete(
-    stages: Stages | SemanticGridNet, camera: Camera, occupancy: CmcdotParams | None, crf: CrfParams | None, seed: int
+    stages: Stages | SemanticGridNet,
+    camera: Camera,
+    occupancy: CmcdotParams | None,
+    crf: CrfParams | None,
+    seed: int,
+    memory: bool | MemoryParams,
 ) -> Stages:
     if isinstance(stages, Stages):
-        return stages.completed(camera, occupancy, crf, seed)
+        return stages.completed(camera, occupancy, crf, seed, memory)
     if isinstance(stages, SemanticGridNet):
-        return Stages.of(stages, occupancy, crf, seed)
+        return Stages.of(stages, occupancy, crf, seed, memory=memory)
     raise ArgumentError("stages", "a network, or Stages(...) with functions in it", type(stages).__name__)
 
 

@@ -1,4 +1,4 @@
-"""The five stages of the system as functions that can be exchanged (paper, Fig. 2)."""
+"""The stages of the system as functions that can be exchanged (paper, Fig. 2), and a sixth that the paper cut."""
 
 import inspect
 from collections.abc import Callable, Iterable, Iterator
@@ -15,6 +15,8 @@ from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.memory import MemoryParams, View, remember_drive
 from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
 from semgrid_edu.occupancy import Belief, CmcdotParams, track_drive
 
@@ -25,14 +27,18 @@ STAGES = {
     "fuse": ("p", "o"),
     "refine": ("log_g", "o"),
 }
-"""The names of the stages, in their order, and of the arguments that each of them takes."""
+"""The names of the paper's stages, in their order, and of the arguments that each of them takes."""
+
+REMEMBER = {"remember": ("views", "spec")}
+"""The stage that the paper leaves out: without it, classes are forgotten at every frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stages:
-    """The five stages as functions on numpy arrays, one frame at a time.
+    """The stages as functions on numpy arrays, one frame at a time.
 
-    The package's own stages replace those that are left out. C is the number of classes, D the number of planes.
+    The package's own stages replace those of the paper's five that are left out. C is the number of classes, D the
+    number of planes.
 
     Parameters
     ----------
@@ -54,6 +60,10 @@ class Stages:
     architecture : Architecture, optional
         The grid, the image size, the planes and the classes that all stages work with; those of the package's own
         stages when left out.
+    remember : callable, optional
+        g -> g over frames: `remember(views, spec)` yields an array (C, H, W) float for each `View` (frame, belief and
+        g of that frame alone): probabilities that sum to 1 in each cell. A generator function, as `track` is. Without
+        it nothing is remembered.
 
     Raises
     ------
@@ -74,6 +84,7 @@ class Stages:
     fuse: Callable[[NDArray, NDArray], NDArray] | None = None
     refine: Callable[[NDArray, NDArray], NDArray] | None = None
     architecture: Architecture | None = None
+    remember: Callable[[Iterable[View], GridSpec], Iterator[NDArray]] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what isn't a function of the stage's arguments."""
@@ -83,7 +94,7 @@ class Stages:
     @property
     def given(self) -> tuple[str, ...]:
         """The names of the stages that weren't left out, in their order."""
-        return tuple(name for name in STAGES if getattr(self, name) is not None)
+        return tuple(name for name in STAGES | REMEMBER if getattr(self, name) is not None)
 
     @classmethod
     def of(
@@ -93,6 +104,7 @@ class Stages:
         crf: CrfParams | None = None,
         seed: int = 0,
         keep_steps: bool = False,
+        memory: bool | MemoryParams = False,
     ) -> "Stages":
         """Return the package's own five stages.
 
@@ -108,11 +120,13 @@ class Stages:
             Seed for the particles of the filter.
         keep_steps : bool
             Whether each belief also tells how the filter came to it, as `cell_story` asks for (`Belief.steps`).
+        memory : bool or MemoryParams
+            Whether classes are remembered over frames, or the parameters with which they are.
 
         Returns
         -------
         Stages
-            Five functions, and the network's architecture.
+            Five functions, six with memory, and the network's architecture.
 
         Raises
         ------
@@ -126,7 +140,8 @@ class Stages:
         """
         architecture = net.need_architecture()
         refine = _mean_field(crf, architecture.grid.cell)
-        return cls(_filter(occupancy, seed, keep_steps), *_functions_of(net), refine, architecture)
+        remember = _memory(memory, architecture.label_set)
+        return cls(_filter(occupancy, seed, keep_steps), *_functions_of(net), refine, architecture, remember)
 
     def over(self, other: "Stages") -> "Stages":
         """Return these stages, and those of `other` where one was left out.
@@ -151,7 +166,12 @@ class Stages:
         return replace(other, **{name: getattr(self, name) for name in self.given})
 
     def completed(
-        self, camera: Camera, occupancy: CmcdotParams | None = None, crf: CrfParams | None = None, seed: int = 0
+        self,
+        camera: Camera,
+        occupancy: CmcdotParams | None = None,
+        crf: CrfParams | None = None,
+        seed: int = 0,
+        memory: bool | MemoryParams = False,
     ) -> "Stages":
         """Return these stages, and the package's own where one was left out.
 
@@ -162,13 +182,13 @@ class Stages:
         ----------
         camera : Camera
             The camera as it took the images of the drive.
-        occupancy, crf, seed
-            Parameters of the package's own filter and refinement, and seed of the filter, as in `of`.
+        occupancy, crf, seed, memory
+            Parameters of the package's own filter and refinement, seed of the filter, and memory, as in `of`.
 
         Returns
         -------
         Stages
-            Five functions and their architecture.
+            Five functions, six with memory, and their architecture.
 
         Raises
         ------
@@ -180,14 +200,16 @@ class Stages:
         if {"segment", "sample", "fuse"} <= set(self.given):
             architecture = self.architecture or Architecture()
             refine = _mean_field(crf, architecture.grid.cell)
-            own = Stages(track=_filter(occupancy, seed), refine=refine, architecture=architecture)
+            remember = _memory(memory, architecture.label_set)
+            own = Stages(_filter(occupancy, seed), refine=refine, architecture=architecture, remember=remember)
         else:
-            own = self.of(load_net(sample_weights(), camera), occupancy, crf, seed)
+            own = self.of(load_net(sample_weights(), camera), occupancy, crf, seed, memory=memory)
         return self.over(own)
 
 
 def _check_function(name: str, function: object) -> None:
-    usage = f"a function {name}({', '.join(STAGES[name])})"
+    takes = (STAGES | REMEMBER)[name]
+    usage = f"a function {name}({', '.join(takes)})"
     if not callable(function):
         raise ArgumentError(name, usage, f"a {type(function).__name__}")
     if isinstance(function, type):
@@ -197,7 +219,7 @@ def _check_function(name: str, function: object) -> None:
     except ValueError:  # some functions written in C don't say what they take
         return
     try:
-        signature.bind(*STAGES[name])
+        signature.bind(*takes)
     except TypeError as error:
         raise ArgumentError(name, usage, f"{name}{signature}") from error
 
@@ -207,6 +229,22 @@ def _filter(params: CmcdotParams | None, seed: int, keep_steps: bool = False) ->
         return track_drive(frames, spec, params, seed, keep_steps)
 
     return track
+
+
+def _memory(memory: bool | MemoryParams, label_set: str) -> Callable | None:
+    """Return the stage `remember`, or None without memory."""
+    if memory is False:
+        return None
+    if not isinstance(memory, bool | MemoryParams):
+        raise ArgumentError("memory", "True, False or MemoryParams", type(memory).__name__)
+    if label_set != KITTI_14.name:
+        raise ArgumentError("memory", f"False with {label_set}, which has no class for what was never seen", memory)
+    params = None if memory is True else memory
+
+    def remember(views: Iterable[View], spec: GridSpec) -> Iterator[NDArray[np.float32]]:
+        return remember_drive(views, spec, params)
+
+    return remember
 
 
 def _functions_of(net: SemanticGridNet) -> tuple[Callable, Callable, Callable]:

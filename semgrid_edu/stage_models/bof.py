@@ -98,13 +98,13 @@ def bof_stage(world: CellsInARow = STANDING_OR_DRIVING) -> StageGraph:
         The row, of which the first belief and the first scan are used.
     """
     columns = range(1, len(world.cells) + 1)
-    rows = {"one{},1": 1.0, "c{},0": 0.0, "c{},1": -1.4, "z{},1": -2.4}
-    before, now = ({f"c{k},{t}": f"$c_{{{k}}}^{{{when}}}$" for k in columns} for t, when in ((0, "t-1"), (1, "t")))
+    rows = {"one{},1": 1.5, "c{},0": 0.0, "c{},1": -1.4, "z{},1": -2.4}
+    before, now = ({f"c{k},{t}": f"$m_{{{k}}}^{{{when}}}$" for k in columns} for t, when in ((0, "t-1"), (1, "t")))
     return StageGraph(
         "BOF: a cell and its antecedents",
         row_model(world, 1),
         observed=tuple(row_evidence(world, 1)),
-        positions={name.format(k): (1.5 * k, y) for name, y in rows.items() for k in columns},
+        positions={name.format(k): (1.9 * k, y) for name, y in rows.items() for k in columns},
         labels={f"one{k},1": r"$\leq 1$" for k in columns}
         | before
         | now

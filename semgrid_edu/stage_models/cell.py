@@ -83,10 +83,14 @@ def one_cell(
         directed(factors),
         observed=tuple(name for t in steps for name in (f"v{t}", f"z{t}")),
         positions=in_rows([None, *above], ["x0", *chain], [None, *below]),
-        labels={f"prior{t}": f"$x_{{{t}}}^-$" for t in steps},
-        equations={f"v{len(scans)}": "seen?", f"x{len(scans)}": "state", f"z{len(scans)}": "scan"},
+        labels={f"prior{t}": f"$m_{{{t}}}^-$" for t in steps}
+        | {f"x{t}": f"$m_{{{t}}}$" for t in (0, *steps)}
+        | {f"v{t}": "seen?" for t in steps}
+        | {"neighbour": "next cell", "front": "in front"},
+        equations={f"x{len(scans)}": "state", f"z{len(scans)}": "scan"},
         plates={"cells": tuple(dict.fromkeys(name for factor in factors for name in factor.names))},
         cut=cut_edges("cell"),
+        ghosts={"neighbour": (0.8, 1.1), "front": (3.0, 1.1)},
     )
 
 

@@ -74,18 +74,19 @@ def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGr
         _two_slices(world, cell),
         observed=evidence,
         positions={
-            "x0": (0, 0.4),
-            "x1": (2.4, 0.4),
-            "o1": (1.2, -0.5),
-            "one1": (1.2, -1.9),
-            "c0": (0, -2.9),
-            "c1": (2.4, -2.9),
-            "z1": (2.4, -3.9),
+            "x0": (0, 0.5),
+            "x1": (3.4, 0.5),
+            "o1": (1.7, -0.7),
+            "one1": (1.7, -2.1),
+            "c0": (0, -3.1),
+            "c1": (3.4, -3.1),
+            "z1": (3.4, -4.1),
         },
-        labels={"x0": "$x_{t-1}^{(i)}$", "x1": "$x_t^{(i)}$", "o1": "$o_t^{(i)}$", "one1": r"$\leq 1$"}
-        | {"c0": "$c_{k,t-1}$", "c1": "$c_{k,t}$", "z1": "$z_{k,t}$"},
+        labels={"x0": "$q_{t-1}^{(i)}$", "x1": "$q_t^{(i)}$", "o1": "along a wall?", "one1": r"$\leq 1$"}
+        | {"c0": "$m_k^{t-1}$", "c1": "$m_k^t$", "z1": "$z_k^t$", "neighbour": "$m_{k+1}^t$"},
         plates={"particles $i$": ("x0", "x1", "o1"), "cells $k$": ("c0", "c1", "one1", "z1")},
         cut=cut_edges("cmcdot"),
+        ghosts={"neighbour": (5.7, -3.1)},
     )
 
 

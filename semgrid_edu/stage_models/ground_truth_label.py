@@ -6,6 +6,7 @@ The second model is a cell of the ground truth, which gets its label by a vote o
 wrong pixels to all of them (lecture 09).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -53,11 +54,16 @@ def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> Stag
         "One scan, one pose error",
         directed(factors),
         observed=measured,
-        positions=in_rows(world.cells, (), reflected, measured, ["e"]),
+        positions=in_rows(world.cells, (), _apart(reflected), _apart(measured), ["e"]),
         equations={reflected[-1]: "which cell reflects", measured[-1]: "range", "e": "pose error"},
         plates={"scans": (*reflected, *measured, "e")},
         cut=cut_edges("pose"),
     )
+
+
+def _apart(names: Sequence[str]) -> list[str | None]:
+    """Leave a gap between neighbours of a row."""
+    return [place for name in names for place in (name, None)][:-1]
 
 
 def _offsets(world: BeamWorld) -> NDArray[np.int64]:
@@ -204,7 +210,9 @@ def lidar_label_stage(world: LabelWorld | None = None) -> StageGraph:
         observed=("o", *(f"{name}{k}" for k in range(1, world.returns + 1) for name in "ad")),
         positions=_positions(world.returns),
         equations={"m": "what stands there", "c": "calibration", "o": "occupancy", "y": "label"},
+        labels={"c": r"$\kappa$", "neighbour": "$y'$"},
         cut=cut_edges("label"),
+        ghosts={"neighbour": (0.9 * world.returns - 0.5, -2.4)},
     )
 
 
@@ -243,7 +251,7 @@ def _voted(world: LabelWorld) -> NDArray[np.float64]:
 
 def _positions(n: int) -> dict[str, tuple[float, float]]:
     """Place the world above, what is measured below it, and the label at the bottom."""
-    places = {"m": (1.0, 2.4), "c": (1.8 * n - 0.6, 2.4), "o": (-1.6, 0.0), "y": (0.9 * (n - 1) + 0.4, -1.2)}
+    places = {"m": (-0.2, 3.4), "c": (1.8 * n - 0.6, 3.4), "o": (-1.6, 0.0), "y": (0.9 * (n - 1) + 0.4, -1.2)}
     for k in range(n):
         places |= {f"a{k + 1}": (1.8 * k, 1.2), f"d{k + 1}": (1.8 * k + 0.8, 1.2), f"x{k + 1}": (1.8 * k + 0.4, 0.0)}
     return places

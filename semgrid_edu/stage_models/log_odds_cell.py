@@ -36,9 +36,11 @@ def one_log_odds_cell(scans: ArrayLike, prior: float = 0.5) -> StageGraph:
         directed([binary("m", prior), *factors]),
         observed=names,
         positions=in_rows(["m"], names),
+        labels={"next": "later", "front": "in front"},
         equations={"m": "free or occupied", names[-1]: "scan"},
         plates={"cells": ("m", *names)},
         cut=cut_edges("log-odds"),
+        ghosts={"next": (len(names) / 2 - 0.5, 1.3), "front": (-1.4, 0.1)},
     )
 
 

@@ -3,14 +3,56 @@
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.axes import Axes
 
+from semgrid_edu.graphical.dashed import Dashed
 from semgrid_edu.graphical.drawing import draw
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.model import GraphicalModel
+
+
+class Price(NamedTuple):
+    """What one cut edge costs, on a toy world where the exact answer is known.
+
+    Parameters
+    ----------
+    exact, system : float
+        The exact answer, and what comes out without the edge.
+    unit : str
+        What the two numbers are.
+    """
+
+    exact: float
+    system: float
+    unit: str
+
+    @property
+    def text(self) -> str:
+        """The two numbers as they are written on the edge, such as ".34 → .57"."""
+        return f"{short(self.exact)} \u2192 {short(self.system)}"
+
+
+def short(number: float) -> str:
+    """Write a number with two digits behind the point, or three where two would leave nothing of it.
+
+    Parameters
+    ----------
+    number : float
+        Not negative.
+
+    Examples
+    --------
+    >>> short(0.3), short(0.0512), short(0.998), short(1.241), short(1), short(0)
+    ('.30', '.051', '.998', '1.24', '1', '0')
+    """
+    digits = 3 if number < 0.0995 or 0.995 <= number < 0.9985 else 2
+    written = f"{number:.{digits}f}"
+    return f"{float(written):.0f}" if float(written).is_integer() else written.removeprefix("0")
 
 
 class CutEdge(NamedTuple):
@@ -22,14 +64,41 @@ class CutEdge(NamedTuple):
         Its two ends, such as "m1 - m2" or "s -> o".
     price : str
         One sentence: what the system leaves out there, and what that costs.
+    ends : tuple of str
+        The two drawn nodes that the dashed line joins.
+    measure : str
+        Name of the function of `stage_models.prices` that measures the price; empty where none has been measured.
+    bend, at : float
+        The line's curvature and the place of the price on it, as `Dashed` takes them.
     """
 
     edge: str
     price: str
+    ends: tuple[str, ...] = ()
+    measure: str = ""
+    bend: float = 0.0
+    at: float = 0.5
+
+    def measured(self) -> Price | None:
+        """Measure the price by exact inference; None where the edge has no measure."""
+        return measured_by(self.measure) if self.measure else None
+
+
+@cache
+def measured_by(measure: str) -> Price:
+    """Return a price, measured once per process.
+
+    Parameters
+    ----------
+    measure : str
+        Name of a function of `stage_models.prices`.
+    """
+    exact, system, unit = getattr(import_module("semgrid_edu.stage_models.prices"), measure)()  # imports all stages
+    return Price(float(exact), float(system), unit)
 
 
 CATALOGUE = Path(__file__).with_name("cut_edges.toml")
-"""The cut edges of all stages, in the order of the pipeline."""
+"""The cut edges of all stages, in the order of the pipeline, and the lecture that shows each stage."""
 
 
 def cut_edges(stage: str) -> tuple[CutEdge, ...]:
@@ -40,7 +109,8 @@ def cut_edges(stage: str) -> tuple[CutEdge, ...]:
     stage : str
         A key of `CATALOGUE`, such as "bof".
     """
-    return tuple(CutEdge(**edge) for edge in tomllib.loads(CATALOGUE.read_text(encoding="utf-8"))[stage])
+    edges = tomllib.loads(CATALOGUE.read_text(encoding="utf-8"))[stage]
+    return tuple(CutEdge(**edge | {"ends": tuple(edge.get("ends", ()))}) for edge in edges)
 
 
 def directed(factors: Iterable[Factor]) -> GraphicalModel:
@@ -88,6 +158,8 @@ class StageGraph:
         The nodes that are repeated for every cell, beam or step, by the text of the box around them.
     cut : tuple of CutEdge
         The edges that the real system cuts, and what that costs.
+    ghosts : dict of str to (float, float)
+        Nodes that the toy model leaves out, by name, and where they stand: ends of cut edges.
     """
 
     title: str
@@ -98,9 +170,12 @@ class StageGraph:
     equations: Mapping[str, str] = field(default_factory=dict)
     plates: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     cut: tuple[CutEdge, ...] = ()
+    ghosts: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def draw(self, ax: Axes | None = None, highlight: Iterable[str] = ()) -> Axes:
-        """Draw the graph.
+        """Draw the graph, with each cut edge dashed and its price on it: exact answer, arrow, the system's answer.
+
+        A cut edge isn't drawn where this graph doesn't have both its ends, as in a shorter row of cells.
 
         Parameters
         ----------
@@ -123,6 +198,20 @@ class StageGraph:
             labels=self.labels,
             equations=self.equations,
             plates=self.plates,
+            dashed=self.dashed,
+            ghosts=self.ghosts,
         )
         ax.set_title(self.title, wrap=True)
         return ax
+
+    @property
+    def dashed(self) -> list[Dashed]:
+        """The cut edges as they are drawn."""
+        drawn = {*self.model.names, *self.ghosts}
+        shown = [edge for edge in self.cut if edge.ends and drawn.issuperset(edge.ends)]
+        prices = [edge.measured() for edge in shown]
+        texts = [price.text if price else "" for price in prices]
+        return [
+            Dashed(edge.ends, text, " - " not in edge.edge, edge.bend, edge.at)
+            for edge, text in zip(shown, texts, strict=True)
+        ]

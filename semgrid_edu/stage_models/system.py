@@ -129,15 +129,15 @@ def _labels(world: SystemWorld, t: int) -> NDArray[np.float64]:
 def _positions(steps: int) -> dict[str, tuple[float, float]]:
     slots = {
         "near": (0.0, 1.0),
-        "far": (1.7, 0.0),
+        "far": (2.6, 0.0),
         "i": (0.0, -1.2),
-        "l": (1.7, -1.2),
-        "s": (0.0, -2.2),
-        "p": (0.0, -3.2),
-        "o": (1.7, -2.7),
-        "g": (0.85, -4.2),
+        "l": (2.6, -1.2),
+        "s": (0.0, -2.4),
+        "p": (0.0, -3.5),
+        "o": (2.6, -2.9),
+        "g": (1.3, -4.6),
     }
-    return {f"{name}{t}": (x + 3.4 * t, y) for t in range(steps) for name, (x, y) in slots.items()}
+    return {f"{name}{t}": (x + 4.6 * t, y) for t in range(steps) for name, (x, y) in slots.items()}
 
 
 def _node_labels(steps: int) -> dict[str, str]:
@@ -157,7 +157,7 @@ def _words(steps: int) -> dict[str, str]:
         "p": "planes",
         "g": "semantic grid",
     }
-    return {f"{name}{steps - 1}": text for name, text in words.items()}
+    return {f"{name}{0 if name in 'isp' else steps - 1}": text for name, text in words.items()}
 
 
 class Score(NamedTuple):

@@ -25,14 +25,14 @@ PATIENT = replace(SETTINGS, timeout=30)
 def with_entries(entries):
     """Return a notebook in which catalogued answers stand in place of the reference, and what it should earn."""
     answers = REFERENCE | {entry.task: entry.code for entry in entries}
-    return handed_in(answers), 13 - sum(entry.loses for entry in entries)
+    return handed_in(answers), 15 - sum(entry.loses for entry in entries)
 
 
 def changed(change):
     """Return a right notebook after something happened to it."""
     notebook = handed_in()
     change(notebook)
-    return notebook, 13
+    return notebook, 15
 
 
 def class_of_thirty():
@@ -40,15 +40,15 @@ def class_of_thirty():
     entries = catalogue.TestBayes.entries
     rights = {task: [e for e in entries if e.task == task and not e.loses] for task in POINTS}
     wrongs = {task: [e for e in entries if e.task == task and e.loses and "timeout" not in e.says] for task in POINTS}
-    found = {"right-0": (handed_in(), 13), "untouched-0": (handed_in({}), 0)}
+    found = {"right-0": (handed_in(), 15), "untouched-0": (handed_in({}), 0)}
     found |= {f"right-{k}": with_entries([ways[k - 1] for ways in rights.values()]) for k in (1, 2)}
-    for k, without in enumerate(combinations(POINTS, 2)):
+    for k, without in enumerate(list(combinations(POINTS, 2))[:10]):
         answers = {task: code for task, code in REFERENCE.items() if task not in without}
-        found[f"partly-{k}"] = handed_in(answers), 13 - sum(POINTS[task] for task in without)
+        found[f"partly-{k}"] = handed_in(answers), 15 - sum(POINTS[task] for task in without)
     found |= {f"wrong-{k}": with_entries([ways[k % len(ways)] for ways in wrongs.values()]) for k in range(5)}
     happened = (fair.split, fair.duplicate, fair.delete_setup, fair.import_in_setup, fair.scratch)
     found |= {f"unlucky-{change.__name__}": changed(change) for change in happened}
-    found["unlucky-exit"] = handed_in(inside("predict", "exit()")), 10
+    found["unlucky-exit"] = handed_in(inside("predict", "exit()")), 12
     hostile = ("transformer", "fake-module", "patched-numpy", "frames", "subclass")
     found |= {f"hostile-{k}": (handed_in(sound.EASIER, sound.EASY + sound.ATTACKS[k]), 0) for k in hostile}
     return found
@@ -93,11 +93,11 @@ def test_everybody_gets_feedback(graded):
         with course_api(course) as api:
             assert api.generate_feedback(NAME, student)["success"]
         page = place(course, "feedback", student, NAME).with_suffix(".html").read_text()
-        assert f"{expected[student]:.1f} / 15.0" in page
+        assert f"{expected[student]:.1f} / 17.0" in page
 
 
 def test_what_is_graded_is_not_graded_again_unless_it_is_handed_in_again(graded):
     course, _, _ = graded
     assert list(grade_course(course, PATIENT)) == []
     write_notebook(handed_in(), place(course, "submitted", "untouched-0", NAME))
-    assert [(one.student, one.score) for one in grade_course(course, PATIENT)] == [("untouched-0", 13)]
+    assert [(one.student, one.score) for one in grade_course(course, PATIENT)] == [("untouched-0", 15)]

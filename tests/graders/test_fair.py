@@ -33,7 +33,7 @@ NOISE = {  # the strict one last, because it changes how the others would end
 
 
 def test_what_is_said_beside_costs_nothing(course):
-    assert graded(course, "noisy", handed_in(inside("locate", "\n    ".join(NOISE.values())))).score == 13
+    assert graded(course, "noisy", handed_in(inside("locate", "\n    ".join(NOISE.values())))).score == 15
 
 
 def twin(cell):
@@ -59,7 +59,7 @@ def delete_setup(notebook):
 def import_in_setup(notebook):
     notebook.cells[cell_of(notebook, "setup")].source += "\nfrom math import log as natural"
     cell = notebook.cells[cell_of(notebook, "transition")]
-    cell.source = cell.source.replace("np.log(2)", "natural(2)")
+    cell.source = cell.source.replace("np.log(0.5)", "natural(0.5)")
 
 
 def delete_a_test(notebook):
@@ -97,7 +97,7 @@ def forget_everything_nbgrader_wrote(notebook):
 def test_a_changed_notebook_keeps_its_points(course, change):
     notebook = handed_in()
     change(notebook)
-    assert graded(course, change.__name__, notebook).score == 13
+    assert graded(course, change.__name__, notebook).score == 15
 
 
 def test_helpers_may_have_any_name(course):
@@ -105,7 +105,7 @@ def test_helpers_may_have_any_name(course):
     helpers = "\n".join(f"def {name}(x): return x" for name in names)
     uses = "x = " + "(".join(names) + "(1" + ")" * len(names)
     answers = {name: f"{helpers}\n{code}\n{uses}" for name, code in inside("follow", uses).items()}
-    assert graded(course, "helpers", handed_in(answers)).score == 13
+    assert graded(course, "helpers", handed_in(answers)).score == 15
 
 
 def test_lists_are_as_good_as_arrays(course):
@@ -116,9 +116,10 @@ def test_lists_are_as_good_as_arrays(course):
         "follow": "follow",
         "transition": "transition",
         "fuse": "fuse",
+        "build-map": "build_map",
     }
     answers = {n: f"{code}{as_lists}\n{functions[n]} = as_lists({functions[n]})" for n, code in REFERENCE.items()}
-    assert graded(course, "lists", handed_in(answers)).score == 13
+    assert graded(course, "lists", handed_in(answers)).score == 15
 
 
 ENDS = {
@@ -136,7 +137,7 @@ ENDS = {
 def test_a_task_that_ends_python_costs_its_own_points(course, kind):
     settings = GradeSettings(timeout=2 if kind == "swallows" else 5)
     result = graded(course, kind, handed_in(inside("predict", ENDS[kind])), settings)
-    assert result.score == 10
+    assert result.score == 12
     if kind in ("os-exit", "crash", "swallows"):
         assert result.note.startswith("Crashed: ")
 
@@ -144,7 +145,7 @@ def test_a_task_that_ends_python_costs_its_own_points(course, kind):
 def test_a_cell_that_ends_python_costs_its_own_points(course):
     answers = REFERENCE | {"predict": "import os\nos._exit(0)"}
     result = graded(course, "cell-exit", handed_in(answers))
-    assert result.score == 10
+    assert result.score == 12
     assert "Python itself ended here" in result.note
 
 
@@ -152,7 +153,7 @@ def test_a_deleted_task_costs_its_own_points(course):
     notebook = handed_in()
     for name in ("predict", "predict-test", "predict-wall-test"):
         del notebook.cells[cell_of(notebook, name)]
-    assert graded(course, "deleted", notebook).score == 10
+    assert graded(course, "deleted", notebook).score == 12
 
 
 def test_who_crashed_gets_feedback_and_the_written_answer_is_read(course):
@@ -172,7 +173,7 @@ def test_who_crashed_gets_feedback_and_the_written_answer_is_read(course):
 @pytest.mark.parametrize("content", ['{"cells": [', "", "[]", '{"cells": 3, "metadata": {}, "nbformat": 4}'])
 def test_a_file_that_is_no_notebook_says_so(course, content):
     result = graded(course, f"broken-{len(content)}", content)
-    assert (result.score, result.points) == (0, 15)
+    assert (result.score, result.points) == (0, 17)
     assert result.note.startswith("Crashed: the file can't be graded")
 
 

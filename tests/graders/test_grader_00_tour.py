@@ -427,4 +427,106 @@ def accuracies(confusion):
     seen = cells > 0
     return (confusion.diagonal()[seen] / cells[seen]).mean(), np.trace(confusion) / confusion.sum()""",
         ),
+        # ---- task 5
+        right(
+            "a loop over classes",
+            task="fmiou",
+            code="""
+def fm_iou(confusion):
+    total = 0.0
+    for c in range(len(confusion)):
+        cells, claimed, found = sum(confusion[c]), sum(row[c] for row in confusion), confusion[c][c]
+        if cells:
+            total += cells / np.sum(confusion) * found / (cells + claimed - found)
+    return total""",
+        ),
+        right(
+            "the union not below one, which changes nothing",
+            task="fmiou",
+            code="""
+def fm_iou(confusion):
+    cells, claimed, right = confusion.sum(axis=1), confusion.sum(axis=0), confusion.diagonal()
+    return np.average(right / np.maximum(cells + claimed - right, 1), weights=cells)""",
+        ),
+        mistake(
+            "plain mean",
+            task="fmiou",
+            loses=3,
+            says="plain mean of the two IoUs",
+            code="""
+def fm_iou(confusion):
+    right = confusion.diagonal()
+    union = confusion.sum(axis=0) + confusion.sum(axis=1) - right
+    return (right / np.maximum(union, 1))[union > 0].mean()""",
+        ),
+        mistake(
+            "divided by the truth alone",
+            task="fmiou",
+            loses=3,
+            says="that is the pixel accuracy",
+            code="""
+def fm_iou(confusion):
+    cells = confusion.sum(axis=1)
+    return (cells / cells.sum() * confusion.diagonal() / np.maximum(cells, 1)).sum()""",
+        ),
+        mistake(
+            "the right cells counted twice",
+            task="fmiou",
+            loses=3,
+            says="you count the right cells twice",
+            code="""
+def fm_iou(confusion):
+    cells, claimed = confusion.sum(axis=1), confusion.sum(axis=0)
+    return (cells / cells.sum() * confusion.diagonal() / np.maximum(cells + claimed, 1)).sum()""",
+        ),
+        mistake(
+            "divided by what is claimed",
+            task="fmiou",
+            loses=3,
+            says="cells that are claimed only",
+            code="""
+def fm_iou(confusion):
+    cells, claimed = confusion.sum(axis=1), confusion.sum(axis=0)
+    return (cells / cells.sum() * confusion.diagonal() / np.maximum(claimed, 1)).sum()""",
+        ),
+        mistake(
+            "a class that never occurs makes it NaN",
+            task="fmiou",
+            loses=3,
+            says="0 / 0 is not a share",
+            code="""
+def fm_iou(confusion):
+    cells, right = confusion.sum(axis=1), confusion.diagonal()
+    return (cells / cells.sum() * right / (cells + confusion.sum(axis=0) - right)).sum()""",
+        ),
+        mistake(
+            "weighted by what is claimed",
+            task="fmiou",
+            loses=3,
+            says="weight each by how frequent the class is in the truth",
+            code="""
+def fm_iou(confusion):
+    cells, claimed, right = confusion.sum(axis=1), confusion.sum(axis=0), confusion.diagonal()
+    return np.average(right / np.maximum(cells + claimed - right, 1), weights=claimed)""",
+        ),
+        mistake(
+            "the answer of the example",
+            task="fmiou",
+            loses=3,
+            says="on inputs you haven't seen: wrong FmIoU",
+            code="def fm_iou(confusion):\n    return 0.625",
+        ),
+        mistake(
+            "the argument changed",
+            task="fmiou",
+            loses=3,
+            says="changed its argument",
+            code="""
+def fm_iou(confusion):
+    right = confusion.diagonal().copy()
+    cells = confusion.sum(axis=1)
+    union = np.maximum(cells + confusion.sum(axis=0) - right, 1)
+    confusion *= 0
+    return (cells / cells.sum() * right / union).sum()""",
+        ),
     )

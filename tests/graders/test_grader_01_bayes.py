@@ -2,17 +2,6 @@
 
 from grader_checks import GraderChecks, mistake, right
 
-HALF_LIFE = "\n\n\ndef half_life(appears, vanishes):\n    return np.log(2) / (appears + vanishes)"
-TRANSITION = """
-import scipy.linalg
-
-
-def transition(appears, vanishes, dt):
-    return scipy.linalg.expm(dt * np.array([[-appears, appears], [vanishes, -vanishes]]))
-
-
-"""
-
 
 class TestBayes(GraderChecks):
     exercise = "01_bayes"
@@ -190,17 +179,6 @@ def locate(belief, says_pole, poles, hit, false_alarm):
         ),
         # ---- task 2
         right(
-            "rolled copies, and a pile at the wall",
-            task="predict",
-            code="""
-def predict(belief, moved, ring=True):
-    if ring:
-        return sum(m * np.roll(belief, d) for d, m in enumerate(moved))
-    long = np.convolve(belief, moved)
-    n = len(belief)
-    return np.append(long[: n - 1], long[n - 1 :].sum())""",
-        ),
-        right(
             "a transition matrix",
             task="predict",
             code="""
@@ -208,22 +186,87 @@ def predict(belief, moved, ring=True):
     n = len(belief)
     M = np.zeros((n, n))
     for i in range(n):
-        for d, m in enumerate(moved):
-            M[i, (i + d) % n if ring else min(i + d, n - 1)] += m
+        for d, p in enumerate(moved[i]):
+            M[i, (i + d) % n if ring else min(i + d, n - 1)] += p
     return belief @ M""",
+        ),
+        right(
+            "one distance at a time, all cells at once",
+            task="predict",
+            code="""
+def predict(belief, moved, ring=True):
+    n = len(belief)
+    if ring:
+        return sum(np.roll(belief * moved[:, d], d) for d in range(moved.shape[1]))
+    after = np.zeros(n)
+    for d in range(moved.shape[1]):
+        np.add.at(after, np.minimum(np.arange(n) + d, n - 1), belief * moved[:, d])
+    return after""",
         ),
         right(
             "a sum over where it comes from, with the wall as the rest",
             task="predict",
             code="""
 def predict(belief, moved, ring=True):
-    after = []
-    for n in range(len(belief)):
-        from_where = [(n - d) % len(belief) if ring else n - d for d in range(len(moved))]
-        after.append(sum(m * belief[f] for m, f in zip(moved, from_where) if f >= 0))
+    N, after = len(belief), []
+    for n in range(N):
+        sources = [(d, (n - d) % N if ring else n - d) for d in range(len(moved[0]))]
+        after.append(sum(moved[f][d] * belief[f] for d, f in sources if f >= 0))
     if not ring:
         after[-1] = 1 - sum(after[:-1])
     return np.array(after)""",
+        ),
+        right(
+            "an array of the standard library",
+            task="predict",
+            code="""
+from array import array
+
+def predict(belief, moved, ring=True):
+    after = array("d", [0] * len(belief))
+    for n, b in enumerate(belief):
+        for d, p in enumerate(moved[n]):
+            after[(n + d) % len(after) if ring else min(n + d, len(after) - 1)] += b * p
+    return after""",
+        ),
+        mistake(
+            "the function that the lecture prints",
+            task="predict",
+            loses=3,
+            says="array element with a sequence",
+            code="""
+def predict(belief, moved, ring=True):
+    after = np.zeros(len(belief))
+    for n in range(len(belief)):
+        for d, p in enumerate(moved):
+            after[n] += p * belief[(n - d) % len(belief)]
+    return after""",
+        ),
+        mistake(
+            "the ice where it arrives",
+            task="predict",
+            loses=3,
+            says="the ice is where it starts",
+            code="""
+def predict(belief, moved, ring=True):
+    n_cells, after = len(belief), np.zeros(len(belief))
+    for n in range(n_cells):
+        for d in range(moved.shape[1]):
+            after[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += moved[(n + d) % n_cells, d] * belief[n]
+    return after""",
+        ),
+        mistake(
+            "the first row for all cells",
+            task="predict",
+            loses=2,
+            says="each cell has its own row",
+            code="""
+def predict(belief, moved, ring=True):
+    n_cells, after = len(belief), np.zeros(len(belief))
+    for n in range(n_cells):
+        for d in range(moved.shape[1]):
+            after[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += moved[0, d] * belief[n]
+    return after""",
         ),
         mistake(
             "backwards",
@@ -232,23 +275,23 @@ def predict(belief, moved, ring=True):
             says="that drives backwards",
             code="""
 def predict(belief, moved, ring=True):
-    n_cells = len(belief)
-    if ring:
-        return sum(m * np.roll(belief, -d) for d, m in enumerate(moved))
-    long = np.convolve(belief, moved)
-    return np.append(long[: n_cells - 1], long[n_cells - 1 :].sum())""",
+    n_cells, after = len(belief), np.zeros(len(belief))
+    for n in range(n_cells):
+        for d in range(moved.shape[1]):
+            after[(n - d) % n_cells if ring else max(n - d, 0)] += moved[n, d] * belief[n]
+    return after""",
         ),
         mistake(
-            "kernel reversed",
+            "rows reversed",
             task="predict",
             loses=2,
-            says="the kernel is reversed",
+            says="the rows are reversed",
             code="""
 def predict(belief, moved, ring=True):
     n_cells, after = len(belief), np.zeros(len(belief))
     for n in range(n_cells):
-        for d, m in enumerate(moved[::-1]):
-            after[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += m * belief[n]
+        for d in range(moved.shape[1]):
+            after[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += moved[n, -1 - d] * belief[n]
     return after""",
         ),
         mistake(
@@ -260,8 +303,8 @@ def predict(belief, moved, ring=True):
 def predict(belief, moved, ring=True):
     n_cells, after = len(belief), np.zeros(len(belief))
     for n in range(n_cells):
-        for d, m in enumerate(moved, start=-(len(moved) // 2)):
-            after[(n + d) % n_cells if ring else min(max(n + d, 0), n_cells - 1)] += m * belief[n]
+        for d in range(moved.shape[1]):
+            after[(n + d - 1) % n_cells if ring else min(max(n + d - 1, 0), n_cells - 1)] += moved[n, d] * belief[n]
     return after""",
         ),
         mistake(
@@ -273,8 +316,8 @@ def predict(belief, moved, ring=True):
 def predict(belief, moved, ring=True):
     n_cells, after = len(belief), np.zeros(len(belief))
     for n in range(n_cells):
-        for d, m in enumerate(moved, start=1):
-            after[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += m * belief[n]
+        for d in range(moved.shape[1]):
+            after[(n + d + 1) % n_cells if ring else min(n + d + 1, n_cells - 1)] += moved[n, d] * belief[n]
     return after""",
         ),
         mistake(
@@ -282,7 +325,12 @@ def predict(belief, moved, ring=True):
             task="predict",
             loses=3,
             says="on a ring it arrives in cell 0",
-            code="def predict(belief, moved, ring=True):\n    return np.convolve(belief, moved)[: len(belief)]",
+            code="""
+def predict(belief, moved, ring=True):
+    after = np.zeros(len(belief) + moved.shape[1])
+    for n, b in enumerate(belief):
+        after[n : n + moved.shape[1]] += b * moved[n]
+    return after[: len(belief)]""",
         ),
         mistake(
             "a ring for ever",
@@ -291,18 +339,27 @@ def predict(belief, moved, ring=True):
             says="nothing comes round to cell 0",
             code="""
 def predict(belief, moved, ring=True):
-    return sum(m * np.roll(belief, d) for d, m in enumerate(moved))""",
+    n_cells, after = len(belief), np.zeros(len(belief))
+    for n in range(n_cells):
+        for d in range(moved.shape[1]):
+            after[(n + d) % n_cells if ring else (n + d) % n_cells] += moved[n, d] * belief[n]
+    return after""",
         ),
         mistake(
             "lost at the wall",
             task="predict",
             loses=1,
-            says="who would drive beyond the wall stands in the last cell",
+            says="what would drive beyond the wall stands in the last cell",
             code="""
 def predict(belief, moved, ring=True):
-    if not ring:
-        return np.convolve(belief, moved)[: len(belief)]
-    return sum(m * np.roll(belief, d) for d, m in enumerate(moved))""",
+    n_cells, after = len(belief), np.zeros(len(belief))
+    beyond = 0
+    for n in range(n_cells):
+        for d in range(moved.shape[1]):
+            if not ring and n + d >= n_cells:
+                continue
+            after[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += moved[n, d] * belief[n]
+    return after""",
         ),
         mistake(
             "normalised at the wall",
@@ -311,13 +368,16 @@ def predict(belief, moved, ring=True):
             says="went to all cells, not to the last",
             code="""
 def predict(belief, moved, ring=True):
-    if not ring:
-        kept = np.convolve(belief, moved)[: len(belief)]
-        return kept / kept.sum()
-    return sum(m * np.roll(belief, d) for d, m in enumerate(moved))""",
+    n_cells, after = len(belief), np.zeros(len(belief))
+    for n in range(n_cells):
+        for d in range(moved.shape[1]):
+            if not ring and n + d >= n_cells:
+                continue
+            after[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += moved[n, d] * belief[n]
+    return after / after.sum()""",
         ),
         mistake(
-            "a kernel of three written in",
+            "moves of at most two cells written in",
             task="predict",
             loses=2,
             says="on inputs you haven't seen: probability is lost or made",
@@ -326,21 +386,22 @@ def predict(belief, moved, ring=True):
     n_cells, after = len(belief), np.zeros(len(belief))
     for n in range(n_cells):
         for d in (0, 1, 2):
-            after[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += moved[d] * belief[n]
+            after[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += moved[n, d] * belief[n]
     return after""",
         ),
         mistake(
-            "only two cells stand before the wall",
+            "belief changed in place",
             task="predict",
-            loses=1,
-            says="on inputs you haven't seen",
+            loses=3,
+            says="changed its argument `belief`",
             code="""
 def predict(belief, moved, ring=True):
-    if ring:
-        return sum(m * np.roll(belief, d) for d, m in enumerate(moved))
-    after = np.convolve(belief, moved)[: len(belief)]
-    after[-1] += belief[-1] * (moved[1] + moved[2]) + belief[-2] * moved[2]
-    return after""",
+    n_cells, before = len(belief), belief.copy()
+    belief[:] = 0
+    for n in range(n_cells):
+        for d in range(moved.shape[1]):
+            belief[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += moved[n, d] * before[n]
+    return belief""",
         ),
         mistake(
             "endless loop",
@@ -354,44 +415,354 @@ def predict(belief, moved, ring=True):
         after = np.roll(after, 1)
     return after""",
         ),
+        mistake(
+            "always the first cell, for roads that aren't known",
+            task="predict",
+            loses=3,
+            says="on inputs you haven't seen",
+            code="""
+def predict(belief, moved, ring=True):
+    n_cells, after = len(belief), np.zeros(len(belief))
+    for n in range(n_cells):
+        for d in range(moved.shape[1]):
+            after[(n + d) % n_cells if ring else min(n + d, n_cells - 1)] += moved[n, d] * belief[n]
+    return after
+
+
+_right = predict
+
+
+def predict(belief, moved, ring=True):
+    return _right(belief, moved, ring) if moved[0][0] == 0.1 else np.eye(len(belief))[0]""",
+        ),
         # ---- task 3
         right(
             "lists and loops",
             task="follow",
             code="""
-def follow(belief, likelihoods, M):
-    S = range(len(belief))
-    rows = []
+def _share(values):
+    return [v / sum(values) for v in values]
+
+
+def follow(belief, likelihoods, M, lag=0):
+    S, rows, answers = range(len(belief)), [], []
     for likelihood in likelihoods:
         prior = [sum(belief[i] * M[i][j] for i in S) for j in S]
-        product = [prior[j] * likelihood[j] for j in S]
-        belief = [p / sum(product) for p in product]
+        belief = _share([prior[j] * likelihood[j] for j in S])
         rows.append(belief)
-    return rows""",
+    for t, row in enumerate(rows):
+        message = [1.0 for _ in S]
+        for k in range(min(t + lag, len(rows) - 1), t, -1):
+            message = _share([sum(M[i][j] * likelihoods[k][j] * message[j] for j in S) for i in S])
+        answers.append(_share([r * m for r, m in zip(row, message)]))
+    return answers""",
         ),
         right(
-            "columns, with the matrix transposed",
+            "forward only: the state at t and the state now, as a table",
             task="follow",
             code="""
-def follow(belief, likelihoods, M):
-    history = np.empty(likelihoods.shape)
-    for k in range(len(likelihoods)):
-        belief = np.diag(likelihoods[k]) @ M.T @ belief
-        belief /= np.linalg.norm(belief, ord=1)
-        history[k] = belief
-    return history""",
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    answers = []
+    for t, row in enumerate(rows):
+        pair = np.diag(row)
+        for later in likelihoods[t + 1 : t + 1 + lag]:
+            pair = (pair @ M) * later
+            pair = pair / pair.sum()
+        answers.append(pair.sum(axis=1))
+    return np.array(answers)""",
         ),
         right(
             "in logarithms",
             task="follow",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     log, rows = np.log(belief), []
     for likelihood in likelihoods:
         log = np.logaddexp.reduce(log[:, None] + np.log(M), axis=0) + np.log(likelihood)
         log = log - np.logaddexp.reduce(log)
-        rows.append(np.exp(log))
-    return np.array(rows)""",
+        rows.append(log)
+    for t in range(len(rows)):
+        message = np.zeros(len(belief))
+        for later in likelihoods[t + 1 : t + 1 + lag][::-1]:
+            message = np.logaddexp.reduce(np.log(M) + np.log(later) + message, axis=1)
+        rows[t] = rows[t] + message
+        rows[t] = rows[t] - np.logaddexp.reduce(rows[t])
+    return np.exp(rows)""",
+        ),
+        right(
+            "fractions in a deque",
+            task="follow",
+            code="""
+from collections import deque
+from fractions import Fraction
+
+
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    for t in range(len(rows)):
+        message = np.ones(len(belief))
+        for later in likelihoods[t + 1 : t + 1 + lag][::-1]:
+            message = M @ (later * message)
+            message = message / message.sum()
+        rows[t] = rows[t] * message / (rows[t] @ message)
+    return deque([Fraction(p) for p in row] for row in rows)""",
+        ),
+        mistake(
+            "no lag: the filter",
+            task="follow",
+            loses=2,
+            says="that is the filter: with `lag=1`",
+            code="""
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    return _forward(belief, likelihoods, M)""",
+        ),
+        mistake(
+            "all later scans, whatever the lag",
+            task="follow",
+            loses=2,
+            says="with `lag=1` only the next one",
+            code="""
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    for t in range(len(rows)):
+        message = np.ones(len(belief))
+        for later in likelihoods[t + 1 : None if lag else t + 1][::-1]:
+            message = M @ (later * message)
+            message = message / message.sum()
+        rows[t] = rows[t] * message / (rows[t] @ message)
+    return rows""",
+        ),
+        mistake(
+            "one scan too many",
+            task="follow",
+            loses=2,
+            says="with `lag=1` only for the next one",
+            code="""
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    for t in range(len(rows)):
+        message = np.ones(len(belief))
+        for later in likelihoods[t + 1 : t + 1 + lag + (lag > 0)][::-1]:
+            message = M @ (later * message)
+            message = message / message.sum()
+        rows[t] = rows[t] * message / (rows[t] @ message)
+    return rows""",
+        ),
+        mistake(
+            "the filter, later",
+            task="follow",
+            loses=2,
+            says="the filter one scan later",
+            code="""
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    return rows[np.minimum(np.arange(len(rows)) + lag, len(rows) - 1)]""",
+        ),
+        mistake(
+            "backward with M transposed",
+            task="follow",
+            loses=2,
+            says="backward in time",
+            code="""
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    for t in range(len(rows)):
+        message = np.ones(len(belief))
+        for later in likelihoods[t + 1 : t + 1 + lag][::-1]:
+            message = (later * message) @ M
+            message = message / message.sum()
+        rows[t] = rows[t] * message / (rows[t] @ message)
+    return rows""",
+        ),
+        mistake(
+            "the later scan taken as one of now",
+            task="follow",
+            loses=2,
+            says="bring it back by M",
+            code="""
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    for t in range(len(rows)):
+        message = np.ones(len(belief))
+        for later in likelihoods[t + 1 : t + 1 + lag][::-1]:
+            message = later * message
+            message = message / message.sum()
+        rows[t] = rows[t] * message / (rows[t] @ message)
+    return rows""",
+        ),
+        mistake(
+            "its own scan twice",
+            task="follow",
+            loses=2,
+            says="counts scan t twice",
+            code="""
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    for t in range(len(rows)):
+        message = np.ones(len(belief))
+        for later in likelihoods[t : t + 1 + lag][::-1] if lag else []:
+            message = M @ (later * message)
+            message = message / message.sum()
+        rows[t] = rows[t] * message / (rows[t] @ message)
+    return rows""",
+        ),
+        mistake(
+            "the message never normalised",
+            task="follow",
+            loses=2,
+            says="on inputs you haven't seen: NaN with a lag of 100",
+            code="""
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    for t in range(len(rows)):
+        message = np.ones(len(belief))
+        for later in likelihoods[t + 1 : t + 1 + lag][::-1]:
+            message = M @ (later * message)
+        rows[t] = rows[t] * message / (rows[t] @ message)
+    return rows""",
+        ),
+        mistake(
+            "the last rows left alone",
+            task="follow",
+            loses=2,
+            says="on inputs you haven't seen: wrong at scan",
+            code="""
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    for t in range(len(rows)):
+        if t + lag >= len(rows):
+            continue
+        message = np.ones(len(belief))
+        for later in likelihoods[t + 1 : t + 1 + lag][::-1]:
+            message = M @ (later * message)
+            message = message / message.sum()
+        rows[t] = rows[t] * message / (rows[t] @ message)
+    return rows""",
+        ),
+        mistake(
+            "a lag of one written in",
+            task="follow",
+            loses=2,
+            says="on inputs you haven't seen: wrong at scan",
+            code="""
+def _forward(belief, likelihoods, M):
+    rows = []
+    for likelihood in likelihoods:
+        belief = (belief @ M) * likelihood
+        belief = belief / belief.sum()
+        rows.append(belief)
+    return np.array(rows)
+
+
+def follow(belief, likelihoods, M, lag=0):
+    rows = _forward(belief, likelihoods, M)
+    for t in range(len(rows)):
+        message = np.ones(len(belief))
+        for later in likelihoods[t + 1 : t + 1 + min(lag, 1)][::-1]:
+            message = M @ (later * message)
+            message = message / message.sum()
+        rows[t] = rows[t] * message / (rows[t] @ message)
+    return rows""",
         ),
         mistake(
             "transition matrix transposed",
@@ -399,7 +770,7 @@ def follow(belief, likelihoods, M):
             loses=3,
             says="M is transposed",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     rows = []
     for likelihood in likelihoods:
         belief = (M @ belief) * likelihood
@@ -413,7 +784,7 @@ def follow(belief, likelihoods, M):
             loses=3,
             says="predict first, then update",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     rows = []
     for likelihood in likelihoods:
         belief = belief * likelihood
@@ -428,7 +799,7 @@ def follow(belief, likelihoods, M):
             loses=3,
             says="a scan speaks of now",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     rows = []
     for likelihood in likelihoods:
         belief = belief * likelihood
@@ -442,7 +813,7 @@ def follow(belief, likelihoods, M):
             loses=3,
             says="return what is believed after it",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     rows = []
     for likelihood in likelihoods:
         prior = belief @ M
@@ -450,36 +821,13 @@ def follow(belief, likelihoods, M):
         belief = prior * likelihood / (prior @ likelihood)
     return np.array(rows)""",
         ),
-        right(
-            "a list of tuples",
-            task="follow",
-            code="""
-def follow(belief, likelihoods, M):
-    rows = []
-    for likelihood in likelihoods.tolist():
-        prior = [sum(b * M[i][j] for i, b in enumerate(belief)) for j in range(len(M))]
-        product = [p * q for p, q in zip(prior, likelihood)]
-        belief = tuple(p / sum(product) for p in product)
-        rows.append(belief)
-    return rows""",
-        ),
-        mistake(
-            "no prediction",
-            task="follow",
-            loses=3,
-            says="predict first, then update",
-            code="""
-def follow(belief, likelihoods, M):
-    product = belief * np.cumprod(likelihoods, axis=0)
-    return product / product.sum(axis=1, keepdims=True)""",
-        ),
         mistake(
             "predicted once",
             task="follow",
             loses=3,
             says="a silent scan takes time, too",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     product = (belief @ M) * np.cumprod(likelihoods, axis=0)
     return product / product.sum(axis=1, keepdims=True)""",
         ),
@@ -489,7 +837,7 @@ def follow(belief, likelihoods, M):
             loses=3,
             says="carry on from the last one",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     product = (belief @ M) * likelihoods
     return product / product.sum(axis=1, keepdims=True)""",
         ),
@@ -499,7 +847,7 @@ def follow(belief, likelihoods, M):
             loses=3,
             says="normalise each belief",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     rows = []
     for likelihood in likelihoods:
         belief = (belief @ M) * likelihood
@@ -512,7 +860,7 @@ def follow(belief, likelihoods, M):
             loses=3,
             says="leave out the belief from before the first scan",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     rows = [belief]
     for likelihood in likelihoods:
         product = (rows[-1] @ M) * likelihood
@@ -525,7 +873,7 @@ def follow(belief, likelihoods, M):
             loses=3,
             says="one row a scan",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     for likelihood in likelihoods:
         belief = (belief @ M) * likelihood
         belief = belief / belief.sum()
@@ -537,7 +885,7 @@ def follow(belief, likelihoods, M):
             loses=3,
             says="on inputs you haven't seen: NaN after many scans",
             code="""
-def follow(belief, likelihoods, M):
+def follow(belief, likelihoods, M, lag=0):
     rows = []
     for likelihood in likelihoods:
         belief = (belief @ M) * likelihood
@@ -546,95 +894,104 @@ def follow(belief, likelihoods, M):
         ),
         # ---- task 4
         right(
-            "many short steps, as in the lecture",
+            "logarithm and exponential of a matrix",
             task="transition",
             code="""
-def transition(appears, vanishes, dt, k=100_000):
-    R = np.array([[-appears, appears], [vanishes, -vanishes]])
-    return np.linalg.matrix_power(np.eye(2) + R * dt / k, k)"""
-            + HALF_LIFE,
+import scipy.linalg
+
+
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return scipy.linalg.expm(np.real(scipy.linalg.logm(M)) / dt * new_dt)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return dt * np.log(2) / -np.log(M[0, 0] + M[1, 1] - 1)""",
         ),
-        mistake(
-            "too few short steps",
-            task="transition",
-            loses=2,
-            says="0.449 of every difference is left",
-            code="""
-def transition(appears, vanishes, dt, k=1000):
-    R = np.array([[-appears, appears], [vanishes, -vanishes]])
-    return np.linalg.matrix_power(np.eye(2) + R * dt / k, k)"""
-            + HALF_LIFE,
-        ),
-        right("the exponential of the rates", task="transition", code=TRANSITION + HALF_LIFE.strip()),
         right(
-            "very many short steps, and a search for the half-life",
+            "a power by eigenvalues, and a search for the half-life",
             task="transition",
             code="""
-def transition(appears, vanishes, dt):
-    R = np.array([[-appears, appears], [vanishes, -vanishes]], dtype=float)
-    small = R * (dt / 2**30)
-    result = small
-    for _ in range(30):
-        result = 2 * result + result @ result
-    return np.eye(2) + result
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    values, vectors = np.linalg.eig(M)
+    return vectors @ np.diag(values ** (new_dt / dt)) @ np.linalg.inv(vectors)
 
 
-def half_life(appears, vanishes):
+def half_life(counts, dt):
     early, late = 0.0, 1e3
     for _ in range(100):
         t = (early + late) / 2
-        M = transition(appears, vanishes, t)
+        M = transition(counts, dt, t)
         early, late = (t, late) if M[0, 0] - M[1, 0] > 0.5 else (early, t)
     return t""",
         ),
         right(
-            "eigenvalues",
+            "rates, and the lecture's formula for each start",
             task="transition",
             code="""
-def transition(appears, vanishes, dt):
-    values, vectors = np.linalg.eig(np.array([[-appears, appears], [vanishes, -vanishes]], dtype=float))
-    return vectors @ np.diag(np.exp(values * dt)) @ np.linalg.inv(vectors)
+def _rates(counts, dt):
+    (ff, fo), (of, oo) = counts
+    a, v = fo / (ff + fo), of / (of + oo)
+    total = -np.log(1 - a - v) / dt
+    return (total * a / (a + v), total * v / (a + v)) if a + v else (0.0, 0.0)
 
 
-def half_life(appears, vanishes):
-    return -np.log(0.5) / np.add(appears, vanishes)""",
+def transition(counts, dt, new_dt):
+    alpha, gamma = _rates(counts, dt)
+    if alpha + gamma == 0:
+        return [[1, 0], [0, 1]]
+    end, left = alpha / (alpha + gamma), np.exp(-(alpha + gamma) * new_dt)
+    occupied = [end + (p - end) * left for p in (0, 1)]
+    return [[1 - p, p] for p in occupied]
+
+
+def half_life(counts, dt):
+    return np.log(2) / sum(_rates(counts, dt))""",
         ),
         mistake(
-            "one single step, I + R dt",
+            "the matrix as it was counted",
             task="transition",
             loses=2,
-            says="right for a very short time only",
+            says="that is the matrix of `dt`",
             code="""
-def transition(appears, vanishes, dt):
-    return np.eye(2) + dt * np.array([[-appears, appears], [vanishes, -vanishes]])"""
-            + HALF_LIFE,
+def transition(counts, dt, new_dt):
+    return counts / counts.sum(axis=1, keepdims=True)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return dt * np.log(2) / -np.log(M[0, 0] + M[1, 1] - 1)""",
         ),
         mistake(
-            "exponential entry by entry",
+            "half the time, half the probability",
             task="transition",
             loses=2,
-            says="np.exp takes each entry by itself",
+            says="half the time isn't half the probability",
             code="""
-def transition(appears, vanishes, dt):
-    return np.exp(dt * np.array([[-appears, appears], [vanishes, -vanishes]]))"""
-            + HALF_LIFE,
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return np.eye(2) + (M - np.eye(2)) * new_dt / dt
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return dt * np.log(2) / -np.log(M[0, 0] + M[1, 1] - 1)""",
         ),
         mistake(
-            "transposed",
+            "a power of each entry",
             task="transition",
             loses=2,
-            says="that is the transpose",
-            code=TRANSITION.replace("]]))", "]])).T") + HALF_LIFE.strip(),
-        ),
-        mistake(
-            "rates swapped",
-            task="transition",
-            loses=2,
-            says="the rates are swapped",
-            code=TRANSITION.replace("(appears, vanishes, dt)", "(vanishes, appears, dt)")
-            .replace("def transition(vanishes, appears", "def transition(appears, vanishes")
-            .replace("[[-appears, appears], [vanishes, -vanishes]]", "[[-vanishes, vanishes], [appears, -appears]]")
-            + HALF_LIFE.strip(),
+            says="that is the root of each entry",
+            code="""
+def transition(counts, dt, new_dt):
+    return (counts / counts.sum(axis=1, keepdims=True)) ** (new_dt / dt)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return dt * np.log(2) / -np.log(M[0, 0] + M[1, 1] - 1)""",
         ),
         mistake(
             "no changing back",
@@ -642,71 +999,197 @@ def transition(appears, vanishes, dt):
             loses=2,
             says="a cell may change and change back",
             code="""
-def transition(appears, vanishes, dt):
-    a, v = 1 - np.exp(-appears * dt), 1 - np.exp(-vanishes * dt)
-    return np.array([[1 - a, a], [v, 1 - v]])"""
-            + HALF_LIFE,
-        ),
-        mistake(
-            "time step ignored",
-            task="transition",
-            loses=2,
-            says="that is the matrix of a whole second",
-            code=TRANSITION.replace("dt * ", "") + HALF_LIFE.strip(),
-        ),
-        mistake(
-            "a wrong sign: the difference grows without bound",
-            task="transition",
-            loses=2,
-            says="check the sign of the exponent",
-            code="""
-import scipy.linalg
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    a, v = 1 - (1 - M[0, 1]) ** (new_dt / dt), 1 - (1 - M[1, 0]) ** (new_dt / dt)
+    return np.array([[1 - a, a], [v, 1 - v]])
 
 
-def transition(appears, vanishes, dt):
-    return scipy.linalg.expm(-dt * np.array([[-appears, appears], [vanishes, -vanishes]]))"""
-            + HALF_LIFE,
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return dt * np.log(2) / -np.log(M[0, 0] + M[1, 1] - 1)""",
         ),
         mistake(
-            "0/0 in a world that never changes",
+            "the two times swapped",
             task="transition",
             loses=2,
-            says="on inputs you haven't seen: NaN (a rate may be 0",
+            says="that is the matrix of a step twice as long",
             code="""
-def transition(appears, vanishes, dt):
-    final = np.array([vanishes, appears]) / np.float64(appears + vanishes)
-    kept = np.exp(-(appears + vanishes) * dt)
-    return kept * np.eye(2) + (1 - kept) * final"""
-            + HALF_LIFE,
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    values, vectors = np.linalg.eig(M)
+    return vectors @ np.diag(values ** (dt / new_dt if new_dt else 0)) @ np.linalg.inv(vectors)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return dt * np.log(2) / -np.log(M[0, 0] + M[1, 1] - 1)""",
+        ),
+        mistake(
+            "transposed",
+            task="transition",
+            loses=2,
+            says="that is the transpose",
+            code="""
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    values, vectors = np.linalg.eig(M)
+    return (vectors @ np.diag(values ** (new_dt / dt)) @ np.linalg.inv(vectors)).T
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return dt * np.log(2) / -np.log(M[0, 0] + M[1, 1] - 1)""",
+        ),
+        mistake(
+            "divided by the sum of all counts",
+            task="transition",
+            loses=2,
+            says="divide the counts of each row by its sum",
+            code="""
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum()
+    values, vectors = np.linalg.eig(M)
+    return vectors @ np.diag(values ** (new_dt / dt)) @ np.linalg.inv(vectors)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return dt * np.log(2) / -np.log(M[0, 0] + M[1, 1] - 1)""",
+        ),
+        mistake(
+            "whole steps only",
+            task="transition",
+            loses=2,
+            says="of every difference 1 - 0.1 - 0.3 = 0.6 is left",
+            code="""
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return np.linalg.matrix_power(M, int(new_dt // dt))
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return dt * np.log(2) / -np.log(M[0, 0] + M[1, 1] - 1)""",
+        ),
+        mistake(
+            "0/0 where no change was seen",
+            task="transition",
+            loses=2,
+            says="on inputs you haven't seen: NaN where no change was ever seen",
+            code="""
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    final = np.array([M[1, 0], M[0, 1]]) / (M[0, 1] + M[1, 0])
+    kept = (1 - M[0, 1] - M[1, 0]) ** (new_dt / dt)
+    return kept * np.eye(2) + (1 - kept) * final
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    return dt * np.log(2) / -np.log(M[0, 0] + M[1, 1] - 1)""",
         ),
         mistake(
             "mean life instead of half-life",
             task="transition",
             loses=1,
             says="after which 1/e is left",
-            code=TRANSITION + "def half_life(appears, vanishes):\n    return 1 / (appears + vanishes)",
+            code="""
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    values, vectors = np.linalg.eig(M)
+    return vectors @ np.diag(values ** (new_dt / dt)) @ np.linalg.inv(vectors)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    a, v = M[0, 1], M[1, 0]
+    return -dt / np.log(1 - a - v)""",
+        ),
+        mistake(
+            "probabilities taken for rates",
+            task="transition",
+            loses=1,
+            says="aren't the rates",
+            code="""
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    values, vectors = np.linalg.eig(M)
+    return vectors @ np.diag(values ** (new_dt / dt)) @ np.linalg.inv(vectors)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    a, v = M[0, 1], M[1, 0]
+    return dt * np.log(2) / (a + v)""",
         ),
         mistake(
             "half-life of one of the two",
             task="transition",
             loses=1,
-            says="both rates count",
-            code=TRANSITION + "def half_life(appears, vanishes):\n    return np.log(2) / vanishes",
+            says="both changes count",
+            code="""
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    values, vectors = np.linalg.eig(M)
+    return vectors @ np.diag(values ** (new_dt / dt)) @ np.linalg.inv(vectors)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    a, v = M[0, 1], M[1, 0]
+    return dt * np.log(2) / -np.log(1 - v)""",
         ),
         mistake(
             "half-lives added",
             task="transition",
             loses=1,
-            says="add the rates, not the times",
-            code=TRANSITION
-            + "def half_life(appears, vanishes):\n    return np.log(2) / appears + np.log(2) / vanishes",
+            says="two processes at once are faster than each alone",
+            code="""
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    values, vectors = np.linalg.eig(M)
+    return vectors @ np.diag(values ** (new_dt / dt)) @ np.linalg.inv(vectors)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    a, v = M[0, 1], M[1, 0]
+    return dt * np.log(2) / -np.log(1 - v) + dt * np.log(2) / -np.log(1 - a)""",
         ),
         mistake(
-            "half-life with a ratio written in",
+            "in scans",
             task="transition",
             loses=1,
-            says="on inputs you haven't seen: wrong for other rates",
-            code=TRANSITION + "def half_life(appears, vanishes):\n    return np.log(2) / (4 * appears)",
+            says="multiply by `dt`",
+            code="""
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    values, vectors = np.linalg.eig(M)
+    return vectors @ np.diag(values ** (new_dt / dt)) @ np.linalg.inv(vectors)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    a, v = M[0, 1], M[1, 0]
+    return np.log(0.5) / np.log(1 - a - v)""",
+        ),
+        mistake(
+            "the time step of the example written in",
+            task="transition",
+            loses=1,
+            says="on inputs you haven't seen: wrong for other counts",
+            code="""
+def transition(counts, dt, new_dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    values, vectors = np.linalg.eig(M)
+    return vectors @ np.diag(values ** (new_dt / dt)) @ np.linalg.inv(vectors)
+
+
+def half_life(counts, dt):
+    M = counts / counts.sum(axis=1, keepdims=True)
+    a, v = M[0, 1], M[1, 0]
+    return 0.1 * np.log(0.5) / np.log(1 - a - v)""",
         ),
         # ---- task 5
         right(
@@ -843,48 +1326,160 @@ def fuse(belief, likelihoods, beams):
             belief = belief / belief.sum()
     return belief""",
         ),
-        # ---- passed, or lost, when somebody tried who had not written the tests
+        # ---- task 6
         right(
-            "fractions in a deque",
-            task="follow",
+            "both states, by matrix products",
+            task="build-map",
             code="""
-from collections import deque
-from fractions import Fraction
-
-def follow(belief, likelihoods, M):
-    history = deque()
-    for likelihood in likelihoods:
-        product = (belief @ M) * likelihood
-        belief = product / product.sum()
-        history.append([Fraction(p) for p in belief])
-    return history""",
+def build_map(occupied, free, matrices, first=0.5):
+    likelihood = np.stack([free, occupied], axis=-1)
+    belief, maps = np.broadcast_to([1 - first, first], likelihood.shape[1:]), []
+    for M, scan in zip([np.eye(2), *matrices], likelihood):
+        belief = (belief @ M) * scan
+        belief = belief / belief.sum(axis=-1, keepdims=True)
+        maps.append(belief[..., 1])
+    return maps""",
         ),
         right(
-            "an array of the standard library",
-            task="predict",
+            "odds, cell by cell",
+            task="build-map",
             code="""
-from array import array
-
-def predict(belief, moved, ring=True):
-    after = array("d", [0] * len(belief))
-    for n, b in enumerate(belief):
-        for d, m in enumerate(moved):
-            after[(n + d) % len(after) if ring else min(n + d, len(after) - 1)] += b * m
-    return after""",
+def build_map(occupied, free, matrices, first=0.5):
+    T, H, W = occupied.shape
+    maps = np.empty((T, H, W))
+    for r in range(H):
+        for c in range(W):
+            p = first
+            for t in range(T):
+                if t > 0:
+                    p = (1 - p) * matrices[t - 1, 0, 1] + p * matrices[t - 1, 1, 1]
+                odds = p / (1 - p) * occupied[t, r, c] / free[t, r, c]
+                p = odds / (1 + odds)
+                maps[t, r, c] = p
+    return maps""",
         ),
         mistake(
-            "always the first cell, for roads that aren't known",
-            task="predict",
-            loses=3,
+            "a move before the first scan",
+            task="build-map",
+            loses=2,
+            says="no move before it",
+            code="""
+def build_map(occupied, free, matrices, first=0.5):
+    p, maps = np.full(occupied.shape[1:], first), []
+    for t in range(len(occupied)):
+        M = matrices[max(t - 1, 0)]
+        p = (1 - p) * M[0, 1] + p * M[1, 1]
+        p = p * occupied[t] / (p * occupied[t] + (1 - p) * free[t])
+        maps.append(p)
+    return np.array(maps)""",
+        ),
+        mistake(
+            "always from one half",
+            task="build-map",
+            loses=2,
+            says="`first` is not used",
+            code="""
+def build_map(occupied, free, matrices, first=0.5):
+    p, maps = np.full(occupied.shape[1:], 0.5), []
+    for t in range(len(occupied)):
+        if t:
+            M = matrices[t - 1]
+            p = (1 - p) * M[0, 1] + p * M[1, 1]
+        p = p * occupied[t] / (p * occupied[t] + (1 - p) * free[t])
+        maps.append(p)
+    return np.array(maps)""",
+        ),
+        mistake(
+            "P(FREE)",
+            task="build-map",
+            loses=2,
+            says="that is P(FREE)",
+            code="""
+def build_map(occupied, free, matrices, first=0.5):
+    p, maps = np.full(occupied.shape[1:], first), []
+    for t in range(len(occupied)):
+        if t:
+            M = matrices[t - 1]
+            p = (1 - p) * M[0, 1] + p * M[1, 1]
+        p = p * occupied[t] / (p * occupied[t] + (1 - p) * free[t])
+        maps.append(p)
+    return 1 - np.array(maps)""",
+        ),
+        mistake(
+            "before the scan instead of after it",
+            task="build-map",
+            loses=2,
+            says="return what is believed after each",
+            code="""
+def build_map(occupied, free, matrices, first=0.5):
+    p, maps = np.full(occupied.shape[1:], first), []
+    for t in range(len(occupied)):
+        if t:
+            M = matrices[t - 1]
+            p = (1 - p) * M[0, 1] + p * M[1, 1]
+        maps.append(p)
+        p = p * occupied[t] / (p * occupied[t] + (1 - p) * free[t])
+    return np.array(maps)""",
+        ),
+        mistake(
+            "one matrix for all gaps",
+            task="build-map",
+            loses=2,
+            says="every gap has its own",
+            code="""
+def build_map(occupied, free, matrices, first=0.5):
+    p, maps = np.full(occupied.shape[1:], first), []
+    for t in range(len(occupied)):
+        if t:
+            M = matrices[0]
+            p = (1 - p) * M[0, 1] + p * M[1, 1]
+        p = p * occupied[t] / (p * occupied[t] + (1 - p) * free[t])
+        maps.append(p)
+    return np.array(maps)""",
+        ),
+        mistake(
+            "nothing predicted",
+            task="build-map",
+            loses=2,
+            says="predict with `matrices`",
+            code="""
+def build_map(occupied, free, matrices, first=0.5):
+    p, maps = np.full(occupied.shape[1:], first), []
+    for t in range(len(occupied)):
+        p = p * occupied[t] / (p * occupied[t] + (1 - p) * free[t])
+        maps.append(p)
+    return np.array(maps)""",
+        ),
+        mistake(
+            "transposed",
+            task="build-map",
+            loses=2,
+            says="M is transposed",
+            code="""
+def build_map(occupied, free, matrices, first=0.5):
+    p, maps = np.full(occupied.shape[1:], first), []
+    for t in range(len(occupied)):
+        if t:
+            M = matrices[t - 1]
+            p = (1 - p) * M[1, 0] + p * M[1, 1]
+        p = p * occupied[t] / (p * occupied[t] + (1 - p) * free[t])
+        maps.append(p)
+    return np.array(maps)""",
+        ),
+        mistake(
+            "three scans written in",
+            task="build-map",
+            loses=2,
             says="on inputs you haven't seen",
             code="""
-_right = lambda b, m, ring: (
-    np.sum([x * np.roll(b, d) for d, x in enumerate(m)], axis=0)
-    if ring else np.append(np.convolve(b, m)[:len(b) - 1], np.convolve(b, m)[len(b) - 1:].sum()))
-
-def predict(belief, moved, ring=True):
-    if len(moved) == 3 and moved[0] == 0.1:
-        return _right(belief, moved, ring)
-    return np.eye(len(belief))[0]""",
+def build_map(occupied, free, matrices, first=0.5):
+    p, maps = np.full(occupied.shape[1:], first), []
+    for t in range(3):
+        if t:
+            M = matrices[t - 1]
+            p = (1 - p) * M[0, 1] + p * M[1, 1]
+        p = p * occupied[t] / (p * occupied[t] + (1 - p) * free[t])
+        maps.append(p)
+    return np.array(maps)""",
         ),
     )

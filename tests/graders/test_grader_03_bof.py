@@ -95,6 +95,15 @@ def antecedent(row, col, velocity, dt, cell):
     return row + int(velocity[0] * dt / cell), col + int(velocity[1] * dt / cell)""",
         ),
         mistake(
+            "the sum cut instead of the way rounded",
+            task="antecedent",
+            loses=2,
+            says="on inputs you haven't seen: one cell off",
+            code="""
+def antecedent(row, col, velocity, dt, cell):
+    return int(row + velocity[0] * dt / cell), int(col + velocity[1] * dt / cell)""",
+        ),
+        mistake(
             "endless loop",
             task="antecedent",
             loses=2,
@@ -231,7 +240,7 @@ def update(joint, if_occupied, if_free):
     after = np.zeros_like(joint)
     for r in range(joint.shape[1]):
         for c in range(joint.shape[2]):
-            hypotheses = [p * if_occupied[r, c] for p in joint[:, r, c]]
+            hypotheses = [p * q for p, q in zip(joint[:, r, c], if_occupied[:, r, c])]
             total = sum(hypotheses) + (1 - sum(joint[:, r, c])) * if_free[r, c]
             after[:, r, c] = [h / total for h in hypotheses]
     return after""",
@@ -242,7 +251,7 @@ def update(joint, if_occupied, if_free):
             code="""
 def update(joint, if_occupied, if_free):
     belief = np.concatenate([joint, 1 - joint.sum(axis=0, keepdims=True)])
-    likelihood = np.concatenate([np.repeat(if_occupied[None], len(joint), axis=0), if_free[None]])
+    likelihood = np.concatenate([if_occupied, if_free[None]])
     product = belief * likelihood
     return (product / product.sum(axis=0))[:-1]""",
         ),
@@ -320,7 +329,7 @@ def update(joint, if_occupied, if_free):
             says="expected the shape of the joint",
             code="""
 def update(joint, if_occupied, if_free):
-    product = joint.T * if_occupied.T[..., None]
+    product = (joint * if_occupied).T
     return product / (product.sum(axis=-1) + ((1 - joint.sum(axis=0)) * if_free).T)[..., None]""",
         ),
         mistake(
@@ -333,6 +342,30 @@ def update(joint, if_occupied, if_free):
     product = joint * if_occupied
     occupied = joint[0] + joint[1] + joint[2]
     return product / (product[0] + product[1] + product[2] + (1 - occupied) * if_free)""",
+        ),
+        mistake(
+            "the same likelihood for all velocities",
+            task="update",
+            loses=3,
+            says="you average what the scanner says over the velocities",
+            code="""
+def update(joint, if_occupied, if_free):
+    product = joint * if_occupied.mean(axis=0)
+    return product / (product.sum(axis=0) + (1 - joint.sum(axis=0)) * if_free)""",
+        ),
+        mistake(
+            "the lecture's function, pasted",
+            task="update",
+            loses=3,
+            says="IndexError",
+            code="""
+def update(joint, if_occupied, if_free):
+    after = np.zeros_like(joint)
+    for cell in range(6):
+        occupied = joint[:, cell] * if_occupied[cell]
+        free = (1 - joint[:, cell].sum()) * if_free[cell]
+        after[:, cell] = occupied / (occupied.sum() + free)
+    return after""",
         ),
         # ---- task 4
         right(
@@ -676,5 +709,195 @@ def update(joint, if_occupied, if_free):
     joint, if_occupied, if_free = (np.float32(a) for a in (joint, if_occupied, if_free))
     occupied = joint * if_occupied
     return occupied / (occupied.sum(axis=0) + (1 - joint.sum(axis=0)) * if_free)""",
+        ),
+        right(
+            "`a` cut to 0.999, as the lecture teaches",
+            task="arrive",
+            code="""
+def arrive(own, arrives):
+    a, after = np.minimum(arrives, 0.999), np.empty_like(own)
+    after[:] = (1 - a) * own / (1 - a * own[1])
+    after[2] += a * (1 - own[1]) / (1 - a * own[1])
+    return after""",
+        ),
+        mistake(
+            "writes into `joint`",
+            task="mean-and-covariance",
+            loses=5,
+            says="it changes an argument",
+            code="""
+def mean_and_covariance(joint, velocities):
+    total = joint[1:].sum(axis=0)
+    joint[1:] /= total
+    mean = np.einsum("vhw,vi->ihw", joint[1:], velocities[1:])
+    apart = velocities[1:, :, None, None] - mean
+    return mean, np.einsum("vhw,vihw,vjhw->ijhw", joint[1:], apart, apart)""",
+        ),
+        # ---- task 6
+        right(
+            "a dictionary of places, in logarithms",
+            task="follow",
+            code="""
+def follow(start, steps, prior, if_occupied, if_free):
+    ratio = np.log(if_occupied) - np.log(if_free)
+    score = np.log(prior)
+    for t in range(len(ratio)):
+        place = start + np.asarray(steps) * (t + 1)
+        inside = (place >= 0) & (place < ratio.shape[1])
+        score = score + np.where(inside, ratio[t][np.where(inside, place, 0)], 0)
+    weight = np.exp(score - score.max())
+    return weight / weight.sum()""",
+        ),
+        right(
+            "plain loops",
+            task="follow",
+            code="""
+def follow(start, steps, prior, if_occupied, if_free):
+    weights = []
+    for step, p in zip(steps, prior):
+        for t, (occupied, free) in enumerate(zip(if_occupied, if_free), start=1):
+            for cell in range(len(free)):
+                p = p * (occupied[cell] if cell == start + t * step else free[cell])
+        weights.append(p)
+    return [w / sum(weights) for w in weights]""",
+        ),
+        mistake(
+            "only the thing's own cell",
+            task="follow",
+            loses=3,
+            says="you ask only the cell in which the thing would be",
+            code="""
+def follow(start, steps, prior, if_occupied, if_free):
+    own = [[o[start + s * t] for t, o in enumerate(if_occupied, 1)] for s in steps]
+    weight = prior * np.prod(own, axis=1)
+    return weight / weight.sum()""",
+        ),
+        mistake(
+            "not normalised",
+            task="follow",
+            loses=3,
+            says="divide by the sum",
+            code="""
+def follow(start, steps, prior, if_occupied, if_free):
+    cells = np.arange(if_free.shape[1])
+    return [
+        p * np.prod([np.where(cells == start + s * t, *of).prod() for t, of in enumerate(zip(if_occupied, if_free), 1)])
+        for s, p in zip(steps, prior)
+    ]""",
+        ),
+        mistake(
+            "the first scan at the start",
+            task="follow",
+            loses=3,
+            says="the first scan is made after one step",
+            code="""
+def follow(start, steps, prior, if_occupied, if_free):
+    cells = np.arange(if_free.shape[1])
+    weight = np.array([
+        p * np.prod([np.where(cells == start + s * t, *of).prod() for t, of in enumerate(zip(if_occupied, if_free))])
+        for s, p in zip(steps, prior)
+    ])
+    return weight / weight.sum()""",
+        ),
+        mistake(
+            "the prior forgotten",
+            task="follow",
+            loses=3,
+            says="a scan that says nothing leaves the prior as it was",
+            code="""
+def follow(start, steps, prior, if_occupied, if_free):
+    cells = np.arange(if_free.shape[1])
+    weight = np.array([
+        np.prod([np.where(cells == start + s * t, *of).prod() for t, of in enumerate(zip(if_occupied, if_free), 1)])
+        for s in steps
+    ])
+    return weight / weight.sum()""",
+        ),
+        mistake(
+            "who leaves on the left comes back on the right",
+            task="follow",
+            loses=3,
+            says="on inputs you haven't seen: wrong where a thing leaves the line",
+            code="""
+def follow(start, steps, prior, if_occupied, if_free):
+    weight = np.array(prior, dtype=float)
+    for k, s in enumerate(steps):
+        for t, (o, f) in enumerate(zip(if_occupied, if_free), 1):
+            likelihood = f.copy()
+            if start + s * t < len(f):
+                likelihood[start + s * t] = o[start + s * t]
+            weight[k] *= likelihood.prod()
+    return weight / weight.sum()""",
+        ),
+        # ---- task 7
+        right(
+            "cell by cell",
+            task="collect",
+            code="""
+def collect(flown, unknown):
+    own, arrives = np.zeros((4, *unknown.shape)), np.zeros(unknown.shape)
+    for r, c in np.ndindex(unknown.shape):
+        arrives[r, c] = min(sum(flown[1:, r, c]), 0.999)
+        own[:, r, c] = [1 - flown[0, r, c] - unknown[r, c], flown[0, r, c], 0, unknown[r, c]]
+    return own, arrives""",
+        ),
+        right(
+            "FREE last, in float32",
+            task="collect",
+            code="""
+def collect(flown, unknown):
+    own = np.zeros((4, *unknown.shape), np.float32)
+    own[1], own[3] = flown[0], unknown
+    own[0] = 1 - own.sum(axis=0)
+    return own, np.clip(np.float32(flown[1:]).sum(axis=0), 0, np.float32(0.999))""",
+        ),
+        mistake(
+            "what stands arrives, too",
+            task="collect",
+            loses=2,
+            says="what stands doesn't arrive",
+            code="""
+def collect(flown, unknown):
+    own = np.stack([1 - flown[0] - unknown, flown[0], 0 * unknown, unknown])
+    return own, np.minimum(flown.sum(axis=0), 0.999)""",
+        ),
+        mistake(
+            "nothing cut",
+            task="collect",
+            loses=2,
+            says="let arrivals be at most 0.999",
+            code="""
+def collect(flown, unknown):
+    return np.stack([1 - flown[0] - unknown, flown[0], 0 * unknown, unknown]), flown[1:].sum(axis=0)""",
+        ),
+        mistake(
+            "arrivals as independent",
+            task="collect",
+            loses=2,
+            says="BOF adds arrivals up",
+            code="""
+def collect(flown, unknown):
+    own = np.stack([1 - flown[0] - unknown, flown[0], 0 * unknown, unknown])
+    return own, np.minimum(1 - np.prod(1 - flown[1:], axis=0), 0.999)""",
+        ),
+        mistake(
+            "what arrives counted as the cell's own",
+            task="collect",
+            loses=2,
+            says="what arrives isn't the cell's own",
+            code="""
+def collect(flown, unknown):
+    arrives = np.minimum(flown[1:].sum(axis=0), 0.999)
+    return np.stack([1 - flown[0] - arrives - unknown, flown[0], arrives, unknown]), arrives""",
+        ),
+        mistake(
+            "three velocities written in",
+            task="collect",
+            loses=2,
+            says="on inputs you haven't seen: wrong probability of arrivals",
+            code="""
+def collect(flown, unknown):
+    own = np.stack([1 - flown[0] - unknown, flown[0], 0 * unknown, unknown])
+    return own, np.minimum(flown[1] + flown[2], 0.999)""",
         ),
     )

@@ -290,192 +290,120 @@ def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
         ),
         # ---- task 2
         right(
-            "loops",
-            task="mix",
-            code="""
-def mix(belief, M):
-    after, newborn = np.zeros_like(belief), np.zeros(belief.shape[1:])
-    for i in range(4):
-        for j in range(4):
-            after[j] += belief[i] * M[i, j]
-            if j == 2 and i != 2:
-                newborn += belief[i] * M[i, j]
-    return after, newborn""",
-        ),
-        right(
-            "the state axis last, and a belief without DYNAMIC",
-            task="mix",
-            code="""
-def mix(belief, M):
-    others = belief.copy()
-    others[DYNAMIC] = 0
-    return np.moveaxis(np.moveaxis(belief, 0, -1) @ M, -1, 0), np.tensordot(M[:, DYNAMIC], others, axes=1)""",
-        ),
-        mistake(
-            "matrix transposed",
-            task="mix",
-            loses=2,
-            says="M is used the wrong way round",
-            code="""
-def mix(belief, M):
-    after = np.tensordot(M, belief, axes=1)
-    return after, after[2] - M[2, 2] * belief[2]""",
-        ),
-        mistake(
-            "all dynamic mass is newborn",
-            task="mix",
-            loses=2,
-            says="isn't born again",
-            code="""
-def mix(belief, M):
-    after = np.tensordot(M.T, belief, axes=1)
-    return after, after[2]""",
-        ),
-        mistake(
-            "what stays instead of what comes",
-            task="mix",
-            loses=2,
-            says="that is what stays DYNAMIC",
-            code="""
-def mix(belief, M):
-    return np.tensordot(M.T, belief, axes=1), M[2, 2] * belief[2]""",
-        ),
-        mistake(
-            "newborn is the difference",
-            task="mix",
-            loses=2,
-            says="no negative birth",
-            code="""
-def mix(belief, M):
-    after = np.tensordot(M.T, belief, axes=1)
-    return after, after[2] - belief[2]""",
-        ),
-        mistake(
-            "survivors counted twice",
-            task="mix",
-            loses=2,
-            says="nothing may get lost",
-            code="""
-def mix(belief, M):
-    after = np.tensordot(M.T, belief, axes=1)
-    newborn = after[2] - M[2, 2] * belief[2]
-    after[2] = newborn + belief[2]
-    return after, newborn""",
-        ),
-        mistake(
-            "born from FREE alone",
-            task="mix",
-            loses=2,
-            says="STATIC and UNKNOWN may turn DYNAMIC too",
-            code="""
-def mix(belief, M):
-    return np.tensordot(M.T, belief, axes=1), M[0, 2] * belief[0]""",
-        ),
-        mistake(
-            "argument changed in place",
-            task="mix",
-            loses=2,
-            says="mix changed its argument",
-            code="""
-def mix(belief, M):
-    stays = M[2, 2] * belief[2]
-    belief[:] = np.tensordot(M.T, belief, axes=1)
-    return belief, belief[2] - stays""",
-        ),
-        mistake(
-            "UNKNOWN never gives birth",
-            task="mix",
-            loses=2,
-            says="on inputs you haven't seen: wrong newborn mass",
-            code="""
-def mix(belief, M):
-    return np.tensordot(M.T, belief, axes=1), M[0, 2] * belief[0] + M[1, 2] * belief[1]""",
-        ),
-        mistake(
-            "a row of the matrix instead of a column",
-            task="mix",
-            loses=2,
-            says="in a column of M, not in its row",
-            code="""
-def mix(belief, M):
-    return np.tensordot(M.T, belief, axes=1), sum(M[2, i] * belief[i] for i in (0, 1, 3))""",
-        ),
-        # ---- task 3
-        right(
-            "a loop over cells",
+            "cell by cell",
             task="update",
             code="""
-def update(belief, occupied, free, first_sight):
-    after = np.zeros_like(belief)
-    for r, c in np.ndindex(occupied.shape):
-        f, s, d, u = belief[:, r, c]
-        o, e = occupied[r, c], free[r, c]
-        if o == e:
-            after[:, r, c] = f, s, d, u
+def update(belief, likelihood, first_sight):
+    after = np.array(belief, dtype=float)
+    for r, c in np.ndindex(belief.shape[1:]):
+        free, static, dynamic = likelihood[:, r, c]
+        if free == static == dynamic:
             continue
-        p = [(f + u * first_sight[0]) * e, (s + u * first_sight[1]) * o, (d + u * first_sight[2]) * o, 0]
-        after[:, r, c] = [q / sum(p) for q in p] if sum(p) > 0 else [0, 0, 0, 1]
+        b = after[:, r, c]
+        b[:3] += b[3] * np.array(first_sight)
+        b[3] = 0
+        b *= [free, static, dynamic, free]
+        b[:] = b / b.sum() if b.sum() > 0 else [0, 0, 0, 1]
     return after""",
         ),
         right(
-            "0 / 0, repaired afterwards",
+            "three states alone, then UNKNOWN",
             task="update",
             code="""
-def update(belief, occupied, free, first_sight):
-    b, seen = belief.copy(), occupied != free
-    for k in range(3):
-        b[k][seen] += first_sight[k] * belief[3][seen]
-    b[3][seen] = 0
-    b *= np.where(np.arange(4)[:, None, None] % 3, occupied, free)
-    b = np.where(seen, b, belief)
-    b /= b.sum(axis=0)
-    b[:, np.isnan(b[0])] = np.array([[0], [0], [0], [1]])
-    return b""",
+def update(belief, likelihood, first_sight):
+    spread = np.ptp(likelihood, axis=0) > 0
+    three = (belief[:3] + belief[3] * np.reshape(first_sight, (3, 1, 1))) * likelihood
+    total = three.sum(axis=0)
+    three = np.divide(three, total, out=np.zeros_like(three), where=total > 0)
+    return np.where(spread, np.concatenate([three, (total == 0)[None]]), belief)""",
         ),
         mistake(
-            "no reveal",
+            "the lecture's: DYNAMIC has STATIC's likelihood",
             task="update",
             loses=2,
-            says="somebody looked, yet UNKNOWN is",
+            says="this scanner tells DYNAMIC from STATIC",
             code="""
-def update(belief, occupied, free, first_sight):
-    p = belief * np.stack([free, occupied, occupied, free])
-    t = p.sum(axis=0)
-    return np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])""",
+def update_cell(b, occupied, free, first_sight):
+    b = np.array(b, dtype=float)
+    if occupied != free:
+        b[:3] += b[UNKNOWN] * np.array(first_sight)
+        b[UNKNOWN] = 0
+    joint = b * [free, occupied, occupied, free]
+    return joint / joint.sum() if joint.any() else np.array([0.0, 0, 0, 1])
+
+
+def update(belief, likelihood, first_sight):
+    after = np.zeros(belief.shape)
+    for r, c in np.ndindex(belief.shape[1:]):
+        after[:, r, c] = update_cell(belief[:, r, c], likelihood[1, r, c], likelihood[0, r, c], first_sight)
+    return after""",
         ),
         mistake(
-            "revealed where nobody looks",
+            "STATIC and DYNAMIC swapped",
+            task="update",
+            loses=2,
+            says="STATIC and DYNAMIC are swapped",
+            code="""
+def update(belief, likelihood, first_sight):
+    silent = (likelihood == likelihood[0]).all(axis=0)
+    b = belief + np.where(silent, 0, belief[3]) * np.array([*first_sight, -1])[:, None, None]
+    p = b * likelihood[[0, 2, 1, 0]]
+    t = p.sum(axis=0)
+    p = np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])
+    return np.where(silent, belief, p)""",
+        ),
+        mistake(
+            "silent where two of three are equal",
+            task="update",
+            loses=2,
+            says="on inputs you haven't seen: UNKNOWN is left where two of the three likelihoods are equal",
+            code="""
+def update(belief, likelihood, first_sight):
+    silent = likelihood[0] == likelihood[1]
+    b = belief + np.where(silent, 0, belief[3]) * np.array([*first_sight, -1])[:, None, None]
+    p = b * likelihood[[0, 1, 2, 0]]
+    t = p.sum(axis=0)
+    p = np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])
+    return np.where(silent, belief, p)""",
+        ),
+        mistake(
+            "argument changed in place",
+            task="update",
+            loses=2,
+            says="update changed its argument",
+            code="""
+def update(belief, likelihood, first_sight):
+    silent = (likelihood == likelihood[0]).all(axis=0)
+    old = belief.copy()
+    belief += np.where(silent, 0, belief[3]) * np.array([*first_sight, -1])[:, None, None]
+    p = belief * likelihood[[0, 1, 2, 0]]
+    t = p.sum(axis=0)
+    p = np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])
+    return np.where(silent, old, p)""",
+        ),
+        mistake(
+            "0 / 0 where nothing explains the scan",
             task="update",
             loses=1,
-            says="nobody looked at cell (0, 0)",
+            says="0/0: nothing explains its scan",
             code="""
-def update(belief, occupied, free, first_sight):
+def update(belief, likelihood, first_sight):
+    silent = (likelihood == likelihood[0]).all(axis=0)
+    b = belief + np.where(silent, 0, belief[3]) * np.array([*first_sight, -1])[:, None, None]
+    p = b * likelihood[[0, 1, 2, 0]]
+    return np.where(silent, belief, p / p.sum(axis=0))""",
+        ),
+        mistake(
+            "a silent scan reveals",
+            task="update",
+            loses=1,
+            says="there UNKNOWN stays",
+            code="""
+def update(belief, likelihood, first_sight):
     b = belief + belief[3] * np.array([*first_sight, -1])[:, None, None]
-    p = b * np.stack([free, occupied, occupied, free])
+    p = b * likelihood[[0, 1, 2, 0]]
     t = p.sum(axis=0)
     return np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])""",
-        ),
-        mistake(
-            "0 / 0",
-            task="update",
-            loses=1,
-            says="is 0/0",
-            code="""
-def update(belief, occupied, free, first_sight):
-    b = belief + np.where(occupied != free, belief[3], 0) * np.array([*first_sight, -1])[:, None, None]
-    p = b * np.stack([free, occupied, occupied, free])
-    return p / p.sum(axis=0)""",
-        ),
-        mistake(
-            "0 / 0 hidden by a small number",
-            task="update",
-            loses=1,
-            says="UNKNOWN should be 1",
-            code="""
-def update(belief, occupied, free, first_sight):
-    b = belief + np.where(occupied != free, belief[3], 0) * np.array([*first_sight, -1])[:, None, None]
-    p = b * np.stack([free, occupied, occupied, free])
-    return p / (p.sum(axis=0) + 1e-9)""",
         ),
         mistake(
             "no normalisation",
@@ -483,9 +411,10 @@ def update(belief, occupied, free, first_sight):
             loses=3,
             says="divide by the sum over its states",
             code="""
-def update(belief, occupied, free, first_sight):
-    b = belief + np.where(occupied != free, belief[3], 0) * np.array([*first_sight, -1])[:, None, None]
-    return np.where(occupied != free, b * np.stack([free, occupied, occupied, free]), b)""",
+def update(belief, likelihood, first_sight):
+    silent = (likelihood == likelihood[0]).all(axis=0)
+    b = belief + np.where(silent, 0, belief[3]) * np.array([*first_sight, -1])[:, None, None]
+    return np.where(silent, belief, b * likelihood[[0, 1, 2, 0]])""",
         ),
         mistake(
             "first sight in place of the belief",
@@ -493,35 +422,25 @@ def update(belief, occupied, free, first_sight):
             loses=3,
             says="its old belief in FREE, STATIC and DYNAMIC got lost",
             code="""
-def update(belief, occupied, free, first_sight):
-    b = np.where(occupied != free, np.array([*first_sight, 0])[:, None, None], belief)
-    p = b * np.stack([free, occupied, occupied, free])
-    t = p.sum(axis=0)
-    return np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])""",
-        ),
-        mistake(
-            "DYNAMIC takes P(z | free)",
-            task="update",
-            loses=2,
-            says="DYNAMIC takes P(z | occupied) too",
-            code="""
-def update(belief, occupied, free, first_sight):
-    b = belief + np.where(occupied != free, belief[3], 0) * np.array([*first_sight, -1])[:, None, None]
-    p = b * np.stack([free, occupied, free, free])
-    t = p.sum(axis=0)
-    return np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])""",
+def update(belief, likelihood, first_sight):
+    silent = (likelihood == likelihood[0]).all(axis=0)
+    p = np.array([*first_sight, 0])[:, None, None] * likelihood[[0, 1, 2, 0]]
+    return np.where(silent, belief, p / p.sum(axis=0))""",
         ),
         mistake(
             "shared out after Bayes' rule",
             task="update",
             loses=2,
-            says="before you multiply by the evidence, not after",
+            says="before you multiply by the likelihood, not after",
             code="""
-def update(belief, occupied, free, first_sight):
-    p = belief * np.stack([free, occupied, occupied, free])
+def update(belief, likelihood, first_sight):
+    silent = (likelihood == likelihood[0]).all(axis=0)
+    p = belief * likelihood[[0, 1, 2, 0]]
     t = p.sum(axis=0)
-    p = np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])
-    return p + np.where((occupied != free) & (t > 0), p[3], 0) * np.array([*first_sight, -1])[:, None, None]""",
+    known = t > 0
+    p = np.where(known, p / np.where(known, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])
+    p = p + np.where(known, p[3], 0) * np.array([*first_sight, -1])[:, None, None]
+    return np.where(silent, belief, p)""",
         ),
         mistake(
             "UNKNOWN thrown away",
@@ -529,11 +448,12 @@ def update(belief, occupied, free, first_sight):
             loses=2,
             says="UNKNOWN was thrown away",
             code="""
-def update(belief, occupied, free, first_sight):
-    p = belief * np.stack([free, occupied, occupied, free])
-    p[3] = np.where(occupied != free, 0, p[3])
+def update(belief, likelihood, first_sight):
+    silent = (likelihood == likelihood[0]).all(axis=0)
+    p = belief * np.concatenate([likelihood, 0 * likelihood[:1]])
     t = p.sum(axis=0)
-    return np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])""",
+    p = np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])
+    return np.where(silent, belief, p)""",
         ),
         mistake(
             "what is improbable taken for a contradiction",
@@ -541,83 +461,73 @@ def update(belief, occupied, free, first_sight):
             loses=1,
             says="on inputs you haven't seen: a cell, surely free, explains its scan with a small probability",
             code="""
-def update(belief, occupied, free, first_sight):
-    b = belief + np.where(occupied != free, belief[3], 0) * np.array([*first_sight, -1])[:, None, None]
-    p = b * np.stack([free, occupied, occupied, free])
+def update(belief, likelihood, first_sight):
+    silent = (likelihood == likelihood[0]).all(axis=0)
+    b = belief + np.where(silent, 0, belief[3]) * np.array([*first_sight, -1])[:, None, None]
+    p = b * likelihood[[0, 1, 2, 0]]
     t = p.sum(axis=0)
-    return np.where(t > 1e-3, p / np.where(t > 1e-3, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])""",
+    p = np.where(t > 1e-3, p / np.where(t > 1e-3, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])
+    return np.where(silent, belief, p)""",
         ),
-        mistake(
-            "contradicted only when surely free",
-            task="update",
-            loses=1,
-            says="on inputs you haven't seen: a cell is NaN",
-            code="""
-def update(belief, occupied, free, first_sight):
-    b = belief + np.where(occupied != free, belief[3], 0) * np.array([*first_sight, -1])[:, None, None]
-    p = b * np.stack([free, occupied, occupied, free])
-    return np.where((b[0] == 1) & (free == 0), np.array([0, 0, 0, 1.0])[:, None, None], p / p.sum(axis=0))""",
-        ),
-        mistake(
-            "revealed only where something is hit",
-            task="update",
-            loses=2,
-            says="on inputs you haven't seen: UNKNOWN is left in cells that the scan sees",
-            code="""
-def update(belief, occupied, free, first_sight):
-    b = belief + np.where(occupied > free, belief[3], 0) * np.array([*first_sight, -1])[:, None, None]
-    p = b * np.stack([free, occupied, occupied, free])
-    t = p.sum(axis=0)
-    return np.where(t > 0, p / np.where(t > 0, t, 1), np.array([0, 0, 0, 1.0])[:, None, None])""",
-        ),
-        # ---- task 4
+        # ---- task 3
         right(
             "two pointers",
-            task="systematic",
+            task="stratified",
             code="""
-def systematic(weight, count, offset):
+def stratified(weight, count, offsets):
     drawn, n, end, total = [], 0, weight[0], sum(weight)
-    for m in range(count):
-        while end <= (m + offset) / count * total:
+    for i in range(count):
+        while end <= (i + offsets[i]) / count * total:
             n += 1
             end += weight[n]
         drawn.append(n)
     return np.array(drawn)""",
         ),
         right(
-            "a list, by helpers with ordinary names",
-            task="systematic",
-            code="""
-weight, before, got, slips = "mine", None, [], 3
-
-
-def drawn(ends, tooth):
-    return sum(bool(end <= tooth) for end in ends)
-
-
-def systematic(weight, count, offset):
-    ends = np.cumsum(weight)
-    return [drawn(ends, (m + offset) / count * ends[-1]) for m in range(count)]""",
-        ),
-        right(
             "count the parts that end before each tooth",
-            task="systematic",
+            task="stratified",
             code="""
-def systematic(weight, count, offset):
+def stratified(weight, count, offsets):
     ends = np.cumsum(weight)
-    teeth = np.linspace(0, ends[-1], count, endpoint=False) + offset * ends[-1] / count
-    return (teeth[:, None] >= ends[None]).sum(axis=1)""",
+    teeth = np.linspace(0, ends[-1], count, endpoint=False) + np.asarray(offsets) * ends[-1] / count
+    return np.digitize(teeth, ends)""",
+        ),
+        mistake(
+            "the lecture's comb, pasted",
+            task="stratified",
+            loses=3,
+            says="truth value of an array",
+            code="""
+def stratified(weight, count, offset):
+    drawn, n, end = [], 0, weight[0]
+    for i in range(count):
+        tooth = (i + offset) / count * sum(weight)
+        while end <= tooth:
+            n += 1
+            end += weight[n]
+        drawn.append(n)
+    return drawn""",
+        ),
+        mistake(
+            "the comb, with the first offset",
+            task="stratified",
+            loses=3,
+            says="with the first offset for all",
+            code="""
+def stratified(weight, count, offsets):
+    ends = np.cumsum(weight)
+    return np.searchsorted(ends, (np.arange(count) + offsets[0]) / count * ends[-1], side="right")""",
         ),
         mistake(
             "two pointers with `if`",
-            task="systematic",
+            task="stratified",
             loses=3,
             says="go on `while` a particle ends before the tooth, not `if`",
             code="""
-def systematic(weight, count, offset):
+def stratified(weight, count, offsets):
     drawn, n, end, total = [], 0, weight[0], sum(weight)
-    for m in range(count):
-        if end <= (m + offset) / count * total:
+    for i in range(count):
+        if end <= (i + offsets[i]) / count * total and n < len(weight) - 1:
             n += 1
             end += weight[n]
         drawn.append(n)
@@ -625,277 +535,265 @@ def systematic(weight, count, offset):
         ),
         mistake(
             "weights not normalised",
-            task="systematic",
+            task="stratified",
             loses=3,
             says="the weights sum to 10, not to 1",
             code="""
-def systematic(weight, count, offset):
-    return np.searchsorted(np.cumsum(weight), (np.arange(count) + offset) / count, side="right")""",
+def stratified(weight, count, offsets):
+    drawn = np.searchsorted(np.cumsum(weight), (np.arange(count) + offsets) / count, side="right")
+    return np.minimum(drawn, len(weight) - 1)""",
         ),
         mistake(
             "cumulative sum off by one",
-            task="systematic",
+            task="stratified",
             loses=3,
             says="every index is one too large",
             code="""
-def systematic(weight, count, offset):
+def stratified(weight, count, offsets):
     ends = np.concatenate([[0], np.cumsum(weight)])
-    return np.searchsorted(ends, (np.arange(count) + offset) / count * ends[-1], side="right")""",
-        ),
-        mistake(
-            "an offset for each tooth: stratified",
-            task="systematic",
-            loses=3,
-            says="the comb has one offset",
-            code="""
-def systematic(weight, count, offset):
-    ends = np.cumsum(weight)
-    offsets = np.random.default_rng().random(count)
     return np.searchsorted(ends, (np.arange(count) + offsets) / count * ends[-1], side="right")""",
         ),
         mistake(
-            "drawn from an urn: multinomial",
-            task="systematic",
+            "own offsets in place of the given ones",
+            task="stratified",
             loses=3,
-            says="nothing else is random",
+            says="the offsets are given",
             code="""
-def systematic(weight, count, offset):
-    return np.sort(np.random.default_rng().choice(len(weight), count, p=weight / sum(weight)))""",
+def stratified(weight, count, offsets):
+    ends = np.cumsum(weight)
+    mine = np.random.default_rng().random(count)
+    return np.searchsorted(ends, (np.arange(count) + mine) / count * ends[-1], side="right")""",
         ),
         mistake(
-            "offset not divided",
-            task="systematic",
+            "on a border, the first of the two",
+            task="stratified",
             loses=3,
-            says="divide it by `count` too",
+            says="on inputs you haven't seen: a particle of weight 0 was drawn",
             code="""
-def systematic(weight, count, offset):
-    ends = np.cumsum(weight) / sum(weight)
-    return np.searchsorted(ends, np.arange(count) / count + offset, side="right")""",
-        ),
-        mistake(
-            "teeth from end to end",
-            task="systematic",
-            loses=3,
-            says="so the last isn't at its end",
-            code="""
-def systematic(weight, count, offset):
-    ends = np.cumsum(weight) / sum(weight)
-    teeth = np.minimum(np.linspace(0, 1, count) + offset / count, 0.999)
-    return np.searchsorted(ends, teeth, side="right")""",
-        ),
-        mistake(
-            "as many as there are weights",
-            task="systematic",
-            loses=3,
-            says="as many as `count`",
-            code="""
-def systematic(weight, count, offset):
-    ends, N = np.cumsum(weight), len(weight)
-    return np.searchsorted(ends, (np.arange(N) + offset) / N * ends[-1], side="right")""",
+def stratified(weight, count, offsets):
+    ends = np.cumsum(weight)
+    return np.searchsorted(ends, (np.arange(count) + offsets) / count * ends[-1], side="left")""",
         ),
         mistake(
             "endless loop",
-            task="systematic",
+            task="stratified",
             loses=3,
             says="no reply before timeout",
             code="""
-def systematic(weight, count, offset):
+def stratified(weight, count, offsets):
     drawn, n = [], 0
     while len(drawn) < count:
         n = (n + 1) % len(weight)
     return drawn""",
         ),
-        mistake(
-            "on a border, the first of the two",
-            task="systematic",
-            loses=3,
-            says="on inputs you haven't seen: a particle of weight 0 was drawn",
+        # ---- task 4
+        right(
+            "by hand",
+            task="cuts",
             code="""
-def systematic(weight, count, offset):
-    ends = np.cumsum(weight)
-    return np.searchsorted(ends, (np.arange(count) + offset) / count * ends[-1], side="left")""",
+def cuts(predicts):
+    exact = {1: 2 / 3, 2: 0.4 / 0.6, 3: 0.5}
+    found = {edge: predicts(*PROBES[edge]) - exact[edge] for edge in exact}
+    return {edge: price for edge, price in found.items() if not -0.001 < price < 0.001}""",
+        ),
+        right(
+            "all combinations",
+            task="cuts",
+            code="""
+def exact(left, own, right):
+    moves = stands = none = 0.0
+    for l in ("right", "static", "other"):
+        for o in ("static", "other"):
+            for r in ("left", "other"):
+                p = left.get(l, 1 - left.get("right", 0) - left.get("static", 0)) if l == "other" else left.get(l, 0)
+                p *= own.get("static", 0) if o == "static" else 1 - own.get("static", 0)
+                p *= right.get("left", 0) if r == "left" else 1 - right.get("left", 0)
+                things = (l == "right") + (o == "static") + (r == "left")
+                if things <= 1:
+                    none += p
+                    moves += p * (l == "right" or r == "left")
+    return moves / none
+
+
+def cuts(predicts):
+    answer = {}
+    for edge in PROBES:
+        price = predicts(*PROBES[edge]) - exact(*PROBES[edge])
+        if abs(price) > 1e-3:
+            answer[edge] = price
+    return answer""",
         ),
         mistake(
-            "offset ignored",
-            task="systematic",
+            "against the package instead of the exact answer",
+            task="cuts",
             loses=3,
-            says="where the comb begins decides",
+            says="is your exact answer of that world right",
             code="""
-def systematic(weight, count, offset):
-    ends = np.cumsum(weight)
-    return np.searchsorted(ends, np.arange(count) / count * ends[-1], side="right")""",
+def cuts(predicts):
+    prices = {edge: predicts(*cells) - package_filter(*cells) for edge, cells in PROBES.items()}
+    return {edge: price for edge, price in prices.items() if abs(price) > 0.001}""",
+        ),
+        mistake(
+            "exact minus filter",
+            task="cuts",
+            loses=3,
+            says="the price is the filter's answer minus the exact one",
+            code="""
+def cuts(predicts):
+    exact = {1: 2 / 3, 2: 2 / 3, 3: 0.5}
+    found = {edge: exact[edge] - predicts(*PROBES[edge]) for edge in exact}
+    return {edge: price for edge, price in found.items() if abs(price) > 0.001}""",
+        ),
+        mistake(
+            "what the filter predicts in place of the price",
+            task="cuts",
+            loses=3,
+            says="subtract the exact answer",
+            code="""
+def cuts(predicts):
+    exact = {1: 2 / 3, 2: 2 / 3, 3: 0.5}
+    found = {edge: predicts(*PROBES[edge]) for edge in exact}
+    return {edge: p for edge, p in found.items() if abs(p - exact[edge]) > 0.001}""",
+        ),
+        mistake(
+            "arrivals of world 1 not struck out",
+            task="cuts",
+            loses=3,
+            says="a price of 0.333 is right, got 0.250",
+            code="""
+def cuts(predicts):
+    exact = {1: 0.75, 2: 2 / 3, 3: 0.5}
+    found = {edge: predicts(*PROBES[edge]) - exact[edge] for edge in exact}
+    return {edge: price for edge, price in found.items() if abs(price) > 0.001}""",
+        ),
+        mistake(
+            "only what is too large",
+            task="cuts",
+            loses=3,
+            says="on inputs you haven't seen",
+            code="""
+def cuts(predicts):
+    exact = {1: 2 / 3, 2: 2 / 3, 3: 0.5}
+    found = {edge: predicts(*PROBES[edge]) - exact[edge] for edge in exact}
+    return {edge: price for edge, price in found.items() if price > 0.001}""",
+        ),
+        mistake(
+            "the answers of the visible test",
+            task="cuts",
+            loses=3,
+            says="on inputs you haven't seen",
+            code="""
+def cuts(predicts):
+    return {1: 1 / 3} if predicts(*PROBES[2]) < 0.7 else {1: 1 / 3, 2: 0.8 - 2 / 3}""",
         ),
         # ---- task 5
         right(
-            "the formulas of the lecture",
-            task="meet",
+            "a generator, and a plain function as the method",
+            task="track",
             code="""
-def meet(own, arrives):
-    a = np.clip(arrives, 0, 0.999)
-    possible = 1 - a * own[1]
-    after = own * (1 - a) / possible
-    after[2] = (a * (1 - own[1]) + (1 - a) * own[2]) / possible
-    return after""",
+class Mine:
+    def __init__(self, draws):
+        self.draws = draws
+
+    def draw(self, weight, count, rng):
+        return self.draws(weight, count, rng.random(count))
+
+
+def track(frames, spec, draws=stratified):
+    params = CmcdotParams(n_particles=20000, resampling=Mine(draws))
+    for belief in track_drive(frames, spec, params, seed=0):
+        yield belief
+
+
+def maps(frames, spec, draws=stratified):
+    return [belief.probability[DYNAMIC].tolist() for belief in track(frames, spec, draws)]""",
         ),
         right(
-            "all eight combinations of each cell",
-            task="meet",
+            "one offset after the other, as a list",
+            task="track",
             code="""
-def meet(own, arrives):
-    after = np.zeros(own.shape)
-    for r, c in np.ndindex(arrives.shape):
-        a = min(arrives[r, c], 0.999)
-        for state in range(4):
-            after[state, r, c] += own[state, r, c] * (1 - a)
-            if state != STATIC:
-                after[DYNAMIC, r, c] += own[state, r, c] * a
-        after[:, r, c] /= after[:, r, c].sum()
-    return after""",
+def track(frames, spec, draws=None):
+    class Slow:
+        def draw(self, weight, count, rng):
+            ends, one = np.cumsum(weight), 1 / count
+            teeth = [(i + rng.random()) * one * ends[-1] for i in range(count)]
+            return np.searchsorted(ends, teeth, side="right")
+    return list(track_drive(frames, spec, CmcdotParams(n_particles=20_000, resampling=Slow())))
+
+
+def maps(frames, spec, draws=None):
+    return np.array([belief.probability[2] for belief in track(frames, spec, draws)])""",
         ),
         mistake(
-            "not normalised after striking out",
-            task="meet",
+            "the package's resampling",
+            task="track",
             loses=2,
-            says="sums to 0.75: divide by what is left",
+            says="that is the package's own resampling",
             code="""
-def meet(own, arrives):
-    a = np.minimum(arrives, 0.999)
-    after = own * (1 - a)
-    after[2] += a * (1 - own[1])
-    return after""",
+def track(frames, spec, draws=None):
+    return track_drive(frames, spec, CmcdotParams(n_particles=20_000), seed=0)
+
+
+def maps(frames, spec, draws=None):
+    return np.array([belief.probability[2] for belief in track(frames, spec, draws)])""",
         ),
         mistake(
-            "nothing struck out",
-            task="meet",
+            "another number of particles",
+            task="track",
             loses=2,
-            says="a thing can't arrive where STATIC stands",
+            says="on inputs you haven't seen: it isn't the same filter",
             code="""
-def meet(own, arrives):
-    a = np.minimum(arrives, 0.999)
-    after = own * (1 - a)
-    after[2] += a
-    return after""",
+def track(frames, spec, draws=None):
+    class Mine:
+        def draw(self, weight, count, rng):
+            ends = np.cumsum(weight)
+            return np.searchsorted(ends, (np.arange(count) + rng.random(count)) / count * ends[-1], side="right")
+    return track_drive(frames, spec, CmcdotParams(n_particles=10_000, resampling=Mine()), seed=0)
+
+
+def maps(frames, spec, draws=None):
+    return np.array([belief.probability[2] for belief in track(frames, spec, draws)])""",
         ),
         mistake(
-            "added to what is there",
-            task="meet",
-            loses=3,
-            says="sums to 1.50: divide by what is left",
-            code="""
-def meet(own, arrives):
-    after = own.copy()
-    after[2] += np.minimum(arrives, 0.999)
-    return after""",
-        ),
-        mistake(
-            "added, then normalised",
-            task="meet",
-            loses=3,
-            says="`arrives and FREE` isn't FREE",
-            code="""
-def meet(own, arrives):
-    after = own.copy()
-    after[2] += np.minimum(arrives, 0.999)
-    return after / after.sum(axis=0)""",
-        ),
-        mistake(
-            "own dynamic mass counted twice",
-            task="meet",
-            loses=1,
-            says="you count its DYNAMIC mass twice",
-            code="""
-def meet(own, arrives):
-    a = np.minimum(arrives, 0.999)
-    after = own * (1 - a)
-    after[2] = own[2] + a * (1 - own[1])
-    return after / after.sum(axis=0)""",
-        ),
-        mistake(
-            "own dynamic mass lost",
-            task="meet",
-            loses=1,
-            says="the own DYNAMIC of cell (0, 1) got lost",
-            code="""
-def meet(own, arrives):
-    a = np.minimum(arrives, 0.999)
-    after = own * (1 - a)
-    after[2] = a * (1 - own[1])
-    return after / after.sum(axis=0)""",
-        ),
-        mistake(
-            "STATIC always wins",
-            task="meet",
+            "only another seed",
+            task="track",
             loses=2,
-            says="STATIC isn't always right",
+            says="on inputs you haven't seen: it isn't the same filter",
             code="""
-def meet(own, arrives):
-    a = np.minimum(arrives, 0.999)
-    after = own * (1 - a)
-    after[1] = own[1]
-    after[2] += a * (1 - own[1])
-    return after""",
+def track(frames, spec, draws=None):
+    return track_drive(frames, spec, CmcdotParams(n_particles=20_000), seed=1)
+
+
+def maps(frames, spec, draws=None):
+    return np.array([belief.probability[2] for belief in track(frames, spec, draws)])""",
         ),
         mistake(
-            "argument changed in place",
-            task="meet",
+            "nothing returned",
+            task="track",
             loses=2,
-            says="meet changed its argument",
+            says="NoneType",
             code="""
-def meet(own, arrives):
-    a = np.minimum(arrives, 0.999)
-    static = own[1].copy()
-    own *= 1 - a
-    own[2] += a * (1 - static)
-    return own / own.sum(axis=0)""",
+def track(frames, spec, draws=None):
+    track_drive(frames, spec)
+
+
+def maps(frames, spec, draws=None):
+    return np.array([belief.probability[2] for belief in track(frames, spec, draws)])""",
         ),
         mistake(
-            "no limit to what arrives",
-            task="meet",
-            loses=1,
-            says="let particles claim 0.999 at most",
-            code="""
-def meet(own, arrives):
-    after = own * (1 - arrives)
-    after[2] += arrives * (1 - own[1])
-    return after / after.sum(axis=0)""",
-        ),
-        mistake(
-            "what arrives fills free space alone",
-            task="meet",
+            "all particles at random",
+            task="track",
             loses=2,
-            says="on inputs you haven't seen: sums are right, values are not (UNKNOWN is a state too)",
+            says="on inputs you haven't seen: it isn't the same filter",
             code="""
-def meet(own, arrives):
-    a = np.minimum(arrives, 0.999)
-    after = own * (1 - a)
-    after[2] += a * (own[0] + own[2])
-    after[3] += a * own[3]
-    return after / after.sum(axis=0)""",
-        ),
-        # ---- passed, or lost, when somebody tried who had not written the tests
-        mistake(
-            "writes into M",
-            task="mix",
-            loses=2,
-            says="it changes an argument",
-            code="""
-def mix(belief, M):
-    after = np.tensordot(M.T, belief, axes=1)
-    M[2, 2] = 0
-    return after, np.tensordot(M[:, 2], belief, axes=1)""",
-        ),
-        mistake(
-            "the same belief, whatever arrives",
-            task="meet",
-            loses=4,
-            says="on inputs you haven't seen",
-            code="""
-def meet(own, arrives):
-    if arrives.shape in ((5, 7), (3, 4)):
-        return np.broadcast_to(np.array([0.1, 0.2, 0.3, 0.4])[:, None, None], own.shape)
-    a = np.minimum(arrives, 0.999)
-    joint = (1 - a) * own
-    joint[2] += a * (1 - own[1])
-    return joint / joint.sum(axis=0)""",
+def track(frames, spec, draws=None):
+    class Mine:
+        def draw(self, weight, count, rng):
+            return rng.integers(0, len(weight), count)
+    return track_drive(frames, spec, CmcdotParams(n_particles=20_000, resampling=Mine()), seed=0)
+
+
+def maps(frames, spec, draws=None):
+    return np.array([belief.probability[2] for belief in track(frames, spec, draws)])""",
         ),
     )

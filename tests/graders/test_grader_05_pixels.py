@@ -3,16 +3,19 @@
 from grader_checks import GraderChecks, mistake, right
 
 
-def intrinsics(
-    f_u="K[0, 0] * scale_u",
-    c_u="(K[0, 2] - left + 0.5) * scale_u - 0.5",
-    f_v="K[1, 1] * scale_v",
-    c_v="(K[1, 2] - top + 0.5) * scale_v - 0.5",
+def undone(
+    scale_u="K_new[0, 0] / K[0, 0]",
+    left="K[0, 2] + 0.5 - (K_new[0, 2] + 0.5) / scale_u",
+    scale_v="K_new[1, 1] / K[1, 1]",
+    top="K[1, 2] + 0.5 - (K_new[1, 2] + 0.5) / scale_v",
+    result="left, top, scale_u, scale_v",
 ):
     """Return an answer to task 1 that finds the four numbers by these expressions."""
     return f"""
-def new_intrinsics(K, left, top, scale_u, scale_v):
-    return np.array([[{f_u}, 0, {c_u}], [0, {f_v}, {c_v}], [0, 0, 1]])"""
+def what_was_done(K, K_new):
+    scale_u, scale_v = {scale_u}, {scale_v}
+    left, top = {left}, {top}
+    return {result}"""
 
 
 def frames(result="now_from_world @ T_world_from_before", turn="R.T", shift="-R.T @ t"):
@@ -35,11 +38,11 @@ def plane(
 ):
     """Return an answer to task 3 that treats one point at a time by these expressions."""
     return f"""
-def plane_pixels(xy, height, K, T_camera_from_grid, size):
+def road_pixels(xy, z, K, T_camera_from_grid, size):
     (f_u, skew, c_u), (_, f_v, c_v), _ = K
     h, w = size
     pixels, visible = np.full((len(xy), 2), np.nan), np.zeros(len(xy), bool)
-    for n, (x, y) in enumerate(xy):
+    for n, ((x, y), height) in enumerate(zip(xy, z)):
         X, Y, Z, _ = {T} @ {point}
         if {front}:
             u, v = {result}
@@ -48,19 +51,37 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
     return pixels, visible"""
 
 
-def drawn(place="x * (z_cam - delta) / (z_cam - z)", never="(z_cam - delta) * (z_cam - z) <= 0"):
+def high(place="z_cam - (z_cam - delta) * x / x_drawn", never="x_drawn > 0"):
     """Return an answer to task 4 by these expressions."""
     return f"""
-def lands_at(x, z, z_cam, delta):
-    if {never}:
-        return np.nan
-    return {place}"""
+def heights_of(x, x_drawn, z_cam, delta):
+    with np.errstate(all="ignore"):
+        return np.where({never}, {place}, np.nan)"""
 
 
-def far(result):
-    """Return an answer to task 5 by this expression."""
+def fault(
+    faults="SHIFT, PITCH, YAW, INVERSE",
+    amounts="np.linspace(-2, 2, 401)",
+    error="np.abs(project_points(points, K, T) - pixels).mean()",
+    result="kind, amount",
+):
+    """Return an answer to task 5 that tries these faults and amounts, and measures the error in this way."""
     return f"""
-def reach(cell, f_u, f_v, z_cam, delta):
+def find_fault(points, pixels, K, T_camera_from_lidar):
+    tried = []
+    for kind in ({faults},):
+        for amount in {amounts}:
+            K_right, T = np.array(K, float), T_camera_from_lidar
+            if kind == SHIFT:
+                K_right[:2, 2] -= amount
+            elif kind == INVERSE:
+                T, amount = np.linalg.inv(T), 0.0
+            else:
+                T = turned(T, "x" if kind == PITCH else "y", amount)
+            def left_over(K, T):
+                return {error}
+            tried.append((left_over(K_right, T), kind, amount))
+    _, kind, amount = min(tried)
     return {result}"""
 
 
@@ -68,158 +89,109 @@ class TestPixels(GraderChecks):
     exercise = "05_pixels"
     entries = (
         # ---- task 1
-        right("four numbers, one by one", task="new-intrinsics", code=intrinsics()),
+        right("four numbers, one by one", task="what-was-done", code=undone()),
         right(
-            "on a copy, measured from the image's edge",
-            task="new-intrinsics",
+            "an affine map between pixels",
+            task="what-was-done",
             code="""
-def new_intrinsics(K, left, top, scale_u, scale_v):
-    K = K.astype(float).copy()
-    K[:2, 2] += 0.5 - np.array([left, top])
-    K[:2] *= np.array([[scale_u], [scale_v]])
-    K[:2, 2] -= 0.5
-    return K""",
-        ),
-        right(
-            "tuples in a list, and helpers with ordinary names",
-            task="new-intrinsics",
-            code="""
-got, slips, before, by_hand = "mine", 4, None, []
-
-
-def moved(c, cut, scale):
-    return (c - cut + 0.5) * scale - 0.5
-
-
-def new_intrinsics(K, left, top, scale_u, scale_v):
-    across, down = moved(K[0][2], left, scale_u), moved(K[1][2], top, scale_v)
-    return [(K[0][0] * scale_u, 0, across), (0, K[1][1] * scale_v, down), (0, 0, 1)]""",
+def what_was_done(K, K_new):
+    S = np.asarray(K_new) @ np.linalg.inv(K)
+    scale = np.diag(S)[:2]
+    corner = (-0.5 - S[:2, 2]) / scale + 0.5
+    return [*corner, *scale]""",
         ),
         mistake(
             "half a pixel forgotten",
-            task="new-intrinsics",
+            task="what-was-done",
             loses=2,
-            says="you scale about the centre of the first pixel",
-            code=intrinsics(c_u="(K[0, 2] - left) * scale_u", c_v="(K[1, 2] - top) * scale_v"),
+            says="you lost half a pixel on the way",
+            code=undone(left="K[0, 2] - K_new[0, 2] / scale_u", top="K[1, 2] - K_new[1, 2] / scale_v"),
         ),
         mistake(
             "half a pixel the wrong way",
-            task="new-intrinsics",
+            task="what-was-done",
             loses=2,
-            says="add 1/2, scale, subtract 1/2",
-            code=intrinsics(c_u="(K[0, 2] - left - 0.5) * scale_u + 0.5", c_v="(K[1, 2] - top - 0.5) * scale_v + 0.5"),
-        ),
-        mistake(
-            "half a pixel at the end only",
-            task="new-intrinsics",
-            loses=2,
-            says="without a resize nothing but the cut may move c_u",
-            code=intrinsics(c_u="(K[0, 2] - left) * scale_u - 0.5", c_v="(K[1, 2] - top) * scale_v - 0.5"),
-        ),
-        mistake(
-            "half a pixel at the end, when the scale isn't one",
-            task="new-intrinsics",
-            loses=2,
-            says="you subtract 1/2 at the end, but you didn't add it",
-            code=intrinsics(
-                c_u="(K[0, 2] - left) * scale_u - (0.5 if scale_u != 1 else 0)",
-                c_v="(K[1, 2] - top) * scale_v - (0.5 if scale_v != 1 else 0)",
+            says="the half has the wrong sign",
+            code=undone(
+                left="K[0, 2] - 0.5 - (K_new[0, 2] - 0.5) / scale_u",
+                top="K[1, 2] - 0.5 - (K_new[1, 2] - 0.5) / scale_v",
             ),
         ),
         mistake(
-            "resized before cutting",
-            task="new-intrinsics",
+            "in new pixels",
+            task="what-was-done",
             loses=2,
-            says="you resize first and then cut",
-            code=intrinsics(c_u="(K[0, 2] + 0.5) * scale_u - 0.5 - left", c_v="(K[1, 2] + 0.5) * scale_v - 0.5 - top"),
+            says="you undo the cut first",
+            code=undone(
+                left="(K[0, 2] + 0.5) * scale_u - 0.5 - K_new[0, 2]",
+                top="(K[1, 2] + 0.5) * scale_v - 0.5 - K_new[1, 2]",
+            ),
         ),
         mistake(
-            "half a pixel added, never taken off",
-            task="new-intrinsics",
+            "the resize not undone",
+            task="what-was-done",
             loses=2,
-            says="half a pixel too much",
-            code=intrinsics(c_u="(K[0, 2] - left + 0.5) * scale_u", c_v="(K[1, 2] - top + 0.5) * scale_v"),
+            says="the resize was not undone",
+            code=undone(left="K[0, 2] - K_new[0, 2]", top="K[1, 2] - K_new[1, 2]"),
         ),
         mistake(
-            "divided by the scale",
-            task="new-intrinsics",
+            "cut with the wrong sign",
+            task="what-was-done",
             loses=2,
-            says="you divide by the scale",
-            code=intrinsics(f_u="K[0, 0] / scale_u", f_v="K[1, 1] / scale_v"),
-        ),
-        mistake(
-            "cut added",
-            task="new-intrinsics",
-            loses=1,
-            says="everything lies 8 pixels farther to the LEFT",
-            code=intrinsics(c_u="(K[0, 2] + left + 0.5) * scale_u - 0.5", c_v="(K[1, 2] + top + 0.5) * scale_v - 0.5"),
-        ),
-        mistake(
-            "cut forgotten",
-            task="new-intrinsics",
-            loses=1,
-            says="pixels are counted from a new first one",
-            code=intrinsics(c_u="(K[0, 2] + 0.5) * scale_u - 0.5", c_v="(K[1, 2] + 0.5) * scale_v - 0.5"),
+            says="what is cut off on the left makes c_u smaller",
+            code=undone(result="-left, -top, scale_u, scale_v"),
         ),
         mistake(
             "left and top swapped",
-            task="new-intrinsics",
-            loses=1,
+            task="what-was-done",
+            loses=2,
             says="left and top are swapped",
-            code=intrinsics(c_u="(K[0, 2] - top + 0.5) * scale_u - 0.5", c_v="(K[1, 2] - left + 0.5) * scale_v - 0.5"),
-        ),
-        mistake(
-            "focal length not scaled",
-            task="new-intrinsics",
-            loses=2,
-            says="every length in pixels is half as long",
-            code=intrinsics(f_u="K[0, 0]", f_v="K[1, 1]"),
-        ),
-        mistake(
-            "half a pixel of focal length",
-            task="new-intrinsics",
-            loses=2,
-            says="a length has no edge",
-            code=intrinsics(f_u="K[0, 0] * scale_u - (1 - scale_u)", f_v="K[1, 1] * scale_v - (1 - scale_v)"),
+            code=undone(result="top, left, scale_u, scale_v"),
         ),
         mistake(
             "scales swapped",
-            task="new-intrinsics",
-            loses=2,
+            task="what-was-done",
+            loses=1,
             says="the scales are swapped",
-            code=intrinsics(
-                f_u="K[0, 0] * scale_v",
-                c_u="(K[0, 2] - left + 0.5) * scale_v - 0.5",
-                f_v="K[1, 1] * scale_u",
-                c_v="(K[1, 2] - top + 0.5) * scale_u - 0.5",
-            ),
+            code=undone(result="left, top, scale_v, scale_u"),
         ),
         mistake(
-            "K changed in place",
-            task="new-intrinsics",
+            "scales turned round",
+            task="what-was-done",
             loses=1,
-            says="changed its argument `K`",
-            code="""
-def new_intrinsics(K, left, top, scale_u, scale_v):
-    K[0, 2], K[1, 2] = (K[0, 2] - left + 0.5) * scale_u - 0.5, (K[1, 2] - top + 0.5) * scale_v - 0.5
-    K[0, 0], K[1, 1] = K[0, 0] * scale_u, K[1, 1] * scale_v
-    return K""",
+            says="turned round",
+            code=undone(result="left, top, 1 / scale_u, 1 / scale_v"),
         ),
         mistake(
-            "a cut rounds to whole pixels",
-            task="new-intrinsics",
-            loses=1,
-            says="on inputs you haven't seen: wrong principal point after a cut",
-            code=intrinsics(
-                c_u="(round(K[0, 2] - left) + 0.5) * scale_u - 0.5", c_v="(round(K[1, 2] - top) + 0.5) * scale_v - 0.5"
-            ),
+            "no border",
+            task="what-was-done",
+            loses=2,
+            says="on inputs you haven't seen: wrong cut (a negative one adds a border",
+            code=undone(result="max(left, 0), max(top, 0), scale_u, scale_v"),
+        ),
+        mistake(
+            "whole pixels",
+            task="what-was-done",
+            loses=2,
+            says="cuts need not be whole pixels",
+            code=undone(result="round(left), round(top), scale_u, scale_v"),
         ),
         mistake(
             "only smaller images",
-            task="new-intrinsics",
-            loses=2,
-            says="on inputs you haven't seen: wrong focal lengths after resizing (images can grow, too)",
-            code=intrinsics(f_u="K[0, 0] * min(scale_u, 1)", f_v="K[1, 1] * min(scale_v, 1)"),
+            task="what-was-done",
+            loses=1,
+            says="on inputs you haven't seen: wrong scales (images can grow",
+            code=undone(result="left, top, min(scale_u, 1), min(scale_v, 1)"),
+        ),
+        mistake(
+            "K changed in place",
+            task="what-was-done",
+            loses=1,
+            says="changed an argument",
+            code=undone()
+            .replace("    scale_u,", "    K[:2, 2] += 0.5\n    scale_u,", 1)
+            .replace("K[0, 2] + 0.5", "K[0, 2]")
+            .replace("K[1, 2] + 0.5", "K[1, 2]"),
         ),
         # ---- task 2
         right(
@@ -357,8 +329,8 @@ def now_from_before(T_world_from_now, T_world_from_before):
             "rotation and shift, homogeneous pixels, masks",
             task="plane-pixels",
             code="""
-def plane_pixels(xy, height, K, T_camera_from_grid, size):
-    points = np.insert(np.asarray(xy, float), 2, height, axis=1)
+def road_pixels(xy, z, K, T_camera_from_grid, size):
+    points = np.insert(np.asarray(xy, float), 2, z, axis=1)
     points = points @ T_camera_from_grid[:3, :3].T + T_camera_from_grid[:3, 3]
     triples = points @ K.T
     pixels = np.full((len(points), 2), np.nan)
@@ -379,7 +351,7 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
             "height forgotten",
             task="plane-pixels",
             loses=3,
-            says="the point lies at z = height",
+            says="each point has a height of its own, z",
             code=plane(point="[x, y, 0, 1]"),
         ),
         mistake(
@@ -463,7 +435,7 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
             "nearer than half a metre is behind",
             task="plane-pixels",
             loses=2,
-            says="on inputs you haven't seen: a point 0.25 m in front of the camera has no pixel",
+            says="on inputs you haven't seen: a point just in front of the camera has no pixel",
             code=plane(front="Z > 0.5"),
         ),
         mistake(
@@ -531,7 +503,7 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
             "rounded to whole pixels",
             task="plane-pixels",
             loses=3,
-            says="no pixel quite whole",
+            says="by hand, Z = 10, 20 and 10",
             code=plane(result="round((f_u * X + skew * Y) / Z + c_u), round(f_v * Y / Z + c_v)"),
         ),
         mistake(
@@ -551,244 +523,203 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
             says="on inputs you haven't seen: wrong at a border of the image",
             code=plane(inside="0 <= u <= w - 1 and 0 <= v < h - 2"),
         ),
-        # ---- task 4
-        right("with the ratio of two slopes", task="lands-at", code=drawn(place="(delta - z_cam) / ((z - z_cam) / x)")),
-        right(
-            "signs first, then the triangles",
-            task="lands-at",
-            code="""
-def lands_at(x, z, z_cam, delta):
-    sinks = z_cam - z
-    if sinks == 0 or np.sign(sinks) != np.sign(z_cam - delta):
-        return float("nan")
-    return x + x * (z - delta) / sinks""",
-        ),
         mistake(
-            "on the ground",
-            task="lands-at",
+            "nearer than 0.2 m is behind",
+            task="plane-pixels",
             loses=2,
-            says="that is the ground",
-            code=drawn(place="x * z_cam / (z_cam - z)"),
+            says="on inputs you haven't seen: a point just in front of the camera has no pixel",
+            code=plane(front="Z > 0.2"),
         ),
         mistake(
-            "triangles swapped",
-            task="lands-at",
+            "no pixel beyond 1500 m",
+            task="plane-pixels",
             loses=2,
-            says="the triangles are swapped",
-            code=drawn(place="x * (z_cam - z) / (z_cam - delta)"),
+            says="on inputs you haven't seen: a point 5 km ahead has no pixel",
+            code=plane(front="0 < Z < 1500"),
         ),
         mistake(
-            "heights from the ground",
-            task="lands-at",
+            "borders a fifth of a pixel too wide",
+            task="plane-pixels",
+            loses=2,
+            says="on inputs you haven't seen: wrong at the",
+            code=plane(inside="-0.2 <= u <= w - 0.8 and -0.2 <= v <= h - 0.8"),
+        ),
+        mistake(
+            "one height for all",
+            task="plane-pixels",
             loses=3,
-            says="measure both heights from the camera",
-            code=drawn(place="x * z / delta if delta else x"),
+            says="by hand, Z = 10, 20 and 10",
+            code=plane().replace("    h, w = size", "    h, w = size\n    z = np.full(len(xy), z[0])"),
         ),
-        mistake(
-            "the thing taken for on the ground",
-            task="lands-at",
-            loses=2,
-            says="the thing's own height is missing",
-            code=drawn(place="x * z_cam / (z_cam - delta)"),
-        ),
-        mistake(
-            "only how far it is thrown",
-            task="lands-at",
-            loses=2,
-            says="count from the camera",
-            code=drawn(place="x * (z - delta) / (z_cam - z)"),
-        ),
-        mistake(
-            "a plane below the ground taken for one above it",
-            task="lands-at",
-            loses=2,
-            says="a plane 0.3 m below the ground isn't one 0.3 m above it",
-            code=drawn(place="x * (z_cam - abs(delta)) / (z_cam - z)"),
-        ),
-        mistake(
-            "climbs, and yet meets", task="lands-at", loses=1, says="behind the camera", code=drawn(never="z == z_cam")
-        ),
-        mistake(
-            "infinity",
-            task="lands-at",
-            loses=1,
-            says="not infinitely far: never",
-            code=drawn().replace("np.nan", "np.inf"),
-        ),
-        mistake(
-            "nothing above the camera",
-            task="lands-at",
-            loses=1,
-            says="both lie above the camera",
-            code=drawn(never="z >= z_cam or delta >= z_cam"),
-        ),
-        mistake(
-            "planes above forgotten",
-            task="lands-at",
-            loses=1,
-            says="yet it is drawn",
-            code=drawn(place="x * abs((z_cam - delta) / (z_cam - z))", never="z >= z_cam and delta < z_cam"),
-        ),
-        mistake(
-            "a level ray divides by zero",
-            task="lands-at",
-            loses=1,
-            says="on inputs you haven't seen: a level ray meets no other plane: NaN",
-            code=drawn(never="(z_cam - delta) * (z_cam - z) < 0"),
-        ),
-        mistake(
-            "never farther than the grid",
-            task="lands-at",
-            loses=2,
-            says="on inputs you haven't seen: the thing and the place where it is drawn have different pixels",
-            code=drawn(place="min(x * (z_cam - delta) / (z_cam - z), 60.0)"),
-        ),
-        # ---- task 5
-        right("numpy's cube root", task="reach", code=far("np.cbrt(f_u * f_v * np.abs(z_cam - delta) * cell * cell)")),
+        # ---- task 4
+        right("by shares, NaN from a mask", task="heights-of", code=high()),
         right(
-            "bisection",
-            task="reach",
+            "one by one, in a list",
+            task="heights-of",
             code="""
-def reach(cell, f_u, f_v, z_cam, delta):
-    near, distant = 1e-6, 1e6
-    for _ in range(200):
-        Z = (near + distant) / 2
-        area = f_u * cell / Z * (f_v * abs(z_cam - delta) * cell / Z**2)
-        near, distant = (Z, distant) if area > 1 else (near, Z)
-    return Z""",
+def heights_of(x, x_drawn, z_cam, delta):
+    heights = []
+    for a, b in zip(x, x_drawn):
+        heights.append(delta + (z_cam - delta) * (1 - a / b) if b > 0 else float("nan"))
+    return heights""",
         ),
         mistake(
-            "no root",
-            task="reach",
+            "ratio turned round",
+            task="heights-of",
             loses=2,
-            says="that is the area at Z = 1 m",
-            code=far("f_u * f_v * abs(z_cam - delta) * cell**2"),
+            says="the ratio is turned round",
+            code=high("z_cam - (z_cam - delta) * x_drawn / x"),
         ),
         mistake(
-            "a third of it",
-            task="reach",
+            "the ground plane",
+            task="heights-of",
             loses=2,
-            says="write `** (1 / 3)`",
-            code=far("(f_u * f_v * abs(z_cam - delta) * cell**2) ** 1 / 3"),
+            says="that is the ground plane",
+            code=high("z_cam - z_cam * x / x_drawn"),
         ),
         mistake(
-            "the cell beside the root",
-            task="reach",
+            "from the camera",
+            task="heights-of",
             loses=2,
-            says="it belongs under the root, squared",
-            code=far("(f_u * f_v * abs(z_cam - delta)) ** (1 / 3) * cell"),
+            says="measure from the ground, not from the camera",
+            code=high("(z_cam - delta) * x / x_drawn"),
         ),
         mistake(
-            "square root",
-            task="reach",
+            "above the plane",
+            task="heights-of",
             loses=2,
-            says="that is the square root",
-            code=far("np.sqrt(f_u * f_v * abs(z_cam - delta) * cell**2)"),
+            says="that is the height above the plane",
+            code=high("(z_cam - delta) * (1 - x / x_drawn)"),
         ),
         mistake(
-            "on the ground",
-            task="reach",
+            "sign of delta lost",
+            task="heights-of",
             loses=2,
-            says="that is a cell on the ground",
-            code=far("(f_u * f_v * z_cam * cell**2) ** (1 / 3)"),
+            says="`delta` has a sign",
+            code=high("z_cam - (z_cam + delta) * x / x_drawn"),
         ),
         mistake(
-            "z_cam + delta",
-            task="reach",
+            "triangle from the plane",
+            task="heights-of",
             loses=2,
-            says="not z_cam + delta",
-            code=far("(f_u * f_v * (z_cam + delta) * cell**2) ** (1 / 3)"),
+            says="the triangle begins at the camera",
+            code=high("delta + (z_cam - delta) * x / x_drawn"),
         ),
         mistake(
-            "cell once",
-            task="reach",
-            loses=2,
-            says="the cell's side counts twice",
-            code=far("(f_u * f_v * abs(z_cam - delta) * cell) ** (1 / 3)"),
+            "behind the camera, too",
+            task="heights-of",
+            loses=1,
+            says="the third would be drawn 30 m behind the camera",
+            code=high(never="x_drawn != 0"),
         ),
         mistake(
-            "f_u twice",
-            task="reach",
-            loses=2,
-            says="you took f_u for f_v",
-            code=far("(f_u**2 * abs(z_cam - delta) * cell**2) ** (1 / 3)"),
+            "at the camera, too",
+            task="heights-of",
+            loses=1,
+            says="the fourth would be drawn at the camera itself",
+            code=high(never="~(x_drawn < 0)"),
         ),
         mistake(
-            "one pixel wide",
-            task="reach",
-            loses=2,
-            says="that is where the cell is one pixel wide",
-            code=far("f_u * cell"),
+            "NaN for all when one is NaN",
+            task="heights-of",
+            loses=1,
+            says="the first has a height",
+            code=high(never="(x_drawn > 0).all()"),
         ),
         mistake(
-            "one pixel high",
-            task="reach",
+            "only planes below the camera",
+            task="heights-of",
             loses=2,
-            says="that is where the cell is one pixel high",
-            code=far("np.sqrt(f_v * abs(z_cam - delta) * cell)"),
+            says="on inputs you haven't seen: the thing and the place",
+            code=high("z_cam - abs(z_cam - delta) * x / x_drawn"),
         ),
         mistake(
-            "a plane above the camera",
-            task="reach",
-            loses=2,
-            says="take |z_cam - delta|",
-            code=far("(f_u * f_v * (z_cam - delta) * cell**2) ** (1 / 3)"),
-        ),
-        mistake(
-            "searched up to 100 m",
-            task="reach",
-            loses=2,
-            says="on inputs you haven't seen: the cell isn't one pixel there (a depth of hundreds of metres)",
-            code="""
-def reach(cell, f_u, f_v, z_cam, delta):
-    near, distant = 1e-6, 100.0
-    for _ in range(200):
-        Z = (near + distant) / 2
-        area = f_u * f_v * abs(z_cam - delta) * cell**2 / Z**3
-        near, distant = (Z, distant) if area > 1 else (near, Z)
-    return Z""",
-        ),
-        mistake(
-            "a plane below the ground taken for one above it",
-            task="reach",
-            loses=2,
-            says="a plane 0.2 m below the ground, 0.5 m below the camera: `delta` has a sign",
-            code=far("(f_u * f_v * abs(z_cam - abs(delta)) * cell**2) ** (1 / 3)"),
-        ),
-        mistake(
-            "cells of half a metre written in",
-            task="reach",
-            loses=2,
-            says="on inputs you haven't seen: the cell isn't one pixel there",
-            code=far("(f_u * f_v * abs(z_cam - delta) * 0.25) ** (1 / 3)"),
+            "x_drawn overwritten",
+            task="heights-of",
+            loses=1,
+            says="it changes an argument",
+            code=high(never="True").replace("    with", "    x_drawn[~(x_drawn > 0)] = np.nan\n    with"),
         ),
         mistake(
             "an endless loop",
-            task="reach",
-            loses=2,
+            task="heights-of",
+            loses=3,
             says="before timeout",
             code="""
-def reach(cell, f_u, f_v, z_cam, delta):
-    Z = 1.0
-    while f_u * f_v * abs(z_cam - delta) * cell**2 / Z**3 != 1:
-        Z += 0.3
-    return Z""",
+def heights_of(x, x_drawn, z_cam, delta):
+    z = -z_cam
+    while np.any(x_drawn * (z_cam - z) != x * (z_cam - delta)):
+        z += 0.01
+    return z""",
         ),
-        # ---- passed, or lost, when somebody tried who had not written the tests
+        # ---- task 5
+        right("all faults, all amounts", task="find-fault", code=fault()),
+        right(
+            "squared errors",
+            task="find-fault",
+            code=fault(error="((project_points(points, K, T) - pixels) ** 2).sum()"),
+        ),
         mistake(
-            "K cut in place",
-            task="new-intrinsics",
-            loses=1,
-            says="it changes an argument",
-            code="""
-def new_intrinsics(K, left, top, scale_u, scale_v):
-    resized = np.diag([scale_u, scale_v, 1.0])
-    shift = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
-    if left != top and left + top > 20:
-        K[0, 2] -= left
-        K[1, 2] -= top
-        left = top = 0
-    cut = np.array([[1, 0, -left], [0, 1, -top], [0, 0, 1]])
-    return np.linalg.inv(shift) @ resized @ shift @ cut @ K""",
+            "a shift for a yaw",
+            task="find-fault",
+            loses=4,
+            says="the fault is YAW",
+            code=fault(faults="SHIFT, PITCH, INVERSE"),
+        ),
+        mistake(
+            "a yaw for a pitch",
+            task="find-fault",
+            loses=4,
+            says="the fault is PITCH",
+            code=fault(faults="SHIFT, YAW, INVERSE"),
+        ),
+        mistake(
+            "never inverted",
+            task="find-fault",
+            loses=4,
+            says="the fault is INVERSE",
+            code=fault(faults="SHIFT, PITCH, YAW"),
+        ),
+        mistake(
+            "whole degrees",
+            task="find-fault",
+            loses=2,
+            says="the amount is 0.5",
+            code=fault(result="kind, float(round(amount))"),
+        ),
+        mistake(
+            "sign turned",
+            task="find-fault",
+            loses=2,
+            says="the sign is turned",
+            code=fault(result="kind, -amount"),
+        ),
+        mistake(
+            "radians",
+            task="find-fault",
+            loses=2,
+            says="the amount is asked for in degrees",
+            code=fault(result="kind, amount if kind == SHIFT else np.radians(amount)"),
+        ),
+        mistake(
+            "only across",
+            task="find-fault",
+            loses=2,
+            says="on inputs you haven't seen: the wrong amount",
+            code=fault(error="np.abs(project_points(points, K, T) - pixels)[:, 0].mean()"),
+        ),
+        mistake(
+            "the mean error",
+            task="find-fault",
+            loses=4,
+            says="on inputs you haven't seen: the wrong fault",
+            code=fault(error="abs((project_points(points, K, T) - pixels).mean())"),
+        ),
+        mistake(
+            "only small faults",
+            task="find-fault",
+            loses=2,
+            says="on inputs you haven't seen: the wrong amount",
+            code=fault(amounts="np.linspace(-1, 1, 201)"),
         ),
     )

@@ -52,38 +52,56 @@ def give_back(p_bar, pixels, visible, h, w):
     return s_bar"""
 
 
-def slope(in_u="(1 - b) * (q - p) + b * (y - x)", in_v="(1 - a) * (x - p) + a * (y - q)", order="{}, {}"):
-    """Return an answer to task 4 with these expressions in the four scores p q / x y around the point."""
+def yaw(
+    p_bar="p - t[j]",
+    u_turns="K[0, 0] * (1 + (X / Z) ** 2)",
+    v_turns="K[1, 1] * X * Y / Z**2",
+    in_u="(1 - b) * (s[n, m + 1] - s[n, m]) + b * (s[n + 1, m + 1] - s[n + 1, m])",
+    in_v="(1 - a) * (s[n + 1, m] - s[n, m]) + a * (s[n + 1, m + 1] - s[n, m + 1])",
+    result="total",
+):
+    """Return an answer to task 4 by the chain rule with these factors."""
     return f"""
-def slopes(s, u, v):
-    n, m = int(v), int(u)
-    a, b = u - m, v - n
-    p, q, x, y = s[n, m], s[n, m + 1], s[n + 1, m], s[n + 1, m + 1]
-    return {order.format(in_u, in_v)}"""
+def yaw_slope(s, points, K, t):
+    total = 0.0
+    for j, (X, Y, Z) in enumerate(points):
+        u, v = K[0, 0] * X / Z + K[0, 2], K[1, 1] * Y / Z + K[1, 2]
+        n, m = int(v), int(u)
+        a, b = u - m, v - n
+        p = (1 - b) * ((1 - a) * s[n, m] + a * s[n, m + 1]) + b * ((1 - a) * s[n + 1, m] + a * s[n + 1, m + 1])
+        in_u, in_v = {in_u}, {in_v}
+        total += ({p_bar}) * (in_u * ({u_turns}) + in_v * ({v_turns}))
+    return {result}"""
 
 
-def by_steps(step, ahead=1, behind=1):
-    """Return an answer to task 4 by finite differences."""
+def by_steps(step):
+    """Return an answer to task 4 by finite differences of the whole loss."""
     return f"""
-def read(s, u, v):
-    down = np.maximum(0, 1 - np.abs(v - np.arange(s.shape[0])))
-    return down @ s @ np.maximum(0, 1 - np.abs(u - np.arange(s.shape[1])))
+def yaw_slope(s, points, K, t):
+    def loss(angle):
+        X, Y, Z = points.T
+        X, Z = X * np.cos(angle) + Z * np.sin(angle), Z * np.cos(angle) - X * np.sin(angle)
+        u, v = K[0, 0] * X / Z + K[0, 2], K[1, 1] * Y / Z + K[1, 2]
+        down = np.maximum(0, 1 - np.abs(v[:, None] - np.arange(s.shape[0])))
+        across = np.maximum(0, 1 - np.abs(u[:, None] - np.arange(s.shape[1])))
+        return 0.5 * ((np.einsum("jn,nm,jm->j", down, s, across) - t) ** 2).sum()
+    return (loss({step}) - loss(-{step})) / (2 * {step})"""
 
-def slopes(s, u, v):
-    in_u = (read(s, u + {ahead * step}, v) - read(s, u - {behind * step}, v)) / {(ahead + behind) * step}
-    in_v = (read(s, u, v + {ahead * step}) - read(s, u, v - {behind * step})) / {(ahead + behind) * step}
-    return in_u, in_v"""
 
-
-def places(true="2 * u / (w - 1) - 1", false="(2 * u + 1) / w - 1", size="h, w", pair="across, down"):
-    """Return an answer to task 5 with these expressions in u and w."""
+def probe(at="1.0", ramp="np.tile(np.arange(w, dtype=float), (h, 1))", swap="False"):
+    """Return an answer to task 5 that reads two places of this ramp."""
     return f"""
-def unit_places(pixels, size, align_corners):
-    {size} = size
-    def place(u, w):
-        return {true} if align_corners else {false}
-    across, down = place(pixels[..., 0], w), place(pixels[..., 1], h)
-    return np.stack([{pair}], axis=-1)"""
+def swaps(sampler, h, w):
+    first, second = sampler(np.tile(np.arange(w, dtype=float), (h, 1)), np.array([1.0, 2.0]), np.array([1.0, 1.0]))
+    return bool(abs(first - second) < 1e-6)
+
+def convention(sampler, h, w):
+    if not {swap} and swaps(sampler, h, w):
+        return convention(lambda image, u, v: sampler(image, v, u), h, w)
+    at = {at}
+    read = float(np.ravel(sampler({ramp}, np.array([at]), np.array([1.0])))[0])
+    places = {{CENTRES: at, CORNERS: at - 0.5, STRETCHED: at * (w - 1) / w}}
+    return min(places, key=lambda kind: abs(places[kind] - read))"""
 
 
 class TestPlanes(GraderChecks):
@@ -94,7 +112,7 @@ class TestPlanes(GraderChecks):
         right(
             "the first neighbour held back",
             task="four-pixels",
-            code=four(top="min(int(v), h - 2)", left="min(int(u), w - 2)"),
+            code=four(top="max(min(int(v), h - 2), 0)", left="max(min(int(u), w - 2), 0)"),
         ),
         right(
             "ask every pixel for its kernel",
@@ -222,6 +240,13 @@ def four_pixels(u, v, h, w):
     weights = [(1 - b) * (1 - a), (1 - b) * a, b * (1 - a), b * a]
     return [top, top, bottom, bottom], [left, right, left, right], weights""",
         ),
+        mistake(
+            "pixel -1 in an image of one column",
+            task="four-pixels",
+            loses=1,
+            says="on inputs you haven't seen",
+            code=four(top="min(int(v), h - 2)", left="min(int(u), w - 2)"),
+        ),
         # ---- task 2
         right("a loop over points", task="sample-plane", code=plane()),
         right(
@@ -331,6 +356,13 @@ def sample_plane(s, pixels, visible):
             loses=2,
             says="on inputs you haven't seen: wrong values",
             code=plane(m="np.minimum(u, 2) - np.arange(w)"),
+        ),
+        mistake(
+            "pixels overwritten",
+            task="sample-plane",
+            loses=1,
+            says="it changes an argument",
+            code=plane().replace("    H, W = visible.shape", "    H, W = visible.shape\n    pixels[~visible] = 0"),
         ),
         # ---- task 3
         right("a loop over points and classes", task="give-back", code=back()),
@@ -475,222 +507,152 @@ def give_back(p_bar, pixels, visible, h, w):
     return s_bar""",
         ),
         # ---- task 4
-        right("the four scores, with int", task="slopes", code=slope()),
-        right("finite differences, a small step", task="slopes", code=by_steps(1e-6)),
-        right(
-            "the slope of the kernel",
-            task="slopes",
-            code="""
-def slopes(s, u, v):
-    dn, dm = v - np.arange(s.shape[0]), u - np.arange(s.shape[1])
-    def k(t):
-        return np.maximum(0, 1 - np.abs(t))
-    def k_slope(t):
-        return np.where(np.abs(t) < 1, -np.sign(t), 0)
-    return k(dn) @ s @ k_slope(dm), k_slope(dn) @ s @ k(dm)""",
-        ),
-        mistake("u and v swapped", task="slopes", loses=2, says="the two are swapped", code=slope(order="{1}, {0}")),
+        right("the chain rule, point by point", task="yaw-slope", code=yaw()),
+        right("finite differences, a small step", task="yaw-slope", code=by_steps(1e-7)),
         mistake(
-            "sign turned",
-            task="slopes",
-            loses=2,
+            "steps across a kink",
+            task="yaw-slope",
+            loses=3,
+            says="does a step cross it?",
+            code=by_steps(2e-4),
+        ),
+        mistake(
+            "wanted minus read",
+            task="yaw-slope",
+            loses=3,
             says="the sign is turned",
-            code=slope("(1 - b) * (p - q) + b * (x - y)", "(1 - a) * (p - x) + a * (q - y)"),
-        ),
-        mistake(
-            "weights crossed",
-            task="slopes",
-            loses=2,
-            says="the rows' weights are crossed",
-            code=slope("b * (q - p) + (1 - b) * (y - x)", "a * (x - p) + (1 - a) * (y - q)"),
-        ),
-        mistake("upper row alone", task="slopes", loses=2, says="that is row 0 alone", code=slope("q - p", "x - p")),
-        mistake("lower row alone", task="slopes", loses=2, says="that is row 1 alone", code=slope("y - x", "y - q")),
-        mistake(
-            "rows added",
-            task="slopes",
-            loses=2,
-            says="you add the differences of both rows",
-            code=slope("(q - p) + (y - x)", "(x - p) + (y - q)"),
-        ),
-        mistake(
-            "mean of the rows",
-            task="slopes",
-            loses=2,
-            says="you take the mean of both rows",
-            code=slope("((q - p) + (y - x)) / 2", "((x - p) + (y - q)) / 2"),
-        ),
-        mistake(
-            "slope of the nearest pixel",
-            task="slopes",
-            loses=2,
-            says="that is the slope of the nearest pixel",
-            code="""
-def slopes(s, u, v):
-    def read(u, v):
-        return s[round(v), round(u)]
-    return (read(u + 1e-6, v) - read(u - 1e-6, v)) / 2e-6, (read(u, v + 1e-6) - read(u, v - 1e-6)) / 2e-6""",
-        ),
-        mistake(
-            "the value",
-            task="slopes",
-            loses=2,
-            says="that is the value itself",
-            code=slope(*["(1 - b) * ((1 - a) * p + a * q) + b * ((1 - a) * x + a * y)"] * 2),
-        ),
-        mistake(
-            "numpy's gradient at the nearest pixel",
-            task="slopes",
-            loses=2,
-            says="that is row 1 alone",
-            code="""
-def slopes(s, u, v):
-    in_v, in_u = np.gradient(s)
-    return in_u[round(v), round(u)], in_v[round(v), round(u)]""",
-        ),
-        mistake(
-            "right in u, crossed in v",
-            task="slopes",
-            loses=2,
-            says="in v: expected",
-            code=slope(in_v="a * (x - p) + (1 - a) * (y - q)"),
-        ),
-        mistake(
-            "two steps, divided by one",
-            task="slopes",
-            loses=2,
-            says="there are two steps",
-            code=by_steps(1e-6).replace("2e-06", "1e-6"),
-        ),
-        mistake(
-            "a step of a tenth of a pixel",
-            task="slopes",
-            loses=2,
-            says="on inputs you haven't seen: wrong close to a pixel's centre",
-            code=by_steps(0.1),
-        ),
-        # ---- task 5
-        right("u and v by themselves", task="unit-places", code=places()),
-        right(
-            "from the edge, or from the centre",
-            task="unit-places",
-            code="""
-def unit_places(pixels, size, align_corners):
-    w_h = np.array([size[1], size[0]], float)
-    if align_corners:
-        share = pixels / (w_h - 1)
-    else:
-        share = (pixels + 0.5) / w_h
-    return -1 + 2 * share""",
-        ),
-        right(
-            "from the middle of the image",
-            task="unit-places",
-            code="""
-def unit_places(pixels, size, align_corners):
-    w_h = np.array(size)[::-1]
-    middle = (w_h - 1) / 2
-    return (pixels - middle) / (middle if align_corners else w_h / 2)""",
-        ),
-        right(
-            "nested lists, and helpers with everyday names",
-            task="unit-places",
-            code="""
-weights, read, loss, slips, before, s, pixels, rows, cols = "these were names of the test cells before".split() + [0]
-
-
-def got(places, size, align_corners):
-    if np.ndim(places) > 1:
-        return [got(part, size, align_corners) for part in places]
-    lasts = [n - 1 if align_corners else n for n in size[::-1]]
-    return [2 * (x + 0.5 * (not align_corners)) / n - 1 for x, n in zip(places, lasts)]
-
-
-def unit_places(pixels, size, align_corners):
-    return got(pixels.tolist(), size, align_corners)""",
-        ),
-        mistake(
-            "rows of different lengths",
-            task="unit-places",
-            loses=2,
-            says="unit_places returned no array of numbers but a list",
-            code="def unit_places(pixels, size, align_corners):\n    return [[1.0], [0.5, 0.0]]",
-        ),
-        mistake(
-            "w steps from centre to centre",
-            task="unit-places",
-            loses=1,
-            says="from the first centre to the last there are w - 1 steps",
-            code=places(true="2 * u / w - 1"),
+            code=yaw(p_bar="t[j] - p"),
         ),
         mistake(
             "the half forgotten",
-            task="unit-places",
-            loses=1,
-            says="half a pixel from the edge: add that half first",
-            code=places(false="2 * u / w - 1"),
+            task="yaw-slope",
+            loses=3,
+            says="the half of the loss is missing",
+            code=yaw(p_bar="2 * (p - t[j])"),
         ),
         mistake(
-            "one formula for both: centres",
-            task="unit-places",
-            loses=1,
-            says="here -1 and 1 are the edges",
-            code=places(false="2 * u / (w - 1) - 1"),
+            "v forgotten",
+            task="yaw-slope",
+            loses=3,
+            says="v is missing",
+            code=yaw(v_turns="0"),
         ),
         mistake(
-            "one formula for both: edges",
-            task="unit-places",
-            loses=1,
-            says="here -1 and 1 are the centres",
-            code=places(true="(2 * u + 1) / w - 1"),
+            "f_u alone",
+            task="yaw-slope",
+            loses=3,
+            says="Z changes too",
+            code=yaw(u_turns="K[0, 0]"),
         ),
         mistake(
-            "the two exchanged",
-            task="unit-places",
+            "v the other way",
+            task="yaw-slope",
+            loses=3,
+            says="v moves the other way",
+            code=yaw(v_turns="-K[1, 1] * X * Y / Z**2"),
+        ),
+        mistake(
+            "slopes swapped",
+            task="yaw-slope",
+            loses=3,
+            says="the slopes in u and v are swapped",
+            code=yaw(
+                in_u="(1 - a) * (s[n + 1, m] - s[n, m]) + a * (s[n + 1, m + 1] - s[n, m + 1])",
+                in_v="(1 - b) * (s[n, m + 1] - s[n, m]) + b * (s[n + 1, m + 1] - s[n + 1, m])",
+            ),
+        ),
+        mistake(
+            "a mean over points",
+            task="yaw-slope",
+            loses=3,
+            says="the loss is a sum, no mean",
+            code=yaw(result="total / len(points)"),
+        ),
+        mistake(
+            "the sign of the error alone",
+            task="yaw-slope",
+            loses=3,
+            says="wrong slope",
+            code=yaw(p_bar="np.sign(p - t[j])"),
+        ),
+        mistake(
+            "one focal length",
+            task="yaw-slope",
+            loses=3,
+            says="on inputs you haven't seen: wrong slope",
+            code=yaw(v_turns="K[0, 0] * X * Y / Z**2"),
+        ),
+        # ---- task 5
+        right("one place on a ramp", task="convention", code=probe()),
+        right(
+            "where a single bright column lies",
+            task="convention",
+            code="""
+def swaps(sampler, h, w):
+    image = np.zeros((h, w))
+    image[:, :2] = 1
+    low, high = sampler(image, np.array([0.0, 3.0]), np.array([0.0, 0.0]))
+    return bool(abs(low - high) < 1e-6)
+
+
+def convention(sampler, h, w):
+    if swaps(sampler, h, w):
+        return convention(lambda image, u, v: sampler(image, v, u), h, w)
+    image = np.zeros((h, w))
+    image[:, 2] = 1
+    places = {CENTRES: 2.0, CORNERS: 2.5, STRETCHED: 2.0 * w / (w - 1)}
+    return max(places, key=lambda kind: sampler(image, np.array([places[kind]]), np.array([1.0]))[0])""",
+        ),
+        mistake(
+            "never corners",
+            task="convention",
             loses=2,
-            says="that is the other convention",
-            code=places(true="(2 * u + 1) / w - 1", false="2 * u / (w - 1) - 1"),
+            says="the sampler is CORNERS",
+            code=probe().replace("CORNERS: at - 0.5, ", ""),
         ),
         mistake(
-            "from 0 to 1",
-            task="unit-places",
+            "at zero",
+            task="convention",
             loses=2,
-            says="not from 0 to 1",
-            code=places(true="u / (w - 1)", false="(u + 0.5) / w"),
+            says="the sampler is CORNERS",
+            code=probe(at="0.0"),
         ),
         mistake(
-            "height and width swapped",
-            task="unit-places",
+            "corners and stretched exchanged",
+            task="convention",
             loses=2,
-            says="height and width are swapped",
-            code=places(size="w, h"),
+            says="the sampler is",
+            code=probe(at="w - 2.0").replace("CORNERS: at - 0.5, STRETCHED", "STRETCHED: at - 0.5, CORNERS"),
         ),
         mistake(
-            "down before across",
-            task="unit-places",
+            "height for width",
+            task="convention",
             loses=2,
-            says="u and v changed places",
-            code=places(pair="down, across"),
+            says="the sampler is",
+            code=probe(at="w - 2.0").replace("at * (w - 1) / w", "at * (h - 1) / h"),
         ),
         mistake(
-            "the half has the wrong sign",
-            task="unit-places",
+            "widths below a hundred",
+            task="convention",
+            loses=2,
+            says="on inputs you haven't seen: the wrong convention",
+            code=probe(at="min(w, 40) - 2.0").replace(
+                "np.tile(np.arange(w, dtype=float), (h, 1)), np.array([at])",
+                "np.tile(np.minimum(np.arange(w), 20.0), (h, 1)), np.array([at])",
+            ),
+        ),
+        mistake(
+            "never swaps",
+            task="convention",
             loses=1,
-            says="the half has the wrong sign",
-            code=places(false="(2 * u - 1) / w - 1"),
+            says="a sampler that takes v for u",
+            code=probe() + "\n\n\ndef swaps(sampler, h, w):\n    return False",
         ),
         mistake(
-            "edges, but w - 1",
-            task="unit-places",
+            "swaps seen, but not undone",
+            task="convention",
             loses=1,
-            says="from edge to edge there are w pixels",
-            code=places(false="(2 * u + 1) / (w - 1) - 1"),
-        ),
-        mistake(
-            "pixels as a table of two columns",
-            task="unit-places",
-            loses=2,
-            says="on inputs you haven't seen: the shape changed",
-            code=places().replace("pixels[..., 0]", "pixels[:, 0]").replace("pixels[..., 1]", "pixels[:, 1]"),
+            says="convention is wrong for a sampler that swaps",
+            code=probe(swap="True").replace("np.array([at]), np.array([1.0])", "np.array([at]), np.array([3.0])"),
         ),
     )

@@ -20,7 +20,8 @@ def course(new_course):
 
 
 EASY = "\n".join(
-    f"def {name}(*_, **__): return 0" for name in ("locate", "predict", "follow", "transition", "half_life", "fuse")
+    f"def {name}(*_, **__): return 0"
+    for name in ("locate", "predict", "follow", "transition", "half_life", "fuse", "build_map")
 )
 
 ATTACKS = {
@@ -72,20 +73,20 @@ def steal(*_, **__):
         for name in ("expected", "right", "by_hand"):
             if name in frame.frame.f_locals: return frame.frame.f_locals[name]
     raise ValueError
-locate = predict = follow = transition = half_life = fuse = steal
+locate = predict = follow = transition = half_life = fuse = build_map = steal
 """,
     "garbage": """
 import gc
 def found(*_, **__):
     return next(x for x in gc.get_objects() if isinstance(x, np.ndarray))
-locate = predict = follow = transition = half_life = fuse = found
+locate = predict = follow = transition = half_life = fuse = build_map = found
 """,
     "subclass": """
 class Same(np.ndarray):
     def __array_function__(self, *a, **k): return True
     def __array_ufunc__(self, *a, **k): return True
     def __eq__(self, other): return True
-locate = predict = follow = transition = half_life = fuse = lambda *a, **k: np.zeros(4).view(Same)
+locate = predict = follow = transition = half_life = fuse = build_map = lambda *a, **k: np.zeros(4).view(Same)
 """,
     "forged-reply": """
 import os
@@ -94,7 +95,9 @@ from semgrid_edu.workshop.course.sandbox import values
 values.encode.__globals__["json"].dumps = lambda *a, **k: "{}"
 locate = lambda *a, **k: 1
 """,
-    "ends-loops": "locate = predict = follow = transition = half_life = fuse = lambda *a, **k: next(iter(()))",
+    "ends-loops": """
+locate = predict = follow = transition = half_life = fuse = build_map = lambda *a, **k: next(iter(()))
+""",
     "more-names": """
 import __main__
 names = __main__.Worker.names
@@ -105,8 +108,10 @@ def answer_array(*a): return [1, 0, 0, 0]
 def answer_number(*a): return 0.34657
 def _explain(*a): pass
 """,
-    "does-nothing": "locate = predict = follow = transition = half_life = fuse = lambda *a, **k: a[0] if a else 0",
-    "empty": "locate = predict = follow = transition = half_life = fuse = lambda *a, **k: np.zeros((0, 4))",
+    "does-nothing": """
+locate = predict = follow = transition = half_life = fuse = build_map = lambda *a, **k: a[0] if a else 0
+""",
+    "empty": "locate = predict = follow = transition = half_life = fuse = build_map = lambda *a, **k: np.zeros((0, 4))",
     "nested-reply": """
 import __main__
 send = __main__.Wire.send
@@ -126,7 +131,7 @@ class Silent(BaseException):
     def __str__(self): return ""
     __mro__ = ()
 def f(*a, **k): raise Silent
-locate = predict = follow = transition = half_life = fuse = f
+locate = predict = follow = transition = half_life = fuse = build_map = f
 """,
 }
 
@@ -206,7 +211,7 @@ def test_changed_tests_earn_nothing(course, change):
     notebook = handed_in(EASIER, first=EASY)
     change(notebook)
     result = graded(course, change.__name__, notebook)
-    assert (result.score, result.points) == (0, 15)
+    assert (result.score, result.points) == (0, 17)
 
 
 def test_nobodys_grades_or_tests_can_be_changed(course):
@@ -225,9 +230,9 @@ try:
     with sqlite3.connect({str(course / "gradebook.db")!r}) as db: db.execute("update grade set auto_score = 0")
 except sqlite3.Error: pass
 """
-    assert graded(course, "vandal", handed_in(first=code)).score == 13
+    assert graded(course, "vandal", handed_in(first=code)).score == 15
     assert contents() == before
-    assert graded(course, "victim-again", handed_in()).score == 13
+    assert graded(course, "victim-again", handed_in()).score == 15
 
 
 def test_hidden_inputs_are_not_in_the_feedback(course):
@@ -269,7 +274,7 @@ display({"image/svg+xml": "<svg onload=" + "'alert(3)'/>", "image/png": '"><scri
     notebook.cells.append(new_markdown_cell(text))
     notebook.metadata["title"] = "<script>alert(7)</script>"
     notebook.metadata["widgets"] = {"application/vnd.jupyter.widget-state+json": {"x": "<script>alert(8)</script>"}}
-    assert graded(course, "scripts", notebook).score == 13
+    assert graded(course, "scripts", notebook).score == 15
     with course_api(course) as api:
         assert api.generate_feedback(NAME, "scripts")["success"]
     page = place(course, "feedback", "scripts", NAME).with_suffix(".html").read_text()
@@ -286,7 +291,7 @@ def test_nothing_that_lies_beside_a_notebook_runs(course, tmp_path):
     for name in names:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')")
-    assert graded(course, "beside", handed_in()).score == 13
+    assert graded(course, "beside", handed_in()).score == 15
     assert not (tmp_path / "ran").exists()
 
 
@@ -338,4 +343,4 @@ if any(pathlib.Path(folder, "left").exists() for folder in ("/tmp", "/dev/shm", 
 def test_nothing_is_left_for_the_next_student(course):
     graded(course, "leaves", handed_in(first=LEAVE))
     answers = {name: FIND + code for name, code in REFERENCE.items()}
-    assert graded(course, "finds", handed_in(answers)).score == 13
+    assert graded(course, "finds", handed_in(answers)).score == 15

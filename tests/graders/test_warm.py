@@ -35,17 +35,17 @@ assert not any(pathlib.Path(folder, "left").exists() for folder in (".", "..", t
 
 
 def test_nothing_of_one_student_reaches_the_next(start):
-    assert points(start, REFERENCE | {"locate": REFERENCE["locate"] + SPOILS + "\nSPOILED = 1"}) < 13
-    assert points(start, {name: FINDS + code for name, code in REFERENCE.items()}) == 13
+    assert points(start, REFERENCE | {"locate": REFERENCE["locate"] + SPOILS + "\nSPOILED = 1"}) < 15
+    assert points(start, {name: FINDS + code for name, code in REFERENCE.items()}) == 15
 
 
 @pytest.mark.parametrize("line", ["import os; os._exit(0)", "while True: pass", "bytearray(10**11)"])
 def test_an_answer_that_ends_python_costs_its_own_points(start, line):
-    assert points(start, inside("predict", line), timeout=1) == 10
+    assert points(start, inside("predict", line), timeout=1) == 12
 
 
 @pytest.mark.skipif(not landlock_version(), reason="this system has no Landlock")
 def test_the_reference_cannot_be_read(start):
     reads = f"open({str(SOURCE)!r}).read()"
-    assert points(start, inside("predict", reads)) == 10
-    assert points(start, inside("predict", "from semgrid_instructor import bayes")) == 10
+    assert points(start, inside("predict", reads)) == 12
+    assert points(start, inside("predict", "from semgrid_instructor import bayes")) == 12

@@ -6,11 +6,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
-from matplotlib.patches import Ellipse, FancyArrow, Rectangle
+from matplotlib.patches import Ellipse, FancyArrow, FancyArrowPatch, PathPatch, Rectangle
 from random_models import chain, one_of_you, random_directed, random_undirected
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Factor, GraphicalModel, draw, in_rows
+from semgrid_edu.graphical.dashed import Dashed, curve
+from semgrid_edu.graphical.layout import NODE
 
 ROWS = in_rows(["m1", "m2"], ["z"])
 
@@ -139,3 +141,27 @@ def test_there_must_be_something_to_draw():
 def test_unknown_names_and_nodes_on_top_of_each_other_are_refused(arguments, says):
     with pytest.raises(ArgumentError, match=says):
         draw(one_of_you(), **arguments)
+
+
+def test_a_straight_dashed_edge_stands_for_the_arrow_and_a_bent_one_beside_it():
+    for bend, arrows in ((0.0, 1), (0.4, 2)):
+        ax = draw(one_of_you(), positions=ROWS, dashed=[Dashed(("m1", "z"), ".1", bend=bend)])
+        assert len(pieces(ax, FancyArrow)) == arrows
+        assert len(pieces(ax, PathPatch)) == len(pieces(ax, FancyArrowPatch)) == 1
+        assert ".1" in said(ax)
+
+
+def test_a_curve_begins_and_ends_at_the_outlines_of_its_nodes():
+    places, names = {"a": (0.0, 0.0), "b": (2.0, 0.0)}, {"a": "a", "b": "b"}
+    start, middle, end = curve(Dashed(("a", "b"), bend=0.25), places, names)
+    np.testing.assert_allclose([np.hypot(*start), np.hypot(*(end - (2, 0)))], NODE / 2 + 0.03)
+    np.testing.assert_allclose(middle, (1, 1))
+
+
+def test_a_ghost_is_drawn_but_is_no_variable():
+    ax = draw(one_of_you(), positions=ROWS, ghosts={"m3": (2.0, 0.0)}, dashed=[Dashed(("m2", "m3"), arrow=False)])
+    assert centres(ax) == {*ROWS.values(), (2.0, 0.0)}
+    assert "$m_{3}$" in said(ax)
+    assert not pieces(ax, FancyArrowPatch)
+    with pytest.raises(ArgumentError):
+        draw(one_of_you(), positions=ROWS, ghosts={"m3": (2.0, 0.0)}, observed="m3")

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 from filterpy import discrete_bayes
-from scipy.linalg import expm
+from scipy.linalg import expm, logm
 
 from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.occupancy import CmcdotParams, transition_matrix
@@ -50,33 +50,46 @@ def check_locate_nothing(locate: Callable) -> None:
     _check_locate(locate, says_pole=False)
 
 
+def _moved(belief: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """Return where things are on a road without an end, (N + D - 1,)."""
+    n_cells, reach = moved.shape
+    after = np.zeros(n_cells + reach - 1)
+    for n in range(n_cells):
+        after[n : n + reach] += belief[n] * moved[n]
+    return after
+
+
 @hidden
+@keeping
 def check_predict_ring(predict: Callable) -> None:
-    """Kernels of other lengths, up to once round the ring."""
+    """Drive moves of other lengths, up to once round the ring, and another one in each cell."""
     rng = generator(12)
     for n_cells, reach in ((9, 5), (6, 6), (4, 2)):
-        belief, moved = rng.dirichlet(np.ones(n_cells)), rng.dirichlet(np.ones(reach))
-        expected = sum(m * np.roll(belief, d) for d, m in enumerate(moved))
+        belief, moved = rng.dirichlet(np.ones(n_cells)), rng.dirichlet(np.ones(reach), size=n_cells)
+        expected = np.zeros(n_cells)
+        np.add.at(expected, np.arange(n_cells + reach - 1) % n_cells, _moved(belief, moved))
         got = answer_array(predict(belief.copy(), moved.copy()))
         assert got.shape == belief.shape, f"shape {got.shape} instead of {belief.shape}"
-        assert close(got.sum(), 1), "probability is lost or made (a kernel may have any length)"
-        assert close(got, expected), "sums are right, values are not (a kernel may have any length)"
+        assert close(got.sum(), 1), "probability is lost or made (a row of moves may have any length)"
+        assert close(got, expected), "sums are right, values are not (a row of moves may have any length)"
 
 
 @hidden
+@keeping
 def check_predict_wall(predict: Callable) -> None:
     """Drive moves that would end far behind the wall, judged also by what the answer itself makes of a long ring."""
     rng = generator(13)
     for n_cells, reach in ((7, 3), (5, 5)):
-        belief, moved = rng.dirichlet(np.ones(n_cells)), rng.dirichlet(np.ones(reach))
+        belief, moved = rng.dirichlet(np.ones(n_cells)), rng.dirichlet(np.ones(reach), size=n_cells)
         got = answer_array(predict(belief.copy(), moved.copy(), ring=False))
         assert got.shape == belief.shape, f"shape {got.shape} instead of {belief.shape}"
         assert not close(got, belief), "nothing has moved"
         turned = answer_array(predict(belief[::-1].copy(), moved.copy(), ring=False))
         assert not close(got, turned), "it doesn't matter what was believed before"
-        beyond = np.convolve(belief, moved)
+        beyond = _moved(belief, moved)
         expected = np.append(beyond[: n_cells - 1], beyond[n_cells - 1 :].sum())
-        wide = answer_array(predict(np.pad(belief, reach), moved.copy()))
+        longer = np.pad(moved, ((reach, reach), (0, 0)), mode="edge")
+        wide = answer_array(predict(np.pad(belief, reach), longer))
         first, last = reach, reach + n_cells - 1
         by_ring = np.concatenate([[wide[: first + 1].sum()], wide[first + 1 : last], [wide[last:].sum()]])
         right = close(got, expected) or close(got, by_ring)
@@ -84,43 +97,92 @@ def check_predict_wall(predict: Callable) -> None:
         assert right, "sums are right, values are not (moves of three and more cells?)"
 
 
+def _cell(seed: int, scans: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a first belief, likelihoods of many scans, some of them silent, and the package's matrix."""
+    likelihoods = generator(seed).uniform(0.05, 0.9, size=(scans, 4))
+    likelihoods[::7] = 0.25
+    return np.array([0.4, 0.3, 0.2, 0.1]), likelihoods, transition_matrix(CmcdotParams(), dt=0.5)
+
+
+def _filtered(belief: np.ndarray, likelihoods: np.ndarray, M: np.ndarray) -> np.ndarray:
+    rows = []
+    for likelihood in likelihoods:
+        belief = discrete_bayes.update(likelihood, belief @ M)
+        rows.append(belief)
+    return np.array(rows)
+
+
 @hidden
+@keeping
 def check_follow(follow: Callable) -> None:
     """Four states, the package's matrix, and a drive of thousands of scans."""
-    rng = generator(14)
-    M = transition_matrix(CmcdotParams(), dt=0.1)
-    likelihoods = rng.uniform(0.05, 0.9, size=(3000, 4))
-    likelihoods[::7] = 0.25
-    belief = np.array([0.4, 0.3, 0.2, 0.1])
-    got = answer_array(follow(belief.copy(), likelihoods.copy(), M.copy()))
-    assert got.shape == likelihoods.shape, f"shape {got.shape} instead of {likelihoods.shape}"
-    for k, likelihood in enumerate(likelihoods[:20]):
-        belief = discrete_bayes.update(likelihood, belief @ M)
-        assert close(got[k], belief), f"wrong from scan {k} on, with four states"
+    cell = _cell(14, 3000)
+    got = answer_array(follow(*(array.copy() for array in cell)))
+    assert got.shape == cell[1].shape, f"shape {got.shape} instead of {cell[1].shape}"
+    for k, expected in enumerate(_filtered(cell[0], cell[1][:20], cell[2])):
+        assert close(got[k], expected), f"wrong from scan {k} on, with four states"
     assert np.isfinite(got).all(), "NaN after many scans: unnormalised products end at zero"
     assert close(got.sum(axis=1), 1), "after many scans the belief no longer sums to 1"
 
 
 @hidden
-def check_transition(transition: Callable) -> None:
-    """Other rates and times; a world that never changes, and one that only ever gains."""
-    slow, fast = generator(16).uniform((0.01, 0.5), (0.4, 3.0))
-    for appears, vanishes, dt in ((slow, fast, 0.1), (fast, slow, 10.0), (slow, 0.0, 1.0), (0.0, 0.0, 1.0)):
-        R = np.array([[-appears, appears], [vanishes, -vanishes]])
-        got = answer_array(transition(appears, vanishes, dt))
-        assert np.isfinite(got).all(), "NaN (a rate may be 0, and so may both)"
-        assert close(got, expm(R * dt), atol=1e-5), "wrong for other rates and times, such as 0 or very long ones"
+@keeping
+def check_follow_lag(follow: Callable) -> None:
+    """Other lags, one longer than the drive, one of a hundred scans."""
+    for scans, lag, scale in ((12, 2, 1), (12, 5, 1), (6, 9, 1), (120, 100, 0.001)):
+        belief, likelihoods, M = _cell(18, scans)
+        likelihoods *= scale  # only ratios matter
+        got = answer_array(follow(belief.copy(), likelihoods.copy(), M.copy(), lag=lag))
+        assert got.shape == likelihoods.shape, f"shape {got.shape} instead of {likelihoods.shape}"
+        assert np.isfinite(got).all(), f"NaN with a lag of {lag} scans: normalise the message on the way"
+        forward = _filtered(belief, likelihoods, M)
+        for t in (0, 1, scans // 2, scans - 2, scans - 1):
+            pair = np.diag(forward[t])  # P(state at t, state later)
+            for later in likelihoods[t + 1 : t + 1 + lag]:
+                pair = pair @ M * later
+                pair /= pair.sum()
+            message = f"wrong at scan {t} of {scans} with a lag of {lag}"
+            assert close(got[t], pair.sum(axis=1)), message
+
+
+def _counts(seed: int) -> list[np.ndarray]:
+    """Return what was counted of cells of several kinds; in the last, one of the changes was never seen."""
+    rng = generator(seed)
+    appears, vanishes = rng.integers(5, 60), rng.integers(80, 250)
+    return [
+        np.array([[700 - appears, appears], [vanishes, 600 - vanishes]]),
+        np.array([[300, 100], [20, 180]]),
+        np.array([[1000 - appears, appears], [0, 50]]),
+    ]
+
+
+def _over(counts: np.ndarray, dt: float, new_dt: float) -> np.ndarray:
+    return expm(np.real(logm(counts / counts.sum(axis=1, keepdims=True))) * (new_dt / dt))
 
 
 @hidden
+@keeping
+def check_transition(transition: Callable) -> None:
+    """Other counts and times, up to very long ones; states of unequal frequency; a world that never changes."""
+    for counts in _counts(16):
+        for dt, new_dt in ((0.1, 0.02), (0.2, 0.5), (0.05, 5.0)):
+            got = answer_array(transition(counts.copy(), dt, new_dt))
+            assert np.isfinite(got).all(), "NaN (a change may never have been seen)"
+            assert close(got, _over(counts, dt, new_dt), atol=1e-5), "wrong for other counts and times"
+    got = answer_array(transition(np.array([[40, 0], [0, 7]]), 0.1, 0.3))
+    assert np.isfinite(got).all(), "NaN where no change was ever seen"
+    assert close(got, np.eye(2), atol=1e-5), "where no change was ever seen the matrix is the identity"
+
+
+@hidden
+@keeping
 def check_half_life(half_life: Callable) -> None:
     """Measure it on the matrix itself."""
-    slow, fast = generator(17).uniform((0.1, 0.8), (0.5, 3.0))
-    for appears, vanishes in ((slow, fast), (fast, slow), (0.0, slow), (fast, 0.0)):
-        R = np.array([[-appears, appears], [vanishes, -vanishes]])
-        M = expm(R * answer_number(half_life(appears, vanishes)))
-        left = M[0, 0] - M[1, 0]
-        assert close(left, 0.5, atol=1e-4), "wrong for other rates: two beliefs must come half as close"
+    for counts in _counts(17):
+        for dt in (0.1, 0.5):
+            M = _over(counts, dt, answer_number(half_life(counts.copy(), dt)))
+            message = "wrong for other counts or another `dt`: two beliefs must come half as close"
+            assert close(M[0, 0] - M[1, 0], 0.5, atol=1e-4), message
 
 
 @hidden
@@ -137,3 +199,31 @@ def check_fuse(fuse: Callable) -> None:
         got = answer_array(fuse(belief.copy(), likelihoods.copy(), beams.copy()))
         assert np.isfinite(got).all(), "NaN with thousands of beams: the product of all likelihoods is zero"
         assert close(got, expected / expected.sum()), "wrong belief (rows of one beam need not be neighbours)"
+
+
+@hidden
+@keeping
+def check_build_map(build_map: Callable) -> None:
+    """Take maps of several sizes, scans with gaps of several lengths, and a single scan."""
+    rng = generator(19)
+    for shape, first in (((9, 4, 3), 0.5), ((6, 2, 7), 0.1), ((1, 3, 3), 0.3)):
+        occupied, free = rng.uniform(0.05, 0.95, size=(2, *shape))
+        silent = rng.random(shape) < 0.4
+        occupied[silent] = free[silent] = 0.5
+        counts = np.array([[300, 100], [20, 180]])
+        gaps = rng.choice([0.05, 0.1, 0.35], size=shape[0] - 1)
+        matrices = np.array([_over(counts, 0.1, gap) for gap in gaps]).reshape(-1, 2, 2)
+        got = answer_array(build_map(occupied.copy(), free.copy(), matrices.copy(), first=first))
+        assert got.shape == shape, f"shape {got.shape} instead of {shape}"
+        expected = _maps(occupied, free, first, matrices)
+        assert close(got[0], expected[0]), f"the first map is wrong, with maps of {shape[1]} x {shape[2]} cells"
+        assert close(got, expected), f"wrong after {shape[0]} scans with gaps of several lengths"
+
+
+def _maps(occupied: np.ndarray, free: np.ndarray, first: float, matrices: np.ndarray) -> np.ndarray:
+    p, maps = np.full(occupied.shape[1:], first), []
+    for M, o, f in zip([np.eye(2), *matrices], occupied, free, strict=True):
+        p = (1 - p) * M[0, 1] + p * M[1, 1]
+        p = p * o / (p * o + (1 - p) * f)
+        maps.append(p)
+    return np.array(maps)

@@ -1,16 +1,20 @@
 """Hidden tests of exercise 04, CMCDOT: the package itself is the reference."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from semgrid_edu.answers import answer_array, answer_arrays
+from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, transition_matrix
+from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, track_drive
 from semgrid_edu.occupancy import update as package_update
 from semgrid_edu.occupancy.local_belief import velocity_moments
 from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
 from semgrid_edu.occupancy.resampling import systematic_resample
+from semgrid_edu.stage_models.bof import bof_beliefs
+from semgrid_edu.stage_models.cells_in_a_row import DT, Cell, CellsInARow
 from semgrid_instructor import close, generator, hidden, keeping
 
 
@@ -40,47 +44,49 @@ def check_in_cells(in_cells: Callable) -> None:
     assert close(mean[~empty], expected[~empty], atol=1e-3), "sums are right, mean velocities are not"
 
 
-@hidden
-@keeping
-def check_mix(mix: Callable) -> None:
-    """Random beliefs through the matrix of default rates, and through one in which UNKNOWN gives birth."""
-    rng = generator(2)
-    belief = rng.dirichlet(np.ones(4), size=(5, 7)).transpose(2, 0, 1)
-    for M in (transition_matrix(CmcdotParams(), 0.3), rng.dirichlet(np.ones(4), size=4)):
-        after, newborn = answer_arrays(mix(belief.copy(), M.copy()), 2)
-        assert after.shape == belief.shape, f"shape {after.shape} instead of {belief.shape}"
-        by_cells = np.einsum("ij,ihw->jhw", M, belief)
-        assert close(after, by_cells), "wrong belief after the step"
-        born = sum(M[i, 2] * belief[i] for i in (0, 1, 3))
-        assert close(newborn, born), "wrong newborn mass (any of the three other states may turn DYNAMIC)"
-
-
-def _scan(belief: np.ndarray, occupied: np.ndarray, free: np.ndarray, first_sight: tuple) -> np.ndarray:
-    """Return what the package makes of a scan."""
-    spec = GridSpec(x_min=0, x_max=belief.shape[1], y_min=0, y_max=belief.shape[2], cell=1)
-    state = FilterState(belief.astype(np.float32), Particles.none(), belief[2].astype(np.float32))
-    evidence = Evidence(occupied.astype(np.float32), free.astype(np.float32))
-    return package_update(state, spec, evidence, CmcdotParams(first_sight=first_sight)).probability
+def _scan(belief: np.ndarray, likelihood: np.ndarray, first_sight: tuple) -> np.ndarray:
+    """Return the belief of each cell after a scan, cell by cell."""
+    after = belief.copy()
+    for r, c in np.ndindex(belief.shape[1:]):
+        free, static, dynamic = likelihood[:, r, c]
+        if free == static == dynamic:
+            continue
+        prior = belief[:3, r, c] + belief[3, r, c] * np.array(first_sight)
+        joint = prior * [free, static, dynamic]
+        after[:, r, c] = [*joint / joint.sum(), 0] if joint.any() else [0, 0, 0, 1]
+    return after
 
 
 @hidden
 @keeping
 def check_update(update: Callable) -> None:
-    """Random beliefs and evidence over a grid of another shape."""
+    """Random beliefs and likelihoods over a grid of another shape; in some cells two of the three are equal."""
     rng = generator(3)
     belief = rng.dirichlet(np.ones(4), size=(6, 5)).transpose(2, 0, 1)
-    occupied, free = rng.uniform(0.05, 1, size=(2, 6, 5))
-    got = answer_array(update(belief.copy(), occupied.copy(), free.copy(), (0.5, 0.2, 0.3)))
+    likelihood = rng.uniform(0.05, 1, size=(3, 6, 5))
+    likelihood[0, 0], likelihood[2, 1], likelihood[0, 2] = likelihood[1, 0], likelihood[1, 1], likelihood[2, 2]
+    got = answer_array(update(belief.copy(), likelihood.copy(), (0.5, 0.2, 0.3)))
     assert got.shape == belief.shape, f"shape {got.shape} instead of {belief.shape}"
     assert close(got.sum(axis=0), 1), "the states of some cells don't sum to 1"
-    assert close(got[3], 0), "UNKNOWN is left in cells that the scan sees (as free, or as occupied)"
-    expected = _scan(belief, occupied, free, (0.5, 0.2, 0.3))
+    left = "UNKNOWN is left where two of the three likelihoods are equal: a scan is silent only where all three are"
+    assert close(got[3], 0), left
+    expected = _scan(belief, likelihood, (0.5, 0.2, 0.3))
     assert close(got, expected, atol=1e-5), "sums are right, values are not"
+    evidence = np.stack([likelihood[0], likelihood[1], likelihood[1]])  # a scanner that measures no speed
+    assert close(_package(belief, evidence), _scan(belief, evidence, (0.5, 0.2, 0.3)), atol=1e-5)
+
+
+def _package(belief: np.ndarray, likelihood: np.ndarray) -> np.ndarray:
+    """Return what the package makes of a scan that doesn't tell DYNAMIC from STATIC."""
+    spec = GridSpec(x_min=0, x_max=belief.shape[1], y_min=0, y_max=belief.shape[2], cell=1)
+    state = FilterState(belief.astype(np.float32), Particles.none(), belief[2].astype(np.float32))
+    evidence = Evidence(likelihood[1].astype(np.float32), likelihood[0].astype(np.float32))
+    return package_update(state, spec, evidence, CmcdotParams(first_sight=(0.5, 0.2, 0.3))).probability
 
 
 @hidden
 def check_update_limits(update: Callable) -> None:
-    """Silent cells, cells certain of being FREE or STATIC, contradictions of either, and what is only improbable.
+    """Silent cells, cells certain of a state, contradictions, and what is only improbable.
 
     What becomes of UNKNOWN and of DYNAMIC in a cell that the scan sees is for check_update to judge.
     """
@@ -88,77 +94,100 @@ def check_update_limits(update: Callable) -> None:
     occupied, free = generator(7).uniform(0.1, 0.9, size=(2, 1, 8))
     free[0, 0] = occupied[0, 1] = occupied[0, 2] = free[0, 3] = 0
     free[0, 4:] = occupied[0, 4:]
-    got = answer_array(update(belief.copy(), occupied.copy(), free.copy(), (0.5, 0.2, 0.3)))
+    likelihood = np.stack([free, occupied, occupied])
+    got = answer_array(update(belief.copy(), likelihood.copy(), (0.5, 0.2, 0.3)))
     assert np.isfinite(got).all(), "a cell is NaN or infinite"
     assert close(got[..., 4:], belief[..., 4:]), "where the scan is silent the belief must stay"
-    expected = _scan(belief, occupied, free, (0.5, 0.2, 0.3))
+    expected = _scan(belief, likelihood, (0.5, 0.2, 0.3))
     assert close(got, expected, atol=1e-5), "wrong where a cell is certain or contradicted"
     for tiny in (1e-4, 1e-7):
-        got = answer_array(update(belief[..., :1], np.array([[0.9]]), np.array([[tiny]]), (0.5, 0.2, 0.3)))
+        got = answer_array(update(belief[..., :1], np.array([tiny, 0.9, 0.9])[:, None, None], (0.5, 0.2, 0.3)))
         possible = "a cell, surely free, explains its scan with a small probability: that is no contradiction"
         assert close(got[:, 0, 0], [1, 0, 0, 0]), possible
 
 
 @hidden
-def check_systematic(systematic: Callable) -> None:
+def check_stratified(stratified: Callable) -> None:
     """More and fewer draws than weights, weights of zero at the ends, and teeth on borders."""
     rng = generator(4)
     for size, count in ((50, 50), (7, 200), (400, 20)):
-        weight, offset = rng.dirichlet(np.full(size, 0.3)) * 3, rng.random()
-        got = answer_array(systematic(weight.copy(), count, offset))
+        weight, offsets = rng.dirichlet(np.full(size, 0.3)) * 3, rng.random(count)
+        got = answer_array(stratified(weight.copy(), count, offsets.copy()))
         assert got.shape == (count,), f"{count} indices expected from {size} weights, got shape {got.shape}"
-        assert np.array_equal(got, systematic_resample(weight, count, offset)), "wrong indices for random weights"
+        teeth = (np.arange(count) + offsets) / count * weight.sum()
+        expected = [int(np.argmax(np.cumsum(weight) > tooth)) for tooth in teeth]
+        assert np.array_equal(got, expected), "wrong indices for random weights"
+    one = rng.random()
+    comb = systematic_resample(weight, 20, one)
+    assert np.array_equal(answer_array(stratified(weight.copy(), 20, np.full(20, one))), comb), "equal offsets: a comb"
     weight = np.array([0.0, 1, 1, 0, 2, 0])
-    got = answer_array(systematic(weight.copy(), 8, 0.0), dtype=int)
+    got = answer_array(stratified(weight.copy(), 8, np.zeros(8)), dtype=int)
     assert (weight[got] > 0).all(), "a particle of weight 0 was drawn (a tooth on a border draws the second)"
     assert np.array_equal(got, [1, 1, 2, 2, 4, 4, 4, 4]), "wrong where a tooth lies on a border"
 
 
-def _struck_out(own: np.ndarray, a: float) -> np.ndarray:
-    """Return the belief of one cell, combination by combination."""
-    after = np.zeros(4)
-    for state, p in enumerate(own):
-        after[state] += (1 - a) * p
-        after[2] += a * p * (state != 1)
-    return after / after.sum()
+def _middle(left: dict, own: dict, right: dict, cut: set[int]) -> float:
+    """Return P(something moves in the middle cell): all combinations, less those that can't be, but for cut edges."""
+    a, b, stands, unknown = left.get("right", 0), right.get("left", 0), own.get("static", 0), own.get("unknown", 0)
+    comes, none = a * (1 - b) + b * (1 - a), (1 - a) * (1 - b)
+    if 1 in cut:
+        comes, none = min(a + b, 0.999), 1 - min(a + b, 0.999)
+    moves = comes if 2 in cut else comes * (1 - stands)
+    if 3 in cut:
+        moves -= comes * left.get("static", 0) * (right.get("static", 0) + right.get("unknown", 0)) * unknown
+    return moves / (moves + none)
 
 
-def _compare(meet: Callable, own: np.ndarray, arrives: np.ndarray) -> None:
-    """Compare `meet` with the enumeration in every cell."""
-    got = answer_array(meet(own.copy(), arrives.copy()))
-    assert got.shape == own.shape, f"shape {got.shape} instead of {own.shape}"
-    assert close(got.sum(axis=0), 1), "the states of some cells don't sum to 1"
-    for r, c in np.ndindex(arrives.shape):
-        expected = _struck_out(own[:, r, c], arrives[r, c])
-        assert close(got[:, r, c], expected), "sums are right, values are not (UNKNOWN is a state too)"
-
-
-@hidden
-def check_meet(meet: Callable) -> None:
-    """Random beliefs in cells in which nothing moves, and arrivals, over a grid of another shape."""
-    rng = generator(5)
-    own = np.insert(rng.dirichlet(np.ones(3), size=(5, 7)), 2, 0, axis=-1).transpose(2, 0, 1)
-    _compare(meet, own, rng.uniform(0.05, 0.95, size=(5, 7)))
+PROBES = {
+    1: ({"right": 0.5}, {}, {"left": 0.5}),
+    2: ({"right": 0.8}, {"static": 0.5}, {}),
+    3: ({"static": 0.3, "right": 0.5}, {"unknown": 1.0}, {"unknown": 1.0}),
+}
+"""The worlds of the exercise, in which one edge matters each."""
 
 
 @hidden
-def check_meet_dynamic(meet: Callable) -> None:
-    """Random beliefs in FREE and DYNAMIC; check_meet judges the two other states."""
-    rng = generator(6)
-    own = np.zeros((4, 5, 7))
-    own[[0, 2]] = rng.dirichlet(np.ones(2), size=(5, 7)).transpose(2, 0, 1)
-    _compare(meet, own, rng.uniform(0.05, 0.95, size=(5, 7)))
+def check_cuts(cuts: Callable) -> None:
+    """Take filters that cut none, one and several of the edges, and the package's own."""
+    exact = {edge: _middle(*cells, set()) for edge, cells in PROBES.items()}
+    filters = [partial(_middle, cut=cut) for cut in (set(), {2}, {3}, {1, 3}, {1, 2, 3})]
+    for predicts in [*filters, _package_filter]:
+        prices = {edge: predicts(*cells) - exact[edge] for edge, cells in PROBES.items()}
+        expected = {edge: price for edge, price in prices.items() if abs(price) > 0.001}
+        got = cuts(predicts)
+        assert isinstance(got, dict), f"it doesn't return a dictionary, but {type(got).__name__}"
+        names = f"{sorted(expected) or 'none'} of the edges cut, and the answer names {sorted(got) or 'none'}"
+        assert set(got) == set(expected), names
+        assert all(close(float(got[edge]), price, atol=1e-4) for edge, price in expected.items()), "a price is wrong"
+
+
+def _package_filter(left: dict, own: dict, right: dict) -> float:
+    """Return what CMCDOT's `predict` tends to, with ever more particles."""
+    cell = bof_beliefs(CellsInARow((left, own, right), ("???",), clearing_time=DT))[0, 1]
+    return float(cell[[Cell.LEFT, Cell.RIGHT]].sum())
+
+
+def _one_tooth_in_each_part(weight: np.ndarray, count: int, offsets: np.ndarray) -> np.ndarray:
+    ends = np.cumsum(weight)
+    return np.searchsorted(ends, (np.arange(count) + offsets) / count * ends[-1], side="right")
+
+
+class _Stratified:
+    """The resampling that the exercise asks for."""
+
+    def draw(self, weight: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Draw by one tooth in each part."""
+        return _one_tooth_in_each_part(weight, count, rng.random(count))
 
 
 @hidden
-def check_meet_limits(meet: Callable) -> None:
-    """Any weights that arrive, in cells certain of each state: they must do what 0.999 does, whatever that is."""
-    own = np.repeat(np.eye(4)[:, None, :], 3, axis=1)
-    arrives = generator(8).uniform([[0], [1], [2]], [[0.9], [1.5], [40]], size=(3, 4))
-    arrives[1, :2] = 1.0
-    got = answer_array(meet(own.copy(), arrives.copy()))
-    assert np.isfinite(got).all(), "a cell is NaN or infinite"
-    assert got.min() >= 0, "a probability is negative"
-    expected = answer_array(meet(own.copy(), np.minimum(arrives, 0.999)))
-    assert not close(expected, answer_array(meet(own.copy(), arrives / 100))), "it doesn't matter what arrives"
-    assert close(got, expected), "wrong where weights of 1 and more arrive"
+def check_track(maps: Callable) -> None:
+    """Frames from the middle of both drives, on another grid, against the same filter with the right resampling."""
+    spec = GridSpec(x_min=0, x_max=24, y_min=-8, y_max=12, cell=0.5)
+    for drive, first in ((sample_drive(), 9), (real_drive(), 4)):
+        frames = [drive[k] for k in range(first, first + 4)]
+        got = answer_array(maps(frames, spec, _one_tooth_in_each_part))
+        assert got.shape == (4, *spec.shape), f"maps of shape {got.shape} for 4 frames"
+        *_, last = track_drive(frames, spec, CmcdotParams(n_particles=20_000, resampling=_Stratified()), seed=0)
+        same = close(got[-1], last.probability[2], atol=1e-4)
+        assert same, "it isn't the same filter (20,000 particles, seed 0, offsets from rng.random(count))"

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, logit
 
 from semgrid_edu.answers import answer_array, answer_number
+from semgrid_edu.graphical import Factor, product
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.literal.evidence import walk_ray
 from semgrid_instructor import close, generator, hidden, keeping
@@ -15,25 +16,64 @@ CLIPPED = 0.05
 """A beam that is in a cell for less than this share of its side only clips it: passed or not, both are right."""
 
 
-@hidden
-def check_log_odds(log_odds: Callable) -> None:
-    """Random arrays, and probabilities close to 0 and 1."""
-    p = generator(21).uniform(0.01, 0.99, size=(4, 5))
-    assert close(answer_array(log_odds(p.copy())), logit(p), atol=1e-3), "wrong log-odds of an array"
-    tiny = np.array([1e-9, 1e-6, 1 - 1e-6])
-    assert close(answer_array(log_odds(tiny.copy())), logit(tiny)), (
-        "wrong near 0 and 1: nothing is to be cut off or added there"
-    )
+def _posterior(prior: NDArray, reflect: NDArray, seen: NDArray) -> NDArray:
+    """Return P(m1, m2, m3 | z) by the package's exact inference, (2, 2, 2)."""
+    passes = np.where(np.array(list(np.ndindex(2, 2, 2))) == 1, 1 - reflect[1], 1 - reflect[0])
+    reaches = np.cumprod(np.column_stack([np.ones(8), passes]), axis=1)
+    reflected = np.column_stack([reaches[:, :3] * (1 - passes), reaches[:, 3]]).reshape(2, 2, 2, 4)
+    cells = [Factor(f"m{k}", [1 - p, p]) for k, p in enumerate(prior)]
+    model = product([*cells, Factor(("m0", "m1", "m2", "r"), reflected), Factor("r", seen)])
+    return model.sum("r").ordered("m0", "m1", "m2").normalised().table
+
+
+def _world(rng: np.random.Generator) -> tuple[NDArray, NDArray, NDArray]:
+    """Return prior, reflect and seen of three cells."""
+    reflect = np.array([rng.uniform(0.02, 0.2), rng.uniform(0.6, 0.9)])
+    return rng.uniform(0.1, 0.9, 3), reflect, rng.uniform(0.1, 0.9, 4)
 
 
 @hidden
-def check_probability(probability: Callable) -> None:
-    """Random arrays, and log-odds whose exponential no computer holds."""
-    L = generator(22).normal(0, 3, size=(4, 5))
-    assert close(answer_array(probability(L.copy())), expit(L)), "wrong probabilities of an array"
-    certain = np.array([answer_number(probability(L)) for L in (-1000.0, 1000.0)])
-    assert not np.isnan(certain).any(), "log-odds of 1000 give no number: e^1000 overflows, so use e^-1000"
-    assert close(certain, [0, 1]), "log-odds of -1000 and 1000 must be as good as 0 and 1"
+@keeping
+def check_posterior(beam_posterior: Callable) -> None:
+    """Other cells and reports; a report that rules some cells out."""
+    rng = generator(21)
+    for k in range(6):
+        prior, reflect, seen = _world(rng)
+        seen[k % 4] *= k % 2
+        got = answer_array(beam_posterior(prior.copy(), reflect.copy(), seen.copy()))
+        expected = _posterior(prior, reflect, seen)
+        assert got.shape == expected.shape, f"shape {got.shape} instead of (2, 2, 2)"
+        assert close(got.sum(), 1.0), "the eight probabilities don't sum to 1"
+        assert close(got, expected), "wrong probabilities of the maps"
+
+
+@hidden
+@keeping
+def check_nothing_back(beam_posterior: Callable) -> None:
+    """Nothing came back, and free cells never reflect: ratios of maps, which no normalisation changes."""
+    rng = generator(30)
+    for clutter in (0.0, 0.1):
+        prior, reflect, _ = _world(rng)
+        reflect[0] = clutter
+        got = answer_array(beam_posterior(prior.copy(), reflect.copy(), np.array([0.0, 0.0, 0.0, 0.5])))
+        assert got.shape == (2, 2, 2), f"shape {got.shape} instead of (2, 2, 2)"
+        assert (got > 0).all(), "every map lets some beams pass"
+        expected = np.prod((1 - reflect[1]) / (1 - clutter) * prior / (1 - prior))
+        assert close(got[1, 1, 1] / got[0, 0, 0], expected), "wrong when nothing came back"
+
+
+@hidden
+@keeping
+def check_price(price: Callable) -> None:
+    """Posteriors drawn at random, and one whose cells are sure of being alike."""
+    rng = generator(22)
+    alike = np.zeros((2, 2, 2))
+    alike[0, 0, 0] = alike[1, 1, 1] = 0.5
+    for table in (*rng.dirichlet(np.full(8, 0.5), size=5).reshape(5, 2, 2, 2), alike):
+        ones = [table.take(1, axis=k).sum() for k in range(3)]
+        q = product(Factor(f"m{k}", [1 - p, p]) for k, p in enumerate(ones)).table
+        got = answer_number(price(table.copy()))
+        assert close(got, 0.5 * np.abs(table - q).sum(), atol=1e-5), "wrong total variation"
 
 
 def _scan(seed: int) -> tuple[NDArray, NDArray, NDArray]:
@@ -49,12 +89,16 @@ def _scan(seed: int) -> tuple[NDArray, NDArray, NDArray]:
 def check_update(update: Callable) -> None:
     """Random scans of a grid of another shape, with limits far away; check_clamp judges what the limits do."""
     L, occupied, free = _scan(23)
-    got = answer_array(update(L.copy(), occupied.copy(), free.copy(), -50.0, 50.0))
-    assert got.shape == L.shape, f"shape {got.shape} instead of {L.shape}"
-    expected = L + np.log(occupied) - np.log(free)
-    silent, within = occupied == free, (expected > -2) & (expected < 3.5)
-    assert close(got[silent & within], L[silent & within]), "cells of which the scan says nothing have changed"
-    assert close(got[within], expected[within]), "wrong log-odds"
+    silent = occupied == free
+    for dt, tau in ((0.1, 0.5), (0.2, 1.5), (0.4, 0.3)):
+        got = answer_array(update(L.copy(), occupied.copy(), free.copy(), dt, tau, -50.0, 50.0))
+        assert got.shape == L.shape, f"shape {got.shape} instead of {L.shape}"
+        expected = np.where(silent, L * np.exp(-dt / tau), L + np.log(occupied) - np.log(free))
+        within = (expected > -2) & (expected < 3.5)
+        assert close(got[silent & within], expected[silent & within]), (
+            "cells of which the scan says nothing fade wrongly"
+        )
+        assert close(got[within], expected[within]), "wrong log-odds where something was seen"
 
 
 @hidden
@@ -62,9 +106,9 @@ def check_clamp(update: Callable) -> None:
     """Other limits, not symmetric; cells on both sides of them, and some that began outside; the sums are its own."""
     L, occupied, free = _scan(24)
     L *= 3
-    got = answer_array(update(L.copy(), occupied.copy(), free.copy(), -1.2, 2.7))
-    sums = answer_array(update(L.copy(), occupied.copy(), free.copy(), -50.0, 50.0))
-    opposite = answer_array(update(L.copy(), free.copy(), occupied.copy(), -50.0, 50.0))
+    got = answer_array(update(L.copy(), occupied.copy(), free.copy(), 0.1, 2.0, -1.2, 2.7))
+    sums = answer_array(update(L.copy(), occupied.copy(), free.copy(), 0.1, 2.0, -50.0, 50.0))
+    opposite = answer_array(update(L.copy(), free.copy(), occupied.copy(), 0.1, 2.0, -50.0, 50.0))
     assert not close(sums, opposite), "with wide limits it doesn't matter what the scan says"
     assert got.size > 0, "no cells came back"
     assert got.max() <= 2.7 + 1e-6, "some cells are above L_max"
@@ -105,20 +149,31 @@ def check_fuse_many(fuse: Callable) -> None:
 
 
 @hidden
-def check_smear(smear: Callable) -> None:
-    """Other speeds, periods, limits and sensors; limits that not a single pass is survived from."""
+def check_highest_clamp(highest_clamp: Callable) -> None:
+    """Other speeds, periods, tails and sensors; tails so short that no pass may be survived."""
     rng = generator(26)
-    for survived in range(8):
+    for survived in range(7):
         occupied, share = rng.uniform(0.1, 0.4), rng.uniform(0.1, 0.9)
-        free = rng.uniform(occupied + 0.1, 0.95)
-        L_max = (survived + share) * np.log(free / occupied)
+        free = rng.uniform(occupied + 0.15, 0.95)
         speed, dt = rng.uniform(1, 30), rng.uniform(0.05, 0.5)
-        passes, metres = answer_array(smear(speed, dt, L_max, occupied, free))
-        assert passes == survived, "wrong number of passes (a cell may survive none)"
-        assert close(metres, survived * speed * dt), "the passes are right, the metres are not"
-    for survived in (0, 1):
-        passes, _ = answer_array(smear(10.0, 0.1, (survived + 1) * np.log(2), 0.25, 0.5))
-        assert passes == survived, "wrong where a pass ends at L = 0 exactly: the cell is occupied while L > 0"
+        got = answer_number(highest_clamp((survived + share) * speed * dt, speed, dt, occupied, free))
+        assert 0 < got < 1, "that is no probability to clamp at"
+        wrong = "wrong clamp (a tail may be so short that no pass is survived)"
+        assert abs(got - expit((survived + 1) * np.log(free / occupied))) < 2e-4, wrong
+
+
+@hidden
+@keeping
+def check_as_belief(as_belief: Callable) -> None:
+    """Random log-odds of a grid that isn't square, and some whose exponential no computer holds."""
+    L = generator(31).normal(0, 2, size=(4, 5))
+    L[0, :2] = 1000, -1000
+    got = answer_array(as_belief(L.copy()))
+    assert got.shape == (4, 4, 5), f"shape {got.shape} instead of (4, 4, 5)"
+    assert np.isfinite(got).all(), "log-odds of 1000 give no number: e^1000 overflows"
+    P = expit(L)
+    expected = np.stack([np.maximum(1 - 2 * P, 0), np.maximum(2 * P - 1, 0), 0 * P, 1 - np.abs(2 * P - 1)])
+    assert close(got, expected, atol=1e-5), "wrong probabilities of the states"
 
 
 def _crossed(spec: GridSpec, x: float, y: float) -> NDArray:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from semgrid_edu.answers import answer_array
-from semgrid_instructor import close, generator, hidden
+from semgrid_instructor import close, generator, hidden, keeping
 
 
 def _weights(four_pixels: Callable, u: float, v: float, h: int, w: int) -> NDArray:
@@ -64,6 +64,10 @@ def check_border(four_pixels: Callable) -> None:
         heaviest.add(int(got.argmax()))
         right = close(got, _right(u, v, n, n), atol=1e-6)
         assert right or not sound, "wrong weights on a border or a pixel's centre"
+    for u, v, h, w in ((0.0, 1.5, 6, 1), (2.25, 0.0, 1, 5)) if sound else ():
+        assert close(_weights(four_pixels, u, v, h, w), _right(u, v, h, w)), (
+            "wrong in an image of one row or one column"
+        )
     assert len(heaviest) > 4, "the same pixel has most weight, wherever the point is"
 
 
@@ -80,6 +84,7 @@ def _plane(seed: int, all_visible: bool = False) -> tuple[NDArray, NDArray, NDAr
 
 
 @hidden
+@keeping
 def check_sample_plane(sample_plane: Callable) -> None:
     """Random scores of an image that is higher than wide, at all of whose corners somebody reads."""
     scores, pixels, visible = _plane(62, all_visible=True)
@@ -93,6 +98,7 @@ def check_sample_plane(sample_plane: Callable) -> None:
 
 
 @hidden
+@keeping
 def check_invisible(sample_plane: Callable) -> None:
     """Not visible for every reason: behind the camera (NaN), outside, hidden by something; or nothing visible."""
     scores, pixels, visible = _plane(63)
@@ -109,6 +115,7 @@ def check_invisible(sample_plane: Callable) -> None:
 
 
 @hidden
+@keeping
 def check_give_back(give_back: Callable) -> None:
     """Compare random blame with a pixel at a time; test <A s, p_bar> = <s, A^T p_bar>."""
     scores, pixels, visible = _plane(64, all_visible=True)
@@ -123,6 +130,7 @@ def check_give_back(give_back: Callable) -> None:
 
 
 @hidden
+@keeping
 def check_give_back_invisible(give_back: Callable) -> None:
     """Place what isn't visible anywhere: it changes nothing, as if the visible points were all there are."""
     _, pixels, visible = _plane(68)
@@ -137,39 +145,68 @@ def check_give_back_invisible(give_back: Callable) -> None:
 
 
 @hidden
-def check_slopes(slopes: Callable) -> None:
-    """Random images and points; then points a thousandth of a pixel away from a centre."""
+@keeping
+def check_yaw_slope(yaw_slope: Callable) -> None:
+    """Random cameras, scores and points; then points a thousandth of a pixel away from a centre line."""
     rng = generator(66)
-    for offset, complaint in ((None, "wrong slopes"), (1e-3, "wrong close to a pixel's centre: does a step cross it?")):
-        for _ in range(10):
-            s, (n, m) = rng.normal(size=(8, 5)), rng.integers(0, (7, 4))
-            across, down = rng.uniform(0.2, 0.8, size=2) if offset is None else (offset, 1 - offset)
-            (a, b), (c, d) = s[n : n + 2, m : m + 2]
-            right = (1 - down) * (b - a) + down * (d - c), (1 - across) * (c - a) + across * (d - b)
-            got = answer_array(slopes(s.copy(), float(m + across), float(n + down))).ravel()
-            assert close(got, right, atol=1e-3), complaint
+    for offset, complaint in ((None, "wrong slope"), (1e-3, "wrong close to a pixel's centre: does a step cross it?")):
+        for n_points in (1, 7):
+            s, t = rng.normal(size=(8, 15)), rng.normal(size=n_points)
+            K = np.array([[rng.uniform(5, 9), 0, 6.3], [0, rng.uniform(5, 9), 2.9], [0, 0, 1]])
+            inside = (
+                rng.uniform(0.2, 0.8, size=(n_points, 2))
+                if offset is None
+                else np.tile([offset, 1 - offset], (n_points, 1))
+            )
+            pixels, Z = rng.integers(0, (14, 7), size=(n_points, 2)) + inside, rng.uniform(2, 30, n_points)
+            rays = (pixels - K[:2, 2]) / np.diag(K)[:2]
+            points = np.column_stack([rays * Z[:, None], Z])
+            got = answer_array(yaw_slope(s, points, K, t)).ravel()
+            assert got.shape == (1,), f"{got.size} numbers instead of one"
+            step = 1e-7
+            later, before = (_loss_turned(s, points, K, t, angle) for angle in (step, -step))
+            assert close(got[0], (later - before) / (2 * step), rtol=1e-3, atol=1e-4), complaint
 
 
-def _judge_places(unit_places: Callable, edge: float) -> None:
-    """Compare with a straight line from -1 to 1, whose ends lie `edge` pixels outside the first and last centre."""
+def _loss_turned(s: NDArray, points: NDArray, K: NDArray, t: NDArray, angle: float) -> float:
+    """Return the loss when the camera is turned to the side."""
+    X, Y, Z = points.T
+    X, Z = X * np.cos(angle) + Z * np.sin(angle), Z * np.cos(angle) - X * np.sin(angle)
+    u, v = K[0, 0] * X / Z + K[0, 2], K[1, 1] * Y / Z + K[1, 2]
+    return float(0.5 * ((map_coordinates(s, [v, u], order=1) - t) ** 2).sum())
+
+
+def _black_box(kind: int, swapped: bool = False) -> Callable:
+    """Return a sampler of a convention: 0 centres, 1 corners, 2 stretched."""
+
+    def sampler(image: NDArray, u: NDArray, v: NDArray) -> NDArray:
+        image = np.asarray(image, float)
+        places = []
+        for at, size in zip((u, v) if swapped else (v, u), image.shape, strict=True):
+            at = np.asarray(at, float)
+            places.append((at, at - 0.5, at * (size - 1) / size)[kind])
+        return map_coordinates(image, places, order=1, mode="nearest")
+
+    return sampler
+
+
+@hidden
+def check_convention(convention: Callable) -> None:
+    """Judge images of other sizes, large and small."""
     rng = generator(67)
-    for h, w in ((4, 9), (7, 2), (96, 320)):
-        pixels = rng.uniform(0, 1, size=(2, 3, 5, 2)) * (w - 1, h - 1)
-        pixels[0, 0, :2] = [[0, 0], [w - 1, h - 1]]
-        got = answer_array(unit_places(pixels.copy(), (h, w), edge == 0))
-        assert got.shape == pixels.shape, "the shape changed (there may be more axes before the last)"
-        for axis, size in ((0, w), (1, h)):
-            right = np.interp(pixels[..., axis], (-edge, size - 1 + edge), (-1, 1))
-            assert close(got[..., axis], right), "wrong places"
+    for h, w in (*rng.integers(4, 60, size=(4, 2)), (4, 4), (375, 1242)):
+        found = [answer_array(convention(_black_box(kind), int(h), int(w))).ravel() for kind in range(3)]
+        assert all(one.shape == (1,) for one in found), "it doesn't return one number"
+        assert np.array_equal(np.ravel(found), range(3)), "the wrong convention in an image of another size"
 
 
 @hidden
-def check_centres(unit_places: Callable) -> None:
-    """Other images, more axes, the first and the last pixel."""
-    _judge_places(unit_places, edge=0)
-
-
-@hidden
-def check_edges(unit_places: Callable) -> None:
-    """Judge the other convention in the same way."""
-    _judge_places(unit_places, edge=0.5)
+def check_swaps(swaps: Callable, convention: Callable) -> None:
+    """Judge samplers of each kind that swap u and v, and others that don't."""
+    for h, w in ((5, 31), (50, 4), (7, 7)):
+        for kind in range(3):
+            told = [bool(swaps(_black_box(kind, swapped), h, w)) for swapped in (False, True)]
+            assert told == [False, True], "wrong about a sampler in an image of another size"
+            if answer_array(convention(_black_box(kind), h, w)).ravel()[0] == kind:  # check_convention judges others
+                found = answer_array(convention(_black_box(kind, True), h, w)).ravel()[0]
+                assert found == kind, "convention is wrong for a sampler that swaps"

@@ -7,7 +7,7 @@ import numpy as np
 from semgrid_edu.answers import answer_array
 from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.metrics import class_accuracy, pixel_accuracy
+from semgrid_edu.metrics import class_accuracy, frequency_weighted_iou, pixel_accuracy
 from semgrid_instructor import close, generator, hidden, keeping
 
 
@@ -90,3 +90,18 @@ def check_accuracies(accuracies: Callable) -> None:
         pixel, per_class = answer_array(accuracies(confusion.copy()))
         assert close(pixel, pixel_accuracy(confusion)), "wrong pixel accuracy"
         assert close(per_class, class_accuracy(confusion)), "wrong class accuracy (some classes have no truth)"
+
+
+@hidden
+def check_fm_iou(fm_iou: Callable) -> None:
+    """Random confusion: classes without truth, one of them claimed, one never found, and one that never occurs."""
+    rng = generator(6)
+    for _ in range(5):
+        confusion = rng.integers(0, 50, size=(14, 14))
+        confusion[[2, 7, 13]] = 0
+        confusion[:, 7] = 0
+        confusion[4, 4] = 0
+        given = confusion.copy()
+        found = answer_array(fm_iou(given))
+        assert close(found, frequency_weighted_iou(confusion)), "wrong FmIoU (some classes have no truth)"
+        assert np.array_equal(given, confusion), "the argument is changed"

@@ -2,7 +2,7 @@
 # # Phantoms on real streets: an assumption that breaks, and its mend
 #
 # **In one sentence.** A filter that takes each newly seen cell as independent of its neighbour believes that a wall
-# moves while the wall comes into view; three rules, which ask what moves where it comes from and where it goes, mend a
+# moves while the wall comes into view; three **look-back rules** ask what moves where it comes from and where it goes, and mend a
 # part of it, at a price.
 #
 # **You will be able to**
@@ -433,15 +433,18 @@ plt.show()
 # [graphical models](graphical_models.ipynb) shows what that costs on a grid. We need a rule that one cell can
 # apply by itself, and that tells a wall from a car. What tells them apart?
 #
-# **A car leaves its place.** Where a car was a short time $\tau$ ago, it isn't any more: that place is free now, or
+# The three rules that follow are the filter's **look-back rules**. BOF and CMCDOT share them, and no other page derives
+# them.
+#
+# **A car leaves its place.** Where a car was a short time $T_b$ ago, it isn't any more: that place is free now, or
 # something else has come there. A phantom comes *out of a wall that still stands*. So each particle is asked for its
-# **origin**, which is the place where it was, $x - v\,\tau$. If something stands there now, that thing did not fly away.
-# As in lectures 03 and 04, $\tau$ is half a second (`clearing_time`), and for slow things as long as they need for three
+# **origin**, which is the place where it was, $x - v\,T_b$. If something stands there now, that thing did not fly away.
+# The **look-back time** $T_b$ is half a second (`clearing_time`), and for slow things as long as they need for three
 # cells (`clearing_cells`); what each half of this rule is good for you will measure below.
 #
 # **Ahead of a car the wall ends.** Somebody who sets off also comes out of a place where something stood, and so does
 # the front of a car whose rear has been taken for standing. But they go where it is free, while a phantom goes on along
-# its wall. So each particle is also asked where it will be, $x + v\,\tau$. If something stands at its origin and the
+# its wall. So each particle is also asked where it will be, $x + v\,T_b$. If something stands at its origin and the
 # place ahead is STATIC or UNKNOWN, the particle's claim is doubtful: it says no more than that the wall goes on.
 #
 # Why isn't it doubtful whenever the place ahead isn't FREE? Think of the side of a bus. It comes out of the rear of the
@@ -518,7 +521,7 @@ assert now.max() < 0.01
 #
 # The same thought works in the other direction. A car was taken for a standing one at first sight, and then it drove
 # off. Behind it lies a piece of STATIC that nobody can see, because the car itself hides it. The next car of a convoy
-# would get stuck in it. But one thing can't be in two places: if what was here a time $\tau$ ago has left with
+# would get stuck in it. But one thing can't be in two places: if what was here a time $T_b$ ago has left with
 # probability $a$, it doesn't stand here. By hand, for a hidden cell with $s = 0.8$ and $a = 0.5$: of the four
 # combinations, "has left" and "stands", 0.4, is struck out, and STATIC keeps 0.4 / 0.6 = 0.67.
 #

@@ -10,7 +10,7 @@
 # - say what changes in a graph without arrows, and turn a graph with arrows into one;
 # - choose an order of elimination and predict its largest table;
 # - say what messages compute on a chain, and how loops and mean field make answers too sure;
-# - look at a stage of the paper and name the edges that it leaves out.
+# - look at a stage of the paper, name the edges that it leaves out, and say what each of them costs.
 #
 # **Prerequisites.** Conditional probability; Bayes' rule as in lecture [01](../01_bayes.ipynb); numpy.
 #
@@ -28,6 +28,9 @@ from semgrid_edu import plotting
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate, enumerate_marginals, in_rows
 from semgrid_edu.graphical import max_product, mean_field_graph, min_fill_order, product, sum_product, why_dependent
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.stage_models import bayes_on_a_line, beam_over_cells, bof_stage, cmcdot_stage, crf_stage
+from semgrid_edu.stage_models import lidar_label_stage, one_cell, one_log_odds_cell, read_scans
+from semgrid_edu.stage_models import scan_with_pose_error, whole_system
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, OCCUPIED = 0, 1
@@ -154,9 +157,7 @@ np.testing.assert_allclose(package.given(z=1).normalised().table, returned[1] / 
 # is too coarse to say by which, so a return only says "at least one of you". A story like this is a **directed model**
 # (or Bayesian network). Each variable $x_i$ gets one table: its distribution given the variables its arrows come from,
 # its **parents**. Parents come first in the story, so arrows never run in a circle. The joint distribution is the
-# product of these tables:
-#
-# $$ P(x_1, \ldots, x_n) = \prod_i P(x_i \mid \text{parents of } x_i) $$
+# product of these tables, $P(x_1, \ldots, x_n) = \prod_i P(x_i \mid \text{parents of } x_i)$.
 
 # %%
 cells = [Factor("m1", [0.8, 0.2]), Factor("m2", [0.8, 0.2])]
@@ -299,13 +300,33 @@ print("open path:", why_dependent(beam_in_space, "m1", "m2", given="z"))
 # known, the past tells nothing more about the future. Because of it a Bayes filter may forget all old scans: its belief
 # about *now* is all that they can still tell.
 #
+# The same question for any variable: what must you know so that nothing else tells more about it? Its parents, its
+# children, and its children's other parents, because of explaining away. Together they are its **Markov blanket**:
+
+
+# %% tags=["markov-blanket"]
+def markov_blanket(parents, name):
+    """Return the parents of a variable, its children, and the other parents of those."""
+    children = [child for child, above in parents.items() if name in above]
+    around = [*parents.get(name, ()), *children, *(above for child in children for above in parents[child])]
+    return set(around) - {name}
+
+
+for parents in (HIDDEN_MARKOV, NOISY_RANGE):
+    for name in (names := any_model(parents).names):
+        blanket = markov_blanket(parents, name)
+        assert d_separated(any_model(parents), name, set(names) - blanket - {name}, given=blanket)
+print("now:", sorted(markov_blanket(HIDDEN_MARKOV, "now")), "  m1:", sorted(markov_blanket(NOISY_RANGE, "m1")))
+
+# %% [markdown]
+# To change one variable we need only its blanket; mean field, below, rests on that.
+#
 # ## No arrows: neighbours that like to agree
 #
 # Not every dependence has a direction. Walls are long, so neighbouring cells tend to agree. Which of the two should
 # get the arrow? Neither. So give each pair of neighbours a factor $\psi$ that is 3 when they agree and 1 when they
 # don't. These numbers aren't probabilities of anything. We multiply them all and divide by whatever makes the sum 1:
-#
-# $$ P(m_1, m_2, m_3) = \frac{1}{Z}\, \psi(m_1, m_2)\, \psi(m_2, m_3), \qquad Z = \sum_{m_1, m_2, m_3} \psi(m_1, m_2)\, \psi(m_2, m_3) $$
+# $P(m_1, m_2, m_3) = \psi(m_1, m_2)\, \psi(m_2, m_3) / Z$, where $Z = \sum \psi(m_1, m_2)\, \psi(m_2, m_3)$ over all maps.
 #
 # Such a model is called **undirected**, or a Markov random field, and $Z$ is its **partition function**. The paper's
 # CRF (conditional random field) is one.
@@ -526,6 +547,8 @@ print("P(occupied), filtered:", filtered[:, OCCUPIED].round(2), "  smoothed:", s
 beliefs = sum_product(scanned)
 np.testing.assert_allclose([beliefs.marginals[name] for name in TIMES], smoothed)
 np.testing.assert_allclose(beliefs.messages["now", "f(now, after)"], filtered[1])
+to_now = M @ beliefs.messages["after", "f(now, after)"]  # the general rule, from a factor to a variable
+np.testing.assert_allclose(beliefs.messages["f(now, after)", "now"], to_now / to_now.sum())
 assert beliefs.exact
 print("most likely sequence:", {name: ("FREE", "OCCUPIED")[state] for name, state in max_product(scanned).items()})
 
@@ -534,8 +557,14 @@ print("most likely sequence:", {name: ("FREE", "OCCUPIED")[state] for name, stat
 # filter of lecture 01 is the forward half of message passing**. A vehicle on the road can't have the other half,
 # because the future hasn't been seen yet. With a recorded drive it can: that is called *smoothing*.
 #
-# `sum_product` passes messages on any graph. As long as the factor graph is a tree, without loops, its answers are
-# exact, because each message sums up one side of an edge and the two sides have nothing in common. With max in place
+# On any factor graph there are two kinds of messages. A variable $x$ sends a factor $f$ the product of what all its
+# *other* factors tell it; a factor sends a variable its table times what its other variables tell it, summed over those:
+#
+# $$ \mu_{x \to f}(x) = \prod_{h \neq f} \mu_{h \to x}(x), \qquad \mu_{f \to x}(x) = \sum_{y \neq x} f(x, y, \ldots) \prod_{y \neq x} \mu_{y \to f}(y) $$
+#
+# The forward step above is both in one: multiply by the scan, then sum over $M$'s first axis. A marginal is the product
+# of all messages into its variable. `sum_product` sends these messages on any graph. As long as the factor graph is a
+# tree, without loops, its answers are exact, because each message sums up one side of an edge and the two sides have nothing in common. With max in place
 # of sum one finds the most likely sequence (`max_product`; on a chain, the Viterbi algorithm). Look at it again: free
 # all three times, although the cell is occupied *now* with probability 0.65. That probability is shared by four
 # sequences, and none of them alone beats the quiet one.
@@ -742,21 +771,48 @@ plt.show()
 # Is $m_1$ independent of $m_2$ once all scans are known? No: both scans are colliders, so the path through the pitch
 # is open. Leave the pitch out, and the cells fall apart into 55,025 problems of two variables each.
 #
-# Now you can read the graph of every stage. Bold print marks what it leaves out:
-#
-# | lecture | variables and edges | edges that are cut |
-# |---|---|---|
-# | [01](../01_bayes.ipynb) a place on a line | a chain over time, one reading per step | none for the present place: the filter is the exact forward message. **Back in time**: a later reading never corrects an earlier place |
-# | [02](../02_grids.ipynb) occupancy grid | cells, each with arrows to the beams that cross it | **cells that share a beam**: one number per cell is kept. **A cell and itself later**: it has one state for ever. **Scans that share an error**: they count as independent |
-# | [03](../03_bof.ipynb) BOF | each cell and its velocity depend on the cells it may have come from, its antecedents | **cells that share an antecedent**. **Two antecedents of a cell**: they count as if only one could send. **A cell and its antecedent**: two things can't share a cell, but that never corrects the cell they came from |
-# | [04](../04_cmcdot.ipynb) CMCDOT | the same with four states | the same. **Places and velocities**: a sample of particles stands for them |
-# | [05](../05_pixels.ipynb), [06](../06_planes.ipynb) planes | pixel scores to plane scores | **the distance**: scores go to each cell where the pixel's ray crosses a plane |
-# | [07](../07_segmentation.ipynb) segmentation | the image points to the scores of each pixel | **scan to scores**: the network sees the image alone |
-# | [08](../08_fusion.ipynb) fusion | planes and occupancy point to the class of each cell | **image to occupancy**, **class to occupancy**, **class to class of the next frame** |
-# | [10](../10_crf.ipynb), [11](../11_fast_crf.ipynb) CRF | classes of cells, each pair linked by a factor | none in the model, **all** in mean field's answer |
-#
-# `semgrid_edu.stage_models` builds these graphs at toy size; the field `cut` of each lists its edges with the
-# price.
+# Now you can read the graph of every stage. A **dashed** edge is one that the real system leaves out, and the two numbers
+# on it are its **price** on a toy world: first the exact answer, then the system's. A dashed circle is a node that the
+# toy model leaves out. `StageGraph.cut` holds a sentence for each dashed edge, and lecture [00](../00_tour.ipynb) shows
+# the whole ledger.
+
+# %% tags=["stages"] jupyter={"source_hidden": true} alt="four graphs with dashed edges: places on a line, .46 to .34 for later readings; one cell of the log-odds grid with three dashed edges without a price; one cell with four states, also three; a beam over eight cells, .34 to .57 between the fifth and the sixth"
+PASSED = read_scans("#.")
+STAGES = {
+    "line": (bayes_on_a_line(), "01"),
+    "cell": (one_log_odds_cell(PASSED), "02"),
+    "chain": (one_cell(PASSED), "04"),
+    "beam": (beam_over_cells(), "02"),
+    "error": (scan_with_pose_error(), "02"),
+    "BOF": (bof_stage(), "03"),
+    "CMCDOT": (cmcdot_stage(), "04"),
+    "label": (lidar_label_stage(), "09"),
+    "CRF": (crf_stage(), "10"),
+    "system": (whole_system(), "00"),
+}
+
+
+def show_stages(names, size):
+    """Draw the graphs of some stages side by side, two in a row."""
+    _, axes = plt.subplots(len(names) // 2, 2, figsize=size, layout="constrained")
+    for ax, name in zip(np.ravel(axes), names, strict=True):
+        stage, lecture = STAGES[name]
+        stage.draw(ax).set_title(f"lecture {lecture}: {stage.title}", fontsize=10)
+    plt.show()
+
+
+show_stages(("line", "cell", "chain", "beam"), (12, 6.6))
+
+# %% jupyter={"source_hidden": true} alt="four graphs with dashed edges and prices: a pose error shared by two rings, .46 to .97; BOF, with 1 to 1.24, .43 to .30 and .67 to 1; CMCDOT, with .010 and .051 of error and .50 to .41; how a label arises, .10 to .012 for a shared calibration"
+show_stages(("error", "BOF", "CMCDOT", "label"), (12, 8.5))
+
+# %% jupyter={"source_hidden": true} alt="left, the CRF, nine cells on a circle, each pair linked, one edge dashed with .52 to .998; right, the whole system at two instants with six dashed edges, three of them priced: .40 to .48, .53 to .68, .62 to .72"
+show_stages(("CRF", "system"), (13, 5.6))
+
+# %% [markdown]
+# Look at the CRF on the left: its model cuts nothing between pairs. What is cut is *every* pair in mean field's answer,
+# and one dashed edge stands for all of them. Lectures 05 to 08 cut edges too; in the system's graph they are the dashed
+# ones around $s$, $p$ and $g$.
 #
 # ## Where this breaks
 #

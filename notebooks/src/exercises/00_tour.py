@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 00: the tour
 #
-# Four small functions, one for each idea that the whole course stands on, and one question to answer in words. About 40 minutes.
+# Five small functions, one for each idea that the whole course stands on, and one question to answer in words. About 50 minutes.
 # The lecture is [00: the tour](../00_tour.ipynb).
 #
 # | task | about | points |
@@ -10,7 +10,8 @@
 # | 2 | Bayes' rule in every cell | 3 |
 # | 3 | from a point to its pixel, equation (1) | 2 + 1 |
 # | 4 | two accuracies that disagree | 3 |
-# | 5 | in your own words | 2 |
+# | 5 | FmIoU, which also charges for wrong claims | 3 |
+# | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -244,14 +245,68 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: in your own words (2 points)
+# ## Task 5: FmIoU (3 points)
+#
+# The *intersection over union* (IoU) of a class is the number of cells that are right, divided by the number of cells that truly are of
+# this class **or** are called so. FmIoU is the mean of the classes' IoU, weighted by the share of each class in the *truth*.
+#
+# Complete `fm_iou` for the confusion matrix of task 4: it returns one number between 0 and 1. A class that neither occurs nor is ever
+# claimed has no IoU; it must not spoil the sum. Do the example by hand first: two classes, three cells of road of which one is called
+# car, and one car that is found.
+
+
+# %% nbgrader={"grade": false, "grade_id": "fmiou", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def fm_iou(confusion):
+    """Return the frequency-weighted mean intersection over union."""
+    ### BEGIN SOLUTION
+    right = np.diag(confusion)
+    cells = confusion.sum(axis=1)
+    union = cells + confusion.sum(axis=0) - right
+    occurs = cells > 0
+    return (cells[occurs] / cells.sum() * right[occurs] / union[occurs]).sum()
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": true, "grade_id": "fmiou-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    confusion = np.array([[2, 1, 0], [0, 1, 0], [0, 0, 0]])  # road, car, and a class that never occurs
+    before = confusion.copy()
+    got = answer_array(fm_iou(confusion), "fm_iou")
+    assert got.shape == (), f"return one number, got {got}"
+    assert np.array_equal(confusion, before), "fm_iou changed its argument `confusion`: make new arrays"
+    assert not np.isnan(got), "class 2 neither occurs nor is claimed: 0 / 0 is not a share, leave it out"
+    slips = {
+        7 / 12: "that is the plain mean of the two IoUs: weight each by how frequent the class is in the truth",
+        7 / 18: "that is the plain mean over all classes: weight each IoU by how frequent the class is in the truth",
+        3 / 4: "that is the pixel accuracy: divide by truth or claimed, not by truth alone",
+        23 / 60: "you count the right cells twice: the union is truth plus claimed minus right",
+        7 / 8: "you divide by the cells that are claimed only, a column: the union also has the cells that were missed",
+    }
+    for slip, hint in slips.items():
+        assert not np.isclose(got, slip, atol=1e-6), f"got {got:.3f}: {hint}"
+    assert np.isclose(got, 0.625), f"road 2 of 3, car 1 of 2: 3/4 of 0.667 and 1/4 of 0.5 are 0.625, got {got:.3f}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import tour
+
+    complaint = tour.check_fm_iou(fm_iou)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 6: in your own words (2 points)
 #
 # Thirty metres ahead, the semantic grid says *road* in a cell that the occupancy grid calls STATIC with probability 0.9. Name two
-# stages of the pipeline that may be to blame, and say for each what you would look at to find out. Five sentences are enough.
+# stages of the pipeline that may be to blame, and say for each what you would look at to find out. Then name one dashed edge of the
+# lecture's graph that could have prevented the mistake, and say what would flow along it. Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "blame", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # The image network may have taken the object for road, or the object is so small from afar that its pixels are mixed with road: look at
 # its scores at the pixels where the cell projects to, at several heights. If the scores are right there, the fusion did not use
 # the right plane, or it trusts road too much because road is the most frequent class: look at the planes one by one. The occupancy grid
 # itself may be wrong: on a slope, ground returns rise above 0.3 m and count as an obstacle: look at the LIDAR points in the cell.
-# One point for each stage with a check that would tell it from the other.
+# The dashed edge from the image to the occupancy grid could tell a grazing return on road from an obstacle; the one from the earlier
+# semantic grid would carry the class that the cell had when it was nearer or better seen.
+# One point for two stages, each with a check that would tell it from the other; one for the edge and what would flow along it.

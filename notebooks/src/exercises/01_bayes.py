@@ -1,17 +1,18 @@
 # %% [markdown]
 # # Exercise 01: Bayes' rule on a line
 #
-# Five small functions: the two halves of a Bayes filter, the whole filter, the matrix of a changing world, and a rule about witnesses.
-# Then one question to answer in words. About 60 minutes. The lecture is [01: Bayes' rule on a line](../01_bayes.ipynb).
+# Seven small functions: one reading on a map, a move on ice, a filter that waits before it answers, a matrix from what was counted, a rule about witnesses,
+# and a map put together from them. Then one question to answer in words. About 75 minutes. The lecture is [01: Bayes' rule on a line](../01_bayes.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
 # | 1 | update: one reading on a map | 1 + 1 |
-# | 2 | predict: a move with an error, on a ring and before a wall | 2 + 1 |
-# | 3 | predict, update, repeat | 3 |
-# | 4 | the transition matrix of a cell, for any time step; its half-life | 2 + 1 |
+# | 2 | predict: a move where the road is slippery, on a ring and before a wall | 2 + 1 |
+# | 3 | a filter, and a smoother that waits for a few scans | 1 + 2 |
+# | 4 | a transition matrix from counts, for any time step; its half-life | 2 + 1 |
 # | 5 | each witness once | 2 |
-# | 6 | in your own words | 2 |
+# | 6 | put together: a map from scans at any times | 2 |
+# | 7 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -110,11 +111,11 @@ _test()
 # %% [markdown]
 # ## Task 2: a move with an error (2 + 1 points)
 #
-# The vehicle drives forward, towards higher cells: `moved[d]` is the probability that it has moved by `d` cells, d = 0, 1, 2, ... (so `moved[0]` is the
-# probability that it has not moved at all).
+# The vehicle drives forward, towards higher cells. Some cells are icy, so the move depends on the cell where it starts: `moved[n, d]` is the probability that a vehicle
+# in cell n moves by d cells, d = 0, 1, 2, ... (so `moved[n, 0]` is the probability that it stays). `moved` has shape `(N, D)`, and each row sums to 1.
 #
 # Complete `predict`: it returns the belief after the move. With `ring=True` the road is a ring: after the last cell comes cell 0. For one more point: with
-# `ring=False` the road ends at a wall behind the last cell, and who would drive beyond it stands in the last cell.
+# `ring=False` the road ends at a wall behind the last cell, and a vehicle that would drive beyond it stands in the last cell.
 
 
 # %% nbgrader={"grade": false, "grade_id": "predict", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -124,37 +125,39 @@ def predict(belief, moved, ring=True):
     n_cells = len(belief)
     after = np.zeros(n_cells)
     for n in range(n_cells):
-        for d, m in enumerate(moved):
+        for d, p in enumerate(moved[n]):
             target = (n + d) % n_cells if ring else min(n + d, n_cells - 1)
-            after[target] += m * belief[n]
+            after[target] += p * belief[n]
     return after
     ### END SOLUTION
 
 
+# %% nbgrader={"grade": false, "grade_id": "predict-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_MOVE_SLIPS = {
+    (0.09, 0.38, 0.26, 0.20): "that is the row of the cell of arrival: the ice is where it starts",
+    (0.09, 0.38, 0.33, 0.20): "row 0 of `moved` for all cells: each cell has its own row",
+    (0.28, 0.09, 0.22, 0.41): "that drives backwards: what arrives in cell n after d cells comes from n - d",
+    (0.22, 0.41, 0.28, 0.09): "the rows are reversed: moved[n, 0] is the probability of staying",
+    (0.38, 0.43, 0.12, 0.07): "one cell too short: moved[n, 0] means 0 cells; the kernel isn't centred",
+    (0.12, 0.07, 0.38, 0.43): "one cell too far: moved[n, 0] means 0 cells",
+    (0.05, 0.38, 0.43, 0.12): "what drives beyond the last cell is lost: on a ring it arrives in cell 0",
+    (0.05, 0.38, 0.43, 0.14): "that is the road before a wall: on a ring it arrives in cell 0",
+}
+
+
 # %% nbgrader={"grade": true, "grade_id": "predict-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    belief, moved = np.array([0.5, 0.3, 0.2, 0.0]), np.array([0.1, 0.7, 0.2])
+    dry, icy = (0.1, 0.7, 0.2), (0.6, 0.3, 0.1)
+    belief, moved = np.array([0.5, 0.3, 0.2, 0.0]), np.array([dry, dry, icy, dry])
     before = belief.copy(), moved.copy()
     got = answer_array(predict(belief, moved), "predict")
     assert np.array_equal(belief, before[0]), "predict changed its argument `belief`: make a new array"
     assert np.array_equal(moved, before[1]), "predict changed its argument `moved`: make a new array"
     assert got.shape == (4,), f"expected one number for each of the 4 cells, shape (4,), got {got.shape}"
-    slips = {
-        (0.30, 0.17, 0.12, 0.41): "that drives backwards: what arrives in cell n after d cells comes from n - d",
-        (0.12, 0.41, 0.30, 0.17): "the kernel is reversed: moved[0] is the probability of staying",
-        (0.38, 0.33, 0.20, 0.09): "one cell too short: moved[0] means 0 cells; the kernel isn't centred",
-        (0.20, 0.09, 0.38, 0.33): "one cell too far: moved[0] means 0 cells",
-        (0.05, 0.38, 0.33, 0.20): "what drives beyond the last cell is lost: on a ring it arrives in cell 0",
-        (
-            0.05,
-            0.38,
-            0.33,
-            0.24,
-        ): "what drives beyond the last cell stands before a wall: on a ring it arrives in cell 0",
-    }
-    _explain(got, slips)
+    _explain(got, _MOVE_SLIPS)
     assert np.isclose(got.sum(), 1), f"the belief sums to {got.sum():.2f}: what leaves one cell must arrive in another"
-    np.testing.assert_allclose(got, [0.09, 0.38, 0.33, 0.20], err_msg="cell 1: 0.7 of 0.5, 0.1 of 0.3 and 0.2 of 0.0")
+    by_hand = "cell 2: 0.2 of 0.5, 0.7 of 0.3 and 0.6 of 0.2"
+    np.testing.assert_allclose(got, [0.07, 0.38, 0.43, 0.12], atol=1e-5, err_msg=by_hand)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import bayes
 
@@ -168,22 +171,24 @@ _test()
 
 # %% nbgrader={"grade": true, "grade_id": "predict-wall-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    belief, moved = np.array([0.5, 0.3, 0.2, 0.0]), np.array([0.1, 0.7, 0.2])
+    dry, icy = (0.1, 0.7, 0.2), (0.6, 0.3, 0.1)
+    belief, moved = np.array([0.5, 0.3, 0.2, 0.0]), np.array([dry, dry, icy, dry])
     got = answer_array(predict(belief.copy(), moved.copy(), ring=False), "predict")
     assert got.shape == (4,), f"expected one number for each of the 4 cells, shape (4,), got {got.shape}"
-    normalised = tuple(np.array([0.05, 0.38, 0.33, 0.20]) / 0.96)
+    normalised = tuple(np.array([0.05, 0.38, 0.43, 0.12]) / 0.98)
     slips = {
-        (0.09, 0.38, 0.33, 0.20): "that is the ring: with `ring=False` nothing comes round to cell 0",
-        (0.05, 0.38, 0.33, 0.20): "0.04 is lost: who would drive beyond the wall stands in the last cell",
-        normalised: "the sum is right, but the 0.04 at the wall went to all cells, not to the last",
+        (0.07, 0.38, 0.43, 0.12): "that is the ring: with `ring=False` nothing comes round to cell 0",
+        (0.05, 0.38, 0.43, 0.12): "0.02 is lost: what would drive beyond the wall stands in the last cell",
+        normalised: "the sum is right, but the 0.02 at the wall went to all cells, not to the last",
     }
     _explain(got, slips)
-    # By your own kernel: on a ring with three empty cells more on either side, what ends in those stands at a wall.
-    wide = answer_array(predict(np.pad(belief, 3), moved.copy()), "predict")
+    # By your own move: on a ring with three empty cells more on either side, what ends in those stands at a wall.
+    longer = np.pad(moved, ((3, 3), (0, 0)), mode="edge")
+    wide = answer_array(predict(np.pad(belief, 3), longer), "predict")
     assert wide.shape == (10,), f"expected one number for each of 10 cells, shape (10,), got {wide.shape}"
     by_ring = [wide[:4].sum(), *wide[4:6], wide[6:].sum()]
-    right = np.allclose(got, by_ring) or np.allclose(got, [0.05, 0.38, 0.33, 0.24])
-    assert right, f"expected 0.05, 0.38, 0.33, 0.24: from cell 2, 0.9 of 0.2 ends in cell 3; got {np.round(got, 3)}"
+    right = np.allclose(got, by_ring, atol=1e-5) or np.allclose(got, [0.05, 0.38, 0.43, 0.14], atol=1e-5)
+    assert right, f"expected 0.05, 0.38, 0.43, 0.14: from cell 2, 0.4 of 0.2 ends in cell 3; got {np.round(got, 3)}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import bayes
 
@@ -195,33 +200,46 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: predict, update, repeat (3 points)
+# ## Task 3: a filter that may wait (1 + 2 points)
 #
 # Now one grid cell with S states. `belief`, shape `(S,)`, is what you believe before the first scan. `M[i, j]` is the probability that a cell in state i is in
-# state j at the next scan. `likelihoods`, shape `(T, S)`, has one row a scan: P(z | state).
-#
-# Complete `follow`: it returns the belief after each scan, shape `(T, S)`. Between two scans the world changes, and before the first scan too. A drive
+# state j at the next scan. `likelihoods`, shape `(T, S)`, has one row per scan: P(z | state). Between two scans the world changes, and before the first scan too. A drive
 # has thousands of scans.
+#
+# Complete `follow`: row t of what it returns, shape `(T, S)`, is the belief in the state at scan t, given the scans 0 to t + `lag`, as far as there are so many. With `lag=0`
+# that is the filter (one point). With `lag=2` the filter waits for two more scans before it says what the cell was: this is a *fixed-lag smoother* (two points). The last rows, for which
+# fewer scans follow, use what there is. Leave your arguments as they are.
 
 
 # %% nbgrader={"grade": false, "grade_id": "follow", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def follow(belief, likelihoods, M):
-    """Return the belief after each scan (T, S)."""
+def follow(belief, likelihoods, M, lag=0):
+    """Return the belief in the state at each scan, given the scans up to `lag` later (T, S)."""
     ### BEGIN SOLUTION
     history = []
     for likelihood in likelihoods:
         product = (belief @ M) * likelihood
         belief = product / product.sum()
         history.append(belief)
-    return np.array(history)
+    history = np.array(history)
+    for t in range(len(history)):
+        message = np.ones(len(belief))
+        for later in likelihoods[t + 1 : t + 1 + lag][::-1]:
+            message = M @ (later * message)
+            message /= message.sum()
+        history[t] *= message
+        history[t] /= history[t].sum()
+    return history
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "follow-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "follow-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     belief, M = np.array([0.6, 0.4]), np.array([[0.9, 0.1], [0.3, 0.7]])  # FREE, OCCUPIED
     likelihoods = np.array([[0.2, 0.8], [0.5, 0.5], [0.9, 0.3]])  # a return, silence, a pass
-    got = answer_array(follow(belief.copy(), likelihoods.copy(), M.copy()), "follow")
+    arguments = belief.copy(), likelihoods.copy(), M.copy()
+    got = answer_array(follow(*arguments), "follow")
+    same = all(np.array_equal(a, b) for a, b in zip(arguments, (belief, likelihoods, M), strict=True))
+    assert same, "follow changed one of its arguments: make new arrays (no *=, no /=)"
     assert got.shape != (4, 2), "four rows for three scans: leave out the belief from before the first scan"
     assert got.shape != (2,), "only one belief came back: return that after each scan, one row a scan"
     assert got.shape == (3, 2), f"expected one row for each scan, shape (3, 2), got {got.shape}"
@@ -251,65 +269,105 @@ def _test():
 
 _test()
 
+
+# %% nbgrader={"grade": true, "grade_id": "follow-lag-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    belief, M = np.array([0.6, 0.4]), np.array([[0.9, 0.1], [0.3, 0.7]])  # FREE, OCCUPIED
+    likelihoods = np.array([[0.2, 0.8], [0.7, 0.4], [0.9, 0.3], [0.1, 0.5]])
+    arguments = belief.copy(), likelihoods.copy(), M.copy()
+    got = answer_array(follow(*arguments, lag=1), "follow")
+    same = all(np.array_equal(a, b) for a, b in zip(arguments, (belief, likelihoods, M), strict=True))
+    assert same, "follow changed one of its arguments: make new arrays (no *=, no /=)"
+    assert got.shape == (4, 2), f"one row for each of 4 scans, whatever the lag, shape (4, 2), got {got.shape}"
+    sums = got.sum(axis=1)
+    wrong = np.abs(sums - 1).argmax()
+    assert np.allclose(sums, 1, atol=1e-5), f"the belief of scan {wrong} sums to {sums[wrong]:.2f}: normalise each row"
+    slips = {  # P(FREE) of the first three rows
+        (0.3267, 0.6327, 0.8642): "that is the filter: with `lag=1` row t also uses scan t + 1",
+        (0.4061, 0.6464, 0.7010): "that uses all later scans: with `lag=1` only the next one",
+        (0.4613, 0.6464, 0.7010): "that waits for two scans: with `lag=1` only for the next one",
+        (0.6327, 0.8642, 0.4743): "that is the filter one scan later: row t is still about scan t",
+        (0.5098, 0.8379, 0.8093): "M is transposed: backward in time, sum over where the cell goes, M @ ...",
+        (0.4592, 0.8379, 0.5600): "the later scan speaks of a later state: bring it back by M",
+        (0.1978, 0.7524, 0.8710): "row t counts scan t twice: the message holds later scans only",
+        (0.4960, 0.6796, 0.8185): "that is a prediction: multiply by what the later scan says",
+    }
+    _explain(got[:3, 0], slips)
+    by_hand = "row 0: the filter's 0.3267, 0.6733, times what the next scan says of each, 0.67 and 0.49"
+    np.testing.assert_allclose(got[0], [0.3989, 0.6011], atol=1e-4, err_msg=by_hand)
+    np.testing.assert_allclose(got[2], [0.7010, 0.2990], atol=1e-4)
+    last = "after the last scan nothing follows: its row is the filter's"
+    np.testing.assert_allclose(got[3], [0.4743, 0.5257], atol=1e-4, err_msg=last)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import bayes
+
+    complaint = bayes.check_follow_lag(follow)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
 # %% [markdown]
 # ## Task 4: a matrix for any time step (2 + 1 points)
 #
-# In a free cell something appears at the rate `appears`, and what stands in it vanishes at the rate `vanishes`, both in 1/s. It may change more than once in a
-# time step: that is what makes this more than two probabilities. Rates may be 0, and so may `dt`.
+# Somebody watched cells at a true drive and counted: `counts[i, j]`, shape `(2, 2)`, is how often a cell in state i (0 is FREE, 1 is OCCUPIED) was in state j at the next scan, `dt` seconds
+# later. Your LIDAR has another time step. A cell may change more than once in a time step: that is what makes this more than a division.
 #
-# Complete `transition`: it returns the 2 x 2 matrix of a step of `dt` seconds, states in the order FREE, OCCUPIED; `M[i, j]` goes from i to j. The closed
-# form (solve one linear differential equation), `scipy.linalg.expm` and the lecture's 100,000 short steps are all fine; five digits must be right.
+# Complete `transition`: it returns the 2 x 2 matrix of a step of `new_dt` seconds; `M[i, j]` goes from i to j. Five digits must be right. `new_dt` may be shorter or longer than `dt`, and 0.
+# Each state was seen at least once; perhaps no change was ever seen. Of free cells a smaller share becomes occupied than of occupied cells stays occupied.
 #
 # For one more point complete `half_life`: whatever is believed of a cell, when nobody looks it tends to the same final belief. After how many seconds is
-# half of the difference left? At least one of the two rates is positive.
+# half of the difference left? Here at least one change has been seen.
 
 
 # %% nbgrader={"grade": false, "grade_id": "transition", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def transition(appears, vanishes, dt):
-    """Return the transition matrix (2, 2) of FREE and OCCUPIED over `dt` seconds."""
+def transition(counts, dt, new_dt):
+    """Return the transition matrix (2, 2) of FREE and OCCUPIED over `new_dt` seconds."""
     ### BEGIN SOLUTION
-    total = appears + vanishes
-    if total == 0:
+    M = np.array(counts) / np.sum(counts, axis=1, keepdims=True)
+    appears, vanishes = M[0, 1], M[1, 0]
+    if appears + vanishes == 0:
         return np.eye(2)
-    final = np.array([vanishes, appears]) / total
-    kept = np.exp(-total * dt)
+    final = np.array([vanishes, appears]) / (appears + vanishes)
+    kept = (1 - appears - vanishes) ** (new_dt / dt)
     return kept * np.eye(2) + (1 - kept) * final
     ### END SOLUTION
 
 
-def half_life(appears, vanishes):
+def half_life(counts, dt):
     """Return the seconds after which half of the difference to the final belief is left."""
     ### BEGIN SOLUTION
-    return np.log(2) / (appears + vanishes)
+    M = np.array(counts) / np.sum(counts, axis=1, keepdims=True)
+    return dt * np.log(0.5) / np.log(1 - M[0, 1] - M[1, 0])
     ### END SOLUTION
 
 
 # %% nbgrader={"grade": true, "grade_id": "transition-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    got = answer_array(transition(appears=0.5, vanishes=1.5, dt=0.4), "transition")
+    counts = np.array([[180, 20], [30, 70]])
+    got = answer_array(transition(counts.copy(), dt=0.1, new_dt=0.05), "transition")
     assert got.shape == (2, 2), f"expected a matrix of shape (2, 2), got {got.shape}"
     slips = {
-        ((0.8, 0.2), (0.6, 0.4)): "that is I + R dt, a single step: right for a very short time only",
-        ((0.8187, 1.2214), (1.8221, 0.5488)): "np.exp takes each entry by itself; the exponential of a matrix is expm",
+        ((0.9, 0.1), (0.3, 0.7)): "that is the matrix of `dt`: use `new_dt`",
+        ((0.95, 0.05), (0.15, 0.85)): "half the time isn't half the probability: a cell may change and change back",
+        ((0.9487, 0.3162), (0.5477, 0.8367)): "that is the root of each entry: take the root of the matrix",
+        ((0.9487, 0.0513), (0.1633, 0.8367)): "(1 - p) to a power forgets that a cell may change and change back",
+        ((0.84, 0.16), (0.48, 0.52)): "that is the matrix of a step twice as long: `new_dt` is the new one",
         (
-            (0.8623, 0.4130),
-            (0.1377, 0.5870),
+            (0.9436, 0.1690),
+            (0.0564, 0.8310),
         ): "that is the transpose: a row is where it comes from, so each row sums to 1",
-        ((0.5870, 0.4130), (0.1377, 0.8623)): "the rates are swapped: what is free changes at the rate `appears`",
-        ((0.8187, 0.1813), (0.4512, 0.5488)): "1 - exp(-rate dt) forgets that a cell may change and change back",
-        ((0.7838, 0.2162), (0.6485, 0.3515)): "that is the matrix of a whole second: use `dt`",
-        ((1.3064, -0.3064), (-0.9191, 1.9191)): "a probability above 1: check the sign of the exponent, belief decays",
-        ((0.75, 0.25), (0.75, 0.25)): "that is where it ends after a very long time: use `dt`",
     }
     _explain(got, slips)
     sums = got.sum(axis=1)
-    assert np.allclose(sums, 1), f"rows sum to {sums.round(3)}: from each state the cell must go somewhere"
-    by_hand = "exp(-2 * 0.4) = 0.449 of every difference is left"
-    np.testing.assert_allclose(got, [[0.8623, 0.1377], [0.4130, 0.5870]], atol=1e-4, err_msg=by_hand)
-    same = answer_array(transition(0.5, 1.5, dt=0.0), "transition")
-    np.testing.assert_allclose(same, np.eye(2), atol=1e-9, err_msg="in no time nothing changes")
-    half = answer_array(transition(0.5, 1.5, dt=0.2), "transition")
-    np.testing.assert_allclose(half @ half, got, atol=1e-5, err_msg="two half steps must make one whole step")
+    assert np.allclose(sums, 1, atol=1e-5), f"rows sum to {sums.round(3)}: divide the counts of each row by its sum"
+    by_hand = "of every difference 1 - 0.1 - 0.3 = 0.6 is left after 0.1 s"
+    np.testing.assert_allclose(got, [[0.94365, 0.05635], [0.16905, 0.83095]], atol=1e-4, err_msg=by_hand)
+    whole = answer_array(transition(counts.copy(), dt=0.1, new_dt=0.1), "transition")
+    np.testing.assert_allclose(whole, [[0.9, 0.1], [0.3, 0.7]], atol=1e-5, err_msg="after `dt` it is what was counted")
+    same = answer_array(transition(counts.copy(), dt=0.1, new_dt=0.0), "transition")
+    np.testing.assert_allclose(same, np.eye(2), atol=1e-5, err_msg="in no time nothing changes")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import bayes
 
@@ -323,16 +381,17 @@ _test()
 
 # %% nbgrader={"grade": true, "grade_id": "half-life-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    got = answer_number(half_life(appears=0.5, vanishes=1.5), "half_life")
+    got = answer_number(half_life(np.array([[180, 20], [30, 70]]), dt=0.1), "half_life")
     slips = {
-        0.5: "1 / (appears + vanishes) is the time after which 1/e is left; you want 1/2",
-        1.3863: "what vanishes pulls towards the final belief, too: both rates count",
-        0.4621: "what appears pulls towards the final belief, too: both rates count",
-        0.6931: "the difference falls like exp(-(appears + vanishes) t), not like exp(-t)",
-        1.8484: "two processes at once are faster than each alone: add the rates, not the times",
+        0.1958: "that is the time after which 1/e is left; you want 1/2",
+        0.1733: "0.1 / dt and 0.3 / dt aren't the rates: a cell may change and change back within `dt`",
+        0.1943: "what appears pulls towards the final belief, too: both changes count",
+        0.6579: "what vanishes pulls towards the final belief, too: both changes count",
+        0.8522: "two processes at once are faster than each alone",
+        1.3569: "that is the number of scans: multiply by `dt`",
     }
     _explain(got, slips)
-    assert np.isclose(got, 0.34657, atol=1e-4), f"expected ln 2 / 2 = 0.347 s, got {got:.3f}"
+    assert np.isclose(got, 0.13569, atol=1e-4), f"expected 0.1 ln 0.5 / ln 0.6 = 0.136 s, got {got:.3f}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import bayes
 
@@ -394,7 +453,101 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 6: in your own words (2 points)
+# ## Task 6: put together (2 points)
+#
+# Now a whole map, each cell filtered by itself. Scan t says P(z | OCCUPIED) of each cell in `occupied[t]` and P(z | FREE) in `free[t]`; both have shape `(T, H, W)`. Where a scan
+# says nothing, the two are equal. Scans come at any times, because a real sensor drops some. So `matrices`, shape `(T - 1, 2, 2)`, holds a transition matrix for each gap: `matrices[t]` leads
+# from scan t to scan t + 1. (In a moment your `transition` will make them.)
+#
+# Complete `build_map`: it returns P(OCCUPIED) of each cell after each scan, shape `(T, H, W)`. At the time of the first scan, before it, each cell is OCCUPIED with probability `first`.
+# Leave your arguments as they are.
+
+
+# %% nbgrader={"grade": false, "grade_id": "build-map", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def build_map(occupied, free, matrices, first=0.5):
+    """Return P(OCCUPIED) of each cell after each scan (T, H, W)."""
+    ### BEGIN SOLUTION
+    p, maps = np.full(np.shape(occupied)[1:], first), []
+    for t in range(len(occupied)):
+        if t:
+            p = (1 - p) * matrices[t - 1][0, 1] + p * matrices[t - 1][1, 1]
+        p = p * occupied[t] / (p * occupied[t] + (1 - p) * free[t])
+        maps.append(p)
+    return np.array(maps)
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": true, "grade_id": "build-map-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    matrices = np.array([[[0.9, 0.1], [0.3, 0.7]], [[0.804, 0.196], [0.588, 0.412]]])  # 0.1 s, then 0.3 s
+    occupied = np.array(
+        [[[0.8, 0.3, 0.5]], [[0.8, 0.3, 0.5]], [[0.5, 0.8, 0.5]]]
+    )  # three scans, one row of three cells
+    free = np.array([[[0.1, 0.7, 0.5]], [[0.1, 0.7, 0.5]], [[0.5, 0.1, 0.5]]])
+    arguments = occupied.copy(), free.copy(), matrices.copy()
+    got = answer_array(build_map(*arguments, first=0.2), "build_map")
+    same = all(np.array_equal(a, b) for a, b in zip(arguments, (occupied, free, matrices), strict=True))
+    assert same, "build_map changed one of its arguments: make new arrays (no *=, no /=)"
+    assert got.shape == (3, 1, 3), f"one map per scan, shape (3, 1, 3), got {got.shape}"
+    slips = {
+        (0.6929, 0.1078, 0.2200): "`first` is the belief at the time of the first scan: no move before it",
+        (0.8889, 0.3000, 0.5000): "`first` is not used",
+        (0.3333, 0.9032, 0.8000): "that is P(FREE)",
+        (0.2000, 0.2000, 0.2000): "that is the belief before the first scan: return what is believed after each",
+    }
+    _explain(got[0, 0], slips)
+    by_hand = "0.2 * 0.8 against 0.8 * 0.1 in the first cell"
+    np.testing.assert_allclose(got[0, 0], [0.6667, 0.0968, 0.2], atol=1e-4, err_msg=by_hand)
+    slips = {
+        (0.6333, 0.5751, 0.2320): "the first matrix for each gap: every gap has its own",
+        (0.9412, 0.2687, 0.2000): "nothing changes between the scans: predict with `matrices`",
+        (0.4274, 0.9093, 0.5211): "M is transposed: M[i, j] goes from i to j",
+    }
+    _explain(got[2, 0], slips)
+    by_hand = "in the first cell 0.889 is predicted to be 0.8889 * 0.412 + 0.1111 * 0.196"
+    np.testing.assert_allclose(got[2, 0], [0.3880, 0.6829, 0.2435], atol=1e-4, err_msg=by_hand)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import bayes
+
+    complaint = bayes.check_build_map(build_map)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ### Does the map light up?
+#
+# It is a stage of the pipeline now. Put this into a file `my_stages.py`, with your `transition` and `build_map` above it:
+#
+# ```python
+# from collections import deque
+#
+# import numpy as np
+#
+# from semgrid_edu.occupancy import PlanarMotion, SensorModel, scan_evidence
+#
+# COUNTS, DT = np.array([[980, 20], [50, 950]]), 0.1  # of free cells 2 % are occupied a tenth of a second later
+#
+#
+# def track(frames, spec):
+#     """Filter the last ten scans again in the grid of each new frame: slow, but easy to read."""
+#     last = deque(maxlen=10)
+#     for frame in frames:
+#         last.append(frame)
+#         poses = [PlanarMotion.from_poses(frame.T_world_from_lidar, old.T_world_from_lidar) for old in last]
+#         scans = [scan_evidence(old.points_grid, spec, SensorModel(), pose) for old, pose in zip(last, poses)]
+#         occupied, free = np.array([scan.occupied for scan in scans]), np.array([scan.free for scan in scans])
+#         matrices = np.array([transition(COUNTS, DT, gap) for gap in np.diff([old.time for old in last])])
+#         p = np.asarray(build_map(occupied, free, matrices))[-1]
+#         seen = (occupied != free).any(axis=0)
+#         yield np.stack([seen * (1 - p), seen * p, 0 * p, 1 - seen])  # FREE, STATIC, DYNAMIC, UNKNOWN
+# ```
+#
+# Then `semgrid-edu demo --stages my_stages.py` runs the system with your filter and with the package's, and shows both side by side. Where do they differ? Yours has no DYNAMIC yet.
+#
+# ## Task 7: in your own words (2 points)
 #
 # A car has been parked in a cell for ten minutes: 6000 scans said *occupied*, and the filter's matrix is the identity (nothing ever changes). Now the car
 # drives off. What will the filter believe of the cell during the next minute, and why? Name one change to the filter that repairs it, and one thing that gets

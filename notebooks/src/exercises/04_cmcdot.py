@@ -1,16 +1,16 @@
 # %% [markdown]
 # # Exercise 04: CMCDOT
 #
-# Five functions, with which you could write the filter again, and one question to answer in words. About 75 minutes.
+# Five functions, none of which the lecture prints, and one question to answer in words. At the end your own filter runs on two streets. About 75 minutes.
 # The lecture is [04: CMCDOT](../04_cmcdot.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
 # | 1 | move, and sum in cells: dynamic mass and mean velocity | 2 |
-# | 2 | a transition matrix, and what is born by it | 2 |
-# | 3 | four states meet a scan, without 0/0 | 2 + 1 |
-# | 4 | systematic resampling | 3 |
-# | 5 | two opinions at arrival | 2 + 1 + 1 |
+# | 2 | a scanner that also measures speed | 2 + 1 |
+# | 3 | resampling with an offset for each tooth | 3 |
+# | 4 | which edges did this filter cut? measure it | 3 |
+# | 5 | your filter on a simulated and on a real street | 2 |
 # | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
@@ -24,6 +24,12 @@ import warnings
 import numpy as np
 
 from semgrid_edu.answers import answer_array, answer_arrays
+from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import CmcdotParams, track_drive
+from semgrid_edu.stage_models.bof import bof_beliefs
+from semgrid_edu.stage_models.cells_in_a_row import DT, Cell, CellsInARow
+from semgrid_edu.stage_models.joint_row import exact_beliefs
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 # Names that begin with _ belong to the tests.
@@ -39,7 +45,7 @@ FREE, STATIC, DYNAMIC, UNKNOWN = range(4)
 # `x_max`, `y_max`, in metres; cells are `cell` metres wide; `shape` is (H, W).
 #
 # Complete `in_cells`: it returns `dynamic`, shape (H, W), the sum of the weights in each cell, and `velocity`, shape (2, H, W), the mean velocity over
-# ground in each cell, **weighed by the weights**; NaN where no particle is. Particles outside the grid count nowhere.
+# ground in each cell, **weighted by the weights**; NaN where no particle is. Particles outside the grid count nowhere.
 
 
 # %% nbgrader={"grade": false, "grade_id": "in-cells", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -99,111 +105,62 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 2: what becomes of a belief (2 points)
+# ## Task 2: a scanner that also measures speed (2 + 1 points)
 #
-# `M[i, j]` is the probability that a cell in state i is in state j one step later; rows sum to 1. `belief` has the shape (4, H, W).
+# Newer scanners measure by the Doppler effect how fast a return comes nearer. So one scan *can* tell something that moves from something that stands:
+# STATIC and DYNAMIC have likelihoods of their own. `belief` is (4, H, W); `likelihood` is (3, H, W): P(z | FREE), P(z | STATIC), P(z | DYNAMIC).
+# Where all three are equal the scan says nothing, and the cell keeps its belief. Where they are not,
 #
-# Complete `mix`: it returns `after`, (4, H, W), and `newborn`, (H, W): that part of `after[DYNAMIC]` which was **not** DYNAMIC before. It has no
-# particles yet, while the rest has. Leave the arguments as they are.
-
-
-# %% nbgrader={"grade": false, "grade_id": "mix", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def mix(belief, M):
-    """Return the belief (4, H, W) after one step, and the newborn mass (H, W)."""
-    ### BEGIN SOLUTION
-    after = np.einsum("ij,ihw->jhw", M, belief)
-    return after, after[DYNAMIC] - M[DYNAMIC, DYNAMIC] * belief[DYNAMIC]
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": true, "grade_id": "mix-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    M = np.array([[0.8, 0, 0.1, 0.1], [0.2, 0.7, 0.1, 0], [0.1, 0.2, 0.5, 0.2], [0, 0, 0, 1]])
-    belief = np.zeros((4, 1, 2))
-    belief[:, 0, 0] = [0.5, 0.2, 0.3, 0]  # DYNAMIC after it: 0.5 * 0.1 + 0.2 * 0.1 + 0.3 * 0.5
-    belief[:, 0, 1] = [0, 0, 0, 1]  # UNKNOWN stays so
-    before = belief.copy()
-    got = mix(belief, M)
-    assert isinstance(got, (tuple, list)), f"return two arrays, after and newborn; got {got}"
-    assert np.array_equal(belief, before), "mix changed its argument `belief`: make a new array"
-    after, newborn = answer_arrays(got, 2, "mix")
-    assert after.shape == (4, 1, 2), f"expected after of shape (4, 1, 2), got {after.shape}"
-    backwards = np.allclose(after[:, 0, 0], M @ before[:, 0, 0])
-    assert not backwards, "M is used the wrong way round, its row is the state before"
-    assert np.allclose(after.sum(axis=0), 1), f"cell (0, 0) sums to {after[:, 0, 0].sum():.2f}: nothing may get lost"
-    np.testing.assert_allclose(after[:, 0, 0], [0.47, 0.2, 0.22, 0.11], err_msg="by hand: sum over i of b_i M[i, j]")
-    assert newborn.shape == (1, 2), f"expected newborn of shape (1, 2), got {newborn.shape}"
-    slips = {
-        0.22: "that is all that is DYNAMIC after the step: what was DYNAMIC before has its particles and isn't born again",
-        **dict.fromkeys((0, -0.08), "what DYNAMIC loses is no negative birth: sum what comes in from the other three"),
-        0.15: "that is what stays DYNAMIC: newborn is the rest, from the three other states",
-        0.09: "M[i, j] leads from i to j: what turns DYNAMIC is in a column of M, not in its row",
-        0.05: "STATIC and UNKNOWN may turn DYNAMIC too",
-    }
-    for slip, hint in slips.items():
-        assert not np.isclose(newborn[0, 0], slip), f"newborn mass {newborn[0, 0]:.2f}: {hint}"
-    np.testing.assert_allclose(newborn, [[0.07, 0]], atol=1e-9, err_msg="by hand: 0.5 * 0.1 + 0.2 * 0.1")
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import cmcdot
-
-    complaint = cmcdot.check_mix(mix)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 3: four states meet a scan (2 + 1 points)
-#
-# `belief` is (4, H, W); `occupied` and `free`, each (H, W), are P(z | occupied) and P(z | free) of a scan. Where the two are equal the scan says
-# nothing, and the cell keeps its belief. Where they differ,
-#
-# 1. somebody looks, so UNKNOWN is shared out among FREE, STATIC and DYNAMIC in the proportions `first_sight` (three numbers that sum to 1);
-# 2. Bayes' rule: STATIC and DYNAMIC share P(z | occupied);
+# 1. a scan has looked, so UNKNOWN is shared out among FREE, STATIC and DYNAMIC in the proportions `first_sight` (three numbers that sum to 1);
+# 2. Bayes' rule;
 # 3. where nothing that was held possible explains the scan, nothing is known any more: UNKNOWN is 1.
 #
 # Complete `update`: it returns the belief after the scan, and leaves its arguments as they are.
 
 
 # %% nbgrader={"grade": false, "grade_id": "update", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def update(belief, occupied, free, first_sight):
+def update(belief, likelihood, first_sight):
     """Return the belief (4, H, W) after one scan."""
     ### BEGIN SOLUTION
-    revealed = np.where(occupied != free, belief[UNKNOWN], 0)
-    prior = belief + revealed * np.array([*first_sight, -1.0])[:, None, None]
-    joint = prior * np.stack([free, occupied, occupied, free])
+    silent = (likelihood == likelihood[0]).all(axis=0)
+    shared = np.where(silent, 0, belief[UNKNOWN])
+    prior = belief + shared * np.array([*first_sight, -1.0])[:, None, None]
+    joint = prior * np.concatenate([likelihood, likelihood[:1]])
     total = joint.sum(axis=0)
     nothing_known = np.array([0.0, 0, 0, 1])[:, None, None]
-    return np.where(total > 0, joint / np.where(total > 0, total, 1), nothing_known)
+    after = np.where(total > 0, joint / np.where(total > 0, total, 1), nothing_known)
+    return np.where(silent, belief, after)
     ### END SOLUTION
 
 
 # %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    belief = np.array([0.2, 0.2, 0.1, 0.5]).reshape(4, 1, 1)  # a return comes back from this cell
+    belief = np.array([0.2, 0.2, 0.1, 0.5]).reshape(4, 1, 1)  # a return comes back, from something that hardly moves
     before = belief.copy()
-    got = update(belief, occupied=np.array([[0.8]]), free=np.array([[0.2]]), first_sight=(0.6, 0.3, 0.1))
+    likelihood = np.array([0.2, 0.8, 0.4]).reshape(3, 1, 1)
+    got = update(belief, likelihood, first_sight=(0.6, 0.3, 0.1))
     got = answer_array(got, "update")
     assert np.array_equal(belief, before), "update changed its argument `belief`: make a new array (no +=, no *=)"
+    assert np.array_equal(likelihood.ravel(), [0.2, 0.8, 0.4]), (
+        "update changed its argument `likelihood`: make a new array"
+    )
     assert got.shape == (4, 1, 1), f"expected the shape of the belief, (4, 1, 1), got {got.shape}"
     seen = np.round(got[:, 0, 0], 2)
-    assert np.isclose(seen[UNKNOWN], 0), f"somebody looked, yet UNKNOWN is {seen[UNKNOWN]}: share it out first"
+    assert np.isclose(seen[UNKNOWN], 0), f"a scan has looked, yet UNKNOWN is {seen[UNKNOWN]}: share it out first"
     assert np.isclose(seen.sum(), 1, atol=0.02), f"the cell sums to {seen.sum():.2f}: divide by the sum over its states"
     slips = {
-        (0.27, 0.55, 0.18, 0): "its old belief in FREE, STATIC and DYNAMIC got lost: add the shares of UNKNOWN to it",
-        (0.11, 0.44, 0.44, 0): "the belief got lost: Bayes' rule multiplies it by the evidence",
-        (0.24, 0.68, 0.07, 0): "DYNAMIC takes P(z | occupied) too, like STATIC",
-        (0.14, 0.57, 0.29, 0): "UNKNOWN was thrown away: share it out among the three others",
-        (0.8, 0.14, 0.06, 0): "P(z | occupied) and P(z | free) are swapped",
-        (0.13, 0.5, 0.37, 0): "UNKNOWN isn't shared out evenly: `first_sight` has a number for each of the three",
-        (0.26, 0.5, 0.24, 0): "share UNKNOWN out before you multiply by the evidence, not after",
+        (0.2, 0.56, 0.24, 0): "this scanner tells DYNAMIC from STATIC: each has its own likelihood",
+        (0.3, 0.6, 0.1, 0): "its old belief in FREE, STATIC and DYNAMIC got lost: add the shares of UNKNOWN to it",
+        (0.14, 0.57, 0.29, 0): "the belief got lost: Bayes' rule multiplies it by the likelihood",
+        (0.17, 0.67, 0.17, 0): "UNKNOWN was thrown away: share it out among the three others",
+        (0.28, 0.39, 0.33, 0): "the likelihoods of STATIC and DYNAMIC are swapped",
+        (0.15, 0.62, 0.23, 0): "UNKNOWN isn't shared out evenly: `first_sight` has a number for each of the three",
+        (0.29, 0.56, 0.15, 0): "share UNKNOWN out before you multiply by the likelihood, not after",
     }
     for slip, hint in slips.items():
         assert not np.allclose(seen, slip, atol=0.006), f"the cell is {seen}: {hint}"
-    np.testing.assert_allclose(
-        seen, [0.2, 0.56, 0.24, 0], atol=0.005, err_msg="by hand: 0.10, 0.28, 0.12, divided by 0.50"
-    )
+    by_hand = "by hand: 0.10, 0.28, 0.06, divided by 0.44"
+    np.testing.assert_allclose(got[:, 0, 0], [0.227, 0.636, 0.136, 0], atol=0.002, err_msg=by_hand)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import cmcdot
 
@@ -220,12 +177,12 @@ def _test():
     belief = np.zeros((4, 1, 2))
     belief[:, 0, 0] = [0.2, 0.2, 0.1, 0.5]  # of this cell the scan says nothing ...
     belief[:, 0, 1] = [1, 0, 0, 0]  # ... and this one, surely free, is surely occupied
-    got = update(belief, occupied=np.array([[0.5, 1.0]]), free=np.array([[0.5, 0.0]]), first_sight=(0.6, 0.3, 0.1))
-    got = answer_array(got, "update")
+    likelihood = np.array([[0.5, 0.0], [0.5, 1.0], [0.5, 1.0]])[:, None]
+    got = answer_array(update(belief, likelihood, first_sight=(0.6, 0.3, 0.1)), "update")
     assert got.shape == (4, 1, 2), f"expected the shape of the belief, (4, 1, 2), got {got.shape}"
     assert np.isfinite(got).all(), "cell (0, 1) is 0/0: nothing explains its scan, so it must become UNKNOWN"
     silent, contradicted = np.round(got, 2)[:, 0].T
-    assert not np.isclose(silent[UNKNOWN], 0), "nobody looked at cell (0, 0): there UNKNOWN stays"
+    assert not np.isclose(silent[UNKNOWN], 0), "no scan looked at cell (0, 0): there UNKNOWN stays"
     assert np.allclose(silent, [0.2, 0.2, 0.1, 0.5]), f"the scan is silent in cell (0, 0), yet it became {silent}"
     assert np.allclose(contradicted, [0, 0, 0, 1]), (
         f"nothing explains cell (0, 1): UNKNOWN should be 1, got {contradicted}"
@@ -241,58 +198,50 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: systematic resampling (3 points)
+# ## Task 3: an offset for each tooth (3 points)
 #
-# Lay the weights end to end on a line. Lay a comb over it, with `count` teeth a `count`-th of the line apart; the first tooth is `offset` (between 0
-# and 1) of that distance from the beginning. Each tooth draws the particle it lies on; a tooth on the border of two draws the second.
+# The lecture's comb has one random number for all its teeth. In **stratified resampling** the line of all weights, end to end, is divided into `count`
+# equal parts, and each part has one tooth, at a random place of its own: tooth i lies `offsets[i]` (between 0 and 1) of a part behind the beginning of
+# part i. Each tooth draws the particle it lies on; a tooth on the border of two draws the second.
 #
-# Complete `systematic`: it returns the `count` indices, in ascending order. The weights need not sum to 1.
+# Complete `stratified`: it returns the `count` indices, in ascending order. The weights need not sum to 1.
 
 
-# %% nbgrader={"grade": false, "grade_id": "systematic", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def systematic(weight, count, offset):
-    """Return the indices (count,) that the teeth draw."""
+# %% nbgrader={"grade": false, "grade_id": "stratified", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def stratified(weight, count, offsets):
+    """Return the indices (count,) that the teeth draw; `offsets` is (count,)."""
     ### BEGIN SOLUTION
     ends = np.cumsum(weight)
-    teeth = (np.arange(count) + offset) / count * ends[-1]
+    teeth = (np.arange(count) + offsets) / count * ends[-1]
     return np.searchsorted(ends, teeth, side="right")
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "systematic-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "stratified-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    weight = np.array([1.0, 6.0, 3.0])  # a line 10 long, whose parts end at 1, 7 and 10; four teeth, 2.5 apart
-    drawn = [systematic(weight.copy(), 4, 0.3) for _ in range(20)]  # at 0.75, 3.25, 5.75, 8.25
-    got = answer_array(drawn[0], "systematic")
+    weight = np.array([1.0, 6.0, 3.0])  # a line 10 long, whose parts end at 1, 7 and 10; four parts, 2.5 long
+    offsets = np.array([0.6, 0.2, 0.9, 0.1])  # teeth at 1.5, 3.0, 7.25, 7.75
+    drawn = [stratified(weight.copy(), 4, offsets.copy()) for _ in range(20)]
+    got = answer_array(drawn[0], "stratified")
     assert got.shape == (4,), f"expected 4 indices, as many as `count`, got shape {got.shape}"
     assert np.issubdtype(np.asarray(drawn[0]).dtype, np.integer), f"an index must be an integer, got {got}"
-    repeats = all(np.array_equal(got, again) for again in drawn)
-    assert repeats, "the same call gave other indices: the comb has one offset, which is given; nothing else is random"
+    assert all(np.array_equal(got, again) for again in drawn), "the same call gave other indices: the offsets are given"
     slips = {
+        (1, 1, 1, 2): "that is the comb of the lecture, with the first offset for all: tooth i has its own, offsets[i]",
         (0, 0, 0, 0): "all teeth lie on particle 0: the weights sum to 10, not to 1",
-        (1, 2, 2, 3): "every index is one too large: particle n ends at w_0 + ... + w_n",
-        (1, 1, 2, 2): "the offset is a part of the distance between two teeth: divide it by `count` too",
-        (1, 1, 2, 3): "the offset is a part of the distance between two teeth: divide it by `count` too",
-        (0, 1, 2, 2): "the teeth are a count-th of the line apart, so the last isn't at its end",
-        (
-            1,
-            1,
-            1,
-            2,
-        ): "the first tooth lies on particle 0, which ends at 1: the weights lie on the line in their own order",
-        (-1, 0, 0, 1): "every index is one too small: what begins at 0 is particle 0",
+        (2, 2, 3, 3): "every index is one too large: particle n ends at w_0 + ... + w_n",
+        (0, 0, 1, 1): "every index is one too small: what begins at 0 is particle 0",
+        (1, 1, 3, 2): "an offset is a part of a part: divide it by `count` too",
+        (0, 1, 1, 2): "the offsets aren't used: tooth i lies offsets[i] of a part behind the beginning of part i",
     }
     assert tuple(got) not in slips, f"got {got}: {slips.get(tuple(got))}"
-    np.testing.assert_array_equal(got, [0, 1, 1, 2], err_msg="teeth at 0.75, 3.25, 5.75, 8.25")
-    got = answer_array(systematic(weight.copy(), 4, 0.5), "systematic")
-    assert got.tolist() != [0, 1, 1, 2], "offset 0.5 drew the same as offset 0.3: where the comb begins decides"
-    np.testing.assert_array_equal(got, [1, 1, 1, 2], err_msg="offset 0.5: teeth at 1.25, 3.75, 6.25, 8.75")
-    (got,) = answer_array(systematic(weight.copy(), 1, 0.8), "systematic")
+    np.testing.assert_array_equal(got, [1, 1, 2, 2], err_msg="teeth at 1.5, 3.0, 7.25, 7.75")
+    (got,) = answer_array(stratified(weight.copy(), 1, np.array([0.8])), "stratified")
     assert got == 2, "the tooth at 8 lies on particle 2: go on `while` a particle ends before the tooth, not `if`"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import cmcdot
 
-    complaint = cmcdot.check_systematic(systematic)
+    complaint = cmcdot.check_stratified(stratified)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -300,128 +249,146 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: two opinions at arrival (2 + 1 + 1 points)
+# ## Task 4: which edges did this filter cut? (3 points)
 #
-# The cells have their own belief, `own` (4, H, W). Particles arrive in them with probability `arrives` (H, W). Take the two opinions as independent, strike
-# out the one impossible combination, "something arrives" and STATIC, and normalise:
+# Three cells in a row. A filter is a function `predicts(left, own, right)`. Each argument is a dictionary with what is believed of one cell: "static",
+# "left" and "right" (moving to the left, to the right, by one cell per step) and "unknown"; the rest is free. It returns the probability that something
+# moves in the **middle** cell after one step, without any scan. A filter may cut any of three edges:
 #
-# | | FREE | STATIC | DYNAMIC | UNKNOWN |
-# |---|---|---|---|---|
-# | arrives | DYNAMIC | impossible | DYNAMIC | DYNAMIC |
-# | doesn't | FREE | STATIC | DYNAMIC | UNKNOWN |
+# | edge | what a filter does that cuts it |
+# |---|---|
+# | 1 | it adds up what arrives from the left and from the right, as if at most one of the two could come |
+# | 2 | it lets something arrive although the middle cell is STATIC |
+# | 3 | it takes "something stands where this comes from" as independent of "this has left from there" |
 #
-# This is a first version. The package's filter strikes out one combination more: something comes out of a wall and goes on along it, and nobody
-# has seen that the cell is free. Leave it out here.
+# For each edge, `PROBES` below holds a world in which that edge matters and the two others don't. At most one thing is in a cell.
 #
-# Complete `meet`: it returns the belief (4, H, W). For the last point: the weights of all that arrives may sum to more than 1, and a cell may be
-# STATIC for sure. So let particles claim 0.999 at most.
+# Complete `cuts`: it returns a dictionary with the number of each edge that the filter cuts, and its **price**: what the filter predicts in that world,
+# minus the exact answer. An edge counts as cut when the two differ by more than 0.001. How you get the exact answers is up to you: by hand, from all
+# combinations without the impossible ones, or by `exact_beliefs(CellsInARow((left, own, right), ("???",)))[0, 1]`, (5,), whose entries have the order of `Cell`.
+
+# %% nbgrader={"grade": false, "grade_id": "probes", "locked": true, "schema_version": 3, "solution": false, "task": false}
+PROBES = {
+    1: ({"right": 0.5}, {}, {"left": 0.5}),
+    2: ({"right": 0.8}, {"static": 0.5}, {}),
+    3: ({"static": 0.3, "right": 0.5}, {"unknown": 1.0}, {"unknown": 1.0}),
+}
 
 
-# %% nbgrader={"grade": false, "grade_id": "meet", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def meet(own, arrives):
-    """Return the belief (4, H, W) after particles have arrived."""
+def package_filter(left, own, right):
+    """What CMCDOT's `predict` tends to, with ever more particles."""
+    cell = bof_beliefs(CellsInARow((left, own, right), ("???",), clearing_time=DT))[0, 1]
+    return cell[[Cell.LEFT, Cell.RIGHT]].sum()
+
+
+# %% nbgrader={"grade": false, "grade_id": "cuts", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def cuts(predicts):
+    """Return {number of a cut edge: its price}."""
     ### BEGIN SOLUTION
-    a = np.minimum(arrives, 0.999)
-    joint = (1 - a) * own
-    joint[DYNAMIC] += a * (1 - own[STATIC])
-    return joint / joint.sum(axis=0)
+    prices = {}
+    for edge, cells in PROBES.items():
+        exact = exact_beliefs(CellsInARow(cells, ("???",)))[0, 1, [Cell.LEFT, Cell.RIGHT]].sum()
+        prices[edge] = float(predicts(*cells) - exact)
+    return {edge: price for edge, price in prices.items() if abs(price) > 0.001}
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "meet-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "cuts-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    own = np.zeros((4, 1, 3))
-    own[:, 0, 0] = [0.5, 0.5, 0, 0]  # four combinations of 1/4 each, one of them impossible
-    own[:, 0, 1] = [0.1, 0.3, 0, 0.6]  # nothing arrives here
-    own[:, 0, 2] = [0.5, 0.5, 0, 0]  # 0.8 arrives: of the combinations 0.4, 0.4, 0.1, 0.1 the second is impossible
-    before = own.copy()
-    got = answer_array(meet(own, np.array([[0.5, 0.0, 0.8]])), "meet")
-    assert np.array_equal(own, before), "meet changed its argument `own`: make a new array"
-    assert got.shape == (4, 1, 3), f"return the belief, of the shape of own, (4, 1, 3); got {got.shape}"
-    fence, quiet, surer = np.round(got, 2)[:, 0].T
-    assert np.allclose(quiet, [0.1, 0.3, 0, 0.6]), f"nothing arrives in cell (0, 1), yet it became {quiet}"
-    assert np.isclose(fence.sum(), 1, atol=0.02), f"cell (0, 0) sums to {fence.sum():.2f}: divide by what is left"
-    slips = {
-        (0.25, 0.25, 0.5, 0): "a thing can't arrive where STATIC stands: strike that combination out",
-        (0.5, 0, 0.5, 0): "`doesn't arrive and STATIC` is possible: don't strike it out",
-        (0.5, 0.25, 0.25, 0): "the impossible quarter goes to no state: strike it out, then divide all that is left",
-        (0.25, 0.5, 0.25, 0): "STATIC isn't always right: strike the combination out, then divide all that is left",
-    }
-    for slip, hint in slips.items():
-        assert not np.allclose(fence, slip, atol=0.011), f"cell (0, 0) is {fence}: {hint}"
-    np.testing.assert_allclose(
-        fence, [0.33, 0.33, 0.33, 0], atol=0.01, err_msg="cell (0, 0): three combinations are left"
-    )
-    assert surer[DYNAMIC] > 0.5, (
-        f"cell (0, 2) is {surer}: `arrives and FREE` isn't FREE, only `doesn't arrive and FREE` is"
-    )
-    by_hand = "cell (0, 2): 0.1, 0.1, 0.4, divided by 0.6"
-    np.testing.assert_allclose(surer, [0.17, 0.17, 0.67, 0], atol=0.01, err_msg=by_hand)
+    def adds(left, own, right):
+        """Adds up what arrives, and strikes out what can't be."""
+        a = min(left.get("right", 0) + right.get("left", 0), 1.0)
+        s = own.get("static", 0)
+        return a * (1 - s) / (1 - a * s)
+
+    def blind(left, own, right):
+        """Adds up, and doesn't ask whether the cell is STATIC."""
+        return min(left.get("right", 0) + right.get("left", 0), 1.0)
+
+    for predicts, expected in ((adds, {1: 1 / 3}), (blind, {1: 1 / 3, 2: 0.8 - 2 / 3})):
+        got = cuts(predicts)
+        assert isinstance(got, dict), f"return a dictionary, such as {{1: 0.25}}; got {type(got).__name__}"
+        assert set(got) <= {1, 2, 3}, f"its keys are numbers of edges, 1 to 3; got {list(got)}"
+        missed, wrong = sorted(set(expected) - set(got)), sorted(set(got) - set(expected))
+        assert not missed, f"this filter cuts edge {missed[0]}, which your answer doesn't name: {predicts.__doc__}"
+        assert not wrong, f"this filter doesn't cut edge {wrong[0]}; is your exact answer of that world right?"
+        for edge, price in expected.items():
+            found = float(got[edge])
+            assert not np.isclose(found, -price, atol=1e-6), (
+                f"edge {edge}: the price is the filter's answer minus the exact one"
+            )
+            whole = np.isclose(found, price + 2 / 3, atol=1e-6)
+            assert not whole, f"edge {edge}: {found:.3f} is what the filter predicts; subtract the exact answer"
+            assert np.isclose(found, price, atol=1e-4), f"edge {edge}: a price of {price:.3f} is right, got {found:.3f}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import cmcdot
 
-    complaint = cmcdot.check_meet(meet)
+    complaint = cmcdot.check_cuts(cuts)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
 
 _test()
 
+# %% [markdown]
+# When the test has passed, try `cuts(package_filter)`. Which edges does the package cut, and does the price fit the lecture's ledger?
+#
+# ## Task 5: your filter on two streets (2 points)
+#
+# Now your resampling drives. Complete `track`: it runs the package's `track_drive(frames, spec, params, seed=0)` with 20,000 particles and a resampling that
+# draws by the function `draws`, and returns or yields its beliefs. `draws(weight, count, offsets)` is a function such as your `stratified`, which it is unless
+# something else is handed over. A resampling is an object with a method `draw(self, weight, count, rng)` that returns `count` indices; take the offsets from
+# `rng.random(count)`, and hand the object over as `CmcdotParams(resampling=...)`. The tests call `maps`; leave it as it is.
 
-# %% nbgrader={"grade": true, "grade_id": "meet-dynamic-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+
+# %% nbgrader={"grade": false, "grade_id": "track", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def track(frames, spec, draws=stratified):
+    """Run the filter with a resampling of one's own over frames, and give one belief for each."""
+
+    ### BEGIN SOLUTION
+    class Stratified:
+        def draw(self, weight, count, rng):
+            return draws(weight, count, rng.random(count))
+
+    return track_drive(frames, spec, CmcdotParams(n_particles=20_000, resampling=Stratified()), seed=0)
+    ### END SOLUTION
+
+
+def maps(frames, spec, draws=stratified):
+    """Return P(DYNAMIC) after each frame, (T, H, W)."""
+    return np.array([belief.probability[DYNAMIC] for belief in track(frames, spec, draws)])
+
+
+# %% nbgrader={"grade": true, "grade_id": "track-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    own = np.zeros((4, 1, 2))
-    own[:, 0] = np.array([[0.4, 0, 0.6, 0]]).T  # something moves here already, perhaps
-    got = answer_array(meet(own, np.array([[0.5, 0.0]])), "meet")
-    assert got.shape == (4, 1, 2), f"return the belief, of the shape of own, (4, 1, 2); got {got.shape}"
-    met, quiet = np.round(got, 2)[:, 0].T
-    assert not np.isclose(quiet[DYNAMIC], 0), (
-        "the own DYNAMIC of cell (0, 1) got lost: nothing arrives, it is still there"
-    )
-    slips = {
-        0.71: "something arrives also where something moves already: that is DYNAMIC too",
-        0.73: "you count its DYNAMIC mass twice: `arrives and DYNAMIC`, `doesn't arrive and DYNAMIC` are two parts of it",
-        0.85: "you count its DYNAMIC mass twice: `arrives and DYNAMIC`, `doesn't arrive and DYNAMIC` are two parts of it",
-    }
-    for slip, hint in slips.items():
-        assert not np.isclose(met[DYNAMIC], slip, atol=0.006), f"DYNAMIC {met[DYNAMIC]} instead of 0.8: {hint}"
-    np.testing.assert_allclose(met, [0.2, 0, 0.8, 0], atol=0.01, err_msg="only `doesn't arrive and FREE` leaves FREE")
+    def draws(weight, count, offsets):  # each index by itself, wherever its offset lies on the whole line
+        ends = np.cumsum(weight)
+        return np.searchsorted(ends, np.sort(offsets) * ends[-1], side="right")
+
+    spec = GridSpec(x_min=0, x_max=30, y_min=-10, y_max=10, cell=0.5)
+    for drive in (sample_drive(), real_drive()):
+        frames = [drive[k] for k in range(3)]
+        got = answer_array(maps(frames, spec, draws), "maps")
+        assert got.shape == (3, *spec.shape), (
+            f"expected one map for each of 3 frames, {(3, *spec.shape)}; got {got.shape}"
+        )
+        *_, usual = track_drive(frames, spec, CmcdotParams(n_particles=20_000), seed=0)
+        change = np.abs(got[-1] - usual.probability[DYNAMIC]).max()
+        assert change > 1e-4, "that is the package's own resampling: hand yours over as `resampling` of CmcdotParams"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import cmcdot
 
-    complaint = cmcdot.check_meet_dynamic(meet)
+    complaint = cmcdot.check_track(maps)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
 
 _test()
 
-
-# %% nbgrader={"grade": true, "grade_id": "meet-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    own = np.zeros((4, 1, 2))
-    own[STATIC, 0, 0] = 1
-    own[FREE, 0, 1] = 1
-    got = answer_array(meet(own.copy(), np.array([[1.0, 1.7]])), "meet")
-    assert got.shape == (4, 1, 2), f"return the belief, of the shape of own, (4, 1, 2); got {got.shape}"
-    assert np.isfinite(got).all(), (
-        "surely STATIC, and surely something arrives: that is 0/0; let particles claim 0.999 at most"
-    )
-    assert got.min() >= 0, (
-        f"a probability of {got.min():.2f}: arriving weights of 1.7 are claimed in full; at most 0.999"
-    )
-    most, less = (answer_array(meet(own.copy(), np.full((1, 2), a)), "meet") for a in (0.999, 0.998))
-    np.testing.assert_allclose(got, most, atol=1e-6, err_msg="weights of 1 and 1.7 claim 0.999, no more and no less")
-    assert not np.allclose(most, less, atol=1e-6), "0.999 and 0.998 make no difference: let particles claim up to 0.999"
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import cmcdot
-
-    complaint = cmcdot.check_meet_limits(meet)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
+# %% [markdown]
+# To see it on the demo's page, save `stratified`, `track` and their imports as `my_stages.py`, and run `semgrid-edu demo --stages my_stages.py`. It runs the
+# whole pipeline on the simulated street and on a real one with your filter in place of the package's. Here is the real street in numbers, when your tests have
+# passed: `(maps([real_drive()[k] for k in range(10)], GridSpec.compact()) > 0.5).sum(axis=(1, 2))`.
 
 # %% [markdown]
 # ## Task 6: in your own words (2 points)

@@ -6,11 +6,11 @@
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | a camera whose image was cropped and resized | 1 + 2 |
+# | 1 | what was done to an image, from its two calibrations | 1 + 2 |
 # | 2 | from one frame to another | 3 |
-# | 3 | the pixels of a plane, equation (1) | 3 + 2 |
-# | 4 | what a wrong height costs | 2 + 1 |
-# | 5 | how far a cell has a pixel of its own | 2 |
+# | 3 | the pixels of a road with a crest, equation (1) | 3 + 2 |
+# | 4 | how high something is, from where a plane draws it | 2 + 1 |
+# | 5 | a calibration with a fault | 2 + 2 |
 # | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
@@ -21,54 +21,54 @@ import warnings
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array, answer_number
+from semgrid_edu.answers import answer_array
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 # Names that begin with _ belong to the tests.
 
 # %% [markdown]
-# ## Task 1: a camera whose image was cropped and resized (1 + 2 points)
+# ## Task 1: what was done to an image (1 + 2 points)
 #
-# `K` is the intrinsic matrix of an image; its skew, K[0, 1], is 0. First `left` columns and `top` rows are cut off; then what is left is resized: every length across is
-# multiplied by `scale_u`, every length down by `scale_v`. The centre of the first pixel is (0, 0), before and after.
+# Somebody gives you two intrinsic matrices: `K` of the camera's image, and `K_new` of the image that a network gets. In between `left` columns and `top` rows
+# were cut off, and then what was left was resized: every length across was multiplied by `scale_u`, every length down by `scale_v`. The centre of the first
+# pixel is (0, 0), before and after. A negative `left` or `top` means that a border was added instead.
 #
-# Complete `new_intrinsics`: it returns the matrix of the new image, 3 x 3, and leaves `K` as it is. The cut is worth one point, the scales two. Draw a row
-# of six pixels, cut two off, make three out of... where is the *edge* of the first pixel?
+# Complete `what_was_done`: it returns the four numbers `left, top, scale_u, scale_v`, and leaves both matrices as they are. The scales are worth one point,
+# the cut two. Write down what a cut and a resize make of K, in this order, and solve.
 
 
-# %% nbgrader={"grade": false, "grade_id": "new-intrinsics", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def new_intrinsics(K, left, top, scale_u, scale_v):
-    """Return K of the image that was cropped, then resized."""
+# %% nbgrader={"grade": false, "grade_id": "what-was-done", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def what_was_done(K, K_new):
+    """Return left, top, scale_u and scale_v: the image was cropped, then resized."""
     ### BEGIN SOLUTION
-    cut = np.array([[1.0, 0, -left], [0, 1, -top], [0, 0, 1]])
-    resize = np.array([[scale_u, 0, (scale_u - 1) / 2], [0, scale_v, (scale_v - 1) / 2], [0, 0, 1]])
-    return resize @ cut @ K
+    scale = np.diag(K_new)[:2] / np.diag(K)[:2]
+    left, top = K[:2, 2] + 0.5 - (K_new[:2, 2] + 0.5) / scale
+    return left, top, *scale
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "crop-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "scales-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     K = np.array([[100.0, 0, 40], [0, 120, 30], [0, 0, 1]])
-    before = K.copy()
-    got = answer_array(new_intrinsics(K, left=8, top=6, scale_u=1, scale_v=1), "new_intrinsics")
-    assert np.array_equal(K, before), "new_intrinsics changed its argument `K`: make a new matrix (K.copy())"
-    assert got.shape == (3, 3), f"expected a matrix of shape (3, 3), got {got.shape}"
-    uncut = answer_array(new_intrinsics(K.copy(), left=0, top=0, scale_u=1, scale_v=1), "new_intrinsics")
-    moved = (got - uncut)[:, 2]  # what the cut alone does to the principal point
+    K_new = np.array([[50.0, 0, 15.75], [0, 30, 5.625], [0, 0, 1]])
+    before = K.copy(), K_new.copy()
+    got = answer_array(what_was_done(K, K_new), "what_was_done").ravel()
+    kept = np.array_equal(K, before[0]) and np.array_equal(K_new, before[1])
+    assert kept, "what_was_done changed an argument: work on copies"
+    assert got.shape == (4,), f"return four numbers, left, top, scale_u, scale_v; got {got}"
     slips = {
-        8: "with 8 columns cut off on the left, everything lies 8 pixels farther to the LEFT: subtract",
-        -6: "left and top are swapped: `left` moves the first row of K, u",
-        0: "the principal point stays in the scene, but pixels are counted from a new first one: c_u = 40 - 8",
+        2.0: "turned round: the new focal length is the old one times the scale",
+        0.25: "the scales are swapped: scale_u belongs to the first row of K",
+        1.0: "the focal length tells the scale: f_u was 100 and is 50",
+        0.39375: "the principal point was cut as well: only the focal lengths tell the scale",
     }
     for slip, hint in slips.items():
-        assert not np.isclose(moved[0], slip), f"8 columns cut off, c_u = {got[0, 2]:g}: {hint}"
-    no_size = "a cut changes no focal length, no pixel has changed its size"
-    assert np.isclose(got[0, 0], uncut[0, 0]), f"f_u = {got[0, 0]:g}: {no_size}"
-    np.testing.assert_allclose(moved, [-8, -6, 0], atol=1e-9, err_msg="by hand: (40 - 8, 30 - 6)")
+        assert not np.isclose(got[2], slip), f"scale_u = {got[2]:g}: {hint}"
+    np.testing.assert_allclose(got[2:], [0.5, 0.25], atol=1e-6, err_msg="f_u from 100 to 50, f_v from 120 to 30")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import pixels
 
-    complaint = pixels.check_crop(new_intrinsics)
+    complaint = pixels.check_scales(what_was_done)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -76,40 +76,29 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "resize-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "cut-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
+    # By hand, backwards: c_u = 15.75 is 16.25 from the image's edge, 32.5 before it was halved, 32 from the first centre; it was 40.
     K = np.array([[100.0, 0, 40], [0, 120, 30], [0, 0, 1]])
-    kept = answer_array(new_intrinsics(K.copy(), 0, 0, 1, 1), "new_intrinsics")
-    assert kept.shape == (3, 3), f"expected a matrix of shape (3, 3), got {kept.shape}"
-    for slip, hint in {39.5: "half a pixel got lost", 40.5: "half a pixel too much"}.items():
-        assert not np.isclose(kept[0, 2], slip), f"{hint}: without a resize nothing but the cut may move c_u"
-    # By hand: from the image's edge, c_u is 40.5; half of it 20.25; from the first centre 19.75. For v: 30.5, 7.625, 7.125.
-    got = answer_array(new_intrinsics(K.copy(), 0, 0, scale_u=0.5, scale_v=0.25), "new_intrinsics")
+    K_new = np.array([[50.0, 0, 15.75], [0, 30, 5.625], [0, 0, 1]])
+    got = answer_array(what_was_done(K, K_new), "what_was_done").ravel()
+    assert got.shape == (4,), f"return four numbers, left, top, scale_u, scale_v; got {got}"
     slips = {
-        (0, 100): "with half as many pixels, every length in pixels is half as long",
-        (0, 200): "you divide by the scale; it multiplies lengths",
-        (0, 25): "the scales are swapped: scale_u belongs to the first row of K",
-        (0, 49.5): "a length has no edge, so it gets no half pixel: f_u times scale_u",
-        (
-            2,
-            20,
-        ): "you scale about the centre of the first pixel: the image begins half a pixel before it, and that edge stays",
-        (2, 20.25): "you lost half a pixel on the way: add 1/2, scale, subtract 1/2",
-        (2, 19.5): "you subtract 1/2 at the end, but you didn't add it at the beginning",
-        (2, 9.625): "the scales are swapped: scale_u belongs to the first row of K",
-        (2, 40): "c_u was not scaled",
+        8.5: "you lost half a pixel on the way: count from the image's edge, divide by the scale, go back to the centre",
+        9.0: "the half has the wrong sign: the edge lies half a pixel BEFORE the first centre",
+        4.25: "that is counted in the new, larger pixels, and half a pixel got lost: the cut came first, in the old ones",
+        4.0: "you undo the cut first: it came first, so it is undone last, and it counts old pixels",
+        24.25: "the resize was not undone",
+        -8.0: "the sign is turned: what is cut off on the left makes c_u smaller",
+        6.0: "left and top are swapped: `left` moves u, the first row of K",
     }
-    for (column, slip), hint in slips.items():
-        assert not np.isclose(got[0, column], slip, atol=1e-6), f"halved, K[0, {column}] = {slip:g}: {hint}"
-    by_hand = [[50, 0, 19.75], [0, 30, 7.125], [0, 0, 1]]
-    np.testing.assert_allclose(got, by_hand, atol=1e-9, err_msg="c' = (c + 1/2) scale - 1/2, f' = f scale")
-    cut, both = (answer_array(new_intrinsics(K.copy(), 8, 6, *s))[0, 2] for s in ((1, 1), (0.5, 0.25)))
-    order = f"cut, then halved, c_u = {both:g}: you resize first and then cut: the cut comes first, in the old pixels"
-    assert np.isclose(both, (cut + 0.5) / 2 - 0.5), order
+    for slip, hint in slips.items():
+        assert not np.isclose(got[0], slip), f"left = {got[0]:g}: {hint}"
+    np.testing.assert_allclose(got[:2], [8, 6], atol=1e-6, err_msg="by hand: 40 - 32 = 8 columns and 30 - 24 = 6 rows")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import pixels
 
-    complaint = pixels.check_resize(new_intrinsics)
+    complaint = pixels.check_cut(what_was_done)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -178,24 +167,25 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: the pixels of a plane (3 + 2 points)
+# ## Task 3: the pixels of a road with a crest (3 + 2 points)
 #
 # $$ \begin{pmatrix} u \\ v \\ 1 \end{pmatrix} = K \begin{pmatrix} X/Z \\ Y/Z \\ 1 \end{pmatrix} \qquad (1) $$
 #
-# `xy`, `(N, 2)`, are centres of cells in the grid frame, metres. The plane lies `height` metres above the ground, so its points are (x, y, height).
+# A road has a crest, so no plane lies on it. `xy`, `(N, 2)`, are centres of cells in the grid frame, metres, and `z`, `(N,)`, is the height of the road in
+# each of them: the points are (x, y, z), each with a height of its own.
 # `T_camera_from_grid`, 4 x 4, takes them to the camera frame: X right, Y down, Z ahead. `size` is `(h, w)`, the image's height and width in pixels.
 # `K` may have a skew, K[0, 1], that isn't 0.
 #
-# Complete `plane_pixels`: it returns two arrays. `pixels`, `(N, 2)`: u and v of each point, NaN for a point that isn't in front of the camera. `visible`,
+# Complete `road_pixels`: it returns two arrays. `pixels`, `(N, 2)`: u and v of each point, NaN for a point that isn't in front of the camera. `visible`,
 # `(N,)` of booleans: in front of the camera, and among the centres of the image's pixels, $0 \le u \le w - 1$ and $0 \le v \le h - 1$. `pixels` is worth
 # three points, NaN and `visible` two.
 
 
 # %% nbgrader={"grade": false, "grade_id": "plane-pixels", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def plane_pixels(xy, height, K, T_camera_from_grid, size):
-    """Return pixels (N, 2) and visible (N,) of the points of a plane."""
+def road_pixels(xy, z, K, T_camera_from_grid, size):
+    """Return pixels (N, 2) and visible (N,) of the points of a road."""
     ### BEGIN SOLUTION
-    points = np.column_stack([xy, np.full(len(xy), height), np.ones(len(xy))])
+    points = np.column_stack([xy, z, np.ones(len(xy))])
     X, Y, Z = (T_camera_from_grid @ points.T)[:3]
     Z = np.where(Z > 0, Z, np.nan)
     u, v, _ = K @ np.stack([X / Z, Y / Z, np.ones(len(xy))])
@@ -208,18 +198,17 @@ def plane_pixels(xy, height, K, T_camera_from_grid, size):
 def _test():
     K = np.array([[100.0, 0, 50], [0, 120, 20], [0, 0, 1]])
     ahead = np.array([[0.0, -1, 0, 0], [0, 0, -1, 1.5], [1, 0, 0, 0], [0, 0, 0, 1]])  # a camera 1.5 m above the ground
-    xy = np.array([[10.0, -2.0], [20.0, 2.0], [10.0, 0.0]])
+    xy, z = np.array([[10.0, -2.0], [20.0, 2.0], [10.0, 0.0]]), np.array([0.5, 0.75, 0.5])
     # The first, 0.5 m up, by hand: X = 2, Y = 1, Z = 10, so u = 50 + 100 * 0.2 and v = 20 + 120 * 0.1.
-    got = plane_pixels(xy, 0.5, K, ahead, (40, 100))
-    assert got is not None, "plane_pixels returned nothing: did you forget `return`?"
-    two = isinstance(got, (tuple, list)) and len(got) == 2
-    assert two, "return two arrays, pixels and visible: `return pixels, visible`"
-    pixels = answer_array(got[0], "plane_pixels")
+    got = road_pixels(xy, z, K, ahead, (40, 100))
+    pair = isinstance(got, (tuple, list)) and len(got) == 2
+    assert pair, "return two arrays, pixels and visible: `return pixels, visible`"
+    pixels = answer_array(got[0], "road_pixels")
     assert pixels.shape == (3, 2), f"three points go in, pixels must have the shape (3, 2), got {pixels.shape}"
     slips = {
         (700, 320): "did you divide by Z?",
-        (70, 38): "that is the ground: the point lies at z = height",
-        (70, 44): "the plane went 0.5 m below the ground: z = +height in the grid frame, T turns it down",
+        (70, 38): "that is the ground: each point has a height of its own, z",
+        (70, 44): "the point went 0.5 m below the ground: +z in the grid frame, T turns it down",
         (70, 14): "the camera's place got lost: the fourth coordinate of a point is 1, not 0",
         (64.3, -322.9): "you use the inverse transform: T_camera_from_grid takes grid to camera as it is",
         (85, 14): "that is R (p - t): the matrix turns a point first and then shifts it, R p + t",
@@ -232,11 +221,13 @@ def _test():
     u, v = pixels[0]
     for slip, hint in slips.items():
         assert not np.allclose((u, v), slip, atol=0.1), f"got ({u:.1f}, {v:.1f}) for the point (10, -2, 0.5): {hint}"
-    np.testing.assert_allclose(pixels, [[70, 32], [40, 26], [50, 32]], atol=1e-9, err_msg="by hand, Z = 10, 20 and 10")
+    np.testing.assert_allclose(
+        pixels, [[70, 32], [40, 24.5], [50, 32]], atol=1e-9, err_msg="by hand, Z = 10, 20 and 10"
+    )
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import pixels
 
-    complaint = pixels.check_plane_pixels(plane_pixels)
+    complaint = pixels.check_road_pixels(road_pixels)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -258,10 +249,10 @@ def _test():
         (7.6, 0.0): "its v is 39.7, and the last row's centre is at h - 1 = 39",
         (0.0, 1.0): "Z is 0 there: nothing in the camera's own plane has a pixel",
     }
-    got = plane_pixels(np.array(list(places)), 0.25, K, ahead, (40, 100))
+    got = road_pixels(np.array(list(places)), np.full(8, 0.25), K, ahead, (40, 100))
     two = isinstance(got, (tuple, list)) and len(got) == 2
     assert two, "return two arrays, pixels and visible: `return pixels, visible`"
-    pixels, visible = answer_array(got[0], "plane_pixels"), np.asarray(got[1])
+    pixels, visible = answer_array(got[0], "road_pixels"), np.asarray(got[1])
     assert pixels.shape == (8, 2), f"eight points go in, pixels must have the shape (8, 2), got {pixels.shape}"
     assert visible.shape == (8,), f"eight points go in, visible must have the shape (8,), got {visible.shape}"
     assert visible.dtype == bool, f"visible must hold booleans, got {visible.dtype}"
@@ -276,7 +267,7 @@ def _test():
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import pixels
 
-    complaint = pixels.check_visible(plane_pixels)
+    complaint = pixels.check_visible(road_pixels)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -284,52 +275,48 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: what a wrong height costs (2 + 1 points)
+# ## Task 4: how high is it? (2 + 1 points)
 #
-# A level camera is `z_cam` metres above the ground. Something is `x` metres ahead of it, at the height `z`. Its pixel is read by the plane at the height
-# `delta` (below the ground where it is negative), which draws it somewhere else. Draw the ray from the side: two similar triangles below (or above) the camera.
+# In the lecture a line on the ground missed the sidewalk's edge, and the miss told how high the sidewalk is. The same on the map: a level camera is `z_cam`
+# metres above the ground. Things stand `x` metres ahead of it, `(N,)`: the LIDAR has measured that. The plane at the height `delta` (below the ground where it
+# is negative) draws them `x_drawn` metres ahead of the camera, `(N,)`.
 #
-# Complete `lands_at`: it returns how many metres ahead of the camera the plane draws it. For one more point: a ray that climbs never meets a plane below the
-# camera, one that sinks none above, and a level one (`z == z_cam`) none but its own. Then return `np.nan`. (Nobody will ask for `delta == z_cam`.)
+# Complete `heights_of`: it returns the height of each thing's visible point above the ground, `(N,)`. For one more point: where nothing is drawn (`x_drawn`
+# is NaN), or where it would be drawn at the camera or behind it (`x_drawn` is 0 or less), no height is possible: return NaN there, and the right heights
+# everywhere else.
 
 
-# %% nbgrader={"grade": false, "grade_id": "lands-at", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def lands_at(x, z, z_cam, delta):
-    """Return how far ahead a plane at delta draws what is x metres ahead at height z."""
+# %% nbgrader={"grade": false, "grade_id": "heights-of", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def heights_of(x, x_drawn, z_cam, delta):
+    """Return the heights, (N,), of what is x metres ahead and drawn x_drawn metres ahead on the plane at delta."""
     ### BEGIN SOLUTION
-    if (z_cam - delta) * (z_cam - z) <= 0:
-        return np.nan
-    return x * (z_cam - delta) / (z_cam - z)
+    share = np.asarray(x) / np.where(np.asarray(x_drawn) > 0, x_drawn, np.nan)
+    return z_cam - (z_cam - delta) * share
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "lands-at-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "heights-of-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # The ray sinks from 1.5 m to 0.9 m, by 0.6 m, in 12 m. Down to the plane at 0.3 m it sinks by 1.2 m: twice as far.
-    got = answer_number(lands_at(12.0, 0.9, z_cam=1.5, delta=0.3), "lands_at")
+    # The ray meets the plane at 0.2 m, 1.4 m below the camera, 25 m ahead: so 10 m ahead it has sunk by 0.56 m, to 1.04 m.
+    x, x_drawn = np.array([10.0, 10.0, 10.0]), np.array([25.0, 10.0, 8.0])
+    got = answer_array(heights_of(x, x_drawn, z_cam=1.6, delta=0.2), "heights_of")
+    assert got.shape == (3,), f"three things, three heights; got the shape {got.shape}"
     slips = {
-        30: "that is the ground: the plane lies at delta",
-        6: "the triangles are swapped: the plane is lower than the thing, so the ray gets there later, farther away",
-        36: "measure both heights from the camera, where the ray starts, not from the ground",
-        4: "measure both heights from the camera, where the ray starts, not from the ground",
-        15: "the thing's own height is missing: how much does the ray sink in 12 m?",
-        12: "that is where the thing is, or how far it is thrown: count from the camera, to where it is drawn",
-        9.6: "z_cam - delta alone isn't the share: compare it with z_cam - z",
+        -1.9: "the ratio is turned round: the ray has sunk less at the thing, which is nearer, than at the plane",
+        0.96: "that is the ground plane: the ray sinks by z_cam - delta until it meets this one",
+        0.56: "that is how far the ray has sunk: measure from the ground, not from the camera",
+        0.88: "that is a plane 0.2 m BELOW the ground: `delta` has a sign",
+        0.84: "that is the height above the plane: measure from the ground",
+        0.76: "the triangle begins at the camera, not at the plane",
     }
     for slip, hint in slips.items():
-        assert not np.isclose(got, slip), f"got {got:g} m: {hint}"
-    np.testing.assert_allclose(got, 24, err_msg="0.6 m down in 12 m, 1.2 m down in 24 m")
-    got = answer_number(lands_at(12.0, 0.3, 1.5, 0.3), "lands_at")
-    np.testing.assert_allclose(got, 12, err_msg="on the plane at its own height a thing is in place")
-    got = answer_number(lands_at(12.0, 0.0, 1.5, 0.9), "lands_at")
-    np.testing.assert_allclose(got, 4.8, err_msg="a plane above the thing draws it nearer")
-    got = answer_number(lands_at(12.0, 0.9, 1.5, -0.3), "lands_at")
-    assert not np.isclose(got, 24), "a plane 0.3 m below the ground isn't one 0.3 m above it: `delta` has a sign"
-    np.testing.assert_allclose(got, 36, err_msg="a plane 0.3 m below the ground: 1.8 m down in 36 m")
+        assert not np.isclose(got[0], slip), f"got {got[0]:.3g} m for the first: {hint}"
+    by_hand = "by hand: 1.04 m; in place on its own plane: 0.2 m; drawn too near: it is lower, -0.15 m"
+    np.testing.assert_allclose(got, [1.04, 0.2, -0.15], atol=1e-6, err_msg=by_hand)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import pixels
 
-    complaint = pixels.check_lands_at(lands_at)
+    complaint = pixels.check_heights_of(heights_of)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -337,24 +324,22 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "never-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "impossible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    got = answer_number(lands_at(12.0, 2.0, 1.5, 0.3), "lands_at")
-    assert not got < 0, (
-        f"a sign 2 m up is drawn {got:g} m ahead: behind the camera. Its ray climbs and never meets this plane"
-    )
-    assert not np.isinf(got), "not infinitely far: never, NaN"
-    assert np.isnan(got), f"a ray that climbs to 2 m never meets the plane at 0.3 m, yet it is drawn {got:g} m ahead"
-    got = answer_number(lands_at(12.0, 2.0, 1.5, 2.5), "lands_at")
-    assert not np.isnan(got), "a ray that climbs to 2 m in 12 m does meet the plane at 2.5 m: both lie above the camera"
-    if np.isclose(answer_number(lands_at(12.0, 1.0, 1.5, 0.5), "lands_at"), 24):  # right below the camera
-        np.testing.assert_allclose(got, 24, err_msg="0.5 m up in 12 m, 1 m up in 24 m")
-    got = answer_number(lands_at(12.0, 0.9, 1.5, 2.5), "lands_at")
-    assert np.isnan(got), f"a ray that sinks never meets the plane at 2.5 m, yet it is drawn {got:g} m ahead"
+    x, x_drawn = np.array([10.0, 12.0, 9.0, 10.0]), np.array([25.0, np.nan, -30.0, 0.0])
+    got = answer_array(heights_of(x, x_drawn, 1.6, 0.2), "heights_of")
+    assert got.shape == (4,), f"four things, four heights; got the shape {got.shape}"
+    assert np.isnan(got[1]), f"the second is drawn nowhere (NaN), yet you say {got[1]:g} m"
+    behind = "no plane draws anything behind the camera"
+    assert np.isnan(got[2]), f"the third would be drawn 30 m behind the camera, yet you say {got[2]:g} m: {behind}"
+    assert np.isnan(got[3]), f"the fourth would be drawn at the camera itself, yet you say {got[3]:g} m"
+    assert not np.isnan(got[0]), "the first has a height: only where nothing can be drawn is there none"
+    alone = answer_array(heights_of(x[:1], x_drawn[:1], 1.6, 0.2), "heights_of")
+    np.testing.assert_allclose(got[:1], alone, err_msg="the first has another height beside the others than alone")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import pixels
 
-    complaint = pixels.check_never(lands_at)
+    complaint = pixels.check_impossible(heights_of)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -362,57 +347,118 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: how far a cell has a pixel of its own (2 points)
+# ## Task 5: a calibration with a fault (2 + 2 points)
 #
-# A square cell with a side of `cell` metres lies on the plane at the height `delta`, straight ahead at the depth $Z$. The level camera is `z_cam` metres above
-# the ground; its focal lengths are `f_u`, `f_v` pixels. The cell is about
+# A calibration `K`, `T_camera_from_lidar` has exactly one fault. Somebody has clicked on the pixels where some LIDAR returns are really seen: `points`,
+# `(N, 3)`, in the LIDAR frame, and `pixels`, `(N, 2)`. The fault is one of four, and each has a number:
 #
-# $$ \frac{f_u\,\text{cell}}{Z} \text{ pixels across and } \frac{f_v\,|z_\text{cam} - \delta|\,\text{cell}}{Z^2} \text{ pixels along.} $$
+# | fault | what is true | amount |
+# |---|---|---|
+# | `SHIFT` | the principal point is (c_u - amount, c_v - amount) | pixels, -2 to 2 |
+# | `PITCH` | the transform is `turned(T_camera_from_lidar, "x", amount)` | degrees, -2 to 2 |
+# | `YAW` | the transform is `turned(T_camera_from_lidar, "y", amount)` | degrees, -2 to 2 |
+# | `INVERSE` | the transform is the inverse of `T_camera_from_lidar` | 0 |
 #
-# Complete `reach`: it returns the depth, in metres, at which its area is exactly one pixel. The plane may lie above the camera, or
-# below the ground, where `delta` is negative. The depth may be hundreds of metres.
+# Complete `find_fault`: it returns two numbers, the fault and its amount. The fault is worth two points, the amount two (to 0.05 pixels or degrees). A yaw
+# moves nearly all pixels by the same amount, like a shift: so don't look at the mean alone. Try each fault, and see which one leaves the smallest error.
+# `project_points` and `turned` below are yours to use.
 
 
-# %% nbgrader={"grade": false, "grade_id": "reach", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def reach(cell, f_u, f_v, z_cam, delta):
-    """Return the depth at which a cell of the plane covers one pixel."""
+# %% nbgrader={"grade": false, "grade_id": "fault-tools", "locked": true, "schema_version": 3, "solution": false, "task": false}
+SHIFT, PITCH, YAW, INVERSE = range(4)
+
+
+def project_points(points, K, T_camera_from_lidar):
+    """Return the pixels, (N, 2), of points in the LIDAR frame, (N, 3): equation (1)."""
+    triples = (points @ T_camera_from_lidar[:3, :3].T + T_camera_from_lidar[:3, 3]) @ K.T
+    return triples[:, :2] / triples[:, 2:]
+
+
+def turned(T_camera_from_lidar, axis, degrees):
+    """Return the transform of a camera that was turned about its own axis "x" (nods) or "y" (to the side)."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.eye(4)
+    turn[:3, :3] = [[1, 0, 0], [0, c, -s], [0, s, c]] if axis == "x" else [[c, 0, s], [0, 1, 0], [-s, 0, c]]
+    return turn @ T_camera_from_lidar
+
+
+# %% nbgrader={"grade": false, "grade_id": "find-fault", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def find_fault(points, pixels, K, T_camera_from_lidar):
+    """Return the fault (SHIFT, PITCH, YAW or INVERSE) and its amount."""
     ### BEGIN SOLUTION
-    return (f_u * f_v * abs(z_cam - delta) * cell**2) ** (1 / 3)
+    T = T_camera_from_lidar
+    amounts = np.linspace(-2, 2, 401)
+
+    def error(K, T):
+        return np.abs(project_points(points, K, T) - pixels).mean()
+
+    def shifted(amount):
+        return K - amount * np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
+
+    errors = {
+        SHIFT: [error(shifted(amount), T) for amount in amounts],
+        PITCH: [error(K, turned(T, "x", amount)) for amount in amounts],
+        YAW: [error(K, turned(T, "y", amount)) for amount in amounts],
+        INVERSE: [error(K, np.linalg.inv(T))],
+    }
+    fault = min(errors, key=lambda fault: min(errors[fault]))
+    return fault, 0.0 if fault == INVERSE else amounts[np.argmin(errors[fault])]
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "reach-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "fault-cases", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _faulty():
+    """Return four cases: points, pixels, K and T, which has one fault each, and what is wrong."""
+    K = np.array([[100.0, 0, 50], [0, 120, 20], [0, 0, 1]])
+    T = np.array([[0.0, -1, 0, 0.1], [0, 0, -1, -0.1], [1, 0, 0, -0.2], [0, 0, 0, 1]])
+    x, y = (a.ravel() for a in np.meshgrid([6.0, 9, 14, 20], [-0.4, -0.1, 0.2, 0.45]))
+    points = np.stack([x, x * y, np.linspace(-1.6, 1, 16)], axis=1)
+    off = np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
+    truths = ((K - off, T), (K, turned(T, "x", 0.5)), (K, turned(T, "y", -1.0)), (K, T))
+    given = [(points, project_points(points, *truth), K, T) for truth in truths[:3]]
+    given.append((points, project_points(points, *truths[3]), K, np.linalg.inv(T)))
+    return given, ((SHIFT, 0.5), (PITCH, 0.5), (YAW, -1.0), (INVERSE, 0.0))
+
+
+# %% nbgrader={"grade": true, "grade_id": "fault-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # Half a metre below the camera: 100 * 80 * 0.5 * 0.5**2 = 1000 pixels at Z = 1 m. The area falls like the third power.
-    got = answer_number(reach(0.5, f_u=100, f_v=80, z_cam=1.5, delta=1.0), "reach")
-    slips = {
-        1000: "that is the area at Z = 1 m: at which Z is it one pixel?",
-        333.333: "`** 1 / 3` is a third of the first power: write `** (1 / 3)`",
-        31.623: "that is the square root: one Z is in the width and two are in the height, three in the area",
-        14.422: "that is a cell on the ground: count the height from the plane, z_cam - delta",
-        17.1: "the camera is z_cam - delta above the plane, not z_cam + delta",
-        12.599: "the cell's side counts twice, across and along",
-        15.874: "the cell's side got lost: it counts twice, across and along",
-        10.772: "you took f_u for f_v: along, the rows count",
-        9.283: "you took f_v for f_u: across, the columns count",
-        50: "that is where the cell is one pixel wide; its area is asked for",
-        4.472: "that is where the cell is one pixel high; its area is asked for",
-        7.937: "the cell's side is part of the area, too: it belongs under the root, squared",
-        0.001: "turn it round: the area at Z is the area at 1 m divided by the third power of Z",
-    }
-    for slip, hint in slips.items():
-        assert not np.isclose(got, slip, rtol=1e-3), f"got {got:.2f} m: {hint}"
-    np.testing.assert_allclose(got, 10, err_msg="1000 pixels at 1 m, so 1000 / 10**3 = 1 pixel at 10 m")
-    got = reach(0.5, f_u=100, f_v=80, z_cam=1.5, delta=2.0)
-    real = np.isrealobj(got) and np.all(np.asarray(got) > 0)
-    assert real, f"got {got} for a plane above the camera: from below its cells are as large: take |z_cam - delta|"
-    np.testing.assert_allclose(answer_number(got, "reach"), 10, err_msg="0.5 m above the camera is as good as below")
-    below = "a plane 0.2 m below the ground, 0.5 m below the camera: `delta` has a sign"
-    np.testing.assert_allclose(reach(0.5, 100, 80, 0.3, -0.2), 10, err_msg=below)
+    names = ("SHIFT", "PITCH", "YAW", "INVERSE")
+    for given, (fault, _) in zip(*_faulty(), strict=True):
+        kept = tuple(a.copy() for a in given)
+        got = answer_array(find_fault(*given), "find_fault").ravel()
+        assert all(map(np.array_equal, kept, given)), "find_fault changed an argument: work on copies"
+        assert got.shape == (2,), f"return two numbers, the fault and its amount; got {got}"
+        found = names[int(got[0])] if got[0] in range(4) else f"{got[0]:g}, which is none of the four"
+        hint = "how large is the error that is left, if you repair each of the four as well as possible?"
+        assert got[0] == fault, f"the fault is {names[fault]}, and you find {found}: {hint}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import pixels
 
-    complaint = pixels.check_reach(reach)
+    complaint = pixels.check_fault(find_fault)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+
+# %% nbgrader={"grade": true, "grade_id": "amount-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    for given, (fault, amount) in zip(*_faulty(), strict=True):
+        got = answer_array(find_fault(*(a.copy() for a in given)), "find_fault").ravel()
+        assert got.shape == (2,), f"return two numbers, the fault and its amount; got {got}"
+        assert amount == 0 or not np.isclose(got[1], -amount, atol=0.05), (
+            f"fault {fault}, amount {got[1]:g}: the sign is turned. The table says what is TRUE, and the calibration is wrong"
+        )
+        radians = amount != 0 and fault != SHIFT and np.isclose(got[1], np.radians(amount), rtol=0.1)
+        assert not radians, f"fault {fault}, amount {got[1]:g}: the amount is asked for in degrees"
+        assert np.isclose(got[1], amount, atol=0.05), (
+            f"fault {fault}: the amount is {amount:g}, and you find {got[1]:g}"
+        )
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import pixels
+
+    complaint = pixels.check_amount(find_fault)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -429,5 +475,5 @@ _test()
 # With the nose down, everything in the image moves up. The row where the cell at 30 m is looked up now shows road that is nearer, about 22 m: so what is at 22 m is drawn at
 # 30 m, labels move away from the car. 1/x' = 1/x + angle / z_cam: it is worst far ahead, where the error grows nearly like the square of the distance, and small nearby. More planes in the same range
 # don't help: the error isn't one of the height alone, it grows with the distance, so no single plane is right for the ground at all distances; the network would have to choose another plane
-# for each distance, and needs planes below zero for a nose that goes up. A pitch angle from an inertial sensor, or the horizon or the LIDAR's ground in the image, helps. One point for direction and place, one for a reasoned answer
+# for each distance, and needs planes below zero for one of the two signs. A pitch angle from an inertial sensor, or the horizon or the LIDAR's ground in the image, helps. One point for direction and place, one for a reasoned answer
 # on the planes.

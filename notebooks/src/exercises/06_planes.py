@@ -1,15 +1,15 @@
 # %% [markdown]
 # # Exercise 06: sampling that learns
 #
-# Five small functions: equation (2), the way back, what half a pixel does; and one question to answer in words. About 75 minutes. The lecture is [06: sampling that learns](../06_planes.ipynb).
+# Five small functions: equation (2), the way back, a camera that learns, a black box; and one question in words. About 75 minutes. The lecture is [06: sampling that learns](../06_planes.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
 # | 1 | four pixels and their weights | 2 + 1 |
 # | 2 | a plane | 2 + 1 |
 # | 3 | the way back | 2 + 1 |
-# | 4 | if the point moves | 2 |
-# | 5 | half a pixel: places for PyTorch | 1 + 1 |
+# | 4 | a camera that learns: the slope of a loss in the yaw | 3 |
+# | 5 | half a pixel: which convention a black box has | 2 + 1 |
 # | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
@@ -309,52 +309,65 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: if the point moves (2 points)
+# ## Task 4: a camera that learns its yaw (3 points)
 #
-# One class, `s` `(h, w)`, and one point, never on a pixel's centre line: neither u nor v is an integer.
+# In the lecture a camera learned its pitch. Now it is turned to the side, by a small angle $\psi$ about its own vertical axis: a point $(X, Y, Z)$ of the
+# camera's frame becomes $(X \cos\psi + Z \sin\psi,\; Y,\; -X \sin\psi + Z \cos\psi)$. Then equation (1) gives its pixel with `K` (no skew), equation (2) reads
+# the scores `s`, `(h, w)`, there, and the loss is half the sum of squared differences from what the map says, `t`, `(J,)`: $\frac12 \sum_j (p_j - t_j)^2$.
 #
-# Complete `slopes`: it returns two numbers, by how much the value changes for each pixel that the point moves to the right, $\partial p / \partial u$, and
-# down, $\partial p / \partial v$. Check yourself by finite differences, with a step small enough.
+# Complete `yaw_slope`: it returns $\partial\,\text{loss} / \partial\psi$ at $\psi = 0$, one number. `points` is `(J, 3)`; all of them are read inside the image,
+# none on a pixel's centre line. Use the chain rule: $\bar p_j$, the slopes of the value in u *and in v*, and what $\psi$ does to u and v. Points may lie a
+# thousandth of a pixel from a centre line, where finite differences with a large step go wrong.
 
 
-# %% nbgrader={"grade": false, "grade_id": "slopes", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def slopes(s, u, v):
-    """Return the derivatives of the value at (u, v) in u and in v."""
+# %% nbgrader={"grade": false, "grade_id": "yaw-slope", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def yaw_slope(s, points, K, t):
+    """Return the derivative of the loss in the yaw, at 0."""
     ### BEGIN SOLUTION
-    n, m = int(np.floor(v)), int(np.floor(u))
-    down, across = v - n, u - m
-    (a, b), (c, d) = s[n : n + 2, m : m + 2]
-    return (1 - down) * (b - a) + down * (d - c), (1 - across) * (c - a) + across * (d - b)
+    total = 0.0
+    for (X, Y, Z), wanted in zip(points, t, strict=True):
+        u, v = K[0, 0] * X / Z + K[0, 2], K[1, 1] * Y / Z + K[1, 2]
+        n, m = int(np.floor(v)), int(np.floor(u))
+        down, across = v - n, u - m
+        (a, b), (c, d) = s[n : n + 2, m : m + 2]
+        p = (1 - down) * ((1 - across) * a + across * b) + down * ((1 - across) * c + across * d)
+        in_u, in_v = (1 - down) * (b - a) + down * (d - c), (1 - across) * (c - a) + across * (d - b)
+        u_turns, v_turns = K[0, 0] * (1 + (X / Z) ** 2), K[1, 1] * X * Y / Z**2
+        total += (p - wanted) * (in_u * u_turns + in_v * v_turns)
+    return total
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "slopes-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "yaw-slope-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    s = np.array([[1.0, 5, 0], [3, 2, 4], [0, 6, 0]])
-    got = answer_array(slopes(s, 0.25, 0.75), "slopes").ravel()
-    assert got.size == 2, f"return two numbers, in u and in v; got {got}"
-    in_u, in_v = got
-    swapped = np.isclose(in_u, 0.75) and np.isclose(in_v, 0.25)
-    assert not swapped, "the two are swapped: u to the right first, then v down"
-    slips = {  # in u, by hand: row 0 rises by 4 and row 1 falls by 1; the point is 0.25 in row 0: 0.25 * 4 - 0.75 * 1
-        -0.25: "the sign is turned: the right pixel minus the left one",
-        2.75: "the rows' weights are crossed: v = 0.75 is nearer to row 1",
-        4.0: "that is row 0 alone: row 1 counts too, by its weight",
-        -1.0: "that is row 1 alone: row 0 counts too, by its weight",
-        3.0: "you add the differences of both rows: weigh them, by 0.25 and 0.75",
-        1.5: "you take the mean of both rows: weigh them, by 0.25 and 0.75",
-        0.0: "that is the slope of the nearest pixel; the bilinear value does change",
-        2.5625: "that is the value itself: how does it change?",
-        1.0: "row 1 got lost: a point between two rows listens to both",
-        0.5: "that is twice the slope: from a step to the left to a step to the right there are two steps",
+    # One point, by hand: X/Z = 0.1, Y/Z = 0.1, so u = 10 * 0.1 + 0.25 = 1.25 and v = 10 * 0.1 - 0.25 = 0.75.
+    s, K = np.array([[0.0, 1, 5], [0, 3, 2]]), np.array([[10.0, 0, 0.25], [0, 10, -0.25], [0, 0, 1]])
+    point = np.array([[0.2, 0.2, 2.0]])
+    got = answer_array(yaw_slope(s, point, K, np.array([3.5625])), "yaw_slope").ravel()
+    assert got.size == 1, f"return one number, got {got}"
+    # It reads 0.25 * 2 + 0.75 * 2.75 = 2.5625, 1 too little. Slopes: 0.25 in u, 0.75 in v; u turns by 10 * 1.01, v by 10 * 0.01.
+    slips = {
+        2.6: "the sign is turned: p_bar is what is read minus what is wanted, and psi turns as the text says",
+        -2.525: "v is missing: beside the axis and below it a yaw moves a point up or down as well",
+        -2.5: "v is missing, and u turns by f_u (1 + (X/Z)^2): Z changes too",
+        -2.575: "u turns by f_u (1 + (X/Z)^2): Z changes too",
+        -5.2: "the half of the loss is missing: the derivative of 1/2 d^2 is d",
+        -2.45: "v moves the other way: Z grows smaller where X is positive, so what lies below the axis moves down",
+        -7.6: "the slopes in u and v are swapped",
     }
-    _explain("in u you have", in_u, slips)
-    assert np.isclose(in_u, 0.25, atol=1e-4), f"in u: expected 0.25 * (5 - 1) + 0.75 * (2 - 3) = 0.25, got {in_u:.4f}"
-    assert np.isclose(in_v, 0.75, atol=1e-4), f"in v: expected 0.75 * (3 - 1) + 0.25 * (2 - 5) = 0.75, got {in_v:.4f}"
+    for slip, hint in slips.items():
+        assert not np.isclose(got[0], slip, atol=2e-3), f"one point, got {got[0]:.4g}: {hint}"
+    one = "by hand: -1 * (0.25 * 10.1 + 0.75 * 0.1)"
+    np.testing.assert_allclose(got[0], -2.6, atol=1e-3, err_msg=one)
+    two = answer_array(yaw_slope(s, np.repeat(point, 2, axis=0), K, np.array([3.5625, 1.5625])), "yaw_slope").ravel()
+    balance = "two points, one reads 1 too little and one 1 too much: their slopes cancel, so take p - t of each"
+    np.testing.assert_allclose(two[0], 0, atol=1e-3, err_msg=balance)
+    twice = answer_array(yaw_slope(s, np.repeat(point, 2, axis=0), K, np.full(2, 3.5625)), "yaw_slope").ravel()
+    np.testing.assert_allclose(twice[0], 2 * got[0], atol=1e-3, err_msg="two equal points: the loss is a sum, no mean")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import planes
 
-    complaint = planes.check_slopes(slopes)
+    complaint = planes.check_yaw_slope(yaw_slope)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -362,44 +375,84 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: half a pixel, places for PyTorch (1 + 1 points)
+# ## Task 5: which convention does a black box have? (2 + 1 points)
 #
-# `torch.nn.functional.grid_sample` wants places between -1 and 1, as pairs of the place across and the place down. With `align_corners=True`, -1 and 1 are
-# the *centres* of the first and the last pixel; with `False` they are the *edges* of the image, half a pixel farther out.
+# `sampler(image, u, v)` reads an image `(h, w)` at places `u`, `v`, both `(J,)`, and returns `(J,)`. It interpolates between neighbouring pixels, and holds
+# the outermost ones beyond the border. But nobody has written down what its u and v mean. There are three candidates:
 #
-# Complete `unit_places`: `pixels` holds pairs of u and v, `(..., 2)` with any number of axes before the last, and `size` is the height and width of the
-# image. It returns places of the same shape, in the convention that `align_corners` asks for. Draw a row of five pixels with their edges, and mark -1 and 1
-# twice, before you write.
+# | convention | the centre of the first pixel is | the centre of the last one is |
+# |---|---|---|
+# | `CENTRES` | (0, 0) | (w - 1, h - 1) |
+# | `CORNERS` | (0.5, 0.5): (0, 0) is the corner of the image | (w - 0.5, h - 0.5) |
+# | `STRETCHED` | (0, 0) | (w, h) |
+#
+# Complete `convention`: it returns the one that the sampler follows, for an image of `h` rows and `w` columns, both at least 4. You may feed it any image you
+# like, except a photograph: what would that tell? For one more point: other samplers swap u and v. `convention` must then return the same, and `swaps` must
+# return whether the sampler takes v for u and u for v.
 
 
-# %% nbgrader={"grade": false, "grade_id": "unit-places", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def unit_places(pixels, size, align_corners):
-    """Return u and v scaled to -1 .. 1, (..., 2)."""
+# %% nbgrader={"grade": false, "grade_id": "conventions", "locked": true, "schema_version": 3, "solution": false, "task": false}
+CENTRES, CORNERS, STRETCHED = range(3)
+
+
+def _sampler(kind, swapped=False):
+    """Return a sampler that follows a convention, and may swap u and v."""
+
+    def place(at, size):
+        at = np.asarray(at, float)
+        moved = at if kind == CENTRES else at - 0.5 if kind == CORNERS else at * (size - 1) / size
+        return np.clip(moved, 0, size - 1)
+
+    def sampler(image, u, v):
+        image, (u, v) = np.asarray(image, float), (v, u) if swapped else (u, v)
+        h, w = image.shape
+        down = np.maximum(0, 1 - np.abs(place(v, h)[:, None] - np.arange(h)))
+        across = np.maximum(0, 1 - np.abs(place(u, w)[:, None] - np.arange(w)))
+        return np.einsum("jn,nm,jm->j", down, image, across)
+
+    return sampler
+
+
+# %% nbgrader={"grade": false, "grade_id": "convention", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def convention(sampler, h, w):
+    """Return CENTRES, CORNERS or STRETCHED."""
     ### BEGIN SOLUTION
-    last = np.array(size[::-1]) - 1
-    return 2 * pixels / last - 1 if align_corners else (2 * pixels + 1) / (last + 1) - 1
+    axis = 0 if swaps(sampler, h, w) else 1
+    ramp = np.broadcast_to(np.arange(w) if axis else np.arange(h)[:, None], (h, w)).astype(float)
+    size = w if axis else h
+    near, far = sampler(ramp, np.array([1.0, size - 2.0]), np.array([1.0, 1.0]))
+    expected = {CENTRES: (1, size - 2), CORNERS: (0.5, size - 2.5)}
+    expected[STRETCHED] = ((size - 1) / size, (size - 2) * (size - 1) / size)
+    return min(expected, key=lambda kind: np.abs(np.subtract(expected[kind], (near, far))).sum())
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "centres-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def swaps(sampler, h, w):
+    """Return whether the sampler takes v for u and u for v."""
+    ### BEGIN SOLUTION
+    ramp = np.broadcast_to(np.arange(w, dtype=float), (h, w))
+    first, second = sampler(ramp, np.array([1.0, 2.0]), np.array([1.0, 1.0]))
+    return bool(np.isclose(first, second))
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": true, "grade_id": "convention-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # A row of five pixels, three rows high: u = 1 lies a quarter of the way from the first to the last centre; v = 2 is the last row.
-    got = answer_array(unit_places(np.array([[1.0, 2.0], [2.0, 1.0]]), (3, 5), align_corners=True), "unit_places")
-    assert got.shape == (2, 2), f"two pairs in, two pairs out, shape (2, 2); got {got.shape}"
-    slips = {
-        -0.6: "from the first centre to the last there are w - 1 steps, not w",
-        -0.4: "that is the other convention: here -1 and 1 are the centres of the first and last pixel",
-        0.25: "places run from -1 to 1, not from 0 to 1",
-        0.0: "height and width are swapped: `size` is (h, w), u runs along the width",
-        1.0: "u and v changed places: first across, then down",
-    }
-    _explain("align_corners=True, u = 1 goes to", got[0, 0], slips)
-    middle = "by hand; (2, 1) is the middle of the image"
-    np.testing.assert_allclose(got, [[-0.5, 1], [0, 0]], atol=1e-6, err_msg=middle)
+    names = ("CENTRES", "CORNERS", "STRETCHED")
+    hint = (
+        "feed it a ramp, in which each pixel's value is its own column: then the value read is the place that was read"
+    )
+    for h, w in ((5, 9), (40, 6), (6, 6)):
+        for kind, name in enumerate(names):
+            got = answer_array(convention(_sampler(kind), h, w), "convention").ravel()
+            assert got.size == 1, f"return one of the three, got {got}"
+            assert got[0] in range(3), f"return CENTRES, CORNERS or STRETCHED, got {got[0]:g}"
+            found = names[int(got[0])]
+            assert got[0] == kind, f"an image of {h} x {w}: the sampler is {name}, and you find {found}: {hint}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import planes
 
-    complaint = planes.check_centres(unit_places)
+    complaint = planes.check_convention(convention)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -407,26 +460,20 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "edges-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "swaps-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # From edge to edge it is five pixels, and u = 1 lies one and a half of them from the first edge: 3/10 of the way.
-    got = answer_array(unit_places(np.array([[1.0, 2.0], [2.0, 1.0]]), (3, 5), align_corners=False), "unit_places")
-    assert got.shape == (2, 2), f"two pairs in, two pairs out, shape (2, 2); got {got.shape}"
-    slips = {
-        -0.6: "u = 0 is a centre, half a pixel from the edge: add that half first",
-        -0.5: "that is the other convention: here -1 and 1 are the edges, half a pixel outside the centres",
-        0.3: "places run from -1 to 1, not from 0 to 1",
-        0.0: "height and width are swapped: `size` is (h, w), u runs along the width",
-        -0.8: "the half has the wrong sign: the first edge lies at u = -1/2, so measure from there",
-        -0.25: "from edge to edge there are w pixels, not w - 1",
-        2 / 3: "u and v changed places: first across, then down",
-    }
-    _explain("align_corners=False, u = 1 goes to", got[0, 0], slips)
-    np.testing.assert_allclose(got, [[-0.4, 2 / 3], [0, 0]], atol=1e-6, err_msg="by hand; (2, 1) is the middle")
+    for kind in range(3):
+        for swapped in (False, True):
+            got = swaps(_sampler(kind, swapped), 8, 5)
+            assert np.size(got) == 1, f"return True or False, got {got}"
+            turns = "takes v for u" if swapped else "takes u for u"
+            assert bool(got) == swapped, (
+                f"a sampler that {turns}, and swaps says {got}: walk along u on a ramp of columns"
+            )
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import planes
 
-    complaint = planes.check_edges(unit_places)
+    complaint = planes.check_swaps(swaps, convention)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 

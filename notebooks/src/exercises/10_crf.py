@@ -56,19 +56,19 @@ def _explain(what, got, slips, atol=1e-4):
 # %% [markdown]
 # ## Task 1: the price of a pair (2 points)
 #
-# Two cells have the places `c_i` and `c_j`, (row, column), and the occupancy probabilities `o_i` and `o_j`, four numbers each; all are arrays. What do different labels in
+# Two cells have the places `r_i` and `r_j`, (row, column), and the occupancy probabilities `o_i` and `o_j`, four numbers each; all are arrays. What do different labels in
 # them cost? With the weights `w1`, `w2` and the widths `alpha`, `beta`, `gamma`
 #
-# $$ k_{ij} = w_1 \exp\!\Big(\!-\frac{|c_i - c_j|^2}{2\sigma_\alpha^2} - \frac{|o_i - o_j|^2}{2\sigma_\beta^2}\Big) + w_2 \exp\!\Big(\!-\frac{|c_i - c_j|^2}{2\sigma_\gamma^2}\Big) $$
+# $$ k_{ij} = w_1 \exp\!\Big(\!-\frac{|r_i - r_j|^2}{2\sigma_\alpha^2} - \frac{|o_i - o_j|^2}{2\sigma_\beta^2}\Big) + w_2 \exp\!\Big(\!-\frac{|r_i - r_j|^2}{2\sigma_\gamma^2}\Big) $$
 #
 # Complete `pair_price`: it returns one number.
 
 
 # %% nbgrader={"grade": false, "grade_id": "pair-price", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def pair_price(c_i, c_j, o_i, o_j, w1, w2, alpha, beta, gamma):
+def pair_price(r_i, r_j, o_i, o_j, w1, w2, alpha, beta, gamma):
     """Return k_ij, the bracket of equation (4)."""
     ### BEGIN SOLUTION
-    apart = np.sum((c_i - c_j) ** 2)
+    apart = np.sum((r_i - r_j) ** 2)
     unlike = np.sum((o_i - o_j) ** 2)
     bilateral = np.exp(-apart / (2 * alpha**2) - unlike / (2 * beta**2))
     return w1 * bilateral + w2 * np.exp(-apart / (2 * gamma**2))
@@ -99,7 +99,7 @@ _PRICE_SLIPS = {
 
 # %% nbgrader={"grade": true, "grade_id": "pair-price-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # By hand: |c_i - c_j|^2 = 1 + 4 = 5 and |o_i - o_j|^2 = 0.04 + 0.04 + 0.01 + 0.01 = 0.1, so 4 exp(-5/18 - 0.8) + 3 exp(-5/8) = 2.967.
+    # By hand: |r_i - r_j|^2 = 1 + 4 = 5 and |o_i - o_j|^2 = 0.04 + 0.04 + 0.01 + 0.01 = 0.1, so 4 exp(-5/18 - 0.8) + 3 exp(-5/8) = 2.967.
     places, states = np.array([[3.0, 1.0], [4.0, 3.0]]), np.array([[0.7, 0.2, 0.1, 0.0], [0.5, 0.4, 0.0, 0.1]])
     got = pair_price(*places, *states, w1=4, w2=3, alpha=3, beta=0.25, gamma=2)
     got = answer_array(got, "pair_price")

@@ -38,9 +38,9 @@ def _explain(what, got, slips):
 # %% [markdown]
 # ## Task 1: a Gaussian along rows, then along columns (2 points)
 #
-# `values` is a map, `(H, W)`. With $c_i$ the row and the column of cell $i$, the spatial kernel of equation (4) sums
+# `values` is a map, `(H, W)`. With $r_i$ the row and the column of cell $i$, the spatial kernel of equation (4) sums
 #
-# $$ \text{blurred}_i = \sum_j \exp\!\left(-\frac{|c_i - c_j|^2}{2\sigma^2}\right) \text{values}_j $$
+# $$ \text{blurred}_i = \sum_j \exp\!\left(-\frac{|r_i - r_j|^2}{2\sigma^2}\right) \text{values}_j $$
 #
 # over **all** cells of the map, cell $i$ included. Nothing is normalised, and beyond the map there are no cells.
 #

@@ -179,6 +179,8 @@ def write_demo(
     own, yours, comparison = Stages.of(net, keep_steps=True), (), None
     if stages is not None:
         mine = load_stages(stages)
+        if "remember" in mine.given:
+            raise ArgumentError("--stages", "a file without `remember`, whose map the page doesn't show", str(stages))
         yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given)
     label_set = LABEL_SETS[net.architecture.label_set]
     stories = _stories_every(len(chosen.shown), net.architecture.grid)

@@ -21,7 +21,7 @@ from semgrid_edu.storage.workplace import check_workers, workplace
 from semgrid_edu.workshop.simulation import writer
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import SAMPLE_WISHES, wishes_of
-from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD, Rig
+from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD, SAMPLE_RIG, Rig
 from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes
 
 FORMAT = 2
@@ -106,7 +106,7 @@ def read_recipes(name: str) -> dict[str, DatasetRecipe]:
 
 RECIPES = read_recipes("recipes")
 RECIPES["sample"] = DatasetRecipe(
-    "sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),), rig=Rig(), edition=1
+    "sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),), rig=SAMPLE_RIG, edition=1
 )
 """Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes.
 "validation" has drives like minikitti's, half as many as its training split, for parameters that are chosen when the

@@ -87,7 +87,7 @@ class SimulatedDrive:
         duration = (n_frames - 1) * PERIOD
         pace = ActorPace.random(rng, wishes.speed)
         self.plan = draw_plan(rng, pace.distance(duration), wishes)
-        swing = (0.05, 0.2) if wishes.even else (0.3, 0.6)
+        swing = (0.05, 0.2) if wishes.relief == {} else (0.3, 0.6)
         self.ego = Ego.random(rng, self.plan.road, pace, wishes.ego_lane, swing)
         self.geodesy = Geodesy.random(rng)
         builder = build_scenery(self.plan, rng)

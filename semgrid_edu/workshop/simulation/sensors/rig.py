@@ -1,6 +1,6 @@
 """The recording car: calibration in KITTI's conventions, camera and LIDAR models (Geiger et al., 2013, figure 1)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -183,3 +183,5 @@ class Rig:
 
 KITTI_AHEAD = Rig(lidar=HDL64E_AHEAD)
 """The sensors of the simulated data sets."""
+SAMPLE_RIG = Rig(lidar=replace(HDL64E_AHEAD, azimuth_step=0.45))
+"""Those of the shipped drive: fewer columns, so that it stays small."""

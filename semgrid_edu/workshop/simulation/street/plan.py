@@ -47,8 +47,9 @@ class Wishes:
         Lane of the recording car; 0 is beside the centre line.
     cast : callable or None
         Function that takes the drive's `Traffic` and puts road users on the street, in place of `fill_street`.
-    even : bool
-        Whether all asphalt is one plane, on which the recording car hardly sways. Else a road has a crown and grades.
+    relief : dict or None
+        Crown, grades and crest, as fields of `Road`. With {} all asphalt is one plane, on which the recording car
+        hardly sways.
     """
 
     layout: str | None = None
@@ -61,7 +62,7 @@ class Wishes:
     speed: float | None = None
     ego_lane: int | None = None
     cast: Callable | None = None
-    even: bool = False
+    relief: dict[str, float] | None = None
 
 
 ANY = Wishes()
@@ -173,8 +174,7 @@ def draw_plan(rng: np.random.Generator, length: float, wishes: Wishes) -> Plan:
     borders = wishes.borders or tuple(map(str, rng.choice(BORDERS, 2, p=[0.2, 0.16, 0.16, 0.12, 0.24, 0.12])))
     parking = wishes.parking or tuple(bool(p) for p in rng.random(2) < 0.5)
     road = _road(rng, length, layout, lanes, styles, parking)
-    if not wishes.even:
-        road = road._replace(**_relief(rng, length))
+    road = road._replace(**(_relief(rng, length) if wishes.relief is None else wishes.relief))
     foliage = [(1.0, 1.0, 1.0), (1.35, 1.25, 0.9), (2.2, 1.05, 0.7)][rng.choice(3, p=[0.55, 0.3, 0.15])]
     light = wishes.light or Light.random(rng)
     drawn = float(rng.uniform(0.15, 1.0))

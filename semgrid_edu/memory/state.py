@@ -1,0 +1,161 @@
+"""What is remembered of the classes of each cell, what one frame says of them, and what the memory assumes."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from semgrid_edu.errors import ArgumentError, check_fields, not_negative, types_named
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.occupancy import State, WorldModel
+
+STAYS, MOVES = 0, 1
+"""The two layers of the memory: what lies and stands in a cell, and what moves through it."""
+
+
+def _leaving(state: State) -> float:
+    """Return the rate at which a cell leaves a state for another one that is known, 1/s."""
+    return float(sum(np.delete(WorldModel().rates[state], [state, State.UNKNOWN])))
+
+
+@dataclass(frozen=True)
+class MemoryParams:
+    """What the memory of classes assumes.
+
+    Parameters
+    ----------
+    worth : float
+        Exponent of the evidence of one more frame, seen from close by: 1 if frames were independent witnesses. Measured
+        on simulated drives other than the shipped one (`measure_memory`).
+    reach : float
+        Distance from the vehicle, metres, over which the exponent falls by a factor e, because a near view is a better
+        witness than a far one. Measured on the same drives.
+    most : float
+        What all frames together may be worth, in frames, at least 1. Beyond this an old frame counts for less with each
+        new one. Measured on the same drives.
+    change_rate : (float, float)
+        Rates at which what stays and what moves becomes something else, 1/s: by default those at which, in the
+        occupancy filter's `WorldModel`, a STATIC and a DYNAMIC cell change into another known state.
+    movable : tuple of int
+        Numbers of the classes that come and go: by default KITTI-14's car, pedestrian and bicycle. Where a frame shows
+        one of them it counts fully, because an earlier frame is no witness against what came since.
+    least_moving : float
+        Probability of DYNAMIC from which on a cell holds something that moves. The default lies above `first_sight`'s
+        0.003 and far below the 0.5 at which the cell is called DYNAMIC.
+    """
+
+    worth: float = 0.7
+    reach: float = 100.0
+    most: float = 1.0
+    change_rate: tuple[float, float] = (_leaving(State.STATIC), _leaving(State.DYNAMIC))
+    movable: tuple[int, ...] = tuple(map(KITTI_14.index, ("car", "pedestrian", "bicycle")))
+    least_moving: float = 0.02
+
+    @types_named
+    def __post_init__(self) -> None:
+        """Refuse what describes no memory."""
+        check_fields(self, "an exponent from 0 to 1", lambda w: 0 <= w <= 1, "worth")
+        check_fields(self, "a positive distance in metres", lambda r: r > 0, "reach")
+        check_fields(self, "a number of frames, at least 1", lambda n: np.isfinite(n) and n >= 1, "most")
+        check_fields(self, "a probability above 0", lambda p: 0 < p <= 1, "least_moving")
+        if len(self.change_rate) != 2 or not all(map(not_negative, self.change_rate)):
+            raise ArgumentError("change_rate", "two rates in 1/s, not negative", self.change_rate)
+
+    def exponent(self, distance: ArrayLike) -> NDArray[np.float64]:
+        """Return what one more frame is worth for cells at a distance from the vehicle.
+
+        Parameters
+        ----------
+        distance : (...) float
+            Metres.
+        """
+        return self.worth * np.exp(-np.asarray(distance) / self.reach)
+
+    def kept(self, dt: float) -> NDArray[np.float64]:
+        """Return which part of each layer's evidence still holds after a time, (2,).
+
+        Parameters
+        ----------
+        dt : float
+            Seconds, not negative.
+        """
+        if not not_negative(dt):
+            raise ArgumentError("dt", "seconds, not negative", dt)
+        return np.exp(-np.array(self.change_rate) * dt)
+
+
+@dataclass(frozen=True, eq=False)
+class ClassMemory:
+    """What earlier frames said of the S semantic classes in each cell of the map.
+
+    Parameters
+    ----------
+    planes : (2 S + 6, H, W) float32
+        All that is remembered, in one array, so that it can be moved at once: `evidence`, `weight`, `seen` and
+        `offset`, which are views of it. float64 in literal twins.
+    """
+
+    planes: NDArray[np.float32]
+
+    @classmethod
+    def empty(cls, n_semantic: int, spec: GridSpec) -> "ClassMemory":
+        """Return the memory before the first frame.
+
+        Parameters
+        ----------
+        n_semantic : int
+            S, the number of semantic classes.
+        spec : GridSpec
+            The cells of the map, (H, W).
+        """
+        return cls(np.zeros((2 * n_semantic + 6, *spec.shape), np.float32))
+
+    @property
+    def evidence(self) -> NDArray:
+        """(2, S, H, W), for what stays and for what moves: the mean of log P(class | frame), by exponents."""
+        return self.planes[:-6].reshape(2, -1, *self.planes.shape[1:])
+
+    @property
+    def weight(self) -> NDArray:
+        """(2, H, W): the sum of these exponents, from 0 to `MemoryParams.most`; the log of the belief is their product.
+
+        Evidence worth less than one frame counts as one: that little was seen stands in `seen`, and isn't said twice.
+        """
+        return self.planes[-6:-4]
+
+    @property
+    def seen(self) -> NDArray:
+        """(2, H, W): the probability that the camera ever saw it; 0 means that nothing is known."""
+        return self.planes[-4:-2]
+
+    @property
+    def offset(self) -> NDArray:
+        """(2, H, W): where in its cell the moving thing is, metres from the centre along the axes of the map.
+
+        It is at most half a cell. Without it, what moves by less than that in a frame would never leave its cell.
+        """
+        return self.planes[-2:]
+
+
+class Look(NamedTuple):
+    """What one frame says of the classes of each cell.
+
+    Parameters
+    ----------
+    classes, log_class : (S, H, W) float32
+        P(class | image, the camera sees the cell), and its natural logarithm.
+    sees : (H, W) float32
+        Probability that the camera sees what is in the cell: that its class isn't one of the unknown ones.
+    exponent : (H, W) float32
+        What the frame is worth there beside others: `MemoryParams.exponent` e, and e + (1 - e) P(movable) in all.
+    moving : (H, W) float32
+        P(DYNAMIC).
+    """
+
+    classes: NDArray[np.float32]
+    log_class: NDArray[np.float32]
+    sees: NDArray[np.float32]
+    exponent: NDArray[np.float32]
+    moving: NDArray[np.float32]

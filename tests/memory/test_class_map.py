@@ -1,0 +1,77 @@
+"""The scrolling map of classes: what was seen stays where it was seen, sharp, and what was never seen stays unknown."""
+
+import numpy as np
+import pytest
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.memory import ClassMap, MemoryParams
+from semgrid_edu.occupancy import Belief, PlanarMotion
+
+SPEC, S = GridSpec(0, 20, -5, 5, 0.5), 3
+NOTHING = np.full((2, 2, *SPEC.shape), np.nan, np.float32)
+KEEPS = MemoryParams(change_rate=(0.0, 0.0), movable=())
+
+
+def all_free() -> Belief:
+    probability = np.zeros((4, *SPEC.shape), np.float32)
+    probability[0] = 1
+    return Belief(probability, NOTHING[0], NOTHING)
+
+
+def street(position: PlanarMotion, ahead_of: float = 10.0) -> tuple[np.ndarray, np.ndarray]:
+    """A floor of 2 m tiles of three classes, of which the camera sees what lies farther ahead than some metres."""
+    world = position.to_previous(SPEC.centers())
+    tile = (np.floor(world[..., 0] / 2) + np.floor(world[..., 1] / 2)).astype(int) % S
+    g = np.zeros((S + 4, *SPEC.shape), np.float32)
+    g[:S] = np.where(np.arange(S)[:, None, None] == tile, 0.8, 0.1)
+    seen = SPEC.centers()[..., 0] > ahead_of
+    g *= seen
+    g[S] += ~seen
+    return g, tile
+
+
+@pytest.mark.parametrize("step", [PlanarMotion(0.37, 0.0, 0.0), PlanarMotion(0.37, 0.02, 0.008)])
+def test_tiles_that_the_camera_no_longer_sees_stay_sharp_and_in_place(step):
+    """However often the map has scrolled, cells behind the view have the class that was seen there, but at edges."""
+    class_map, position = ClassMap(SPEC, S, KEEPS), PlanarMotion()
+    for k in range(40):
+        motion = step if k else PlanarMotion()
+        position = position.then(motion)
+        g, tile = street(position)
+        remembered = class_map.step(g, all_free(), motion, 0.1)
+        np.testing.assert_allclose(remembered.sum(axis=0), 1, atol=1e-5)
+    near = slice(SPEC.shape[0] - 16, SPEC.shape[0] - 4), slice(5, 15)  # 2 to 8 m ahead, seen 5 to 20 frames ago
+    x, y = np.moveaxis(position.to_previous(SPEC.centers())[near], -1, 0)
+    inside = (np.abs(x / 2 - np.rint(x / 2)) > 0.26) & (np.abs(y / 2 - np.rint(y / 2)) > 0.26)  # over a cell from edges
+    assert inside.sum() > 15
+    right = remembered[:S].argmax(axis=0)[near][inside] == tile[near][inside]
+    assert right.mean() > 0.8  # each time the map turns, cells move by up to half a cell
+    assert (
+        np.median(remembered[:S].max(axis=0)[near][inside]) > 0.75
+    )  # interpolation at each step would have blurred 0.8 away
+
+
+def test_what_was_never_seen_has_the_unknown_class_of_its_state():
+    class_map = ClassMap(SPEC, S, KEEPS)
+    g, _ = street(PlanarMotion())
+    remembered = class_map.step(g, all_free(), PlanarMotion(), 0.1)
+    never = SPEC.centers()[..., 0] < 10
+    np.testing.assert_allclose(remembered[S, never], 1, atol=1e-6)
+    np.testing.assert_allclose(remembered[:S, ~never], g[:S, ~never], atol=1e-5)
+
+
+def test_a_standing_vehicle_forgets_what_it_no_longer_sees_at_the_rate_of_change():
+    rate, class_map = 0.03, ClassMap(SPEC, S, MemoryParams(movable=()))
+    seen, blind = street(PlanarMotion(), ahead_of=-1)[0], street(PlanarMotion(), ahead_of=99)[0]
+    class_map.step(seen, all_free(), PlanarMotion(), 0.1)
+    for _ in range(20):
+        remembered = class_map.step(blind, all_free(), PlanarMotion(), 0.5)
+    np.testing.assert_allclose(remembered[:S].sum(axis=0), np.exp(-rate * 10), rtol=1e-4)
+    np.testing.assert_allclose(remembered[:S].max(axis=0) / remembered[:S].sum(axis=0), 0.8, atol=1e-4)
+
+
+def test_another_number_of_classes_is_refused():
+    class_map = ClassMap(SPEC, S + 1)
+    with pytest.raises(ArgumentError, match="grid: expected 4 semantic classes and 4 unknown ones, found 7 classes"):
+        class_map.step(street(PlanarMotion())[0], all_free(), PlanarMotion(), 0.1)
