@@ -63,7 +63,7 @@ def test() -> None:
     # take minutes come first, so that no process ends long before the others.
     pool = ("-n", "3", "--dist", "loadfile", "--no-loadscope-reorder", "-p", "no:cacheprovider")
     nbval = ("--nbval", "--nbval-current-env", "--nbval-cell-timeout=300")
-    files = (*notebooks, "tests/graders", "tests", "semgrid_edu")
+    files = (*notebooks, "tests", "semgrid_edu")
     _pytest(*pool, *nbval, "--doctest-modules", "--ignore=tests/browser", *files)
 
 

@@ -1,14 +1,21 @@
 """Each stage of the paper as a model of toy size, built from the functions that the pipeline itself calls.
 
-In the order of the lectures: `line` (01); `log_odds_cell`, `beam`, `thick_walls` (02); `cells_in_a_row`, `joint_row`,
-`bof` (03); `cell`, `cmcdot`, `cmcdot_graph` (04); `pixel_ray` (05, 06); `ground_truth_label` (09); `crf` (10); the
+In the order of the lectures: `line` (01); `cell` (02, 04), `beam`, `thick_walls` (02); `cells_in_a_row`, `joint_row`,
+`bof` (03); `cmcdot`, `cmcdot_graph` (04); `pixel_ray` (05, 06); `ground_truth_label` (09); `crf` (10); the
 whole, `system_world` and `system`; and `class_memory`, an edge that the whole cuts. `stage_graph` holds what each of
-them builds: a model, its drawing, and the edges that are cut. `prices` measures what those cost, and `ledger` lists it.
+them builds: a model, its drawing, and the edges that are cut, whose ledger it lists. `prices` measures what those cost.
 """
 
 from semgrid_edu.stage_models.beam import BeamWorld, beam_over_cells
 from semgrid_edu.stage_models.bof import bof_stage
-from semgrid_edu.stage_models.cell import exact_cell, one_cell, package_cell
+from semgrid_edu.stage_models.cell import (
+    exact_cell,
+    one_cell,
+    one_log_odds_cell,
+    package_cell,
+    package_log_odds_cell,
+    read_scans,
+)
 from semgrid_edu.stage_models.class_memory import MemoryWorld, class_over_time, memory_price
 from semgrid_edu.stage_models.cmcdot_graph import cmcdot_stage
 from semgrid_edu.stage_models.crf import crf_stage
@@ -19,11 +26,9 @@ from semgrid_edu.stage_models.ground_truth_label import (
     scan_with_pose_error,
     wrong_label,
 )
-from semgrid_edu.stage_models.ledger import LedgerLine, ledger, ledger_table
 from semgrid_edu.stage_models.line import bayes_on_a_line
-from semgrid_edu.stage_models.log_odds_cell import one_log_odds_cell, package_log_odds_cell, read_scans
 from semgrid_edu.stage_models.pixel_ray import RayWorld, pixel_height, pixel_ray, shared_pixel
-from semgrid_edu.stage_models.stage_graph import CutEdge, Price, StageGraph
+from semgrid_edu.stage_models.stage_graph import CutEdge, LedgerLine, Price, StageGraph, ledger, ledger_table
 from semgrid_edu.stage_models.system import system_gain, whole_system
 from semgrid_edu.stage_models.system_world import SystemWorld
 from semgrid_edu.stage_models.thick_walls import beam_beliefs, thick_walls

@@ -95,4 +95,4 @@ def test_the_shipped_image_networks_know_the_shipped_images(segmenter):
     for sample in sample_frames():
         with torch.inference_mode():
             predicted = net.segmenter(sample.image[None] / 255)[0].argmax(0)
-        assert (predicted == sample.labels).float().mean() > 0.75
+        assert (predicted == sample.labels).float().mean() > 0.7

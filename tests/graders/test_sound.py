@@ -239,7 +239,7 @@ def test_hidden_inputs_are_not_in_the_feedback(course):
     """The secret: hidden tests of `locate` draw thirty cells, visible ones have four."""
     spy = "seen.append(len(belief)); print('cells:', len(belief)); assert len(belief) < 5, f'cells: {len(belief)}'"
     notebook = handed_in(inside("locate", spy), first="seen = []", last="print('cells:', max(seen))")
-    assert graded(course, "spy", notebook).score == 11
+    assert graded(course, "spy", notebook).score == 13
     with course_api(course) as api:
         assert api.generate_feedback(NAME, "spy")["success"]
     page = place(course, "feedback", "spy", NAME).with_suffix(".html").read_text()
@@ -257,7 +257,7 @@ TELLS = {
 @pytest.mark.parametrize("kind", TELLS)
 def test_an_error_does_not_tell_hidden_inputs(course, kind):
     notebook = handed_in(inside("locate", TELLS[kind]), first="UNREADABLE = 'ascii', b'x', 0, 1, ''")
-    assert graded(course, f"tells-{kind}", notebook).score == 11
+    assert graded(course, f"tells-{kind}", notebook).score == 13
     graded_notebook = place(course, "autograded", f"tells-{kind}", NAME).read_text()
     assert "cells: 30" not in graded_notebook
 

@@ -11,8 +11,15 @@ from pyagrum_oracle import assert_oracle_agrees
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals
 from semgrid_edu.occupancy import LogOddsParams, State, WorldModel, transition_matrix
-from semgrid_edu.stage_models.cell import cell_given, exact_cell, one_cell, package_cell
-from semgrid_edu.stage_models.log_odds_cell import one_log_odds_cell, package_log_odds_cell, read_scans
+from semgrid_edu.stage_models.cell import (
+    cell_given,
+    exact_cell,
+    one_cell,
+    one_log_odds_cell,
+    package_cell,
+    package_log_odds_cell,
+    read_scans,
+)
 
 PAIRS = st.tuples(*[st.floats(0.01, 1)] * 2) | st.just((1.0, 1.0))
 SCANS = st.lists(PAIRS, min_size=1, max_size=6)

@@ -8,8 +8,7 @@ from pyagrum_oracle import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, why_dependent
-from semgrid_edu.stage_models.cell import exact_cell
-from semgrid_edu.stage_models.log_odds_cell import read_scans
+from semgrid_edu.stage_models.cell import exact_cell, read_scans
 from semgrid_edu.stage_models.system import class_and_sensors, same_belief, street, system_gain, whole_system
 from semgrid_edu.stage_models.system_world import CLASS_OF, CONTENTS, PARAMS, STREET, SystemWorld
 
