@@ -142,12 +142,16 @@ def _wheel_legend(ax: Axes) -> Axes:
     """Name the states that keep their colours, and show the wheel below them, with its speeds."""
     still = [state for state in State if state != State.DYNAMIC]
     colour_legend(ax, [STATE_NAMES[s] for s in still], [STATE_COLOURS[s] for s in still])
-    ahead, left, back, right, speeds = (
+    name, ahead, left, back, right, speeds = (
         TextArea(text, textprops={"fontsize": "small"})
-        for text in ("ahead", "left", "back", "right", f"ring {WHEEL_SPEED / 4:.0f} m/s\nrim {WHEEL_SPEED:.0f} m/s")
+        for text in (
+            f"{STATE_NAMES[State.DYNAMIC]}, by velocity:",
+            *("ahead", "left", "back", "right"),
+            f"ring {WHEEL_SPEED / 4:.0f} m/s\nrim {WHEEL_SPEED:.0f} m/s",
+        )
     )
     middle = HPacker(children=[left, OffsetImage(wheel_picture(), zoom=0.55), right], align="center", pad=0, sep=3)
-    box = VPacker(children=[ahead, middle, back, speeds], align="center", pad=0, sep=3)
+    box = VPacker(children=[name, ahead, middle, back, speeds], align="center", pad=0, sep=3)
     below = {"xybox": (8, -58), "boxcoords": "offset points", "box_alignment": (0, 1), "annotation_clip": False}
     ax.add_artist(AnnotationBbox(box, (1, 1), xycoords="axes fraction", frameon=False, **below))
     return ax

@@ -70,9 +70,10 @@ def _draw_states(story: "CellStory", steps: Axes, past: Axes) -> None:
     _stack(steps, list(story.steps), np.stack(list(story.steps.values()), axis=1))
     _stack(past, [f"{time:.1f} s" for time in story.times], story.history)
     steps.set_title("states, step by step", loc="left", fontsize="medium")
-    past.set_title("states of the place, frame by frame", loc="left", fontsize="medium")
+    past.set_title("states of the place, scan by scan", loc="left", fontsize="medium")
+    past.set_xlabel("probability", fontsize="small")
     colour_legend(
-        past, STATE_NAMES, STATE_COLOURS, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=4, columnspacing=0.8
+        past, STATE_NAMES, STATE_COLOURS, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4, columnspacing=0.8
     )
 
 
@@ -97,9 +98,10 @@ def _draw_parts(story: "CellStory", kinds: Axes, classes: Axes, planes: Axes) ->
     kinds.set_title(
         f"why {story.names[story.label]}\nand not {story.names[story.rival]}", loc="left", fontsize="medium"
     )
-    classes.set_title("image, by class", loc="left", fontsize="medium")
+    classes.set_title("image, by the score's class", loc="left", fontsize="medium")
     planes.set_title("image, by plane", loc="left", fontsize="medium")
-    planes.set_xlabel("part of the difference of scores", fontsize="small")
+    for ax in (classes, planes):
+        ax.set_xlabel("part of the difference of scores", fontsize="small")
 
 
 def _bars(ax: Axes, names: Sequence[str], values: Sequence[float]) -> None:

@@ -60,9 +60,9 @@ def behind_the_wall() -> Price:
 
 
 def shared_pose_error() -> Price:
-    """Lecture 02: the cell of two rings' returns that share the error of the pose."""
+    """Lecture 02: the cell of two rings' returns that share the error of the pose, and if each had one of its own."""
     counted = count_rings(rings=2)
-    return Price(counted.exact[1], counted.package[1], "P(occupied) after two rings")
+    return Price(counted.exact[1], counted.independent[1], "P(occupied) after two rings")
 
 
 def in_both_places() -> Price:

@@ -871,7 +871,7 @@ def follow(belief, likelihoods, M, lag=0):
             "only the last belief",
             task="follow",
             loses=3,
-            says="one row a scan",
+            says="one row per scan",
             code="""
 def follow(belief, likelihoods, M, lag=0):
     for likelihood in likelihoods:

@@ -803,7 +803,7 @@ def show_stages(names, size):
 
 show_stages(("line", "cell", "chain", "beam"), (12, 6.6))
 
-# %% jupyter={"source_hidden": true} alt="four graphs with dashed edges and prices: a pose error shared by two rings, .46 to .97; BOF, with 1 to 1.24, .43 to .30 and .67 to 1; CMCDOT, with .010 and .051 of error and .50 to .41; how a label arises, .10 to .012 for a shared calibration"
+# %% jupyter={"source_hidden": true} alt="four graphs with dashed edges and prices: a pose error shared by two rings, .46 to .57; BOF, with 1 to 1.24, .43 to .30 and .67 to 1; CMCDOT, with .010 and .051 of error and .50 to .41; how a label arises, .10 to .012 for a shared calibration"
 show_stages(("error", "BOF", "CMCDOT", "label"), (12, 8.5))
 
 # %% jupyter={"source_hidden": true} alt="left, the CRF, nine cells on a circle, each pair linked, one edge dashed with .52 to .998; right, the whole system at two instants with six dashed edges, three of them priced: .40 to .48, .53 to .68, .62 to .72"

@@ -126,7 +126,8 @@ _test()
 # $$ \begin{pmatrix} u \\ v \\ 1 \end{pmatrix} = K \begin{pmatrix} X/Z \\ Y/Z \\ 1 \end{pmatrix} \qquad (1) $$
 #
 # `point` is (x, y, z) in the grid frame, metres. `T_camera_from_grid`, 4 x 4, takes it to the camera frame: X right, Y down, Z ahead.
-# `K`, 3 x 3, is the camera's intrinsic matrix, in pixels; the centre of the first pixel is (0, 0).
+# (A 4 x 4 matrix takes a point as (x, y, z, 1), so that its last column can shift the point.) `K`, 3 x 3, is the camera's intrinsic
+# matrix, in pixels; the centre of the first pixel is (0, 0).
 #
 # Complete `pixel_of`: it returns `(u, v)`. For one more point: a point that is not in front of the camera has no pixel, so return
 # `(nan, nan)`.

@@ -241,7 +241,7 @@ def _test():
     same = all(np.array_equal(a, b) for a, b in zip(arguments, (belief, likelihoods, M), strict=True))
     assert same, "follow changed one of its arguments: make new arrays (no *=, no /=)"
     assert got.shape != (4, 2), "four rows for three scans: leave out the belief from before the first scan"
-    assert got.shape != (2,), "only one belief came back: return that after each scan, one row a scan"
+    assert got.shape != (2,), "only one belief came back: return that after each scan, one row per scan"
     assert got.shape == (3, 2), f"expected one row for each scan, shape (3, 2), got {got.shape}"
     sums = got.sum(axis=1)
     wrong = np.abs(sums - 1).argmax()
@@ -311,11 +311,11 @@ _test()
 # %% [markdown]
 # ## Task 4: a matrix for any time step (2 + 1 points)
 #
-# Somebody watched cells at a true drive and counted: `counts[i, j]`, shape `(2, 2)`, is how often a cell in state i (0 is FREE, 1 is OCCUPIED) was in state j at the next scan, `dt` seconds
+# Somebody watched cells on a real drive and counted: `counts[i, j]`, shape `(2, 2)`, is how often a cell in state i (0 is FREE, 1 is OCCUPIED) was in state j at the next scan, `dt` seconds
 # later. Your LIDAR has another time step. A cell may change more than once in a time step: that is what makes this more than a division.
 #
 # Complete `transition`: it returns the 2 x 2 matrix of a step of `new_dt` seconds; `M[i, j]` goes from i to j. Five digits must be right. `new_dt` may be shorter or longer than `dt`, and 0.
-# Each state was seen at least once; perhaps no change was ever seen. Of free cells a smaller share becomes occupied than of occupied cells stays occupied.
+# Each state was seen at least once; perhaps no change was ever seen. You may assume that a cell that was occupied is occupied at the next scan more often than one that was free.
 #
 # For one more point complete `half_life`: whatever is believed of a cell, when nobody looks it tends to the same final belief. After how many seconds is
 # half of the difference left? Here at least one change has been seen.
@@ -405,7 +405,7 @@ _test()
 # %% [markdown]
 # ## Task 5: each witness once (2 points)
 #
-# A scan gives K returns: `likelihoods`, shape `(K, S)`, has one row a return. `beams`, shape `(K,)`, says which beam each came from. Different beams err
+# A scan gives K returns: `likelihoods`, shape `(K, S)`, has one row per return. `beams`, shape `(K,)`, says which beam each came from. Different beams err
 # independently. Returns of one beam don't: what fools the first fools the second too. So of each beam count only its **first** return, in the order of the
 # rows; they need not be sorted by beam.
 #

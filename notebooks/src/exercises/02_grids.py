@@ -191,7 +191,7 @@ def fuse(prior, posteriors):
 def _test():
     # Three scans of two cells, prior 0.2. Cell (0, 0): none says anything. Cell (0, 1): two make it 0.5, the third says nothing.
     got = answer_array(fuse(0.2, np.array([[[0.2, 0.5]], [[0.2, 0.5]], [[0.2, 0.2]]])), "fuse")
-    assert got.shape == (1, 2), f"expected one number a cell, (1, 2), got {got.shape}: sum over the scans only"
+    assert got.shape == (1, 2), f"expected one number per cell, (1, 2), got {got.shape}: sum over the scans only"
     slips = {
         0.0154: "the prior is counted three times, once with each scan: subtract L_0 from each L_k",
         0.0039: "the prior is counted four times: subtract L_0 from each L_k before you add it once",
@@ -319,7 +319,7 @@ def beam_evidence(x, y, spec, L_hit, L_pass):
 def _test():
     spec = GridSpec(x_min=-0.5, x_max=5.5, y_min=-4.5, y_max=4.5, cell=1)  # draw it, with the beam from cell (5, 4)
     got = answer_array(beam_evidence(3.8, 1.8, spec, L_hit=2.0, L_pass=-1.0), "beam_evidence")
-    assert got.shape == (6, 9), f"expected one number a cell, shape (6, 9), got {got.shape}"
+    assert got.shape == (6, 9), f"expected one number per cell, shape (6, 9), got {got.shape}"
     assert got.max() > 0, "no cell is hit: the cell of the return is hit, whatever passes were counted in it"
     slips = {
         (2, 1): "row and column are swapped: rows count along x, columns along y",
@@ -353,7 +353,7 @@ _test()
 def _test():
     spec = GridSpec(x_min=-0.5, x_max=5.5, y_min=-4.5, y_max=4.5, cell=1)
     got = answer_array(beam_evidence(9.5, 0.3, spec, L_hit=2.0, L_pass=-1.0), "beam_evidence")
-    assert got.shape == (6, 9), f"expected one number a cell, shape (6, 9), got {got.shape}"
+    assert got.shape == (6, 9), f"expected one number per cell, shape (6, 9), got {got.shape}"
     hit = [tuple(cell) for cell in np.argwhere(got > 0).tolist()]
     assert not hit, (
         f"the return is 4 m beyond the grid, yet cell {hit[0]} is hit: an array's row -4 is the fourth from its end"
@@ -379,7 +379,7 @@ _test()
 # %% [markdown]
 # ## Task 5: put together (2 + 1 + 2 points)
 #
-# Now a grid of your own, one that forgets only where nobody looks. `L`, `occupied` and `free` are (H, W): the log-odds of every cell, and the two likelihoods of a scan. Complete
+# Now a grid of your own. Unlike the lecture's, it forgets only where nobody looks. `L`, `occupied` and `free` are (H, W): the log-odds of every cell, and the two likelihoods of a scan. Complete
 # `update`:
 # - where the scan says nothing, that is where `occupied` equals `free`, the log-odds fade: they shrink by the factor $e^{-dt / \tau}$;
 # - everywhere else they take the scan in by Bayes' rule, without fading;
