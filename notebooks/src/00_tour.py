@@ -113,15 +113,14 @@ plt.show()
 # At the top is the world: what the cells hold ($m_t$, $m'_t$), which sensors see but we don't. Below is what the paper
 # computes. Information flows down, and from one instant to the next only inside $o$.
 #
-# **Dashed edges are missing.** In an exact answer, each of them would carry information. The system cuts them because
-# then every stage is small enough to compute, ten times a second. The numbers on a dashed edge are its **price** on
-# this toy street, where the exact answer can be computed by summing over everything that may happen. (Three
-# dashed edges have no number, because their price isn't measured.) Here prices are mean
-# surprise, $-\log P(\text{truth})$ in **nats**: first the exact answer's, then the system's. On the edge from
-# $g_{t-1}$ to $g_t$ the class of the far cell gets .62 nats if the earlier image is used, and .72 if it is forgotten;
-# on (geometric) average, the truth gets the probability $e^{-.62} = .54$ or $e^{-.72} = .49$. Where a
-# dashed line runs beside a solid arrow, only a part is cut: from $s_t$ to $p_t$ the scores do flow, but not the distance
-# at which each thing was seen.
+# **Dashed edges are missing.** An exact answer would use what they carry. The system cuts them because then every stage
+# is small enough to compute, ten times a second. The numbers on a dashed edge are its **price** on this toy street, where
+# the exact answer can be computed by summing over everything that may happen. (Three dashed edges have no number, because
+# their price isn't measured.) Here prices are mean surprise, $-\log P(\text{truth})$ in **nats**: first the exact
+# answer's, then the system's. On the edge from $g_{t-1}$ to $g_t$ the class of the far cell gets .62 nats if the earlier
+# image is used, and .72 if it is forgotten; in the geometric mean the truth then has the probability $e^{-.62} = .54$ or
+# $e^{-.72} = .49$. Where a dashed line runs beside a solid arrow, only a part is cut: from $s_t$ to $p_t$ the scores do
+# flow, but not the distance at which each thing was seen.
 #
 # **Predict before you run.** You know $o_t$ and $p_t$. Does the earlier map $g_{t-1}$ still tell you something about
 # $g_t$, as the system computes it? And does the earlier image $i_{t-1}$ tell you something about the *world* $m_t$,
@@ -145,8 +144,8 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # %% [markdown]
 # `d_separated` reads independences off the graph, without any numbers; *d-separated* is the field's word for "every
 # path between them is closed". The companion [graphical models](deeper/graphical_models.ipynb) introduces it from
-# nothing; read it after lecture 01. Every lecture shows the graph of its stage like this, and adds its cut edges to one ledger. You find it whole
-# at the end of this page.
+# nothing; read it after lecture 01. Lectures show the graph of their stage like this, and add its cut edges to
+# one ledger. You find it whole at the end of this page.
 #
 # | lecture | arrow | idea |
 # |---|---|---|
@@ -695,8 +694,8 @@ Markdown(ledger_table(ledger()))
 
 # %% [markdown]
 # Don't add the numbers up: they have different units, and each toy world was chosen to show its edge. Read the table as
-# a list of questions. Is a beam's coupling of cells expensive on *your* street? The last row is an edge that you can pay
-# back: carry the classes along from one semantic grid to the next.
+# a list of questions. Is a beam's coupling of cells expensive on *your* street? One edge you can pay back yourself: `g0 -> g1`,
+# by carrying the classes along from one semantic grid to the next.
 #
 # ## The registers
 #
