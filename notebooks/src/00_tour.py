@@ -576,8 +576,8 @@ for pair, result in zip(axes.reshape(3, 2), shown, strict=True):
     draw(result, pair)
 for ax in axes[1:]:
     ax.set_ylabel("")
-below = {"loc": "upper center", "bbox_to_anchor": (1.1, -0.16), "ncols": 4}
-colour_legend(axes[0], STATE_NAMES, STATE_COLOURS, **below)
+below = {"loc": "upper center", "bbox_to_anchor": (1.1, -0.12), "ncols": 4}
+colour_legend(axes[0], STATE_NAMES, STATE_COLOURS, **below).get_legend().set_in_layout(False)
 class_legend(axes[-1], KITTI_14, np.stack([result.refined.argmax(axis=0) for result in shown]))
 plt.show()
 
@@ -634,7 +634,7 @@ plt.show()
 first, second = (times[(moving[ahead] > 0.5).argmax()] for ahead in (7, 14))
 print(f"P(DYNAMIC) passes one half after {first:.1f} s on the nearer car, after {second:.1f} s on the one behind it")
 clear = [np.mean([b[State.FREE].mean() for b in before_it[:10]]) for _, before_it in followed.values()]
-print("P(FREE) of the two metres in front of each, mean of the first second: {:.1f} and {:.1f}".format(*clear))
+print("P(FREE) on the two metres in front of each, mean of the first second: {:.1f} and {:.1f}".format(*clear))
 assert 0.5 < first < 1.1
 assert second > 1.2 * first
 assert clear[0] > 0.9 > 0.65 > clear[1]
@@ -684,10 +684,11 @@ for name in ("road", "sidewalk", "car", "pedestrian", "bicycle"):
 #
 # Every stage is exact inference in *some* model, and each was made affordable by cutting edges. Here is what that
 # costs, each on a toy world of its own lecture in which the exact answer can be computed. *What is asked* names a
-# quantity; the last two columns give its exact value and the value without the edge. (In the first row more is better:
-# how often a place is named rightly. In the rows with an error or with nats, less is better. In the others only the
-# exact value is right.) Where an edge stands for many of its kind, the row says which, after *as*. The names are those
-# of each lecture's graph; its code measures the numbers.
+# quantity; the last two columns give its exact value, and what the system says without the edge. (In the first row more
+# is better: how often a place is named rightly. In the rows with an error or with nats, less is better. In the others
+# only the exact value is right.) An edge has the names of its lecture's graph, and stands for all of its kind: `m2 -> a3`
+# means every $m_i \to a_j$ with $i < j$, `m5 - m6` every pair of cells, `n1 <- n2` every step of the trip. (In the rows
+# of 00, 0 is $t-1$ and 1 is $t$.)
 
 # %% tags=["ledger"]
 Markdown(ledger_table(ledger()))

@@ -47,8 +47,8 @@ plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 # A vehicle drives round a ring road of ten cells. Poles stand beside three of them: a pair at **A**, beside cells 2
 # and 3, and a single one at **B**, beside cell 7. A sensor looks to the side and says *pole* or *nothing*. It errs: it
 # says *pole* with probability 0.8 beside a pole, and with probability 0.1 elsewhere. The map is known. Where is the
-# vehicle? Here is what a filter believes over 25 readings. Each bar is the probability of a cell. The orange circle is
-# the vehicle, which the filter can't see.
+# vehicle? Here is what a filter believes over 25 readings. Each bar is the probability of a cell; a bar of one half
+# reaches the dotted circle. The orange circle is the vehicle, which the filter can't see.
 
 # %% jupyter={"source_hidden": true}
 POLES = [2, 3, 7]
@@ -61,7 +61,8 @@ SAYS_POLE = [2, 3, 4, 9, 15, 18, 23, 24]  # the steps at which the sensor says "
 def draw_ring(ax, belief, place, title):
     """Draw a belief as bars around the ring, the poles as triangles and the vehicle as a circle."""
     ax.clear()
-    ax.add_patch(plt.Circle((0, 0), 1, fill=False, color="0.8", zorder=0))
+    for radius, style in ((1, "-"), (1.5, ":")):
+        ax.add_patch(plt.Circle((0, 0), radius, fill=False, color="0.8", linestyle=style, zorder=0))
     for n, b in enumerate(belief):
         x, y = np.sin(2 * np.pi * n / N_CELLS), np.cos(2 * np.pi * n / N_CELLS)
         ax.plot([x, x * (1 + b)], [y, y * (1 + b)], color="#0072b2", linewidth=14, solid_capstyle="butt")
@@ -580,8 +581,8 @@ plt.show()
 Markdown(ledger_table(ledger("line")))
 
 # %% [markdown]
-# This line isn't counted but computed: it adds up all possible readings of a trip of six steps. Over 30 steps both
-# numbers are higher, because there is more past and more future to listen to.
+# `n1 <- n2` stands for every step. This line isn't counted but computed: it adds up all possible readings of a trip of
+# six steps. Over 30 steps both numbers are higher, because there is more past and more future to listen to.
 #
 # ## Turn the problem round
 #

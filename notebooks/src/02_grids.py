@@ -144,7 +144,8 @@ assert area["map"][-1] > 50 * max(area["scan"])
 # ## Three small graphs
 #
 # Everything in this lecture is about a cell $m_k$, FREE or OCCUPIED, and a scan $z_t$. A grid keeps one number for
-# each cell. That is exact inference in a model, and these are three pieces of it. What the grid leaves out is dashed.
+# each cell. That is exact inference in a model, and these are three pieces of it. A box (a **plate**) stands for many
+# copies, one for each cell, beam or scan. What the grid leaves out is dashed.
 # Two dashed lines carry their price: the exact answer, and the answer without the edge. You will compute both.
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="three graphs: a fork, one cell m with arrows to two shaded scans, and dashed lines to the cell later, from what is in front, and between the scans; a collider, six cells with arrows to r, which points to a shaded range, with a dashed line between two cells, .34 to .57; a shared error, three cells point to two reflections, and a pose error to both shaded ranges, one of its arrows dashed, .46 to .57"
@@ -818,7 +819,8 @@ assert shares[2] > 2 * shares[1] > 3 * shares[0]
 # ## The ledger
 #
 # Each lecture adds its lines to one ledger: which edge was cut, the exact answer on a small world, and the answer
-# without that edge. These are the lines of this lecture, measured by the package (that both end at .57 is chance):
+# without that edge. These are the lines of this lecture, measured by the package (that both end at .57 is chance;
+# `m5 - m6` stands for all pairs of cells):
 
 # %% jupyter={"source_hidden": true}
 lines = [line for stage in ("log-odds", "beam", "pose") for line in ledger(stage)]

@@ -98,7 +98,7 @@ def _draw_parts(story: "CellStory", kinds: Axes, classes: Axes, planes: Axes) ->
     kinds.set_title(
         f"why {story.names[story.label]}\nand not {story.names[story.rival]}", loc="left", fontsize="medium"
     )
-    classes.set_title("image, by the score's class", loc="left", fontsize="medium")
+    classes.set_title("image, by class", loc="left", fontsize="medium")
     planes.set_title("image, by plane", loc="left", fontsize="medium")
     for ax in (classes, planes):
         ax.set_xlabel("part of the difference of scores", fontsize="small")

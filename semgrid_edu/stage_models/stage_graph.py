@@ -269,7 +269,7 @@ def ledger_table(lines: Iterable[LedgerLine]) -> str:
     lines : iterable of LedgerLine
         What `ledger` returns, or a part of it.
     """
-    rows = ["| lecture | stage | edge cut | what is asked | exact | without the edge |", "|---|---|---|---|---|---|"]
+    rows = ["| lecture | stage | edge cut | what is asked | exact | the system |", "|---|---|---|---|---|---|"]
     for line in lines:
         numbers = [short(line.exact), short(line.system)]
         rows.append("| " + " | ".join([line.lecture, line.stage, f"`{line.edge}`", line.unit, *numbers]) + " |")
