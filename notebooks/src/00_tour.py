@@ -740,4 +740,4 @@ Markdown(stage_table())
 # ## Exercise
 #
 # [Exercise 00](exercises/00_tour.ipynb): from metres to cells, Bayes' rule in every cell, a point's pixel, three
-# scores of a map, and one question.
+# scores of a map, the price of a cut edge, and one question.

@@ -2,6 +2,12 @@
 
 from grader_checks import GraderChecks, mistake, right
 
+FORGETTING = """
+def forgetting(joint):
+    def surprise(known):
+        return -(joint * {log}(known / known.sum(0))).sum()
+    return (surprise(joint), surprise({known}))"""
+
 
 class TestTour(GraderChecks):
     exercise = "00_tour"
@@ -528,5 +534,122 @@ def fm_iou(confusion):
     union = np.maximum(cells + confusion.sum(axis=0) - right, 1)
     confusion *= 0
     return (cells / cells.sum() * right / union).sum()""",
+        ),
+        # ---- task 6
+        right(
+            "case by case",
+            task="forgetting",
+            code="""
+def forgetting(joint):
+    both = alone = 0.0
+    for (c, i, j), p in np.ndenumerate(joint):
+        if p > 0:
+            both -= p * np.log(p / joint[:, i, j].sum())
+            alone -= p * np.log(joint[c, :, j].sum() / joint[:, :, j].sum())
+    return both, alone""",
+        ),
+        right(
+            "as differences of entropies",
+            task="forgetting",
+            code="""
+def forgetting(joint):
+    def H(table):
+        return -(table * np.log(np.maximum(table, 1e-300))).sum()
+    return [H(joint) - H(joint.sum(0)), H(joint.sum(1)) - H(joint.sum((0, 1)))]""",
+        ),
+        mistake(
+            "the earlier image alone",
+            task="forgetting",
+            loses=3,
+            says="that is the earlier image alone",
+            code=FORGETTING.format(log="np.log", known="joint.sum(2, keepdims=True)"),
+        ),
+        mistake(
+            "no image at all",
+            task="forgetting",
+            loses=3,
+            says="that uses no image at all",
+            code=FORGETTING.format(log="np.log", known="joint.sum((1, 2), keepdims=True)"),
+        ),
+        mistake(
+            "in bits",
+            task="forgetting",
+            loses=3,
+            says="that is in bits",
+            code=FORGETTING.format(log="np.log2", known="joint.sum(1, keepdims=True)"),
+        ),
+        mistake(
+            "the mean over the cells of the table",
+            task="forgetting",
+            loses=3,
+            says="every case counts as often as it happens",
+            code="""
+def forgetting(joint):
+    seen = joint.sum(1)
+    return -np.log(joint / joint.sum(0)).mean(), -np.log(seen / seen.sum(0)).mean()""",
+        ),
+        mistake(
+            "the surprise at class and image together",
+            task="forgetting",
+            loses=3,
+            says="that is the surprise at class and image together",
+            code="""
+def forgetting(joint):
+    both, alone = joint, joint.sum(1)
+    return -(both * np.log(both)).sum(), -(alone * np.log(alone)).sum()""",
+        ),
+        mistake(
+            "the two swapped",
+            task="forgetting",
+            loses=3,
+            says="the two are swapped",
+            code=FORGETTING.format(log="np.log", known="joint.sum(1, keepdims=True)") + "[::-1]",
+        ),
+        mistake(
+            "the present image in both",
+            task="forgetting",
+            loses=3,
+            says="knowing more can't cost more",
+            code="""
+def forgetting(joint):
+    seen = joint.sum(1)
+    surprise = -(seen * np.log(seen / seen.sum(0))).sum()
+    return surprise, surprise""",
+        ),
+        mistake(
+            "0 log 0",
+            task="forgetting",
+            loses=3,
+            says="what never happens adds nothing",
+            code="""
+def forgetting(joint):
+    seen = joint.sum(1)
+    return -(joint * np.log(joint / joint.sum(0))).sum(), -(seen * np.log(seen / seen.sum(0))).sum()""",
+        ),
+        mistake(
+            "the price alone",
+            task="forgetting",
+            loses=3,
+            says="return two numbers",
+            code="def forgetting(joint):\n    return 0.336",
+        ),
+        mistake(
+            "the answer of the example",
+            task="forgetting",
+            loses=3,
+            says="wrong surprise with the present image alone",
+            code="def forgetting(joint):\n    return 0.2949, 0.6109",
+        ),
+        mistake(
+            "the argument changed",
+            task="forgetting",
+            loses=3,
+            says="changed its argument",
+            code="""
+def forgetting(joint):
+    seen = joint.sum(1)
+    alone = -(seen * np.log(seen / seen.sum(0))).sum()
+    joint /= joint.sum(0)
+    return 0.2949, alone""",
         ),
     )

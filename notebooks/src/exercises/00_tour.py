@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 00: the tour
 #
-# Five small functions, one for each idea that the whole course stands on, and one question to answer in words. About 50 minutes.
+# Six small functions, one for each idea that the whole course stands on, and one question to answer in words. About 60 minutes.
 # The lecture is [00: the tour](../00_tour.ipynb).
 #
 # | task | about | points |
@@ -11,7 +11,8 @@
 # | 3 | from a point to its pixel, equation (1) | 2 + 1 |
 # | 4 | two accuracies that disagree | 3 |
 # | 5 | FmIoU, which also charges for wrong claims | 3 |
-# | 6 | in your own words | 2 |
+# | 6 | the price of a cut edge | 3 |
+# | 7 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -297,7 +298,67 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 6: in your own words (2 points)
+# ## Task 6: the price of a cut edge (3 points)
+#
+# The system cuts the edge from $g_{t-1}$ to $g_t$, so it forgets what the earlier image showed. What does that cost? Take one cell of a street of which
+# everything is known: `joint`, shape `(C, I, J)`, holds P(class, earlier image, present image). There are C classes; the earlier image shows one of I
+# things, the present image one of J. All entries sum to 1. What is impossible has an entry of 0, and perhaps two images never follow each other at all.
+#
+# Complete `forgetting`: it returns two numbers, both **mean surprise** in nats, that is $-\log P(\text{true class} \mid \text{images used})$ averaged over
+# everything that may happen, each case as often as it happens. The first number is for both images, the second for the present image alone. Which of the
+# two is smaller, and can it ever be the other way round?
+
+
+# %% nbgrader={"grade": false, "grade_id": "forgetting", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def forgetting(joint):
+    """Return the mean surprise at the class, in nats: with both images, and with the present one alone."""
+    ### BEGIN SOLUTION
+    happens = joint > 0
+    both = np.log(np.where(happens, joint, 1)) - np.log(np.where(happens, joint.sum(axis=0), 1))
+    seen = joint.sum(axis=1, keepdims=True)
+    present = np.log(np.where(happens, seen, 1)) - np.log(np.where(happens, seen.sum(axis=0), 1))
+    return -(joint * both).sum(), -(joint * present).sum()
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": true, "grade_id": "forgetting-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # Two classes, equally frequent. The earlier image names the right one with 0.9, the present one with 0.7, each by itself.
+    earlier, present = np.array([[0.9, 0.1], [0.1, 0.9]]), np.array([[0.7, 0.3], [0.3, 0.7]])
+    joint = 0.5 * earlier[:, :, None] * present[:, None, :]
+    before = joint.copy()
+    got = answer_array(forgetting(joint), "forgetting")
+    assert got.shape == (2,), f"return two numbers, with both images and with the present one, got {got}"
+    assert np.array_equal(joint, before), "forgetting changed its argument `joint`: make new arrays"
+    both, alone = got
+    slips = {
+        0.8813: "that is in bits: take the natural logarithm",
+        0.3251: "that is the earlier image alone: the system keeps the present one, the last axis",
+        0.6931: "that uses no image at all: condition on what the image shows",
+        1.3040: "that is the surprise at class and image together: divide by the probability of what the image shows",
+        0.7803: "every case counts as often as it happens: weight the surprise by `joint`",
+        0.7: "that is how probable the right class is: surprise is minus its logarithm",
+        0.2949: "the two are swapped: first with both images, then with the present one alone",
+    }
+    for slip, hint in slips.items():
+        assert not np.isclose(alone, slip, atol=1e-3), f"with the present image alone {alone:.3f}: {hint}"
+    by_hand = "-0.7 log 0.7 - 0.3 log 0.3 = 0.611"
+    assert np.isclose(alone, 0.6109, atol=1e-3), f"with the present image alone {alone:.3f}, by hand {by_hand}"
+    assert both < alone, f"both images leave {both:.3f}, one alone {alone:.3f}: knowing more can't cost more on average"
+    by_hand = "P(truth) is 0.95 where both images are right: 0.63 / (0.63 + 0.03)"
+    assert np.isclose(both, 0.2949, atol=1e-3), f"with both images {both:.3f}, expected 0.295: {by_hand}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import tour
+
+    complaint = tour.check_forgetting(forgetting)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 7: in your own words (2 points)
 #
 # Thirty metres ahead, the semantic grid says *road* in a cell that the occupancy grid calls STATIC with probability 0.9. Name two
 # stages of the pipeline that may be to blame, and say for each what you would look at to find out. Then name one dashed edge of the
