@@ -595,7 +595,7 @@ plt.show()
 # that the filter holds occupied: how much of them does it call DYNAMIC?
 
 
-# %% jupyter={"source_hidden": true} alt="P(DYNAMIC) of two cars against time: both begin near zero; the nearer car passes one half after less than a second, the one behind it later"
+# %% jupyter={"source_hidden": true}
 def follow(place):
     """Follow the car at `place`, metres, back from the last frame; return the beliefs (4, cells) on it, first to last.
 
@@ -620,6 +620,7 @@ def dynamic_share(belief):
     return belief[State.DYNAMIC, occupied].mean() if occupied.any() else np.nan
 
 
+# %% jupyter={"source_hidden": true} alt="P(DYNAMIC) of two cars against time: both begin near zero; the nearer car passes one half after less than a second, the one behind it later"
 times = np.array([r.frame.time for r in simulated]) - simulated[0].frame.time
 followed = {ahead: follow((ahead, 7)) for ahead in (7, 14)}
 moving = {ahead: np.array([dynamic_share(b) for b in on_it]) for ahead, (on_it, _) in followed.items()}

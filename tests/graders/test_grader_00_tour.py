@@ -620,7 +620,7 @@ def forgetting(joint):
             "0 log 0",
             task="forgetting",
             loses=3,
-            says="what never happens adds nothing",
+            says="on inputs you haven't seen: NaN or infinity",
             code="""
 def forgetting(joint):
     seen = joint.sum(1)
@@ -637,7 +637,7 @@ def forgetting(joint):
             "the answer of the example",
             task="forgetting",
             loses=3,
-            says="wrong surprise with the present image alone",
+            says="on inputs you haven't seen: wrong surprise",
             code="def forgetting(joint):\n    return 0.2949, 0.6109",
         ),
         mistake(

@@ -188,14 +188,14 @@ for seed, (scan, *places) in enumerate(parks):
     assert users[1] > 0.95 * users[0]
 rows, cols, inside = spec.cells(scan[:, :2])
 lost = scan[inside][(walked & places[0])[rows[inside], cols[inside]], 2]
-print(f"park 3: the returns on bare grass that still count as hits lie {np.median(lost):.1f} m above the road (median)")
+print(f"park 3: the returns on bare grass that still count as hits lie {np.median(lost):.2f} m above the road (median)")
 assert 0.5 < np.median(lost) < 1
 
 # %% [markdown]
 # The flat rule puts a wall where a lawn rises, and hides what is behind it. In three of these four parks the walk
 # removes more than 85 % of the false hits, and it keeps the road users but for a cell or two. In the last park 45 % of
-# the false hits stay. Their returns lie on a bank, half of them more than 0.7 m above the road. The walk has lost this
-# bank: if a fence or a car hides where a bank begins, the first grass behind it may be higher than a step is allowed to
+# the false hits stay. Their returns lie on a bank, half of them some 0.75 m or more above the road. The walk has lost
+# this bank: if a fence or a car hides where a bank begins, the first grass behind it may be higher than a step is allowed to
 # be.
 #
 # ## Ask each cell for its beam
