@@ -48,7 +48,7 @@ from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, State, update
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.planes import sample_planes_naive
-from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, class_legend, colour_legend
+from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, class_legend, colour_patches
 from semgrid_edu.plotting.story import draw_cell_story
 from semgrid_edu.stage_models import ledger, ledger_table, whole_system
 from semgrid_edu.story import cell_story
@@ -428,9 +428,9 @@ assert parts["image"] > 0
 assert parts["occupancy"] > 0
 
 # %% [markdown]
-# Both sensors speak for *car*; the constants, which come from the network's biases and from no sensor, speak for *road*. The parts add up to
-# the difference of the two scores, and by the soft-max $e^\text{difference}$ is the odds of *car* against the runner-up.
-# (A part isn't what would change without this input: lecture 08.) The same for all cells:
+# Both sensors speak for *car*; the constants, which come from the network's biases and from no sensor, speak for *road*.
+# The parts add up to the difference of the two scores, and by the soft-max $e^\text{difference}$ is the odds of *car*
+# against the runner-up. (A part isn't what would change without this input: lecture 08.) The same for all cells:
 
 # %% jupyter={"source_hidden": true} alt="two label maps of the real street: semantic grid, and labels, which have gaps; road in the middle, a row of parked cars, trees and a building on the right"
 truth = grid_truth(now.frame.labels, now.belief.probability, spec)
@@ -576,8 +576,7 @@ for pair, result in zip(axes.reshape(3, 2), shown, strict=True):
     draw(result, pair)
 for ax in axes[1:]:
     ax.set_ylabel("")
-below = {"loc": "upper center", "bbox_to_anchor": (1.1, -0.12), "ncols": 4}
-colour_legend(axes[0], STATE_NAMES, STATE_COLOURS, **below).get_legend().set_in_layout(False)
+fig.legend(handles=colour_patches(STATE_NAMES, STATE_COLOURS), loc="outside lower left", ncols=4, frameon=False)
 class_legend(axes[-1], KITTI_14, np.stack([result.refined.argmax(axis=0) for result in shown]))
 plt.show()
 
@@ -631,11 +630,11 @@ ax.set(xlabel="time since the first scan [s]", ylabel="P(DYNAMIC) on the car", y
 ax.legend(title="in the last frame:")
 plt.show()
 
-# %% jupyter={"source_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 first, second = (times[(moving[ahead] > 0.5).argmax()] for ahead in (7, 14))
 print(f"P(DYNAMIC) passes one half after {first:.1f} s on the nearer car, after {second:.1f} s on the one behind it")
 clear = [np.mean([b[State.FREE].mean() for b in before_it[:10]]) for _, before_it in followed.values()]
-print("P(FREE) on the two metres in front of each, mean of the first second: {:.1f} and {:.1f}".format(*clear))
+print("P(FREE) on the two metres in front of each, mean of the first second: {:.2f} and {:.2f}".format(*clear))
 assert 0.5 < first < 1.1
 assert second > 1.2 * first
 assert clear[0] > 0.9 > 0.65 > clear[1]

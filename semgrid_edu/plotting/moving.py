@@ -142,13 +142,10 @@ def _wheel_legend(ax: Axes) -> Axes:
     """Name the states that keep their colours, and show the wheel below them, with its speeds."""
     still = [state for state in State if state != State.DYNAMIC]
     colour_legend(ax, [STATE_NAMES[s] for s in still], [STATE_COLOURS[s] for s in still])
+    words = f"{STATE_NAMES[State.DYNAMIC]}, by velocity:", "ahead", "left", "back", "right"
+    rings = f"ring {WHEEL_SPEED / 4:.0f} m/s\nrim {WHEEL_SPEED:.0f} m/s"
     name, ahead, left, back, right, speeds = (
-        TextArea(text, textprops={"fontsize": "small"})
-        for text in (
-            f"{STATE_NAMES[State.DYNAMIC]}, by velocity:",
-            *("ahead", "left", "back", "right"),
-            f"ring {WHEEL_SPEED / 4:.0f} m/s\nrim {WHEEL_SPEED:.0f} m/s",
-        )
+        TextArea(text, textprops={"fontsize": "small"}) for text in (*words, rings)
     )
     middle = HPacker(children=[left, OffsetImage(wheel_picture(), zoom=0.55), right], align="center", pad=0, sep=3)
     box = VPacker(children=[name, ahead, middle, back, speeds], align="center", pad=0, sep=3)
