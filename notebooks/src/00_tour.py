@@ -80,6 +80,8 @@ assert story.label == story.refined == story.truth == CAR
 assert story.scan.verdict == "hit"
 assert story.steps["shown"][State.STATIC] > 0.9
 assert (story.history[State.STATIC, 1:] > 0.9).all()
+assert story.pull.messages.argmax() == CAR
+assert story.pull.before[CAR] > 0.99
 
 # %% [markdown]
 # Read it from A to G. You needn't understand any panel yet: the rest of this page explains one after the other.
