@@ -679,8 +679,7 @@ for name in ("road", "sidewalk", "car", "pedestrian", "bicycle"):
     assert (found[1] > found[0]) == (name == "road")
 
 # %% [markdown]
-# The CRF finds a little more of the road, the class with the most cells here, and less of each of the four others. Their
-# cells have many neighbours of another class, and each such neighbour charges its price.
+# The CRF finds a little more of the road and less of each of the four others: lectures 10 and 12 explain why.
 #
 # ## The ledger of cut edges
 #
@@ -697,8 +696,8 @@ Markdown(ledger_table(ledger()))
 
 # %% [markdown]
 # Don't add the numbers up: they have different units, and each toy world was chosen to show its edge. Read the table as
-# a list of questions. Is a beam's coupling of cells expensive on *your* street? One edge you can pay back yourself: `g0 -> g1`,
-# by carrying the classes along from one semantic grid to the next.
+# a list of questions about *your* street. One edge you can pay back yourself: `g0 -> g1`, by carrying the classes along
+# from one semantic grid to the next.
 #
 # ## The registers
 #
