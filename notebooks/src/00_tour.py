@@ -679,7 +679,7 @@ for name in ("road", "sidewalk", "car", "pedestrian", "bicycle"):
     assert (found[1] > found[0]) == (name == "road")
 
 # %% [markdown]
-# The CRF finds a little more of the road and less of each of the four others: lectures 10 and 12 explain why.
+# The CRF finds a little more of the road and less of each of the four others. Lecture 10 counts which classes lose most.
 #
 # ## The ledger of cut edges
 #
