@@ -1,6 +1,7 @@
 """Why does a cell get its class? Every stage's part in the answer, in numbers that add up (paper, Fig. 2).
 
-`cell_story` follows one cell of one frame. `contribution_maps` does the costliest part for all cells at once.
+`cell_story` follows one cell of one frame, and printed it says in words which stage went wrong. `contribution_maps`
+does the costliest part for all cells at once, and `what_if` says what cells would be called with other inputs.
 """
 
 from semgrid_edu.story.cell_evidence import CellScan, ScanMaps, cell_scan, place_history, scan_maps
@@ -13,6 +14,8 @@ from semgrid_edu.story.crf_messages import (
     strongest_neighbours,
     weights_of_cell,
 )
+from semgrid_edu.story.what_if import what_if
+from semgrid_edu.story.words import story_text
 
 __all__ = [
     "CellScan",
@@ -29,6 +32,8 @@ __all__ = [
     "neighbour_pull",
     "place_history",
     "scan_maps",
+    "story_text",
     "strongest_neighbours",
     "weights_of_cell",
+    "what_if",
 ]

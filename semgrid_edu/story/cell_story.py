@@ -19,6 +19,9 @@ from semgrid_edu.planes import plane_pixels
 from semgrid_edu.story.cell_evidence import CellScan, cell_scan, place_history
 from semgrid_edu.story.contributions import Contributions, cell_contributions
 from semgrid_edu.story.crf_messages import NeighbourPull, neighbour_pull
+from semgrid_edu.story.pixel_classes import classes_at
+from semgrid_edu.story.what_if import what_if
+from semgrid_edu.story.words import FAULTS, faults, story_text
 
 FRAMES = 10
 """How many frames a history goes back, the present one included."""
@@ -50,6 +53,8 @@ class CellStory:
         The heights of the planes above the cell, metres.
     pixels, visible : (D, 2) float64, (D,) bool
         Where eq. (1) finds the points of the planes in the frame's image, and whether the camera sees them.
+    pixel_classes, pixel_truth : (D,) int64
+        What the image network calls the pixels at these points, and what they show (`classes_at`).
     label, rival : int
         The class of the semantic grid, and the one that it is compared with: the truth where that is another class,
         otherwise the second most probable one.
@@ -59,8 +64,17 @@ class CellStory:
         What the CRF did.
     truth : int or None
         The true class, where it is known.
+    otherwise : dict of str to int
+        What the cell is called before the CRF when an input is true or gone, see `what_if`.
     names : tuple of str
         The names of the classes.
+
+    Examples
+    --------
+    >>> print(story)                                                                        # doctest: +SKIP
+    Cell (101, 31), 20.2 m ahead and 0.2 m to the left.
+    Called road (71 %), but it is car.
+    The image network went wrong: with the true class at every pixel, and nothing else changed, it would be called car.
     """
 
     cell: tuple[int, int]
@@ -72,18 +86,31 @@ class CellStory:
     heights: NDArray[np.float64]
     pixels: NDArray[np.float64]
     visible: NDArray[np.bool_]
+    pixel_classes: NDArray[np.int64]
+    pixel_truth: NDArray[np.int64]
     label: int
     rival: int
     for_label: Contributions
     for_rival: Contributions
     pull: NeighbourPull
     truth: int | None
+    otherwise: dict[str, int]
     names: tuple[str, ...]
 
     @property
     def refined(self) -> int:
         """The class after the CRF."""
         return int(self.pull.after.argmax())
+
+    @property
+    def fault(self) -> str:
+        """Which stage went wrong, one of `words.FAULTS`, see `words.faults`."""
+        truth = IGNORE if self.truth is None else self.truth
+        return FAULTS[faults(self.label, self.refined, truth, self.otherwise)]
+
+    def __str__(self) -> str:
+        """Tell the story in sentences."""
+        return story_text(self)
 
 
 def cell_story(
@@ -137,6 +164,7 @@ def cell_story(
     label, rival = map(int, label_and_rival(result.grid[:, *cell], IGNORE if truth is None else truth))
     times, history = place_history([*past[max(0, len(past) - FRAMES + 1) :], result], spec, cell)
     pixels, visible = plane_pixels(spec, architecture.heights, result.frame.camera)
+    pixel_classes, pixel_truth = classes_at(result, pixels, visible)
     parts = [cell_contributions(net, result.scores, o, cell, c) for c in (label, rival)]
     params = crf or CrfParams.for_cells(spec.cell)
     return CellStory(
@@ -149,12 +177,15 @@ def cell_story(
         heights=np.array(architecture.heights),
         pixels=pixels[:, *cell],
         visible=visible[:, *cell],
+        pixel_classes=pixel_classes[:, *cell],
+        pixel_truth=pixel_truth[:, *cell],
         label=label,
         rival=rival,
         for_label=parts[0],
         for_rival=parts[1],
         pull=neighbour_pull(result.grid, result.refined, o, cell, params),
         truth=truth,
+        otherwise={change: int(classes[cell]) for change, classes in what_if(result, net).items()},
         names=LABEL_SETS[architecture.label_set].names,
     )
 

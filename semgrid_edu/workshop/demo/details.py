@@ -17,10 +17,13 @@ from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.plotting import STATE_COLOURS
-from semgrid_edu.story import ContributionMaps, contribution_maps, scan_maps
+from semgrid_edu.story import ContributionMaps, contribution_maps, scan_maps, what_if
 from semgrid_edu.story.cell_evidence import VERDICTS
 from semgrid_edu.story.cell_story import label_and_rival
 from semgrid_edu.story.crf_messages import beliefs_before_last_update, neighbour_messages, strongest_neighbours
+from semgrid_edu.story.pixel_classes import classes_at
+from semgrid_edu.story.what_if import CHANGES
+from semgrid_edu.story.words import FAULTS, SENTENCES, faults
 
 STEPS = {"part": 0.1, "reach": 0.5, "distance": 0.1, "pixel": 1 / 32, "message": 0.1}
 """To what the numbers are rounded: parts of a score, metres, pixels, and what neighbours add.
@@ -102,6 +105,7 @@ def frame_details(result: FrameResult, net: SemanticGridNet, truth: NDArray | No
         "states": np.concatenate([states_bytes(states[step]) for step in FILTER_STEPS]),
         **_scan(result, spec),
         "classes": np.stack([*named, known]).astype(np.uint8),
+        **_words(result, net, named, known),
         "after": _bytes(255 * after),
         "strongest": _bytes(np.concatenate([rows + 128, cols + 128, pull / STEPS["message"]])),
     }
@@ -111,6 +115,21 @@ def frame_details(result: FrameResult, net: SemanticGridNet, truth: NDArray | No
         **_parts(contribution_maps(net, result.scores, o), *named[:2]),
     }
     return StoryMaps(alike, smooth)
+
+
+def _words(result: FrameResult, net: SemanticGridNet, named: NDArray, truth: NDArray) -> Maps:
+    """Return what the sentences of each cell are filled with: `CellStory`'s classes of pixels, `otherwise`, `fault`."""
+    architecture, otherwise = net.need_architecture(), what_if(result, net)
+    called, shown = classes_at(result, *plane_pixels(architecture.grid, architecture.heights, result.frame.camera))
+    label, _, refined = named
+    unknown = np.full_like(label, IGNORE)
+    maps = {
+        "called": called,
+        "shown": shown,
+        "otherwise": np.stack([otherwise.get(change, unknown) for change in CHANGES]),
+        "fault": faults(label, refined, truth, otherwise)[None],
+    }
+    return {name: values.astype(np.uint8) for name, values in maps.items()}
 
 
 def states_bytes(probability: NDArray) -> NDArray[np.uint8]:
@@ -225,6 +244,9 @@ def story_data(net: SemanticGridNet, camera: Camera, frame_layout: dict[str, lis
         "names": label_set.names,
         "colours": {"classes": label_set.rgb, "states": STATE_COLOURS},
         "verdicts": VERDICTS,
+        "sentences": SENTENCES,
+        "faults": FAULTS,
+        "changes": CHANGES,
         "steps": STEPS,
         "layout": frame_layout,
         "filter_steps": FILTER_STEPS,

@@ -32,6 +32,15 @@ function cellIn(k) { return anchor === null ? -1 : cellThen(story.grid, frames[k
 // A cell of the road ahead, to begin with.
 function cellAhead() { return Math.floor(0.8 * story.grid.rows) * story.grid.cols + Math.floor(story.grid.cols / 2); }
 
+// Forget the cell that was chosen.
+function clear() {
+  anchor = null;
+  turn++;
+  places.then((everywhere) => mark(-1, everywhere, null));
+  where.textContent = "No cell is chosen.";
+  telling.innerHTML = "<p>No cell is chosen. Click one, or move to a grid with the Tab key and use the arrow keys.</p>";
+}
+
 function choose(cell) { anchor = { frame: shown(), cell }; tell(shown()); }
 
 async function tell(k) {
@@ -39,9 +48,10 @@ async function tell(k) {
   if (anchor === null) return;
   const cell = cellIn(k), everywhere = await places;
   if (mine !== turn) return;
-  mark(cell, everywhere);
+  mark(cell, everywhere, null);
   const read = await readerOf(k);
   if (mine !== turn) return;
+  if (cell >= 0 && read) mark(cell, everywhere, read("called", cell));
   if (cell < 0 || read === null) {
     const away = (frame) => Math.abs(frame.time - frames[k].time);
     const [near] = frames.filter((frame) => frame.details).sort((a, b) => away(a) - away(b));
@@ -69,7 +79,7 @@ async function tell(k) {
 function heading(cell, read) {
   const [, , refined, truth] = read("classes", cell), row = Math.floor(cell / story.grid.cols);
   const known = truth === 255 ? frames[shown()].images.truth ? "Nobody labelled this cell." : "Nobody labelled this frame." : truth === refined ? "This is right." : `The truth is <b>${escaped(story.names[truth])}</b>.`;
-  return `<p><b>${place(centre(story.grid, cell))}</b> (row ${row}, column ${cell % story.grid.cols}): the refined grid says ${swatch(refined)}. ${known}</p>`;
+  return `<p><b>${place(centre(story.grid, cell))}</b> (row ${row}, column ${cell % story.grid.cols}): the refined grid says ${swatch(refined)}. ${known}</p>${sentences(story, read, cell).map((sentence) => `<p>${escaped(sentence)}</p>`).join("")}`;
 }
 
 function swatch(label) { return `<span class="class" style="--swatch:${rgb(story.colours.classes[label])}">${escaped(story.names[label])}</span>`; }
@@ -107,7 +117,8 @@ function partStory(cell, read, label, rival) {
   const heights = story.heights.map((h) => `${h.toFixed(1)} m`), order = of.scores.map((_, i) => i).sort((a, b) => Math.abs(of.scores[b]) - Math.abs(of.scores[a]));
   const often = of.times > 1e6 ? "more than a million" : of.times.toLocaleString("en");
   const byClass = order.slice(0, 8);
-  return `<h3>Why ${escaped(story.names[label])} and not ${escaped(story.names[rival])}?</h3>
+  const before = read("classes", cell)[2] === label ? "Why" : "Before the CRF: why";
+  return `<h3>${before} ${escaped(story.names[label])} and not ${escaped(story.names[rival])}?</h3>
 <p>In the semantic grid ${swatch(label)} is about ${often} times as probable as ${swatch(rival)}: its fused score is higher by ${score.toFixed(1)}. Gradient times input splits this difference:</p>
 ${bars(["image, on the planes", "occupancy", "constants", "sum"], of.totals)}
 <p>The constants are biases and normalisations that the open ReLUs let pass: no input has a share in them. Image and occupancy count in all cells around that the network looks at. A part isn't what would change if its input were missing, and parts that cancel may be much larger than their sum. Below, each table has its own scale.</p>
@@ -135,16 +146,16 @@ function crfStory(cell, read, pulls, [label, rival, refined]) {
 ${pulls ? `<p>They pull most towards ${swatch(refined)} (lines in the refined grid):</p><ol>${near.join("")}</ol>` : "<p>The neighbours are told when the drive is paused.</p>"}`;
 }
 
-// Marks: a square around the cell in every grid, and its points of equation (1) in every image.
-function mark(cell, everywhere) {
+// Marks: a square around the cell in every grid, and its points of equation (1) in every image, in the colours of what their pixels are called.
+function mark(cell, everywhere, called) {
   const { grid } = story, [x, y] = cell < 0 ? [0, 0] : centre(grid, cell);
   for (const group of document.querySelectorAll("[data-marks]")) {
     group.replaceChildren();
     if (cell >= 0) group.append(shape("rect", { class: "mark", x: -y - grid.cell / 2, y: -x - grid.cell / 2, width: grid.cell, height: grid.cell }), shape("circle", { class: "ring", cx: -y, cy: -x, r: 0.4 + 1.2 / Number(zoom.value) }));
   }
   for (const layer of document.querySelectorAll("[data-column]")) {
-    const seen = cell < 0 ? [] : pixels(story, everywhere, cell).filter((point) => point);
-    layer.replaceChildren(...seen.map(([u, v], i) => shape("circle", { cx: u, cy: v, r: story.width / (i ? 260 : 160), class: i ? "point" : "point lowest" })));
+    const seen = cell < 0 ? [] : pixels(story, everywhere, cell).flatMap((point, i) => (point ? [[...point, called ? rgb(story.colours.classes[called[i]]) : ""]] : []));
+    layer.replaceChildren(...seen.map(([u, v, fill], i) => shape("circle", { cx: u, cy: v, r: story.width / (i ? 260 : 160), class: i ? "point" : "point lowest", style: fill && `fill:${fill}` })));
   }
   zoomGrids();
 }
@@ -234,6 +245,7 @@ function cellBelow(svg, event) {
 }
 
 function stepCell(event) {
+  if (event.key === "Escape") return clear();
   const step = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0] }[event.key];
   if (!step || event.altKey || event.ctrlKey || event.metaKey) return;
   event.preventDefault();

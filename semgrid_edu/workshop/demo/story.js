@@ -34,6 +34,33 @@ function parts(story, read, cell) {
   return { planes: scaled(read("planes", cell), 128), scores: scaled(read("scores", cell), 128), occupancy: totals.slice(0, 4), totals: totals.slice(4), times: (digits * 10 ** power) / 10 };
 }
 
+// A sentence of words.toml with the names in braces filled in.
+function filled(sentence, values) { return sentence.replace(/{(\w+)}/g, (_, name) => values[name]); }
+
+// How often each class occurs, the most frequent first: `counted` of words.py.
+function counted(classes, names) {
+  const found = new Map();
+  for (const c of classes) if (c < names.length) found.set(c, (found.get(c) ?? 0) + 1);
+  return [...found].sort(([a, m], [b, n]) => n - m || a - b).map(([c, number]) => `${names[c]} (${number})`).join(", ");
+}
+
+// A cell's story in sentences, without its place and its numbers: `story_text` of words.py.
+function sentences(story, read, cell) {
+  const said = story.sentences, [label, , refined, truth] = read("classes", cell), added = messages(story, read, cell);
+  const otherwise = Object.fromEntries(story.changes.map((change, i) => [change, story.names[read("otherwise", cell)[i]]]));
+  const names = { label: story.names[label], refined: story.names[refined], truth: story.names[truth] };
+  const weights = { for_refined: added[2].toFixed(1), for_truth: added[truth === label ? 0 : 1].toFixed(1) };
+  const called = read("called", cell), seen = called.filter((c) => c !== 255), shows = counted(read("shown", cell), story.names);
+  const heights = [story.heights[0], story.heights.at(-1)].map((height) => height.toFixed(1));
+  const points = { points: called.length, lowest: heights[0], highest: heights[1], seen: seen.length, says: counted(seen, story.names) };
+  const image = filled(seen.length ? said.image.some : said.image.none, points);
+  return [
+    filled(said.fault[story.faults[read("fault", cell)[0]]], { ...names, ...weights, all_true: otherwise["both true"] }),
+    seen.length && shows ? `${image} ${filled(said.image.shown, { shows })}` : image,
+    filled(said.otherwise.removed, { no_image: otherwise["no image"], no_occupancy: otherwise["no occupancy"] }),
+  ].filter((sentence) => sentence);
+}
+
 // What the neighbours add for label, rival and refined class.
 function messages(story, read, cell) { return read("messages", cell).map((byte) => byte * story.steps.message); }
 
