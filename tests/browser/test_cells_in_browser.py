@@ -93,7 +93,7 @@ class TestMarks:
     CELL = (100, 24)
 
     def test_the_raster_lies_between_the_axes(self, shipped, grid):
-        page = shipped()
+        page = shipped("#0")
         svg = page.locator(f"svg[data-grid={grid}]")
         raster, border = svg.locator("[data-image]").bounding_box(), svg.locator(".frame").bounding_box()
         assert raster == pytest.approx(border, abs=1)
@@ -124,7 +124,7 @@ def turn(yaw):
 
 class TestChosenCells:
     def test_without_a_cell_the_keys_begin_on_the_road_ahead(self, shipped):
-        page = shipped()
+        page = shipped("#0")
         page.locator("svg[data-grid=grid]").focus()
         page.keyboard.press("ArrowUp")
         page.locator("#telling h3").first.wait_for()
@@ -149,8 +149,17 @@ class TestChosenCells:
         assert page.locator(".mark").count() == 0
         assert page.locator("#slider").input_value() == "3"
 
+    def test_without_an_address_it_begins_with_a_mistake_and_escape_leaves_it(self, shipped):
+        page = shipped("")
+        page.locator("#telling", has_text="went wrong").wait_for()
+        assert page.locator("svg[data-grid=grid] .mark").count() == 1
+        page.locator("svg[data-grid=grid]").focus()
+        page.keyboard.press("Escape")
+        page.locator("#telling", has_text="No cell is chosen").wait_for()
+        assert page.locator(".mark").count() == 0
+
     def test_a_click_beside_the_map_chooses_nothing(self, shipped):
-        page = shipped()
+        page = shipped("#0")
         x, y = point_at(page, "grid", (70, 0))
         page.mouse.click(x - 20, y)
         page.wait_for_timeout(200)
@@ -192,7 +201,11 @@ class TestStory:
         assert ("This is right." if right else f"The truth is {story.names[story.truth]}.") in heading.inner_text()
         assert page.locator("#where").text_content().endswith(f": {story.names[story.refined]}.")
         why = page.locator("#telling h3", has_text="and not")
-        assert why.inner_text() == f"Why {story.names[story.label]} and not {story.names[story.rival]}?"
+        begins = "Why" if story.refined == story.label else "Before the CRF: why"
+        assert why.inner_text() == f"{begins} {story.names[story.label]} and not {story.names[story.rival]}?"
+        sentences = page.locator("#telling > p").all_inner_texts()
+        lines = str(story).splitlines()
+        assert set(sentences) >= {line for line in lines[2:-1] if not line.startswith("LIDAR")}
 
     def test_what_the_scan_says(self, shipped, cells, stories, name):
         page, scan = shipped(f"#{FRAME}"), stories[name].scan
@@ -347,7 +360,7 @@ class TestZoom:
         click(page, "refined", (self.CELL[0] + 5, self.CELL[1] - 4))
 
     def test_without_a_cell_the_road_ahead_is_in_view(self, shipped, factor):
-        page = shipped()
+        page = shipped("#0")
         page.locator("#zoom").select_option(str(factor))
         click(page, "grid", (115, 31))
 

@@ -279,5 +279,15 @@ function followCell() {
   const { rows, cols } = story.grid, [, row, col] = location.hash.slice(1).split("/").map((part) => parseInt(part, 10));
   if (row >= 0 && row < rows && col >= 0 && col < cols) choose(row * cols + col);
 }
+// Without a cell in the address, begin with the nearest one, from 5 m on, in which a stage went wrong and the camera sees all points.
+async function begin() {
+  const read = await readerOf(shown());
+  if (read === null || anchor !== null) return;
+  const far = (cell) => Math.hypot(...centre(story.grid, cell)), right = ["none", "mended"].map((name) => story.faults.indexOf(name));
+  const cells = Array.from({ length: story.grid.rows * story.grid.cols }, (_, cell) => cell).filter((cell) => far(cell) >= 5);
+  const wrong = cells.filter((cell) => !right.includes(read("fault", cell)[0]) && !read("called", cell).includes(255));
+  if (wrong.length) choose(wrong.reduce((one, other) => (far(other) < far(one) ? other : one)));
+}
 window.addEventListener("hashchange", followCell);
 followCell();
+if (location.hash === "") begin();
