@@ -145,7 +145,7 @@ def test_the_house_stays_small():
         storey = "workshop" if module.startswith(("workshop/", "__main__")) else "book"
         modules[storey] += not module.endswith("__init__.py")
         lines[storey] += code_lines(module)
-    assert modules["book"] <= 172
+    assert modules["book"] <= 173
     assert modules["workshop"] <= 127
     assert lines["book"] <= 12_310
     assert lines["workshop"] <= 10_890
