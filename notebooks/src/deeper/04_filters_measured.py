@@ -37,6 +37,8 @@ from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 params, near = CmcdotParams(), GridSpec(x_min=0, x_max=40, y_min=-12, y_max=12, cell=0.5)
+assert round(sum(params.rates[DYNAMIC]), 6) == 0.7
+assert round(np.exp(-0.7), 1) == 0.5  # what is left of what moves after a second unseen
 
 # %% [markdown]
 # ## Three ways to move a map
@@ -320,10 +322,6 @@ def time_to_notice(stood, speed):
 def crosser(t):
     """A car that crosses from right to left at 5 m/s, 22 m ahead."""
     return Box.around(22, -14 + 5 * t, 1.8, 4, 1.5)
-
-
-assert round(sum(params.rates[DYNAMIC]), 6) == 0.7
-assert round(np.exp(-0.7), 1) == 0.5
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true, "outputs_hidden": true}
