@@ -59,7 +59,8 @@ def separated(parents, a, b, given=()):
 """
 
 ELIMINATE = """
-def eliminate(factors, order):
+def eliminate(factors, order, seen):
+    factors = [f.given(**{n: s for n, s in seen.items() if n in f.names}) for f in factors]
     largest = 0
     for name in order:
         touching = [f for f in factors if name in f.names]
@@ -704,7 +705,8 @@ from functools import reduce
 from semgrid_edu.graphical import product
 
 
-def eliminate(factors, order):
+def eliminate(factors, order, seen):
+    factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     sizes = []
     for name in order:
         without = [f for f in factors if name not in f.names]
@@ -721,15 +723,15 @@ from semgrid_edu.graphical import GraphicalModel
 from semgrid_edu.graphical import eliminate as exact
 
 
-def eliminate(factors, order):
+def eliminate(factors, order, seen):
     model = GraphicalModel(factors)
-    left = [name for name in model.names if name not in order]
-    scopes, largest = [set(f.names) for f in factors], 0
+    left = [name for name in model.names if name not in order and name not in seen]
+    scopes, largest = [set(f.names) - set(seen) for f in factors], 0
     for name in order:
         together = set().union(*(s for s in scopes if name in s))
         largest = max(largest, int(np.prod([model.cardinalities[n] for n in together])))
         scopes = [s for s in scopes if name not in s] + [together - {name}]
-    return exact(model, left, order=order), largest""",
+    return exact(model, left, seen, order=order), largest""",
         ),
         right(
             "recursion",
@@ -738,7 +740,8 @@ def eliminate(factors, order):
 from functools import reduce
 
 
-def eliminate(factors, order):
+def eliminate(factors, order, seen=()):
+    factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     if not order:
         return reduce(Factor.__mul__, factors), 0
     name, *rest = order
@@ -766,7 +769,8 @@ def eliminate(factors, order):
             loses=1,
             says="you multiplied all factors first",
             code="""
-def eliminate(factors, order):
+def eliminate(factors, order, seen):
+    factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     together = factors[0]
     for f in factors[1:]:
         together = together * f
@@ -831,7 +835,8 @@ def eliminate(factors, order):
             loses=3,
             says="multiply first, then sum",
             code="""
-def eliminate(factors, order):
+def eliminate(factors, order, seen):
+    factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     largest = 0
     for name in order:
         touching = [f for f in factors if name in f.names]
@@ -881,6 +886,46 @@ def eliminate(factors, order):
             loses=2,
             says="on inputs you haven't seen: wrong result",
             code=ELIMINATE.replace("result = factors[0]\n", "result = factors[-1]\n    return result, largest\n"),
+        ),
+        mistake(
+            "the companion's function, pasted",
+            task="eliminate",
+            loses=3,
+            says="takes 2 positional arguments",
+            code="""
+from functools import reduce
+
+from semgrid_edu.graphical import product
+
+
+def eliminate(factors, order):
+    entries = []
+    for name in order:
+        together = reduce(Factor.__mul__, [f for f in factors if name in f.names])
+        entries.append(together.table.size)
+        factors = [f for f in factors if name not in f.names] + [together.sum(name)]
+    return product(factors), max(entries)""",
+        ),
+        mistake(
+            "what is seen is ignored",
+            task="eliminate",
+            loses=3,
+            says="then it has no axis any more",
+            code=ELIMINATE.replace("seen.items()", "()"),
+        ),
+        mistake(
+            "what is seen is summed out",
+            task="eliminate",
+            loses=3,
+            says="you summed m2 out",
+            code=ELIMINATE.replace("seen.items()", "()").replace("in order:", "in [*order, *seen]:"),
+        ),
+        mistake(
+            "always state 0",
+            task="eliminate",
+            loses=2,
+            says="slice at the state that was seen",
+            code=ELIMINATE.replace("{n: s for", "{n: 0 for"),
         ),
         # ---- task 5
         right(

@@ -178,14 +178,22 @@ def _ring() -> list[Factor]:
 
 @hidden
 def check_eliminate(eliminate: Callable) -> None:
-    """Several variables left, one of them without neighbours, and several orders."""
+    """Several variables left, one of them without neighbours, several orders, and none to two variables seen."""
     factors = _ring()
-    for order in (["c", "e", "b"], ["b", "e", "d"], ["a", "b", "c", "e"], ["e"]):
-        result = eliminate(list(factors), list(order))
+    for order, seen in (
+        (["c", "e", "b"], {}),
+        (["b", "e", "d"], {}),
+        (["a", "b", "c", "e"], {}),
+        (["e"], {}),
+        (["c", "e"], {"b": 2}),
+        (["e", "a"], {"d": 3, "c": 0}),
+        (["a", "c"], {"e": 1}),
+    ):
+        result = eliminate(list(factors), list(order), dict(seen))
         result = result[0] if isinstance(result, tuple | list) else result
-        left = [name for name in STATES if name not in order]
+        left = [name for name in STATES if name not in order and name not in seen]
         assert sorted(result.names) == sorted(left), f"wrong variables are left, where {len(left)} should be"
-        got, expected = result.ordered(*left).table, eliminate_exactly(GraphicalModel(factors), left).table
+        got, expected = result.ordered(*left).table, eliminate_exactly(GraphicalModel(factors), left, seen).table
         same_shares = close(got / got.sum(), expected / expected.sum())
         assert close(got.sum(), expected.sum()) or not same_shares, (
             "right up to a factor: don't normalise, and keep the number that a variable without neighbours leaves"
@@ -195,9 +203,15 @@ def check_eliminate(eliminate: Callable) -> None:
 
 @hidden
 def check_cost(eliminate: Callable) -> None:
-    """Two to four states, and several orders."""
-    for order, right in ((["c", "e", "b"], 24), (["b", "e", "d"], 16), (["e"], 3), (["a", "b", "c", "e"], 24)):
-        largest = eliminate(_ring(), list(order))[1]
+    """Two to four states, several orders, and what is seen."""
+    for order, seen, right in (
+        (["c", "e", "b"], {}, 24),
+        (["b", "e", "d"], {}, 16),
+        (["e"], {}, 3),
+        (["a", "b", "c", "e"], {}, 24),
+        (["b", "e", "c"], {"a": 1}, 8),
+    ):
+        largest = eliminate(_ring(), list(order), dict(seen))[1]
         assert largest == right, (
             "wrong size of the largest table, for variables of two to four states: count the entries of the tables "
             "from which a variable is summed out, not of what is left"

@@ -10,7 +10,7 @@
 # | 1 | divide two tables with named axes | 1 + 1 |
 # | 2 | what is seen: slice, sum out, normalise | 2 + 1 |
 # | 3 | independence read off a graph | 2 + 2 |
-# | 4 | eliminate in a given order, and say what it costs | 2 + 1 |
+# | 4 | eliminate what isn't seen, in a given order, and say what it costs | 2 + 1 |
 # | 5 | messages forward and backward: filtering and smoothing | 2 + 2 |
 # | 6 | in your own words | 2 |
 #
@@ -324,16 +324,18 @@ _test()
 #
 # From here on factors are the package's: `f.names`, `f.table`, the product `f * g`, and `f.sum("x")`, the factor without x.
 #
-# Complete `eliminate`. `factors` is a list of `Factor`s, `order` the names of variables to sum out, one after the other in this order. For each, multiply only those factors
-# that contain it, then sum it out. Return two things: the product of all that is left in the end, as a `Factor`, not normalised; and the number of entries of the
-# largest table from which a variable was summed out. At least one variable is left in the end. Two points are for the factor, one for the size.
+# Complete `eliminate`. `factors` is a list of `Factor`s; `seen` says what is known, such as `{"z": 1}`, or nothing, `{}`; `order` holds the names of variables to sum out,
+# one after the other in this order. First slice each factor at what is known (`f.given(z=1)` does it; it refuses a variable that `f` doesn't have). Then, for each name in `order`,
+# multiply only those factors that contain it, and sum it out. Return two things: the product of all that is left in the end, as a `Factor`, not normalised; and the number of
+# entries of the largest table from which a variable was summed out. At least one variable is left in the end. Two points are for the factor, one for the size.
 
 
 # %% nbgrader={"grade": false, "grade_id": "eliminate", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def eliminate(factors, order):
-    """Return the Factor over the variables that aren't in `order`, and the entries of the largest table."""
+def eliminate(factors, order, seen):
+    """Return the Factor over the variables that are neither seen nor in `order`, and the entries of the largest table."""
     ### BEGIN SOLUTION
-    factors, largest = list(factors), 0
+    factors = [factor.given(**{name: seen[name] for name in factor.names if name in seen}) for factor in factors]
+    largest = 0
     for name in order:
         together = Factor((), 1.0)
         for factor in factors:
@@ -357,7 +359,7 @@ _STAR = (Factor("street", [0.5, 0.5]), *(Factor(("street", cell), _SEEN) for cel
 
 # %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"])
+    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"], {})
     assert got is not None, "eliminate returned nothing: did you forget `return`?"
     result = got[0] if isinstance(got, tuple | list) else got
     assert isinstance(result, Factor), f"the first thing must be a Factor, got {type(result).__name__}"
@@ -372,7 +374,19 @@ def _test():
         result.table, [0.75, 0.25], atol=1e-9, err_msg="P(m1): the mean of 0.9, 0.1 and 0.6, 0.4"
     )
 
-    got = eliminate(list(_ROW), ["m2"])
+    got = eliminate(list(_STAR), ["m3", "m4", "street"], {"m2": 1})
+    result = got[0] if isinstance(got, tuple | list) else got
+    assert "m2" not in result.names, "m2 is seen: slice the factors at its state, then it has no axis any more"
+    slips = {
+        (0.75, 0.25): "you summed m2 out: it is known, so slice at its state",
+        (0.585, 0.165): "that is for m2 = 0: slice at the state that was seen",
+        (0.66, 0.34): "you divided by the sum, P(m2 = 1) = 0.25: don't normalise",
+    }
+    _explain(result.table, slips)
+    by_hand = "P(m1, m2 = 1): 0.05 * 0.9 + 0.2 * 0.6 and 0.05 * 0.1 + 0.2 * 0.4"
+    np.testing.assert_allclose(result.table, [0.165, 0.085], atol=1e-9, err_msg=by_hand)
+
+    got = eliminate(list(_ROW), ["m2"], {})
     result = got[0] if isinstance(got, tuple | list) else got
     assert sorted(result.names) == ["m1", "m3"], f"m1 and m3 are left, your result is over {result.names}"
     total = result.table.sum()
@@ -391,7 +405,7 @@ _test()
 
 # %% nbgrader={"grade": true, "grade_id": "eliminate-cost-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"])
+    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"], {})
     assert isinstance(got, tuple | list), f"return two things, the factor and the size, got one {type(got).__name__}"
     costs = {
         32: "you multiplied all factors first: of each variable only those that contain it",
@@ -399,7 +413,7 @@ def _test():
         16: "that is the sum of all sizes: the largest counts",
     }
     assert got[1] == 4, f"largest {got[1]}: {costs.get(got[1], 'each product here has two axes of two states')}"
-    largest = eliminate(list(_STAR), ["street", "m2", "m3", "m4"])[1]
+    largest = eliminate(list(_STAR), ["street", "m2", "m3", "m4"], {})[1]
     costs = {
         16: "count before the variable is summed out: with the street the product still has five axes",
         4: "street comes first in this order: keep to `order`, and keep the largest, not the last",
@@ -409,7 +423,9 @@ def _test():
     assert largest == 32, (
         f"largest {largest}: {costs.get(largest, 'street links all four cells: five axes, 32 entries')}"
     )
-    largest = eliminate(list(_ROW), ["m2"])[1]
+    largest = eliminate(list(_STAR), ["street", "m3", "m4"], {"m2": 1})[1]
+    assert largest == 16, f"largest {largest}: m2 is seen, so it has no axis: the street, m1, m3, m4, 16 entries"
+    largest = eliminate(list(_ROW), ["m2"], {})[1]
     assert largest == 8, f"largest {largest}: the product over m1, m2, m3 has 8 entries before m2 is summed out"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
