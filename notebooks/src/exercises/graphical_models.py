@@ -355,6 +355,12 @@ _AGREE = [[3.0, 1.0], [1.0, 3.0]]
 _ROW = (Factor(("m1", "m2"), _AGREE), Factor(("m2", "m3"), _AGREE))
 _SEEN = [[0.9, 0.1], [0.6, 0.4]]
 _STAR = (Factor("street", [0.5, 0.5]), *(Factor(("street", cell), _SEEN) for cell in ("m1", "m2", "m3", "m4")))
+_SEEN_SLIPS = {
+    (0.75, 0.25): "you summed m2 out: it is known, so slice at its state",
+    (0.585, 0.165): "that is for m2 = 0: slice at the state that was seen",
+    (0.66, 0.34): "you divided by the sum, P(m2 = 1) = 0.25: don't normalise",
+}
+_SEEN_BY_HAND = "P(m1, m2 = 1): 0.05 * 0.9 + 0.2 * 0.6 and 0.05 * 0.1 + 0.2 * 0.4"
 
 
 # %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
@@ -377,14 +383,8 @@ def _test():
     got = eliminate(list(_STAR), ["m3", "m4", "street"], {"m2": 1})
     result = got[0] if isinstance(got, tuple | list) else got
     assert "m2" not in result.names, "m2 is seen: slice the factors at its state, then it has no axis any more"
-    slips = {
-        (0.75, 0.25): "you summed m2 out: it is known, so slice at its state",
-        (0.585, 0.165): "that is for m2 = 0: slice at the state that was seen",
-        (0.66, 0.34): "you divided by the sum, P(m2 = 1) = 0.25: don't normalise",
-    }
-    _explain(result.table, slips)
-    by_hand = "P(m1, m2 = 1): 0.05 * 0.9 + 0.2 * 0.6 and 0.05 * 0.1 + 0.2 * 0.4"
-    np.testing.assert_allclose(result.table, [0.165, 0.085], atol=1e-9, err_msg=by_hand)
+    _explain(result.table, _SEEN_SLIPS)
+    np.testing.assert_allclose(result.table, [0.165, 0.085], atol=1e-9, err_msg=_SEEN_BY_HAND)
 
     got = eliminate(list(_ROW), ["m2"], {})
     result = got[0] if isinstance(got, tuple | list) else got
