@@ -62,7 +62,7 @@ def antecedent(row, col, velocity, dt, cell):
             "time forgotten",
             task="antecedent",
             loses=2,
-            says="velocity times dt is the way",
+            says="the distance covered is velocity times dt",
             code="""
 def antecedent(row, col, velocity, dt, cell):
     return row + round(velocity[0] / cell), col + round(velocity[1] / cell)""",

@@ -59,7 +59,8 @@ def separated(parents, a, b, given=()):
 """
 
 ELIMINATE = """
-def eliminate(factors, order):
+def eliminate(factors, order, seen):
+    factors = [f.given(**{n: s for n, s in seen.items() if n in f.names}) for f in factors]
     largest = 0
     for name in order:
         touching = [f for f in factors if name in f.names]
@@ -101,8 +102,8 @@ class TestGraphicalModels(GraderChecks):
     entries = (
         # ---- task 1
         right(
-            "broadcasting, axes by name",
-            task="multiply",
+            "broadcasting, axes by name, zeros put back",
+            task="divide",
             code="""
 def spread(names, factor):
     own, table = factor
@@ -110,184 +111,165 @@ def spread(names, factor):
     return table[tuple(slice(None) if name in own else None for name in names)]
 
 
-def multiply(f, g):
-    names = tuple(dict.fromkeys(f[0] + g[0]))
-    return names, spread(names, f) * spread(names, g)""",
+def divide(f, g):
+    return f[0], np.nan_to_num(f[1] / spread(f[0], g), nan=0.0)""",
         ),
         right(
             "a loop over all states, names sorted",
-            task="multiply",
+            task="divide",
             code="""
-def multiply(f, g):
-    states = dict(zip(f[0], f[1].shape)) | dict(zip(g[0], g[1].shape))
+def divide(f, g):
+    states = dict(zip(f[0], f[1].shape))
     names = tuple(sorted(states))
     table = np.zeros([states[name] for name in names])
     for index in np.ndindex(table.shape):
         at = dict(zip(names, index))
-        table[index] = f[1][tuple(at[n] for n in f[0])] * g[1][tuple(at[n] for n in g[0])]
+        below = g[1][tuple(at[n] for n in g[0])]
+        if below:
+            table[index] = f[1][tuple(at[n] for n in f[0])] / below
     return names, table""",
         ),
         right(
-            "the package's factors, returned as a list",
-            task="multiply",
-            code="""
-def multiply(f, g):
-    both = Factor(*f) * Factor(*g)
-    return [both.names, both.table]""",
-        ),
-        right(
-            "lists, and helpers with everyday names",
-            task="multiply",
+            "the package's product with the inverse, returned as lists",
+            task="divide",
             code="""
 before, got, slips, table, cases, street = "tests", "may", "have", "these", "names", "too"
 
 
-def read(f, names):
-    states = dict(zip(f[0], np.shape(f[1])))
-    return np.transpose(f[1], [f[0].index(n) for n in names if n in states]), [states.get(n, 1) for n in names]
-
-
-def multiply(f, g):
-    names = sorted({*f[0], *g[0]})
-    (f, f_shape), (g, g_shape) = read(f, names), read(g, names)
-    return names, (f.reshape(f_shape) * g.reshape(g_shape)).tolist()""",
+def divide(f, g):
+    inverse = np.array([1 / x if x else 0 for x in np.ravel(g[1])]).reshape(np.shape(g[1]))
+    both = Factor(*f) * Factor(g[0], inverse)
+    return [list(both.names), both.table.tolist()]""",
+        ),
+        mistake(
+            "the companion's product, pasted",
+            task="divide",
+            loses=2,
+            says="you multiplied: a quotient divides",
+            code="""
+def divide(f, g):
+    both = Factor(*f) * Factor(*g)
+    return both.names, both.table""",
         ),
         mistake(
             "rows of different lengths",
-            task="multiply",
+            task="divide",
             loses=2,
-            says="for the table multiply returned no array of numbers",
-            code="def multiply(f, g):\n    return [*f[0], *(n for n in g[0] if n not in f[0])], [[1.0], [2.0, 3.0]]",
+            says="for the table divide returned no array of numbers",
+            code="def divide(f, g):\n    return f[0], [[1.0], [2.0, 3.0]]",
         ),
         mistake(
             "numpy broadcasts by place",
-            task="multiply",
+            task="divide",
             loses=2,
             says="line the axes up by name",
             code="""
-def multiply(f, g):
-    return (g[0] if len(g[0]) > len(f[0]) else f[0]), (f[1] * g[1].T).T""",
+def divide(f, g):
+    return f[0], np.nan_to_num(f[1] / g[1], nan=0.0)""",
         ),
         mistake(
-            "outer product: the shared variable twice",
-            task="multiply",
+            "upside down",
+            task="divide",
             loses=2,
-            says="a variable that both factors have is one axis",
+            says="divide f by g",
             code="""
-def multiply(f, g):
-    return f[0] + g[0], np.multiply.outer(f[1], g[1])""",
-        ),
-        mistake(
-            "the shared variable summed out",
-            task="multiply",
-            loses=2,
-            says="a product keeps every variable",
-            code="""
-def multiply(f, g):
-    shared = [name for name in f[0] if name in g[0]]
-    names = tuple(name for name in f[0] + g[0] if name not in shared)
-    axes = [f[0].index(n) for n in shared], [g[0].index(n) for n in shared]
-    return names, np.tensordot(f[1], g[1], axes)""",
-        ),
-        mistake(
-            "added",
-            task="multiply",
-            loses=2,
-            says="a product multiplies",
-            code="""
-def multiply(f, g):
-    both = Factor(*f) * Factor(*g)
-    ones = Factor(f[0], np.ones(f[1].shape)), Factor(g[0], np.ones(g[1].shape))
-    return both.names, (Factor(*f) * ones[1]).table + (ones[0] * Factor(*g)).table""",
+def divide(f, g):
+    both = Factor(f[0], 1 / f[1]) * Factor(*g)
+    return both.names, both.table""",
         ),
         mistake(
             "normalised",
-            task="multiply",
+            task="divide",
             loses=2,
-            says="a product isn't normalised",
+            says="a quotient isn't normalised",
             code="""
-def multiply(f, g):
-    both = (Factor(*f) * Factor(*g)).normalised()
+def divide(f, g):
+    both = (Factor(*f) * Factor(g[0], 1 / np.maximum(g[1], 1e-300))).normalised()
     return both.names, both.table""",
         ),
         mistake(
             "g's axes taken in f's order",
-            task="multiply",
+            task="divide",
             loses=1,
             says="the axes of g stand the other way round",
             code="""
-def multiply(f, g):
+def divide(f, g):
+    inverse = np.divide(1, g[1], out=np.zeros(np.shape(g[1])), where=np.asarray(g[1]) > 0)
     if sorted(f[0]) == sorted(g[0]):
-        return f[0], f[1] * g[1]
-    both = Factor(*f) * Factor(*g)
+        return f[0], f[1] * inverse
+    both = Factor(*f) * Factor(g[0], inverse)
     return both.names, both.table""",
         ),
         mistake(
+            "0 / 0 left as it is",
+            task="divide",
+            loses=1,
+            says="the quotient is 0 there",
+            code="""
+def divide(f, g):
+    shared = [name for name in f[0] if name in g[0]]
+    below = np.transpose(g[1], [g[0].index(name) for name in shared])
+    return f[0], f[1] / below[tuple(slice(None) if name in shared else None for name in f[0])]""",
+        ),
+        mistake(
             "names don't fit the table",
-            task="multiply",
+            task="divide",
             loses=2,
             says="right numbers, wrong names",
             code="""
-def multiply(f, g):
-    both = Factor(*f) * Factor(*g)
+def divide(f, g):
+    both = Factor(*f) * Factor(g[0], 1 / np.maximum(g[1], 1e-300))
     return tuple(sorted(both.names, reverse=True)), both.table""",
         ),
         mistake(
             "in place",
-            task="multiply",
-            loses=1,
-            says="multiply changed the table of `g`",
+            task="divide",
+            loses=2,
+            says="divide changed the table of `f`",
             code="""
-def multiply(f, g):
-    if len(f[0]) == 1 and f[0][0] in g[0]:
-        table = np.moveaxis(g[1], g[0].index(f[0][0]), -1)
-        table *= f[1]
-        return g[0], g[1]
-    both = Factor(*f) * Factor(*g)
-    return both.names, both.table""",
+def divide(f, g):
+    table = np.moveaxis(f[1], f[0].index(g[0][0]), -1)
+    table /= g[1]
+    return f[0], f[1]""",
         ),
         mistake(
-            "an argument changed where two variables are shared",
-            task="multiply",
+            "an argument changed where several variables are shared",
+            task="divide",
             loses=1,
             says="it changed a table that it was given",
             code="""
-def multiply(f, g):
-    both = Factor(*f) * Factor(*g)
-    if len(f[0]) > 1 and both.names == f[0]:
-        f[1][...] = both.table
+def divide(f, g):
+    inverse = np.divide(1, g[1], out=np.zeros(np.shape(g[1])), where=np.asarray(g[1]) > 0)
+    both = Factor(*f) * Factor(g[0], inverse)
+    if len(g[0]) == 2:
+        f[1][...] = 0
     return both.names, both.table""",
         ),
         mistake(
             "nothing returned",
-            task="multiply",
+            task="divide",
             loses=2,
             says="did you forget `return`?",
-            code="""
-def multiply(f, g):
-    both = Factor(*f) * Factor(*g)
-    (both.names, both.table)""",
+            code="def divide(f, g):\n    (f[0], f[1])",
         ),
         mistake(
-            "at most one shared variable, at most two axes",
-            task="multiply",
+            "at most two axes",
+            task="divide",
             loses=2,
             says="on inputs you haven't seen",
             code="""
-def multiply(f, g):
-    if len(f[0]) > len(g[0]):
-        f, g = g, f
-    if len(f[0]) == 1:
-        return g[0], (g[1] * f[1] if g[0][-1] == f[0][0] else (g[1].T * f[1]).T)
-    return f[0], f[1] * g[1].T""",
+def divide(f, g):
+    if len(g[0]) == 1:
+        return f[0], (f[1].T / g[1]).T if f[0][0] == g[0][0] else f[1] / g[1]
+    return f[0], np.nan_to_num(f[1] / g[1].T, nan=0.0)""",
         ),
         mistake(
             "an endless loop",
-            task="multiply",
+            task="divide",
             loses=2,
             says="before timeout",
             code="""
-def multiply(f, g):
+def divide(f, g):
     while True:
         pass""",
         ),
@@ -723,7 +705,8 @@ from functools import reduce
 from semgrid_edu.graphical import product
 
 
-def eliminate(factors, order):
+def eliminate(factors, order, seen):
+    factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     sizes = []
     for name in order:
         without = [f for f in factors if name not in f.names]
@@ -740,15 +723,15 @@ from semgrid_edu.graphical import GraphicalModel
 from semgrid_edu.graphical import eliminate as exact
 
 
-def eliminate(factors, order):
+def eliminate(factors, order, seen):
     model = GraphicalModel(factors)
-    left = [name for name in model.names if name not in order]
-    scopes, largest = [set(f.names) for f in factors], 0
+    left = [name for name in model.names if name not in order and name not in seen]
+    scopes, largest = [set(f.names) - set(seen) for f in factors], 0
     for name in order:
         together = set().union(*(s for s in scopes if name in s))
         largest = max(largest, int(np.prod([model.cardinalities[n] for n in together])))
         scopes = [s for s in scopes if name not in s] + [together - {name}]
-    return exact(model, left, order=order), largest""",
+    return exact(model, left, seen, order=order), largest""",
         ),
         right(
             "recursion",
@@ -757,7 +740,8 @@ def eliminate(factors, order):
 from functools import reduce
 
 
-def eliminate(factors, order):
+def eliminate(factors, order, seen=()):
+    factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     if not order:
         return reduce(Factor.__mul__, factors), 0
     name, *rest = order
@@ -785,7 +769,8 @@ def eliminate(factors, order):
             loses=1,
             says="you multiplied all factors first",
             code="""
-def eliminate(factors, order):
+def eliminate(factors, order, seen):
+    factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     together = factors[0]
     for f in factors[1:]:
         together = together * f
@@ -850,7 +835,8 @@ def eliminate(factors, order):
             loses=3,
             says="multiply first, then sum",
             code="""
-def eliminate(factors, order):
+def eliminate(factors, order, seen):
+    factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     largest = 0
     for name in order:
         touching = [f for f in factors if name in f.names]
@@ -900,6 +886,46 @@ def eliminate(factors, order):
             loses=2,
             says="on inputs you haven't seen: wrong result",
             code=ELIMINATE.replace("result = factors[0]\n", "result = factors[-1]\n    return result, largest\n"),
+        ),
+        mistake(
+            "the companion's function, pasted",
+            task="eliminate",
+            loses=3,
+            says="takes 2 positional arguments",
+            code="""
+from functools import reduce
+
+from semgrid_edu.graphical import product
+
+
+def eliminate(factors, order):
+    entries = []
+    for name in order:
+        together = reduce(Factor.__mul__, [f for f in factors if name in f.names])
+        entries.append(together.table.size)
+        factors = [f for f in factors if name not in f.names] + [together.sum(name)]
+    return product(factors), max(entries)""",
+        ),
+        mistake(
+            "what is seen is ignored",
+            task="eliminate",
+            loses=3,
+            says="then it has no axis any more",
+            code=ELIMINATE.replace("seen.items()", "()"),
+        ),
+        mistake(
+            "what is seen is summed out",
+            task="eliminate",
+            loses=3,
+            says="you summed m2 out",
+            code=ELIMINATE.replace("seen.items()", "()").replace("in order:", "in [*order, *seen]:"),
+        ),
+        mistake(
+            "always state 0",
+            task="eliminate",
+            loses=2,
+            says="slice at the state that was seen",
+            code=ELIMINATE.replace("{n: s for", "{n: 0 for"),
         ),
         # ---- task 5
         right(

@@ -191,7 +191,7 @@ for seen in ({}, {"z": 1}, {"z": 1, "m1": OCCUPIED}, {"z": 1, "m1": FREE}):
 # `enumerate_marginals` does what we did: it goes through all combinations and adds up. It leaves normalising to us,
 # because the sum of what it returns is the probability of what was given.
 #
-# Something odd has happened. Before the return, the cells told nothing about each other. After it, each tells a lot
+# Before the return, the cells told nothing about each other. After it, each tells a lot
 # about the other: if $m_1$ is free, $m_2$ must be occupied. *Seeing the beam has coupled the cells.* An occupancy
 # grid, which keeps one number per cell, can't store that coupling; the last task of the exercise asks what follows.
 #
@@ -261,7 +261,7 @@ for title, (parents, (a, middle, b), _) in PATTERNS.items():
         print(f"{title:<9} {middle + (' known' if known else ' unknown'):<12} independent: {separated}")
 
 # %% [markdown]
-# Graph and numbers agree six times. The rule for larger graphs follows. A **path** goes from one variable to another
+# The rule for larger graphs follows. A **path** goes from one variable to another
 # along edges, with or against the arrows. It is *open* when each variable between its ends lets influence pass: the
 # middle of a chain or a fork when it is *not* known, a collider when it *is* known. A collider also opens when only
 # something further down its arrows is known, because that tells something about it too. Otherwise the path is
@@ -695,8 +695,8 @@ np.testing.assert_allclose(np.abs(np.subtract(found, 0.5)), 0.25, atol=1e-6)
 # occupied together. Right: after a weak hint of 0.6, messages become too sure slowly, and mean field steeply, mostly
 # between factors of 2 and 4.
 #
-# If all you want is one clean map, picking a side may be welcome. But on this triangle, with couplings that strong, the
-# numbers that come out are no probabilities to rely on.
+# If all you want is one clean map, picking a side may be welcome. But on this triangle, with couplings that strong, mean
+# field's numbers are no probabilities to rely on.
 #
 # ### Play with it
 #
@@ -771,8 +771,9 @@ plt.show()
 # Is $m_1$ independent of $m_2$ once all scans are known? No: both scans are colliders, so the path through the pitch
 # is open. Leave the pitch out, and the cells fall apart into 55,025 problems of two variables each.
 #
-# Now you can read the graph of every stage. A **dashed** edge is one that the real system leaves out, and the two numbers
-# on it are its **price** on a toy world: first the exact answer, then the system's. A dashed circle is a node that the
+# Now you can read the graphs of the stages. A **dashed** edge is one that the real system leaves out, and the two numbers
+# on it are its **price** on a toy world: first the exact answer, then the system's. Without numbers the price wasn't
+# measured. A dashed circle is a node that the
 # toy model leaves out. `StageGraph.cut` holds a sentence for each dashed edge, and lecture [00](../00_tour.ipynb) shows
 # the whole ledger.
 
@@ -902,5 +903,4 @@ plt.show()
 # ## Exercise
 #
 # [Exercise: graphical models](../exercises/graphical_models.ipynb): tables with named axes, independence read off a
-# graph, elimination with its price, filtering and smoothing, and one question. Or back to lecture
-# [01](../01_bayes.ipynb).
+# graph, elimination with its price, filtering and smoothing, and one question.

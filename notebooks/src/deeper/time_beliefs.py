@@ -81,7 +81,8 @@ np.testing.assert_allclose(exact, [[0, 0.5], [0.5, 0]], atol=1e-12)
 # 0.5 for each cell and nothing else. Now there are two things with probability 0.25, and none with probability 0.25.
 # Both tables have the same marginals. So the error of B can't be seen in the map, until the next scan arrives.
 #
-# A is right, but for 55,025 cells of five states it has $5^{55025}$ entries. This page is about what to store instead.
+# A is right, but for the paper's 55,025 cells, with the five states of a cell in this row (FREE, STATIC, moving to the
+# left or to the right, UNKNOWN), it has $5^{55025}$ entries. This page is about what to store instead.
 #
 # ## A dynamic Bayesian network
 #
@@ -158,8 +159,8 @@ assert forward[15] > 0.5 > 0.35 > smooth[15]
 # the other way round: the filter still doubts what the smoother knows. At 15 the filter takes a while to believe that the
 # cell is free again. The path gives one block, from 6 to 14. It doesn't say how sure it is.
 #
-# A vehicle can't wait for the end of the drive, but it may wait for a moment. A smoother that uses the scans up to $L$
-# steps later is called a **fixed-lag smoother**; exercise 01 asks for one.
+# A vehicle can't wait for the end of the drive, but it may wait for a moment. A smoother that uses the scans up to a few
+# steps later, always the same number, is called a **fixed-lag smoother**; exercise 01 asks for one.
 #
 # Smoothing needs beliefs about pairs of slices. So a filter that has thrown couplings away has thrown away what a
 # smoother would need. From here on we ask for the filter only.
@@ -253,16 +254,19 @@ for name, world in WORLDS.items():
     print(f"{name:<20}{worst[name][0]:12.3f}{worst[name][1]:9.3f}{worst[name][2]:9.3f}")
 by_scan = assumed_density(STANDING_OR_DRIVING, twice)
 np.testing.assert_allclose(by_scan, bof_beliefs(STANDING_OR_DRIVING), atol=1e-6)
+by_step = total_variation(bof_beliefs(TOWARDS_A_FENCE), exact_beliefs(TOWARDS_A_FENCE)).max(axis=1)
+np.testing.assert_allclose(by_step, 0.13, atol=0.005)
 assert max(errors[0] for errors in worst.values()) < 0.02
 assert worst["stands or drives"][1] > 0.25
+assert round(exact_beliefs(STANDING_OR_DRIVING)[0, 0, Cell.FREE], 2) == 0.97
 assert max(worst["head on"][1], worst["towards a fence"][1], *worst["at the edge"]) < 1e-6
 assert min(worst["head on"][2], worst["towards a fence"][2]) > 0.1
 
 # %% [markdown]
-# In these worlds, *when* one projects matters more than *that* one does. After the whole step the largest error of all five worlds is
-# 0.011; after the prediction it is 0.274, and these are BOF's numbers: in the first world, `twice` and BOF agree to six
-# digits. In a real grid nobody can update jointly, since all cells hang together; but a scan that is used before the
-# coupling is forgotten is worth a lot.
+# In these worlds, the moment of the projection matters more than the projection itself. After the whole step the largest
+# error of all five worlds is 0.011; after the prediction it is 0.274. In the first world, `twice` and BOF agree to six
+# digits, so the moment explains all of BOF's error there. In a real grid nobody can update jointly, because all cells
+# depend on each other. But the first three rows show what a scan is worth if it is used before the coupling is forgotten.
 #
 # The surprise is in the last two rows. There, projecting costs nothing, and BOF errs all the same: it computes even the
 # marginals of the *prediction* in an approximate way. It adds what two cells send as if only one could ("head on"), and
@@ -289,7 +293,7 @@ for name, beliefs in (("exact", exact_beliefs(STANDING_OR_DRIVING)), ("BOF", bof
 # By hand: ten particles, one in each cell, and the sensor says *pole*. Three have 0.8, seven have 0.1, and the sum is
 # 3.1. So a particle beside a pole weighs 0.26, as Bayes' rule said. How many particles are really at work? The
 # **effective sample size** $1 / \sum_i w_i^2$ is $N$ when all weigh the same, and 1 when one has everything. Here it is
-# $1 / (3 \cdot 0.26^2 + 7 \cdot 0.03^2)$ = 4.8.
+# $1 / (3 \cdot 0.258^2 + 7 \cdot 0.032^2)$ = 4.8.
 #
 # Over time, each particle moves at random and its weights multiply. That goes wrong: after some steps one particle is by
 # luck a little better than all others and has all the weight. So we **resample**: draw $N$ particles with probabilities
@@ -299,6 +303,7 @@ for name, beliefs in (("exact", exact_beliefs(STANDING_OR_DRIVING)), ("BOF", bof
 N_CELLS, POLES, MOVED = 10, [2, 3, 7], [0.1, 0.8, 0.1]
 P_POLE = np.where(np.isin(np.arange(N_CELLS), POLES), 0.8, 0.1)
 SENSOR = np.array([1 - P_POLE, P_POLE])
+assert round(P_POLE.sum() ** 2 / np.sum(P_POLE**2), 1) == 4.8  # ten particles, by hand
 READINGS = np.isin(np.arange(25), [2, 3, 4, 9, 15, 18, 23, 24]).astype(int)  # the trip of lecture 01
 
 
@@ -323,7 +328,7 @@ def particle_filter(n, rng, resample=True):
 #
 # <details><summary>Answer</summary>
 #
-# Without resampling about two; with it some 800, and at no step fewer than 300. The error of an average of $N$ independent draws falls like
+# Without resampling about two; with it several hundred, and at no step fewer than 300. The error of an average of $N$ independent draws falls like
 # $1/\sqrt{N}$, so 100 times as many particles make it 10 times smaller. Resampling makes particles dependent, but the
 # law stays.
 #
@@ -357,7 +362,7 @@ for ax in axes:
     ax.legend(fontsize=9, frameon=False)
 plt.show()
 slope = np.polyfit(np.log(NUMBERS), np.log(errors[True]), 1)[0]
-assert at_work[False][-1] < 20 < 300 < at_work[True].min()
+assert at_work[False][-1] < 3 < 300 < at_work[True].min()
 assert -0.6 < slope < -0.4
 assert errors[False][-1] > 3 * errors[True][-1]
 
@@ -365,30 +370,31 @@ assert errors[False][-1] > 3 * errors[True][-1]
 # The error of a sample is random, and it can be bought off with particles, at a poor rate. That is the opposite of
 # BOF's error, which isn't random and stays.
 #
-# But a sample of *all* cells would need far more. Each particle would be a complete map, and among $5^{55025}$ maps no
-# sample holds one that fits the scan. Sampling alone fails for the same reason for which the table did.
+# But a sample of *all* cells would need far more. Each particle would be a complete map, and there are $5^{55025}$ maps. A
+# sample of any size that we can store hardly ever holds one that fits the whole scan. So sampling alone fails for the
+# same reason for which the table did.
 #
 # ## Both: Rao-Blackwell
 #
 # The way out is to sample as little as possible. Suppose that somebody may have taken the pole beside cell 7 away; let
-# $u$ be 1 if it stands. The unknowns are the path and $u$. We could sample both. But *given the path*, $u$ is one
+# $e$ be 1 if it still exists. The unknowns are the path and $e$. We could sample both. But *given the path*, $e$ is one
 # unknown with two states, and lecture 01 says how to update it exactly. So let each particle have a place $q$ and its own
-# little belief about $u$. This is a **Rao-Blackwellised particle filter**: some variables are sampled, the rest is
+# little belief about $e$. This is a **Rao-Blackwellised particle filter**: some variables are sampled, the rest is
 # computed exactly given the sample. The theorem behind the name says that, for independent
 # draws, this never makes an average worse. (Resampling makes draws dependent, so we also measure.) If an estimate $f$
-# depends on what is sampled ($x$) and on the rest ($y$), then
+# depends on what is sampled, $q$, and on the rest, then its mean given $q$ varies less than $f$ itself:
 #
-# $$ \operatorname{Var}\, \mathrm{E}[f \mid x] = \operatorname{Var} f - \mathrm{E}\,\operatorname{Var}[f \mid x]
+# $$ \operatorname{Var}\, \mathrm{E}[f \mid q] = \operatorname{Var} f - \mathrm{E}\,\operatorname{Var}[f \mid q]
 # \;\le\; \operatorname{Var} f $$
 
 
 # %% tags=["rao-blackwell"]
 NO_POLE = np.where(np.isin(np.arange(N_CELLS), [2, 3]), 0.8, 0.1)
-SAYS_POLE = np.array([NO_POLE, P_POLE])  # P("pole" | u, place): row u = 0 without the pole beside cell 7
+SAYS_POLE = np.array([NO_POLE, P_POLE])  # P("pole" | e, place): row e = 0 without the pole beside cell 7
 
 
 def is_it_there(n, rng, exact):
-    """Return P(u = 1) after each reading; each particle has a belief about u, certain unless `exact`."""
+    """Return P(e = 1) after each reading; each particle has a belief about e, certain unless `exact`."""
     place = rng.integers(N_CELLS, size=n)
     belief = np.full((n, 2), 0.5) if exact else np.eye(2)[rng.integers(2, size=n)]
     answers = []
@@ -435,7 +441,7 @@ print("how many times more particles the plain filter needs:", ", ".join(f"{g:.0
 
 # %% [markdown]
 # To be as good, the plain filter needs several times as many particles, since variance falls like $1/N$. A particle
-# that has decided about $u$ at the start can never change its mind, while one that carries a belief can.
+# whose $e$ was drawn at the start keeps it for ever, while one that carries a belief about $e$ goes on learning.
 #
 # **CMCDOT is built like this.** What moves is sampled: each particle has a place, a velocity and a weight. What stands,
 # what is free and what is unknown is computed cell by cell, given the particles. That is the "conditional Monte Carlo"
@@ -455,7 +461,7 @@ assert sampled.to_bof[-1] < 0.3 * sampled.to_bof[0]
 # ### Play with it
 #
 # How few particles are enough on the ring road? (Without a running kernel there is no slider; the figure shows three
-# settings.)
+# settings; the darker, the more probable.)
 
 
 # %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
@@ -486,8 +492,8 @@ plt.show()
 # they keep: the best assignment (nearest neighbour), the marginals (joint probabilistic data association, which is
 # assumed-density filtering again), a few good assignments (multi-hypothesis tracking), or a sample of them.
 #
-# A grid names no things, so it has nothing to associate: it asks of a cell *that* something arrived, not who. The price
-# is that a grid can't count. It can hold 1.24 things.
+# A grid names no things, so it has nothing to associate: it asks *whether* something arrived in a cell, not which thing.
+# The price is that a grid can't count: above, it held 1.24 things where there is one.
 
 # %% jupyter={"source_hidden": true}
 straight, crossed = (np.exp(-0.5 * np.sum(np.square(gap))) for gap in ((0.9, 0.6), (1.4, 1.1)))
@@ -507,12 +513,13 @@ assert round(straight / (straight + crossed), 2) == 0.73
 # ## Where this breaks
 #
 # Assumed density is good as long as what is seen makes up for what is forgotten. In the row above, scans see every cell
-# and the error shrinks from step to step. Where nobody looks, nothing repairs it, and "head on" stays wrong to the end.
+# and the number of things falls from 1.24 towards 1. Where nobody looks, nothing repairs it: "towards a fence" is wrong
+# by 0.13 after each of its three steps.
 #
-# A sample breaks where nobody is. If no particle is near the truth, weights only choose the best of the wrong ones, and
-# their sum doesn't look different after normalising. And resampling forgets: after some steps, all particles descend
-# from a few ancestors. In `is_it_there` each belief about $u$ depends on the whole path of its particle, so for a pole
-# that was passed long ago only these few count. That is why filters which compute a map per path (FastSLAM is one) have
+# A sample breaks where it has no particles. If none is near the truth, weights only choose the best of the wrong ones, and
+# after normalising nobody sees that all of them fitted badly. And resampling forgets: after some steps, all particles
+# descend from a few ancestors. In `is_it_there` each belief about $e$ depends on the whole path of its particle, so for a
+# pole that was passed long ago only these few paths count. That is why filters which compute a map per path (FastSLAM is one) have
 # trouble with long loops. The four numbers above are from one trip of one length; they prove no general factor.
 #
 # ## In five lines

@@ -57,11 +57,11 @@ def _test():
     got = tuple(np.asarray(got).tolist())
     slips = {
         (2, 24): "that is where it will be: you look for where it was",
-        (2, 16): "rows count down the map and x counts up it: who drives forward comes from a larger row",
-        (18, 24): "columns count to the right and y to the left: who drives to the right comes from a smaller column",
+        (2, 16): "rows count down the map and x counts up it: what drives forward comes from a larger row",
+        (18, 24): "columns count to the right and y to the left: what drives to the right comes from a smaller column",
         (6, 28): "x and y are swapped: vx, forward, goes over rows",
         (14, 12): "x and y are swapped: vx, forward, goes over rows",
-        (26, 12): "the time got lost: velocity times dt is the way",
+        (26, 12): "the time got lost: the distance covered is velocity times dt",
         (12, 19): "you count metres: how many cells of 0.25 m are 2 m?",
     }
     assert got not in slips, f"got {got}: {slips[got]}"
@@ -376,7 +376,7 @@ _test()
 # %% [markdown]
 # ## Task 6: one thing, followed exactly (3 points)
 #
-# BOF asks each cell by itself, and finds 1.24 things where there is one. How surely would somebody know who follows the thing as a whole? There are K cells
+# BOF asks each cell by itself, and finds 1.24 things where there is one. What is the exact answer, if you follow the thing as a whole? There are K cells
 # on a line and exactly one thing. At scan 0 it is in cell `start`. It has one of V velocities and keeps it: `steps` (V,) says by how many cells it moves
 # from each scan to the next, to the right if positive, and `prior` (V,) how probable that is. Then come T scans. Scan number t = 0, 1, ... T - 1 of the arrays
 # is made after t + 1 steps; of each cell it says P(z | occupied) and P(z | free): `if_occupied` and `if_free`, both (T, K). Cells are seen independently of
@@ -585,19 +585,20 @@ def light_up():
 #     semgrid-edu demo --stages my_stages.py
 #
 # Then the semantic grid of both streets is built upon your filter, beside that of the package. Where do they differ, and which of your five functions
-# is to blame?
+# makes the difference?
 #
 # ## Task 8: in your own words (2 points)
 #
-# A bus 12 m long drives past you at a constant 10 m/s, a few metres to the side, so that your scanner sees its whole flank. After two
-# seconds the filter is sure that its front moves at 10 m/s. Of the cells in the middle of the flank it says: occupied, and most
-# probably standing. Why? And the front moves for sure: which edge of the lecture's graph is cut, so that this doesn't help the cells in the middle?
-# Five sentences are enough.
+# A train of small cars passes you on your left at 20 m/s. Each car carries one thin post, and the posts follow each other at a distance of exactly 2 m. Your
+# scanner turns ten times a second and sees the posts alone. The lattice has velocities 5 m/s apart, up to 20 m/s. Among the posts that have been in view from
+# the beginning, what will the filter say of their velocity? Which velocities of the lattice explain all scans of them alike, and what decides between these? The first
+# post of the train drives into free road, where the filter sees that it moves: which edge of the lecture's graph is cut, so that this doesn't help the posts behind it?
+# And name one change to the scanner that would help. Six sentences are enough.
 
-# %% [markdown] nbgrader={"grade": true, "grade_id": "flank", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
-# In the middle of the flank there was something in the cell before, and there is now, whatever the velocity along the flank: the antecedent of
-# the cell lies in the bus for 0 m/s as for 10 m/s, so every scan fits all of these velocities alike, and the prior decides between them:
-# it says that most things stand. Only where the flank begins or ends do the hypotheses predict something else: the front arrives in
-# cells that were free. That doesn't help the middle because the filter treats each cell by itself (the edge between the cells of one instant is cut, and
-# no message goes back from a cell to its antecedents): it keeps no memory of which cells belong together, and it knows no rigid bodies.
-# One point for the antecedent that lies in the bus for every velocity, one for cells that are independent of each other.
+# %% [markdown] nbgrader={"grade": true, "grade_id": "posts", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
+# In a tenth of a second each post moves by 2 m, to where the next one was. So each scan looks like the one before, and the antecedents of a post's cell hold a post for 0 m/s,
+# for 20 m/s and for 20 m/s the other way. All three explain the scans alike, and the prior decides: most things stand, so the filter calls the posts STATIC.
+# (The others of the lattice, 5 to 15 m/s, lead from a gap to a post and are refuted.) The first post arrives in cells that were free, so it is DYNAMIC. (In a simulation
+# the first one or two posts are DYNAMIC and all others STATIC.) But the filter treats each cell by itself: the edge between the cells of one instant is cut, and no message goes back from a cell to its antecedents. So what is known of the
+# first post says nothing about those behind it. A scanner with another rate would help, 15 scans a second say: then standing and driving predict different places. So would one that measures velocity (Doppler).
+# One point for 0 and 20 m/s (either way) together with the prior, one for the cut edge and a change that helps.

@@ -1,16 +1,16 @@
 # %% [markdown]
 # # Exercise: graphical models
 #
-# Five pieces of a small inference library: the product of two tables, Bayes' rule on a table, independence read off a graph, elimination with its price, and
+# Five pieces of a small inference library: the quotient of two tables, Bayes' rule on a table, independence read off a graph, elimination with its price, and
 # the two sweeps of messages on a chain. Then one question to answer in words. About 90 minutes. The companion is
 # [Graphical models from nothing](../deeper/graphical_models.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | multiply two tables with named axes | 1 + 1 |
+# | 1 | divide two tables with named axes | 1 + 1 |
 # | 2 | what is seen: slice, sum out, normalise | 2 + 1 |
 # | 3 | independence read off a graph | 2 + 2 |
-# | 4 | eliminate in a given order, and say what it costs | 2 + 1 |
+# | 4 | eliminate what isn't seen, in a given order, and say what it costs | 2 + 1 |
 # | 5 | messages forward and backward: filtering and smoothing | 2 + 2 |
 # | 6 | in your own words | 2 |
 #
@@ -37,60 +37,60 @@ def _explain(got, slips):
 
 
 # %% [markdown]
-# ## Task 1: multiply by name (1 + 1 points)
+# ## Task 1: divide by name (1 + 1 points)
 #
-# A factor is a pair `(names, table)`: a tuple of names, one for each axis, and a table of non-negative numbers. Complete `multiply`: it returns the product of two
-# factors, again as a pair, over all variables of both, each once. An entry of the product is the entry of `f` times the entry of `g` at the same states. Variables
-# that both have may stand at different places. You may choose the order of the result's axes, as long as `names` tells it.
-# The second point is for factors that share several variables, or none. A factor may also have no variables at all: then `names` is `()` and the table one number.
+# The companion multiplies factors: $P(z, m) = P(m)\, P(z \mid m)$. Sometimes one must go back, from $P(z, m)$ and $P(m)$ to $P(z \mid m)$, or take a message out of a belief
+# that it has been multiplied into. A factor is a pair `(names, table)`: a tuple of names, one for each axis, and a table of non-negative numbers. Complete `divide`: it
+# returns the quotient, again as a pair, over the variables of `f`. An entry is the entry of `f` divided by the entry of `g` at the same states. All variables of `g` are
+# among those of `f`, but their axes may stand at other places. You may choose the order of the result's axes, as long as `names` tells it.
+# The second point is for factors that share several variables, for `g` without any (then its `names` is `()` and its table one number), and for zeros: where `g` is 0, `f` is 0 too, and the quotient is 0.
 
 
-# %% nbgrader={"grade": false, "grade_id": "multiply", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def multiply(f, g):
-    """Return the product of two factors as (names, table)."""
+# %% nbgrader={"grade": false, "grade_id": "divide", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def divide(f, g):
+    """Return the quotient of two factors as (names, table)."""
     ### BEGIN SOLUTION
-    names = tuple(dict.fromkeys(tuple(f[0]) + tuple(g[0])))
-    letters = {name: chr(ord("a") + k) for k, name in enumerate(names)}
-
-    def axes(of):
-        return "".join(letters[name] for name in of)
-
-    return names, np.einsum(f"{axes(f[0])},{axes(g[0])}->{axes(names)}", f[1], g[1])
+    names = tuple(f[0])
+    shared = [name for name in names if name in g[0]]
+    below = np.transpose(g[1], [g[0].index(name) for name in shared])
+    below = below[tuple(slice(None) if name in shared else None for name in names)]
+    return names, np.divide(f[1], below, out=np.zeros(np.shape(f[1])), where=below > 0)
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "product-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_PRODUCT_SLIPS = {  # rows z, columns m
-    ((0.63, 0.14), (0.03, 0.24)): "the numbers of m were multiplied along the axis of z: line the axes up by name",
-    ((1.6, 0.5), (0.8, 1.1)): "you added: a product multiplies",
-    ((0.63, 0.07), (0.06, 0.24)): "right numbers, wrong names: your names stand in another order than your axes",
+# %% nbgrader={"grade": false, "grade_id": "quotient-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_QUOTIENT_SLIPS = {  # rows m, columns z
+    ((0.9, 7 / 30), (6 / 70, 0.8)): "the numbers of m divide along the axis of z: line the axes up by name",
+    ((0.441, 0.049), (0.018, 0.072)): "you multiplied: a quotient divides",
+    ((10 / 9, 10), (5, 1.25)): "upside down: divide f by g",
+    ((0.45, 0.05), (0.1, 0.4)): "you divided by the sum: a quotient isn't normalised",
+    ((0.9, 0.2), (0.1, 0.8)): "right numbers, wrong names: your names stand in another order than your axes",
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "multiply-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "divide-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    cell, beam = (("m",), np.array([0.7, 0.3])), (("z", "m"), np.array([[0.9, 0.2], [0.1, 0.8]]))
-    before = cell[1].copy(), beam[1].copy()
-    got = multiply(cell, beam)
-    assert got is not None, "multiply returned nothing: did you forget `return`?"
-    assert np.array_equal(cell[1], before[0]), "multiply changed the table of `f`: make a new one (no *=)"
-    assert np.array_equal(beam[1], before[1]), "multiply changed the table of `g`: make a new one (no *=)"
+    joint, cell = (("m", "z"), np.array([[0.63, 0.07], [0.06, 0.24]])), (("m",), np.array([0.7, 0.3]))
+    before = joint[1].copy(), cell[1].copy()
+    got = divide(joint, cell)
+    assert got is not None, "divide returned nothing: did you forget `return`?"
+    assert np.array_equal(joint[1], before[0]), "divide changed the table of `f`: make a new one (no /=)"
+    assert np.array_equal(cell[1], before[1]), "divide changed the table of `g`: make a new one"
     assert isinstance(got, tuple | list), f"return a pair, (names, table), got {type(got).__name__}"
     assert len(got) == 2, f"return two things, the names and the table, got {len(got)}"
-    names, table = tuple(got[0]), answer_array(got[1], "for the table multiply")
+    names, table = tuple(got[0]), answer_array(got[1], "for the table divide")
     assert len(set(names)) == len(names), (
         f"the names {names} hold m twice: a variable that both factors have is one axis"
     )
-    assert "m" in names, "m is summed out: a product keeps every variable, the sum comes later"
-    assert sorted(names) == ["m", "z"], f"the product is over m and z, yours is over {names}"
+    assert sorted(names) == ["m", "z"], f"the quotient is over the variables of f, m and z, yours is over {names}"
     assert table.shape == (2, 2), f"two variables of two states make a table of shape (2, 2), got {table.shape}"
-    _explain(table if names == ("z", "m") else table.T, _PRODUCT_SLIPS)
-    wanted = [[0.63, 0.06], [0.07, 0.24]] if names == ("z", "m") else [[0.63, 0.07], [0.06, 0.24]]
-    np.testing.assert_allclose(table, wanted, err_msg="z = 0: 0.9 * 0.7, 0.2 * 0.3; z = 1: 0.1 * 0.7, 0.8 * 0.3")
+    table = table if names == ("m", "z") else table.T
+    _explain(table, _QUOTIENT_SLIPS)
+    np.testing.assert_allclose(table, [[0.9, 0.1], [0.2, 0.8]], err_msg="P(z | m): 0.63 / 0.7, 0.07 / 0.7 for m = 0")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
-    complaint = graphical_models.check_multiply(multiply)
+    complaint = graphical_models.check_divide(divide)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -98,24 +98,22 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "multiply-shared-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "divide-shared-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    f = ("m1", "m2"), np.array([[1.0, 2.0], [3.0, 4.0]])
-    got = multiply(f, (("m2", "m1"), np.array([[1.0, 10.0], [100.0, 1000.0]])))
+    f = ("m1", "m2"), np.array([[1.0, 200.0], [30.0, 0.0]])
+    got = divide(f, (("m2", "m1"), np.array([[1.0, 10.0], [100.0, 0.0]])))
     assert isinstance(got, tuple | list), f"return a pair, (names, table), got {type(got).__name__}"
-    names, table = got[0], answer_array(got[1], "for the table multiply")
-    assert sorted(names) == ["m1", "m2"], f"the product is over m1 and m2, yours is over {names}"
+    names, table = got[0], answer_array(got[1], "for the table divide")
+    assert sorted(names) == ["m1", "m2"], f"the quotient is over m1 and m2, yours is over {names}"
+    assert np.isfinite(table).all(), "0 / 0 where m1 = 1 and m2 = 1: the quotient is 0 there"
     table = table if tuple(names) == ("m1", "m2") else table.T
-    slips = {
-        ((1.0, 20.0), (300.0, 4000.0)): "the axes of g stand the other way round: sort them by name, not by place",
-        ((1 / 4231, 200 / 4231), (30 / 4231, 4000 / 4231)): "you divided by the sum: a product isn't normalised",
-    }
-    _explain(table, slips)
-    np.testing.assert_allclose(table, [[1, 200], [30, 4000]], err_msg="at m1 = 0, m2 = 1: f says 2 and g says 100")
+    swapped = "the axes of g stand the other way round: sort them by name, not by place"
+    _explain(table, {((1.0, 20.0), (0.3, 0.0)): swapped})
+    np.testing.assert_allclose(table, [[1, 2], [3, 0]], err_msg="at m1 = 0, m2 = 1: f says 200 and g says 100")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
-    complaint = graphical_models.check_multiply_shared(multiply)
+    complaint = graphical_models.check_divide_shared(divide)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -326,16 +324,18 @@ _test()
 #
 # From here on factors are the package's: `f.names`, `f.table`, the product `f * g`, and `f.sum("x")`, the factor without x.
 #
-# Complete `eliminate`. `factors` is a list of `Factor`s, `order` the names of variables to sum out, one after the other in this order. For each, multiply only those factors
-# that contain it, then sum it out. Return two things: the product of all that is left in the end, as a `Factor`, not normalised; and the number of entries of the
-# largest table from which a variable was summed out. At least one variable is left in the end. Two points are for the factor, one for the size.
+# Complete `eliminate`. `factors` is a list of `Factor`s; `seen` says what is known, such as `{"z": 1}`, or nothing, `{}`; `order` holds the names of variables to sum out,
+# one after the other in this order. First slice each factor at what is known (`f.given(z=1)` does it; it refuses a variable that `f` doesn't have). Then, for each name in `order`,
+# multiply only those factors that contain it, and sum it out. Return two things: the product of all that is left in the end, as a `Factor`, not normalised; and the number of
+# entries of the largest table from which a variable was summed out. At least one variable is left in the end. Two points are for the factor, one for the size.
 
 
 # %% nbgrader={"grade": false, "grade_id": "eliminate", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def eliminate(factors, order):
-    """Return the Factor over the variables that aren't in `order`, and the entries of the largest table."""
+def eliminate(factors, order, seen):
+    """Return the Factor over the variables that are neither seen nor in `order`, and the entries of the largest table."""
     ### BEGIN SOLUTION
-    factors, largest = list(factors), 0
+    factors = [factor.given(**{name: seen[name] for name in factor.names if name in seen}) for factor in factors]
+    largest = 0
     for name in order:
         together = Factor((), 1.0)
         for factor in factors:
@@ -355,11 +355,17 @@ _AGREE = [[3.0, 1.0], [1.0, 3.0]]
 _ROW = (Factor(("m1", "m2"), _AGREE), Factor(("m2", "m3"), _AGREE))
 _SEEN = [[0.9, 0.1], [0.6, 0.4]]
 _STAR = (Factor("street", [0.5, 0.5]), *(Factor(("street", cell), _SEEN) for cell in ("m1", "m2", "m3", "m4")))
+_SEEN_SLIPS = {
+    (0.75, 0.25): "you summed m2 out: it is known, so slice at its state",
+    (0.585, 0.165): "that is for m2 = 0: slice at the state that was seen",
+    (0.66, 0.34): "you divided by the sum, P(m2 = 1) = 0.25: don't normalise",
+}
+_SEEN_BY_HAND = "P(m1, m2 = 1): 0.05 * 0.9 + 0.2 * 0.6 and 0.05 * 0.1 + 0.2 * 0.4"
 
 
 # %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"])
+    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"], {})
     assert got is not None, "eliminate returned nothing: did you forget `return`?"
     result = got[0] if isinstance(got, tuple | list) else got
     assert isinstance(result, Factor), f"the first thing must be a Factor, got {type(result).__name__}"
@@ -374,7 +380,13 @@ def _test():
         result.table, [0.75, 0.25], atol=1e-9, err_msg="P(m1): the mean of 0.9, 0.1 and 0.6, 0.4"
     )
 
-    got = eliminate(list(_ROW), ["m2"])
+    got = eliminate(list(_STAR), ["m3", "m4", "street"], {"m2": 1})
+    result = got[0] if isinstance(got, tuple | list) else got
+    assert "m2" not in result.names, "m2 is seen: slice the factors at its state, then it has no axis any more"
+    _explain(result.table, _SEEN_SLIPS)
+    np.testing.assert_allclose(result.table, [0.165, 0.085], atol=1e-9, err_msg=_SEEN_BY_HAND)
+
+    got = eliminate(list(_ROW), ["m2"], {})
     result = got[0] if isinstance(got, tuple | list) else got
     assert sorted(result.names) == ["m1", "m3"], f"m1 and m3 are left, your result is over {result.names}"
     total = result.table.sum()
@@ -393,7 +405,7 @@ _test()
 
 # %% nbgrader={"grade": true, "grade_id": "eliminate-cost-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"])
+    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"], {})
     assert isinstance(got, tuple | list), f"return two things, the factor and the size, got one {type(got).__name__}"
     costs = {
         32: "you multiplied all factors first: of each variable only those that contain it",
@@ -401,7 +413,7 @@ def _test():
         16: "that is the sum of all sizes: the largest counts",
     }
     assert got[1] == 4, f"largest {got[1]}: {costs.get(got[1], 'each product here has two axes of two states')}"
-    largest = eliminate(list(_STAR), ["street", "m2", "m3", "m4"])[1]
+    largest = eliminate(list(_STAR), ["street", "m2", "m3", "m4"], {})[1]
     costs = {
         16: "count before the variable is summed out: with the street the product still has five axes",
         4: "street comes first in this order: keep to `order`, and keep the largest, not the last",
@@ -411,7 +423,9 @@ def _test():
     assert largest == 32, (
         f"largest {largest}: {costs.get(largest, 'street links all four cells: five axes, 32 entries')}"
     )
-    largest = eliminate(list(_ROW), ["m2"])[1]
+    largest = eliminate(list(_STAR), ["street", "m3", "m4"], {"m2": 1})[1]
+    assert largest == 16, f"largest {largest}: m2 is seen, so it has no axis: the street, m1, m3, m4, 16 entries"
+    largest = eliminate(list(_ROW), ["m2"], {})[1]
     assert largest == 8, f"largest {largest}: the product over m1, m2, m3 has 8 entries before m2 is summed out"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
