@@ -671,7 +671,7 @@ plotting.points_on_image(real, axes[0], size=2, colour_bar=False)
 plotting.plane_on_image(coarse, 0.0, paled(real), ax=axes[1], size=4, colour_bar=False)
 axes[0].set_title("A: LIDAR returns", fontsize="medium")
 axes[1].set_title("B: centres of cells of 1 m on the ground plane", fontsize="medium")
-fig.supxlabel(real_drive().credit, fontsize=7)
+fig.supxlabel(real_drive().credit, fontsize=8)
 plt.show()
 
 # %% [markdown]

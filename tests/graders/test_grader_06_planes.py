@@ -320,7 +320,7 @@ def cell_means(s, pixels, visible):
         mistake(
             "the sum",
             task="cell-means",
-            loses=3,
+            loses=2,
             says="that is the sum of its two points",
             code=means(mean="total"),
         ),

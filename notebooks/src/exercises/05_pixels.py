@@ -540,8 +540,8 @@ _test()
 
 # %% [markdown]
 # Now it becomes a stage of the pipeline: `sample` lays the planes through your camera. The pipeline doesn't tell this stage which camera it has, but the filter sees every
-# frame first, so `track` notes it there. The calibration gets a pitch of 1°, is repaired by your function, and equation (2) is the package's. What the map loses without the
-# repair, you see when the `#` before the last line is gone (half a minute):
+# frame first, so `track` notes it there. The calibration gets a fault, a pitch of -1°, and is repaired by your functions; equation (2) is the package's. Take the `#` away from
+# the last line (half a minute), then set `WITH_FAULT = True` and run the cell again: how much of the map does the fault cost?
 
 
 # %%
@@ -555,7 +555,7 @@ def sampler_of(frame):
     from semgrid_edu.grid import GridSpec
     from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels
 
-    points, seen, K, T = _street(frame, PITCH, 1.0)
+    points, seen, K, T = _street(frame, PITCH, -1.0)
     if not WITH_FAULT:
         K, T = repaired(points, seen, K, T)
     camera = Camera(K, T, frame.camera.size, frame.camera.lidar_height).resized((96, 320))
@@ -600,8 +600,8 @@ def right_cells():
 # right_cells()
 
 # %% [markdown]
-# Run it with `WITH_FAULT = True` as well. Then put `import numpy as np`, the tools of task 5, your `find_fault` and `repaired`, and the cells with `_street` and `sample` into a file
-# `my_stages.py`, and run
+# And a surprise: with a pitch of +1°, left in, the map loses nothing. Why not? Think of the crest. To see all this on the demo's page, put `import numpy as np`, the tools
+# of task 5, your `find_fault` and `repaired`, and the cells with `_street` and `sample` into a file `my_stages.py`, and run
 #
 #     semgrid-edu demo --stages my_stages.py
 #

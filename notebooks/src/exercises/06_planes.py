@@ -547,12 +547,12 @@ def there_and_back(s, p_bar, pixels, visible, weights_of=four_pixels):
 
 
 # %% nbgrader={"grade": false, "grade_id": "streets", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _cells(frame, size, cell=8.0, side=3):
+def _cells(frame, size, cell=16.0, side=3):
     """Return u and v of side x side points in each cell of the ground, (N, K, 2), and which are in view, (N, K)."""
     from semgrid_edu.camera import project, transform_points
     from semgrid_edu.grid import GridSpec
 
-    camera, points = frame.camera.resized(size), GridSpec(0, 72, -16, 16, cell / side).centers()
+    camera, points = frame.camera.resized(size), GridSpec(0, 64, -16, 16, cell / side).centers()
     on_ground = np.dstack([points, np.zeros(points.shape[:2])])
     pixels, visible = project(transform_points(camera.T_camera_from_grid, on_ground), camera)
     H, W = (n // side for n in visible.shape)
@@ -607,7 +607,8 @@ _test()
 # %% [markdown]
 # Now it becomes the stage `sample` of the pipeline: twenty planes, and four points in each cell. The pipeline doesn't tell this stage which camera it has, but the
 # filter sees every frame first, so `track` notes it there and builds your matrix once. Take the `#` away from the last line (about a minute) to see how many cells of the
-# simulated street get their true class. Then set `SIDE` to 1, which is the package's own sampling, and compare.
+# simulated street get their true class. Then set `SIDE` to 1, which is the package's own sampling. Does the mean make the map better? The network was trained with one point
+# in each cell.
 
 
 # %%
@@ -669,7 +670,7 @@ def right_cells():
 #
 #     semgrid-edu demo --stages my_stages.py
 #
-# Both streets, the real one too, with your planes and with the package's. The network was trained with one point in each cell. Where do the maps differ, near by or far ahead?
+# It shows both streets, the real one too, with your planes and with the package's. Where do the maps differ, near by or far ahead?
 #
 # ## Task 7: in your own words (2 points)
 #
