@@ -297,8 +297,9 @@ plt.show()
 # %% [markdown]
 # ## The way back: backpropagation
 #
-# Now learn. (The gradient of the loss in a value is written with a bar: $\bar p = \partial\,\text{loss} / \partial p$.) The loss sits at the far end, on the map; suppose that it asks the point at (1.25, 0.5) for a higher value
-# and a second point, at (1, 1.5), for a lower one: $\bar p = (-1, +2)$.
+# The loss sits at the far end, on the map, and the scores are to learn from it. So we need its derivative with respect to
+# each score; a bar marks such a derivative, $\bar p = \partial\,\text{loss} / \partial p$. Suppose that the loss asks the
+# point at (1.25, 0.5) for a higher value and a second point, at (1, 1.5), for a lower one: $\bar p = (-1, +2)$.
 #
 # Nudge the pixel with the 6 by a small amount $\varepsilon$. The first point reads it with weight 3/8 and the second
 # with 1/2, so $p$ changes by $(3/8\,\varepsilon, 1/2\,\varepsilon)$ and the loss by $-3/8\,\varepsilon + 2 \cdot
@@ -454,7 +455,8 @@ print("fast == literal; sparse, with its transpose, {:.0f} MB, as a full matrix 
 #
 # Forget the network: let every score of the image be a free number, all zero at first. No pixel has a label. You get the
 # *map* instead, the class of each ground cell that the camera sees. Sample the
-# scores on the ground plane, compare with the map (cross-entropy, as in training), send the gradient back, take a step.
+# scores on the ground plane, compare with the map (by *cross-entropy*, minus the logarithm of the true class's
+# probability), send the gradient back, take a step.
 #
 # **Predict before you run.** After twenty steps, which pixels of the image have got a class? Think of the pieces at 8,
 # 20 and 45 m. And what will the pixels of a picket fence learn, when the cell *behind* it is lawn?
