@@ -205,11 +205,11 @@ for side, name in ((0.04, "uphill"), (-0.04, "downhill")):
         print(f"nearest plane off by {off[0]:.1f} m, with 20 planes from -1.2 m by {off[1]:.1f} m")
 
 # %% [markdown]
-# The drive has such a road: it has a crest, and the vehicle pitches. Where does the road lie in the grid's frame, which is fixed to the vehicle? The LIDAR measures it, in simulation and on the real street:
+# The drive has such a road: it has a crest, and the vehicle pitches. Where does the road lie in the grid's frame, which is
+# fixed to the vehicle? The LIDAR measures it, in simulation and on the real street:
 
-# %% jupyter={"source_hidden": true} alt="height of the road against distance: in the simulated drive from plus 0.1 m to minus 1.1 m at 52 m, differently in each frame; on the real street within 0.2 m of zero up to 64 m"
 
-
+# %% jupyter={"source_hidden": true}
 def road_profile(frame, x):
     """Return the median height of the road at distances x, NaN where no labelled return lies."""
     at, in_view = project(transform_points(frame.camera.T_camera_from_grid, frame.points_grid[:, :3]), frame.camera)
@@ -219,6 +219,7 @@ def road_profile(frame, x):
     return np.array([np.median(part) if len(part) > 3 else np.nan for part in near])
 
 
+# %% jupyter={"source_hidden": true} alt="height of the road against distance: in the simulated drive from plus 0.1 m to minus 1.1 m at 52 m, differently in each frame; on the real street within 0.2 m of zero up to 64 m"
 x = np.arange(8, 66, 4.0)
 fig, axes = plt.subplots(1, 2, figsize=(8, 2.8), layout="constrained", sharey=True)
 for ax, some_drive, frames, name in (

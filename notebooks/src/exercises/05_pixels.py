@@ -562,6 +562,7 @@ def sampler_of(frame):
     return PlaneSampler(*plane_pixels(GridSpec.compact(), plane_heights(), camera), camera.size)
 
 
+# %%
 def track(frames, spec):
     """Yield the package's beliefs, and note the camera."""
     from semgrid_edu.occupancy import track_drive
@@ -582,6 +583,7 @@ def sample(s):
     return noted["sampler"](torch.from_numpy(np.asarray(s, np.float32))[None])[0].numpy()
 
 
+# %%
 def right_cells():
     """Print how many cells of the simulated street get their true class, with your stage."""
     from semgrid_edu.datasets.samples import sample_drive
@@ -601,7 +603,7 @@ def right_cells():
 
 # %% [markdown]
 # And a surprise: with a pitch of +1°, left in, the map loses nothing. Why not? Think of the crest. To see all this on the demo's page, put `import numpy as np`, the tools
-# of task 5, your `find_fault` and `repaired`, and the cells with `_street` and `sample` into a file `my_stages.py`, and run
+# of task 5, your `find_fault` and `repaired`, and the three cells from `_street` to `sample` into a file `my_stages.py`, and run
 #
 #     semgrid-edu demo --stages my_stages.py
 #

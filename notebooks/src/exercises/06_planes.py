@@ -250,9 +250,8 @@ _POINTS = np.array([[0.3, 0.4], [0.7, 0.2], [1.2, 1.7], [2.6, 2.3], [0.4, 0.8]])
 
 def _boxes(kind, points=_POINTS, h=4, w=4):
     """Return forward and backward of a kind, for points (n, 2) in an image of h rows and w columns."""
-    u, v = points.T
-    down = np.maximum(0, 1 - np.abs(v[:, None] - np.arange(h)))
-    across = np.maximum(0, 1 - np.abs(u[:, None] - np.arange(w)))
+    down = np.maximum(0, 1 - np.abs(points[:, 1:] - np.arange(h)))
+    across = np.maximum(0, 1 - np.abs(points[:, :1] - np.arange(w)))
     A = (down[:, :, None] * across[:, None, :]).reshape(len(points), h * w)
 
     def forward(s):
@@ -629,6 +628,7 @@ def matrix_of(frame):
     return cell_matrix(pixels, visible.reshape(-1, H, SIDE, W, SIDE).swapaxes(2, 3).reshape(-1, SIDE**2), 96, 320)
 
 
+# %%
 def track(frames, spec):
     """Yield the package's beliefs, and note the camera."""
     from semgrid_edu.occupancy import track_drive
@@ -648,6 +648,7 @@ def sample(s):
     return (noted["matrix"] @ s.reshape(len(s), -1).T).T.reshape(len(s), -1, *noted["shape"])
 
 
+# %%
 def right_cells():
     """Print how many cells of the simulated street get their true class, with your stage."""
     from semgrid_edu.datasets.samples import sample_drive
@@ -666,7 +667,7 @@ def right_cells():
 # right_cells()
 
 # %% [markdown]
-# Put `import numpy as np`, your `four_pixels` and `cell_matrix` with its import, and the cell with `sample` into a file `my_stages.py`, and run
+# Put `import numpy as np`, your `four_pixels` and `cell_matrix` with its import, and the two cells with `matrix_of` and `sample` into a file `my_stages.py`, and run
 #
 #     semgrid-edu demo --stages my_stages.py
 #
