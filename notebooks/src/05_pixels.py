@@ -1,8 +1,8 @@
 # %% [markdown]
 # # 05 · From grid to pixel: equation (1)
 #
-# **In one sentence.** A pixel does not know how far away its thing is, but every point in space has exactly one pixel;
-# so we lay planes over the grid, at several heights, and look up the pixel of every point of every plane.
+# **In one sentence.** A pixel does not know how far away its thing is, but a point in space has one pixel, or none when it
+# is out of view; so we lay planes over the grid, at several heights, and look up the pixel of every point of every plane.
 #
 # **You will be able to**
 # - find the pixel of a point by similar triangles, and say what $K$ does to it;
@@ -70,8 +70,9 @@ def places_of(rows, cols, frame=frame):
 pale = paled(frame)
 coarse = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, cell=1.0)  # to draw, so that dots stay apart
 instances, _ = ndimage.label(frame.labels.image == CAR)
-car_rows, car_cols = np.nonzero((instances == instances[140, 120]) & (frame.labels.depth < 13))
-car = places_of(car_rows, car_cols)
+is_red_car = (instances == instances[140, 120]) & (frame.labels.depth < 13)
+car = places_of(*np.nonzero(is_red_car))
+pale.image[is_red_car] = pale.image[is_red_car] // 2 + np.array([110, 10, 10], np.uint8)
 
 # %% [markdown]
 # ## A plane that rises through the street
@@ -83,15 +84,15 @@ car = places_of(car_rows, car_cols)
 
 # %% jupyter={"source_hidden": true}
 def read_at(height):
-    """Return the class that each cell of the plane reads from the true labels of the image, (H, W); 255 out of view."""
+    """Return what cells read from the true labels, (H, W) each: the class (255 out of view), whether the red car."""
     (pixels,), (visible,) = plane_pixels(spec, [height], camera)
-    read = np.full(spec.shape, 255)
+    read, red = np.full(spec.shape, 255), np.zeros(spec.shape, bool)
     cols, rows = pixels[visible].round().astype(int).T
-    read[visible] = frame.labels.image[rows, cols]
-    return read
+    read[visible], red[visible] = frame.labels.image[rows, cols], is_red_car[rows, cols]
+    return read, red
 
 
-# %% jupyter={"source_hidden": true} alt="animation: A, a sheet of coloured dots rises through the camera image of a street and becomes a line at the camera's height; B, seen from the side, it cuts through a car; C, the map of classes read on the sheet, on which the car is a smear that begins behind it on the ground plane, and shorter, on both sides of its place, at 0.8 m"
+# %% jupyter={"source_hidden": true} alt="animation: A, a sheet of coloured dots rises through the camera image of a street with one car marked in red, and becomes a line at the camera's height; B, seen from the side, it cuts through the red car; C, the map of classes read on the sheet, with red dots where a cell reads the red car: a long smear from its place outwards on the ground plane, and a shorter one on both sides of its place at 0.8 m"
 
 
 def raised():
@@ -102,10 +103,11 @@ def raised():
         axes = fig.subplot_mosaic([["A", "C"], ["B", "C"]], width_ratios=(2.7, 1), height_ratios=(1.6, 1))
         plotting.plane_on_image(coarse, height, pale, ax=axes["A"], size=2, colour_bar=False)
         axes["B"].scatter(*car[::7, [0, 2]].T, s=1, color="tab:red")
-        axes["B"].plot([0, 40], [height] * 2, color="tab:blue")
-        axes["B"].plot(eye[0], z_cam, "ks")
+        axes["B"].plot([0, 40], [height] * 2, "C0", eye[0], z_cam, "ks")
         axes["B"].set(xlim=(-1, 41), ylim=(-1.2, 3.2), xlabel="x, forward [m]", ylabel="height [m]")
-        plotting.grid_labels(spec, read_at(height), KITTI_14, ax=axes["C"])
+        read, red = read_at(height)
+        plotting.grid_labels(spec, read, KITTI_14, ax=axes["C"])
+        axes["C"].plot(*spec.centers()[red][:, ::-1].T, "s", color="tab:red", markersize=1.8)
         axes["C"].plot(*car[::60, 1::-1].T, "k.", markersize=3)
         axes["C"].set_ylim(0, 45)
         for letter, ax in axes.items():
@@ -120,8 +122,8 @@ plotting.animate(
 # %% [markdown]
 # A: each dot is the centre of a cell, drawn at its pixel; nearer cells are lighter. B: the same from the side, with the
 # pixels of the red car where they really are. The black square is the camera. C: the map of classes that the plane
-# reads, with the true place of the red car in black. At 0 m the car is thrown over the map like a shadow. At 0.8 m,
-# in the middle of its bodywork, the smear is shorter and lies on both sides of the true place. At the camera's own
+# reads. Red are the cells that read the red car, black is its true place. At 0 m the car is thrown over the map like a
+# shadow. At 0.8 m, in the middle of its bodywork, the smear is shorter and lies on both sides of the true place. At the camera's own
 # height the sheet becomes a line, and above it the map shows what is high: trees, houses. **No height is right for
 # everything.** The lecture says how these pictures come about, and what it costs that a pixel doesn't tell its height.
 #
@@ -154,7 +156,7 @@ plt.show()
 labels = [0, 1, 1, 1]
 print("exact,        P(car):", exact_ray(labels).round(2))
 print("equation (1), P(car):", cell_by_cell(labels).round(2))
-print("mean difference over all labels, by cell:", occlusion_cost().round(2))
+print("by how much (1) is off, mean over all labels:", occlusion_cost().round(2))
 assert d_separated(stage.model, "m1", "m3")
 assert not d_separated(stage.model, "m1", "m3", given=("a3",))
 
@@ -290,7 +292,7 @@ print(f"line {outwards:.2f} m from the camera, ray {meets:.2f} m: the sidewalk i
 print(f"by the simulator {true_height:.2f} m")
 
 # %% [markdown]
-# That is a kerb of 12 cm and the slopes of road and sidewalk. Drawn at 16 cm, the line fits (C, dashed). So 17 cm of
+# That is the kerb, and the slopes of road and sidewalk. Drawn at 16 cm, the line fits (C, dashed). So 17 cm of
 # height are half a metre on the map: this is why the system needs several planes. Draw this picture for every camera.
 #
 # ## A new image, a new $K$
@@ -394,7 +396,7 @@ toy = Camera(K, T_camera_from_lidar, size=(96, 320), lidar_height=2.0)
 np.testing.assert_allclose(T_camera_from_grid, toy.T_camera_from_grid)
 np.testing.assert_allclose(inverse(T_camera_from_grid), invert_rigid(T_camera_from_grid))
 print("post, from the camera:", (T_camera_from_grid @ [10, -2, 0.5, 1])[:3])
-print("camera, from the grid:", np.abs(inverse(T_camera_from_grid)[:3, 3]))  # no -0
+print("camera, from the grid:", inverse(T_camera_from_grid)[:3, 3] + 0.0)  # + 0.0 makes 0 of -0
 
 # %% [markdown]
 # ## Equation (1) for a plane
@@ -512,7 +514,8 @@ print(f"of the course's grid {100 * ground.mean():.0f} % is in view on the groun
 #
 # </details>
 #
-# Two similar triangles once more, down to the plane at $\delta$, and down to the thing at $z$:
+# Two similar triangles once more. From the camera, $z_\text{cam}$ above the ground, one goes down to the thing, $x$ metres
+# ahead of the camera and $z$ high, the other on to the plane at $\delta$, which it meets at $x_\delta$:
 #
 # $$ x_\delta = x\, \frac{z_\text{cam} - \delta}{z_\text{cam} - z} $$
 
@@ -540,7 +543,7 @@ print(
     f"each on the best of the planes 20 cm apart: {100 * (best > spec.cell).mean():.0f} % are off by more than a cell"
 )
 
-# %% jupyter={"source_hidden": true} alt="left, from the side: pixels of a car and three rays over it that meet the ground ten to thirty metres behind; middle and right, from above: the car drawn on the ground plane is a smear of forty metres, on the plane at 0.8 m one half as long around the true place"
+# %% jupyter={"source_hidden": true} alt="A, from the side: pixels of a car that stands 7 to 11 m ahead, and three rays from the camera through pixels 0.4, 0.9 and 1.2 m high, which meet the ground 10, 19 and 24 m ahead; B and C, from above: the car drawn on the ground plane is a smear from its place to beyond 45 m, on the plane at 0.8 m one from 4 to 25 m, around the true place"
 fig, axes = plt.subplots(1, 3, figsize=(8.6, 3.4), layout="constrained", width_ratios=(2, 1, 1))
 axes[0].scatter(*car[::7, [0, 2]].T, s=2, c=plt.get_cmap("viridis")(car[::7, 2] / 1.7))
 for z in (0.4, 0.9, 1.2):
@@ -548,8 +551,8 @@ for z in (0.4, 0.9, 1.2):
     axes[0].plot([eye[0], on_ground[k, 0]], [z_cam, 0], color="0.7", linewidth=0.8, zorder=0)
     axes[0].plot(on_ground[k, 0], 0, "x", color="tab:red")
 axes[0].plot(eye[0], z_cam, "ks")
-axes[0].set(xlabel="x, forward [m]", ylabel="height [m]", xlim=(-1, 41), ylim=(-0.2, 2))
-for ax, drawn, name in ((axes[1], on_ground, "plane at 0 m"), (axes[2], on_plane, "plane at 0.8 m")):
+axes[0].set(xlabel="x, forward [m]", ylabel="height [m]", xlim=(-1, 30), ylim=(-0.2, 2), title="A")
+for ax, drawn, name in ((axes[1], on_ground, "B: plane at 0 m"), (axes[2], on_plane, "C: plane at 0.8 m")):
     ax.scatter(*drawn[::3, ::-1].T, s=1, color="tab:red", label="drawn")
     ax.scatter(*car[::3, 1::-1].T, s=1, color="black", label="true")
     ax.set(xlim=(15.5, -5), ylim=(0, 50), aspect="equal", xlabel="y, to the left [m]", title=name)
@@ -558,8 +561,8 @@ axes[2].legend(markerscale=6, fontsize="small")
 plt.show()
 
 # %% [markdown]
-# Left, from the side: the pixels of the car, coloured by height, and where the flat world puts three of them (crosses).
-# On the right, from above: the true places, black, and the drawn ones, red. On the plane at 0.8 m what is lower lies
+# A, from the side: the pixels of the car, coloured by height, and where the flat world puts three of them (crosses). The
+# black square is the camera. B and C, from above: the true places, black, and the drawn ones, red. On the plane at 0.8 m what is lower lies
 # too near, what is higher too far. Even if someone chose the best plane for each pixel, four in ten would be off by
 # more than a cell, because near the camera's own height a ray is nearly level: there 10 cm of height are metres of
 # road. The planes only make sure that better answers are among those offered. The choice is left to what is learnt.
@@ -602,7 +605,8 @@ np.testing.assert_allclose(counts / counts.sum(), CAR_HEIGHTS, atol=0.01)
 #
 # In more than half, 55 %; over the whole drive it is 52 to 67 %. And here is a surprise: another 32 % read something
 # *behind* the cell. The road has a crest. In this frame the ground 40 m ahead lies 0.7 m lower than below the vehicle,
-# so the ray through the plane's cell flies over it. Only 13 % read what stands in the cell.
+# so the ray through the plane's cell flies over it and meets something lower than the plane. Only 13 % read what stands
+# in the cell.
 #
 # </details>
 
@@ -612,7 +616,8 @@ cols, rows = pixels[visible].round().astype(int).T
 wanted = np.linalg.norm(spec.centers()[visible] - eye[:2], axis=1)
 shares = []
 for other in drive:
-    seen_at = np.linalg.norm(places_of(rows, cols, other)[:, :2] - eye[:2], axis=1) / wanted
+    there = places_of(rows, cols, other)
+    seen_at = np.linalg.norm(there[:, :2] - eye[:2], axis=1) / wanted
     shares.append([(seen_at < 0.9).mean(), (np.abs(seen_at - 1) <= 0.1).mean(), (seen_at > 1.1).mean()])
 print("cells whose pixel shows something nearer, in place, farther (within a tenth of the distance):")
 print("last frame:", *(f"{100 * s:.0f} %" for s in shares[-1]), end="; all frames: ")
@@ -620,6 +625,7 @@ print(*(f"{100 * min(s):.0f} to {100 * max(s):.0f} %" for s in zip(*shares, stri
 front, right = seen_at < 0.9, frame.labels.image[rows, cols] == frame.labels.birdseye_on(spec)[visible]
 ground = places_of(*np.nonzero(frame.labels.image == ROAD))
 assert np.isclose(np.median(ground[np.abs(ground[:, 0] - 40) < 2, 2]), -0.7, atol=0.03)  # the crest
+assert (there[seen_at > 1.1, 2] < 0).mean() > 0.99
 for name, which in (("nearer", front), ("in place", np.abs(seen_at - 1) <= 0.1), ("farther", seen_at > 1.1)):
     print(f"{name}: {100 * right[which].mean():.0f} % read their true class")
 
@@ -665,13 +671,14 @@ plotting.points_on_image(real, axes[0], size=2, colour_bar=False)
 plotting.plane_on_image(coarse, 0.0, paled(real), ax=axes[1], size=4, colour_bar=False)
 axes[0].set_title("A: LIDAR returns", fontsize="medium")
 axes[1].set_title("B: centres of cells of 1 m on the ground plane", fontsize="medium")
-fig.supxlabel(real_drive().credit, fontsize=7)
+fig.supxlabel(real_drive().credit, fontsize=8)
 plt.show()
 
 # %% [markdown]
-# A: the colour of the returns changes where the outlines in the image are, so calibration and poses agree. B: a carpet
-# on the road. It also lies over the cars, because equation (1) knows nothing of cars. This street is nearly flat: up to
-# 50 m its road stays within 9 cm of the ground plane. Even so the road 40 m ahead is drawn 1.5 m too near.
+# A: nearer returns are lighter. Their colour changes where the outlines of cars and trees are in the image, as it must
+# if the calibration is right. B: a carpet on the road. It also lies over the cars, because equation (1) knows nothing
+# of cars. This street is nearly flat: at these five distances its road is at most 8 cm above or below the ground plane.
+# Even so the road 40 m ahead is drawn 1.5 m too near.
 #
 # ## Play with it
 #
@@ -734,6 +741,8 @@ for name, axis, sign in (("nose down", "x", 1), ("nose up", "x", -1), ("to the s
     x, y = read_instead(30.0, toy, turned(toy, axis, sign))
     assert axis == "y" or np.isclose(1 / x, 1 / 30 + sign * np.radians(1) / 1.5, rtol=0.01)
     print(f"{name:<12} the cell 30 m ahead reads the ground {x:.1f} m ahead, {abs(y):.1f} m to the side")
+on_drive = [read_instead(at, camera, turned(camera, "x", sign))[0] for at, sign in ((30.0, 1), (37.0, -1))]
+np.testing.assert_allclose(on_drive, (23, 60), atol=0.5)  # the drive's camera, for the figure below
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="which ground a cell reads, against the cell's distance, for pitch errors of a quarter, half and one degree: nose up bends far above the diagonal, nose down below it"
 fig, ax = plt.subplots(figsize=(6, 3.2), layout="constrained")
@@ -765,7 +774,7 @@ Markdown(ledger_table(ledger("pixel") + ledger("height")))
 # 1. $(X/Z, Y/Z)$ is the picture one metre ahead; $K$ turns it into pixels. Resized, $K$ moves by half pixels; cropped,
 #    it shifts.
 # 2. Transforms are read by names, right to left; the inverse undoes the shift first, then the turn.
-# 3. Every point has one pixel, (1); a pixel has a whole ray of points. All planes meet at the horizon.
+# 3. A point in view has one pixel, (1); a pixel has a whole ray of points. All planes meet at the horizon.
 # 4. The error of a wrong height grows like $1 / (z_\text{cam} - z)$: 17 cm of sidewalk are half a metre on the map.
 # 5. In view is not yet seen: (1) cuts occlusion (0.83 instead of 0.23) and the height (1 instead of 0.03).
 #
@@ -782,5 +791,5 @@ Markdown(ledger_table(ledger("pixel") + ledger("height")))
 #
 # ## Exercise
 #
-# [Exercise 05](exercises/05_pixels.ipynb): undo a crop, transforms by name, the pixels of a plane, a height from a miss
-# on the map, and a calibration with a fault that you find. Next: lecture [06](06_planes.ipynb), reading between pixels.
+# [Exercise 05](exercises/05_pixels.ipynb): undo a crop, transforms by name, what a cell's pixel really shows, a height
+# from a miss on the map, and a calibration with a fault that you find, and repair on two streets. Next: lecture [06](06_planes.ipynb), reading between pixels.

@@ -126,7 +126,7 @@ on_zero, on_lidar = ([lesson(drive[k], from_lidar) for k in chosen] for from_lid
 # Suppose that the drive's camera points two degrees lower than we believe. Nobody tells the program. It has a map of
 # road and sidewalk, the labels of five images, and the derivative of what it reads. Watch:
 
-# %% jupyter={"source_hidden": true} alt="animation: A, dots of road and sidewalk lie too high in the image and slide down within four steps until the border between them lies on the kerb; B, the pitch over the steps falls from two degrees to near zero"
+# %% jupyter={"source_hidden": true} alt="animation: A, dots of road and sidewalk lie too high in the image and slide down within four steps until the border between them lies on the kerb; B, the pitch over the steps falls from two degrees to minus 0.3"
 path = descend(2.0, on_lidar, steps=12)
 
 
@@ -141,7 +141,8 @@ def converging():
         u, v = (a.numpy() for a in pixels_at(points, torch.tensor(np.radians(degrees))))
         for c, colour in ((0, "tab:purple"), (1, "tab:orange")):
             left.plot(u[t[c] > 0], v[t[c] > 0], ".", color=colour, markersize=2, label=KITTI_14.names[flat[c]])
-        left.set(ylim=(95.5, 30), xlim=(60, 319.5), title=f"A: the map's cells in the image, step {step}")
+        left.set(ylim=(95.5, 30), xlim=(60, 319.5), xlabel="u [pixels]", ylabel="v [pixels]")
+        left.set_title(f"A: the map's cells in the image, step {step}")
         left.legend(loc="upper left", fontsize="small", markerscale=4)
         right.plot(path[: step + 1, 0], ".-", color="black")
         right.axhline(0, color="0.6", linewidth=1)
@@ -153,8 +154,8 @@ plotting.animate(converging(), period=0.5, alt="the map's cells slide onto road 
 
 # %% [markdown]
 # A: each dot is a cell that the map calls road or sidewalk, at the pixel that equation (1) gives to it with the pitch
-# learnt so far. B: that pitch. After four steps the border between the colours lies on the kerb. What made this
-# possible is that *reading a pixel has a derivative*: the loss on the map says in which direction each dot should move,
+# learnt so far. B: that pitch. After four steps the border between the colours lies on the kerb. (Why the pitch ends
+# at -0.3° and not at 0 comes below.) What made this possible is that *reading a pixel has a derivative*: the loss on the map says in which direction each dot should move,
 # and the chain rule collects that into one number. The same derivative, in the scores instead of the place, trains the
 # whole image network (lecture 08). This lecture builds both, from four numbers on.
 #
@@ -258,7 +259,7 @@ def draw_point(ax, u, v):
         weight = kernel(u - m) * kernel(v - n)
         ax.text(m, n - 0.12, f"{s[n, m]:.0f}", ha="center", va="bottom", fontsize=14)
         if weight > 0:
-            ax.text(m, n + 0.12, f"weight {weight:.3f}", ha="center", va="top", color="tab:red", fontsize=9)
+            ax.text(m, n + 0.12, f"times {weight:.3f}", ha="center", va="top", color="tab:red", fontsize=9)
     ax.plot(u, v, "x", color="tab:red", markersize=10, markeredgewidth=2)
     ax.set(xticks=range(3), yticks=range(3), xlabel="u [pixels]", ylabel="v [pixels]")
     ax.set_title(f"the point at ({u:.2f}, {v:.2f}) reads {read(s, u, v):.2f}", fontsize="medium")
@@ -266,21 +267,21 @@ def draw_point(ax, u, v):
 
 fig, axes = plt.subplots(1, 2, figsize=(8, 3.3), layout="constrained")
 draw_point(axes[0], 1.25, 0.5)
-t = np.linspace(-1.6, 1.6, 321)
+t = np.linspace(-1.6, 2.4, 401)
 axes[1].plot(t, [kernel(x) for x in t], color="black")
 for m in range(3):
     axes[1].plot(1.25 - m, kernel(1.25 - m), "o", color="tab:red")
     axes[1].annotate(f"column {m}", (1.25 - m, kernel(1.25 - m)), xytext=(8, 6), textcoords="offset points")
-axes[1].set(xlabel="t = u - m [pixels]", ylabel="k(t)", title="across, for u = 1.25", xlim=(-1.6, 1.9))
+axes[1].set(xlabel="t = u - m [pixels]", ylabel="k(t)", title="across, for u = 1.25", xlim=(-1.6, 2.4))
 plt.show()
 
 # %% [markdown]
-# Left, the red cross is the point; a pixel's weight is the product of two numbers between 0 and 1, one across and one
-# down. Right, the one across: the point is 0.25 from column 1 (weight 0.75), -0.75 from column 2 (0.25) and too far
-# from column 0.
+# Left, the red cross is the point, and the red numbers are weights. A pixel's weight is the product of two numbers between 0 and 1, one across and one
+# down. Right, the one across: the point is 0.25 from column 1 (0.75), -0.75 from column 2 (0.25) and 1.25, too far, from
+# column 0.
 #
 # On the drive, equation (1) has found the pixels. Here are three small pieces of one image, magnified, with the points
-# of the ground plane on them. Near by, most pixels are read by nobody; far ahead, many points share the same four.
+# of the ground plane on them. Near by, most pixels are read by no point; far ahead, many points share the same four.
 
 # %% jupyter={"source_hidden": true} alt="three magnified pieces of the image with yellow dots: far apart 8 m ahead, a dense lattice at 20 m, lines of dots that run into each other at 45 m"
 fig, axes = plt.subplots(1, 3, figsize=(8, 2.9), layout="constrained")
@@ -296,8 +297,9 @@ plt.show()
 # %% [markdown]
 # ## The way back: backpropagation
 #
-# Now learn. (The gradient of the loss in a value is written with a bar: $\bar p = \partial\,\text{loss} / \partial p$.) The loss sits at the far end, on the map; suppose that it asks the point at (1.25, 0.5) for a higher value
-# and a second point, at (1, 1.5), for a lower one: $\bar p = (-1, +2)$.
+# The loss sits at the far end, on the map, and the scores are to learn from it. So we need its derivative with respect to
+# each score; a bar marks such a derivative, $\bar p = \partial\,\text{loss} / \partial p$. Suppose that the loss asks the
+# point at (1.25, 0.5) for a higher value and a second point, at (1, 1.5), for a lower one: $\bar p = (-1, +2)$.
 #
 # Nudge the pixel with the 6 by a small amount $\varepsilon$. The first point reads it with weight 3/8 and the second
 # with 1/2, so $p$ changes by $(3/8\,\varepsilon, 1/2\,\varepsilon)$ and the loss by $-3/8\,\varepsilon + 2 \cdot
@@ -308,8 +310,8 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# The 8 is read by the first point alone, with 1/8: -0.125. The lower right corner is
-# read by nobody: 0, and so are the three pixels of column 0. A pixel gets back what it gave: the same weight, times
+# The 8 is read by the first point alone, with 1/8: -0.125. No point reads the lower right corner: 0, and so for the three
+# pixels of column 0. A pixel gets back what it gave: the same weight, times
 # the gradient of the reader, **added up** over all readers.
 #
 # </details>
@@ -364,7 +366,7 @@ print("largest difference is below 1e-9:", np.abs(by_differences - scores.grad[0
 # On the drive, let every point of every plane send back 1. What arrives at a pixel is then the sum of the weights with
 # which it is read: how strongly the map will train it.
 
-# %% jupyter={"source_hidden": true} alt="the image with the sum of weights per pixel: bright along the horizon in the middle, dark below, white at the lower and upper border where no point reads"
+# %% jupyter={"source_hidden": true} alt="the image with the sum of weights per pixel: bright along the horizon in the middle, dark above and below, white where no point reads: at the lower and upper border, and in a wedge above and below the vanishing point"
 sampler = PlaneSampler(pixels, visible, camera.size)
 scores = torch.zeros(1, 1, *camera.size, requires_grad=True)
 sampler(scores).sum().backward()
@@ -378,21 +380,22 @@ left, middle, right = np.split(scores.grad[0, 0, round(camera.K[1, 2])].numpy(),
 print(f"on the horizon: left {left.mean():.0f}, in the middle {middle.mean():.0f}, right {right.mean():.0f}")
 
 # %% [markdown]
-# White pixels are read by nobody. Along the horizon a pixel of the middle third is read with a weight that is many
-# times that of a pixel at its side. So what the network learns from the map, it learns mostly in the middle.
+# No point reads the white pixels. The white wedges in the middle lie between the two middle columns of cells, which run
+# towards the vanishing point. Along the horizon a pixel of the middle third is read with a weight that is many times
+# that of a pixel at its side. So if all readers send back gradients of the same size and sign, a pixel there receives
+# the most.
 #
 # ## The whole of equation (2) is one matrix
 #
 # For one calibration the weights never change. Write the nine scores below each other as a vector, take three points
-# and write down who reads whom: three rows, nine columns.
+# and write down which point reads which pixel: three rows, nine columns.
 #
 # **Predict before you run.** How many of the 27 entries aren't zero, for the points (1.25, 0.5), (1, 1.5) and (0, 0)?
 # And what does the *column* of the pixel with the 6 say?
 #
 # <details><summary>Answer</summary>
 #
-# 4 + 2 + 1 = 7. A row says what a point reads; a column says by whom a pixel is read:
-# 3/8, 1/2, 0. The gradient above was that column times the gradients of the readers.
+# 4 + 2 + 1 = 7. A row says which pixels a point reads; a column says which points read a pixel: 3/8, 1/2, 0. The gradient above was that column times the gradients of the readers.
 #
 # </details>
 #
@@ -450,9 +453,10 @@ print("fast == literal; sparse, with its transpose, {:.0f} MB, as a full matrix 
 #
 # ## Pixels that learn from the map alone
 #
-# Forget the network: let every score of the image be a free number, all zero at first. Nobody
-# labels a pixel. Someone gives you the *map* instead, the class of each ground cell that the camera sees. Sample the
-# scores on the ground plane, compare with the map (cross-entropy, as in training), send the gradient back, take a step.
+# Forget the network: let every score of the image be a free number, all zero at first. No pixel has a label. You get the
+# *map* instead, the class of each ground cell that the camera sees. Sample the
+# scores on the ground plane, compare with the map (by *cross-entropy*, minus the logarithm of the true class's
+# probability), send the gradient back, take a step.
 #
 # **Predict before you run.** After twenty steps, which pixels of the image have got a class? Think of the pieces at 8,
 # 20 and 45 m. And what will the pixels of a picket fence learn, when the cell *behind* it is lawn?
@@ -494,20 +498,24 @@ print(f"of the wrong ones {100 * (learnt == KITTI_14.index('car'))[wrong].mean()
 print(f"everything else that is read: {100 * is_right[heard & ~is_flat].mean():.0f} % are right", end=", ")
 print(f"of the fence {100 * is_right[heard & (true_labels == KITTI_14.index('fence'))].mean():.0f} %")
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="above, the classes that pixels have learnt from the map, dots near by and a closed area far ahead, with nothing above the horizon; below, the true labels"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="A, the classes that pixels have learnt from the map, dots near by and a closed area far ahead, with nothing above the horizon, and the fence at F learnt as vegetation; B, the true labels, with the fence at F"
 fig, axes = plt.subplots(2, 1, figsize=(7.5, 3.8), layout="constrained")
-plotting.image_labels(image, learnt, KITTI_14, ax=axes[0], opacity=1).set_title("learnt from the map")
-plotting.image_labels(image, true_labels, KITTI_14, ax=axes[1]).set_title("truth, which nobody has shown to it")
+plotting.image_labels(image, learnt, KITTI_14, ax=axes[0], opacity=1).set_title("A: learnt from the map")
+plotting.image_labels(image, true_labels, KITTI_14, ax=axes[1]).set_title("B: true labels, never shown to it")
+axes[0].get_legend().remove()
+plotting.class_legend(axes[1], KITTI_14, true_labels, loc="upper center", bbox_to_anchor=(0.5, 0), ncols=5)
 for ax in axes:
     ax.images[0].set_interpolation("nearest")
     ax.set_ylim(95.5, 35.5)
+    arrow = {"arrowstyle": "->", "color": "black"}
+    ax.annotate("F", (254, 60), (234, 86), fontweight="bold", arrowprops=arrow, bbox={"fc": "white", "pad": 1.5})
 plt.show()
 
 # %% [markdown]
-# Top: where the photograph shines through, no point reads. On road and sidewalk the map reads part of the pixels, and
-# most of what it reads is right, although no pixel was ever labelled: this is end-to-end training in miniature. Wrong
-# is, above all, what stands up. Of the fence's pixels 1 % have learnt *fence*, because the lawn *behind* it has the same
-# pixels. This is lecture 05's cut edge, occlusion, at work in the gradient.
+# A: where the photograph is seen, no point reads. On road and sidewalk the map reads part of the pixels, and
+# most of what it reads is right, although no pixel was ever labelled: this is end-to-end training in miniature. Most
+# errors are on what stands up. Of the pixels of the fence (F) that are read, 1 % have learnt *fence*, because the lawn
+# *behind* it has the same pixels. This is lecture 05's cut edge, occlusion, at work in the gradient.
 
 # %% [markdown]
 # ## If the point moves: the gradient in u and v
@@ -516,13 +524,13 @@ plt.show()
 # *nearest* pixel, and the pixel gets the whole gradient. But what if the calibration should learn, or the height of a plane?
 # Then the point moves, and the question is how $p$ changes with $u$.
 #
-# **Predict before you run.** Move the point of (1.25, 0.5) by a tiny step to the right. How much does $p$ change a
-# pixel? And down? And if it reads the nearest pixel instead?
+# **Predict before you run.** Move the point of (1.25, 0.5) by a tiny step to the right. How much does $p$ change, per
+# pixel of the step? And down? And if it reads the nearest pixel instead?
 #
 # <details><summary>Answer</summary>
 #
-# To the right the value rises along row 0, by 8 - 4 a pixel, and falls along row 1,
-# by 6; the point is half in each: 1/2 · 4 - 1/2 · 6 = -1. Down: 3/4 · (6 - 4) + 1/4 · (0 - 8) = -0.5. With the
+# To the right the value rises along row 0, by 8 - 4 per pixel, and falls along row 1, by 6 per pixel; the point is half
+# in each: 1/2 · 4 - 1/2 · 6 = -1. Down: 3/4 · (6 - 4) + 1/4 · (0 - 8) = -0.5. With the
 # nearest pixel a tiny step changes nothing, so there is nothing to learn from.
 #
 # </details>
@@ -565,7 +573,7 @@ axes[0].legend()
 between = across[across % 1 > 1e-9]
 axes[1].plot(between, np.zeros_like(between), ".", color="0.6", markersize=2, label="nearest pixel")
 axes[1].plot(between, [slopes(s, u, 1.0)[0] for u in between], ".", color="tab:red", markersize=2, label="bilinear")
-axes[1].set(xlabel="u [pixels]", ylabel="slope of p in u [a pixel]", xticks=range(3), title="its slope")
+axes[1].set(xlabel="u [pixels]", ylabel="slope of p in u [per pixel]", xticks=range(3), title="its slope")
 plt.show()
 
 # %% [markdown]
@@ -620,7 +628,8 @@ print(f"by hand {by_hand:.3f}, by PyTorch {gradient.item():.3f}")
 #
 # No. From +2° it ends at -0.1°, from -2° at -0.7° after twenty steps, and taken one by one the five images have
 # their minima between -0.7° and +0.2°: the loss explains the slope of the road by a pitch of the camera. With heights
-# of the ground from the LIDAR, both descents end at -0.3°, less than a pixel from the truth.
+# of the ground from the LIDAR, both descents end at -0.3°, 0.9 pixels from the truth; the five minima still lie up to
+# 0.6° apart.
 #
 # </details>
 
@@ -640,15 +649,17 @@ for name, (down, up) in paths.items():
     print(f"{name}: from +2 to {down[-1, 0]:+.1f}, from -2 to {up[-1, 0]:+.1f} degrees", end="; ")
     print("single images:", *(f"{a:+.1f}" for a in single))
 assert max(abs(path[-1, 0]) for path in paths["height from LIDAR"]) < 0.35
+off = camera.K[1, 1] * np.tan(np.radians(-paths["height from LIDAR"][0][-1, 0]))
+print(f"with heights from LIDAR both end {off:.1f} pixels from the truth")
 assert abs(paths["height 0"][0][-1, 0] - paths["height 0"][1][-1, 0]) > 0.4
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="loss over pitch with two descents: on the left, with the ground at height 0, a wide flat valley between minus 0.7 and minus 0.1 degrees in which the descents end apart; on the right, with the LIDAR's heights, one valley where both end together"
 fig, axes = plt.subplots(1, 2, figsize=(8, 3), layout="constrained", sharey=True)
 for ax, name in zip(axes, paths, strict=True):
-    ax.plot(degrees, losses[name].T, color="0.85", linewidth=1)
-    ax.plot(degrees, losses[name].mean(axis=0), color="tab:red", label="loss, five images")
-    for path in paths[name]:
-        ax.plot(*path.T, ".-", color="black")
+    ax.plot(degrees, losses[name].T, color="0.8", linewidth=1, label=("one image", *4 * [None]))
+    ax.plot(degrees, losses[name].mean(axis=0), color="tab:red", label="mean of five")
+    for path, label in zip(paths[name], ("two descents", None), strict=True):
+        ax.plot(*path.T, ".-", color="black", label=label)
     ax.axvline(0, color="0.6", linewidth=1)
     ax.set(xlabel="pitch [degrees]", title=name)
 axes[0].set_ylabel("loss")
@@ -656,10 +667,10 @@ axes[0].legend(fontsize="small")
 plt.show()
 
 # %% [markdown]
-# Grey: single images; red: their mean; black: the descents. On the left the loss has no single lowest point, because
-# each image was taken on another slope. On the right it has, 0.3° from the truth: 0.9 pixels in this image. So the
-# descent works, and it found what the model says and the world doesn't: height 0. A gradient corrects *whatever may
-# move*; when the wrong thing is held fixed, it bends another. (The map used here is the simulator's, so this is a
+# On the left the mean has a wide floor instead of one lowest point, because each image was taken on another slope. On the
+# right it has one, 0.3° from the truth: 0.9 pixels in this image. So the descent works; what was wrong on the left is
+# what the model holds fixed, height 0. A gradient changes *whatever may move*: if an error lies in what is held fixed,
+# it bends something else to make up for it. (The map used here is the simulator's, so this is a
 # demonstration, not a calibration without measurements.) Read by the nearest pixel, the loss has no slope at all:
 
 # %%
@@ -677,13 +688,13 @@ print("nearest pixel: is there a gradient?", nearest.requires_grad)
 #
 # $$ \text{True:} \quad \frac{2u}{w - 1} - 1, \qquad \text{False:} \quad \frac{2u + 1}{w} - 1 $$
 #
-# **Predict before you run.** Somebody scales for one and calls the other. How large is the error at the borders, and in
+# **Predict before you run.** A program scales for one and calls the other. How large is the error at the borders, and in
 # the middle of the image? Which image would you feed to a sampler to find out which convention it has?
 #
 # <details><summary>Answer</summary>
 #
-# Half a pixel at either border, in opposite directions, and nothing in the middle: no picture shows it. A **ramp**
-# shows it: let each pixel's score be its own v. Then the value read *is* the place that it was read from.
+# Half a pixel at either border, in opposite directions, and nothing in the middle: too little to see in a picture. A
+# **ramp** shows it: let each pixel's score be its own v. Then the value read *is* the place that it was read from.
 #
 # </details>
 
@@ -776,20 +787,25 @@ _ = interact(
 # %% [markdown]
 # ## Where this breaks
 #
-# **A slope is felt only near by.** The gradient in u and v knows four pixels. How far off may the calibration start?
+# **A slope is felt only near by.** The gradient in u and v knows four pixels. How far off may the calibration start, if
+# the descent gets ninety steps?
 
 # %%
-for start in (4.0, -4.0, 6.0, -6.0, 8.0, -8.0):
-    path = descend(start, on_lidar, steps=30)
-    print(f"starts at {start:+.0f} degrees, after 30 steps at {path[-1, 0]:+.1f}")
+for start in (6.0, 8.0, 10.0, -12.0, -15.0):
+    path = descend(start, on_lidar, steps=91)
+    print("from {:+.1f} degrees: after 30 steps at {:+.1f}, after 90 at {:+.1f}".format(*path[[0, 30, 90], 0]))
+readings = read_points(on_lidar[0][0], *pixels_at(on_lidar[0][2], torch.tensor(np.radians(10.0))))
+assert not readings.any()  # at 10 degrees no point reads road or sidewalk
 
 # %% [markdown]
-# From six degrees it arrives. From eight degrees up it is still far away: there the cells read trees, houses and sky,
-# where no direction leads to a road. That is why registration starts with small, blurred images, where one pixel is wide, and
-# refines.
+# From six degrees it arrives within thirty steps, from eight and from -12 it needs up to ninety. From ten degrees it
+# never moves: every cell reads trees, houses or sky, where the scores of road and sidewalk are 0 all around, so the
+# slope is exactly zero. From -15 all cells fall below the image. That is why registration of images starts with small,
+# blurred ones, where a slope reaches farther, and refines.
 #
 # **Four pixels are the right number at one distance only.** A cell of 0.5 m covers about 40 pixels at 7 m and a
-# sixteenth at 60 m. Near by, most of them have no say (*aliasing*); far away, cells share one. The
+# sixteenth at 60 m. Near by, most of these pixels are never read, so a thin thing may be missed (*aliasing*); far away,
+# cells share one. The
 # [companion](deeper/06_sampling.ipynb) measures both.
 #
 # **The gradient goes to whatever was read.** A cell whose view is blocked reads the thing in front, and trains it
@@ -822,6 +838,6 @@ Markdown(ledger_table(ledger("planes")))
 #
 # ## Exercise
 #
-# [Exercise 06](exercises/06_planes.ipynb): four pixels and their weights, a plane, the way back, the slope of a loss in
-# the pitch, which convention a black box has, and one question. Next: lecture [07](07_segmentation.ipynb), three
+# [Exercise 06](exercises/06_planes.ipynb): four pixels and their weights, the mean over a cell, a bug in a way back, the
+# slope of a loss in the yaw, which convention a black box has, your own sampler on two streets, and one question. Next: lecture [07](07_segmentation.ipynb), three
 # networks for segmentation.

@@ -176,13 +176,14 @@ def shared_pixel(readers: int = 4, right: float = 0.8, prior: float = 0.5) -> St
     if not 1 <= readers <= 12:
         raise ArgumentError("readers", "from 1 to 12", readers)
     cells = [f"x{k}" for k in range(1, readers + 1)]
+    wide = [place for cell in cells for place in (cell, None)][:-1]  # room for the price between two arrows
     pixel = Factor(("m", "a"), [[right, 1 - right], [1 - right, right]])
     factors = [binary("m", prior), pixel, *(Factor(("a", cell), np.eye(2)) for cell in cells)]
     return StageGraph(
         f"{readers} cells read one pixel",
         directed(factors),
         observed=tuple(cells),
-        positions=in_rows(["m"], ["a"], cells),
+        positions=in_rows(["m"], ["a"], wide),
         equations={"m": "what lies there", "a": "the pixel", cells[-1]: "what the cells read"},
         cut=cut_edges("planes"),
     )

@@ -29,26 +29,33 @@ def now_from_before(T_world_from_now, T_world_from_before):
     return {result}"""
 
 
-def plane(
-    point="[x, y, height, 1]",
-    T="T_camera_from_grid",
-    result="(f_u * X + skew * Y) / Z + c_u, f_v * Y / Z + c_v",
-    front="Z > 0",
-    inside="0 <= u <= w - 1 and 0 <= v <= h - 1",
+def walls(
+    ray="z_cam + (delta - z_cam) * x[i] / x[j]",
+    order="range(len(x))",
+    meets="top[i] >= ray",
+    none="len(x)",
+    before="",
+    count="np.sum(shown(x, top, z_cam, delta) == np.arange(len(x)))",
+    choose="np.argmax(counts)",
 ):
-    """Return an answer to task 3 that treats one point at a time by these expressions."""
+    """Return an answer to task 3 that follows one ray at a time by these expressions."""
     return f"""
-def road_pixels(xy, z, K, T_camera_from_grid, size):
-    (f_u, skew, c_u), (_, f_v, c_v), _ = K
-    h, w = size
-    pixels, visible = np.full((len(xy), 2), np.nan), np.zeros(len(xy), bool)
-    for n, ((x, y), height) in enumerate(zip(xy, z)):
-        X, Y, Z, _ = {T} @ {point}
-        if {front}:
-            u, v = {result}
-            pixels[n] = u, v
-            visible[n] = {inside}
-    return pixels, visible"""
+def shown(x, top, z_cam, delta):
+    {before or "pass"}
+    firsts = []
+    for j in range(len(x)):
+        firsts.append({none})
+        for i in {order}:
+            ray = {ray}
+            if {meets}:
+                firsts[-1] = i
+                break
+    return np.array(firsts)
+
+
+def best_plane(x, top, z_cam, heights):
+    counts = [{count} for delta in heights]
+    return {choose}"""
 
 
 def high(place="z_cam - (z_cam - delta) * x / x_drawn", never="x_drawn > 0"):
@@ -82,6 +89,29 @@ def find_fault(points, pixels, K, T_camera_from_lidar):
                 return {error}
             tried.append((left_over(K_right, T), kind, amount))
     _, kind, amount = min(tried)
+    return {result}"""
+
+
+def mended(
+    found="find(points, pixels, K, T_camera_from_lidar)",
+    shift="-amount",
+    turn="amount",
+    inverse="np.linalg.inv(T_camera_from_lidar)",
+    before="",
+    result="K_right, T",
+):
+    """Return an answer to task 6 that repairs each fault by these expressions."""
+    return f"""
+def repaired(points, pixels, K, T_camera_from_lidar, find=None):
+    {before or "pass"}
+    kind, amount = {found}
+    K_right, T = np.array(K, float), T_camera_from_lidar
+    if kind == SHIFT:
+        K_right[:2, 2] += {shift}
+    elif kind == INVERSE:
+        T = {inverse}
+    else:
+        T = turned(T, "x" if kind == PITCH else "y", {turn})
     return {result}"""
 
 
@@ -319,237 +349,141 @@ def now_from_before(T_world_from_now, T_world_from_before):
     return T""",
         ),
         # ---- task 3
-        right("one point at a time", task="plane-pixels", code=plane()),
+        right("one ray at a time", task="shown", code=walls()),
         right(
-            "lists of pairs and of booleans",
-            task="plane-pixels",
-            code=plane().replace("return pixels, visible", "return pixels.tolist(), visible.tolist()"),
-        ),
-        right(
-            "rotation and shift, homogeneous pixels, masks",
-            task="plane-pixels",
+            "slopes from the camera",
+            task="shown",
             code="""
-def road_pixels(xy, z, K, T_camera_from_grid, size):
-    points = np.insert(np.asarray(xy, float), 2, z, axis=1)
-    points = points @ T_camera_from_grid[:3, :3].T + T_camera_from_grid[:3, 3]
-    triples = points @ K.T
-    pixels = np.full((len(points), 2), np.nan)
-    front = triples[:, 2] > 0
-    pixels[front] = triples[front, :2] / triples[front, 2:]
-    with np.errstate(invalid="ignore"):
-        visible = np.all((pixels >= 0) & (pixels <= np.array(size)[::-1] - 1), axis=1)
-    return pixels, visible""",
+def shown(x, top, z_cam, delta):
+    slopes = (np.asarray(top) - z_cam) / x
+    firsts = [np.flatnonzero(slopes >= (delta - z_cam) / far) for far in x]
+    return [int(first[0]) if len(first) else len(x) for first in firsts]
+
+
+def best_plane(x, top, z_cam, heights):
+    best, most = 0, -1
+    for number, delta in enumerate(heights):
+        in_place = sum(j == wall for j, wall in enumerate(shown(x, top, z_cam, delta)))
+        if in_place > most:
+            best, most = number, in_place
+    return best""",
         ),
         mistake(
-            "not divided by Z",
-            task="plane-pixels",
-            loses=3,
-            says="did you divide by Z?",
-            code=plane(result="f_u * X + c_u * Z, f_v * Y + c_v * Z"),
+            "equation (1) alone", task="shown", loses=5, says="equation (1) alone", code=walls(order="[j]", none="j")
         ),
         mistake(
-            "height forgotten",
-            task="plane-pixels",
-            loses=3,
-            says="each point has a height of its own, z",
-            code=plane(point="[x, y, 0, 1]"),
-        ),
-        mistake(
-            "height downwards",
-            task="plane-pixels",
-            loses=3,
-            says="0.5 m below the ground",
-            code=plane(point="[x, y, -height, 1]"),
-        ),
-        mistake(
-            "fourth coordinate zero",
-            task="plane-pixels",
-            loses=3,
-            says="the fourth coordinate of a point is 1, not 0",
-            code=plane(point="[x, y, height, 0]"),
-        ),
-        mistake(
-            "inverse transform",
-            task="plane-pixels",
+            "nothing flies over",
+            task="shown",
             loses=5,
-            says="you use the inverse transform",
-            code=plane(T="np.linalg.inv(T_camera_from_grid)"),
+            says="nothing flies over in your answer",
+            code=walls(order="range(j)", none="j"),
         ),
         mistake(
-            "v, u",
-            task="plane-pixels",
-            loses=3,
-            says="u counts to the right and comes first",
-            code=plane(result="f_v * Y / Z + c_v, f_u * X / Z + c_u"),
-        ),
-        mistake(
-            "no principal point",
-            task="plane-pixels",
-            loses=3,
-            says="the principal point is missing",
-            code=plane(result="f_u * X / Z, f_v * Y / Z"),
-        ),
-        mistake(
-            "divided by the distance",
-            task="plane-pixels",
-            loses=3,
-            says="you divide by the distance",
-            code=plane(
-                result="[c + f * q / np.sqrt(X**2 + Y**2 + Z**2) for c, f, q in ((c_u, f_u, X), (c_v, f_v, Y))]"
-            ),
-        ),
-        mistake(
-            "f_u and f_v swapped",
-            task="plane-pixels",
-            loses=3,
-            says="f_u and f_v are swapped",
-            code=plane(result="f_v * X / Z + c_u, f_u * Y / Z + c_v"),
-        ),
-        mistake(
-            "pixels without a mask",
-            task="plane-pixels",
+            "nothing is hidden",
+            task="shown",
             loses=5,
-            says="return two arrays",
-            code=plane().replace("return pixels, visible", "return pixels"),
+            says="nothing is hidden in your answer",
+            code=walls(order="range(j, len(x))"),
         ),
         mistake(
-            "shifted, then turned",
-            task="plane-pixels",
+            "walls against the plane",
+            task="shown",
+            loses=5,
+            says="you compare the walls with the plane",
+            code=walls(ray="delta"),
+        ),
+        mistake(
+            "the last wall",
+            task="shown",
+            loses=5,
+            says="that is the last wall",
+            code=walls(order="reversed(range(len(x)))"),
+        ),
+        mistake(
+            "walls against one another",
+            task="shown",
+            loses=5,
+            says="a higher wall in front doesn't hide all behind it",
+            code=walls(order="range(j)", meets="top[i] > top[j]", none="j"),
+        ),
+        mistake(
+            "counted from 1",
+            task="shown",
+            loses=5,
+            says="count the cells from 0",
+            code=walls().replace("return np.array(firsts)", "return np.minimum(np.array(firsts) + 1, len(x))"),
+        ),
+        mistake(
+            "no wall is number 0",
+            task="shown",
             loses=3,
-            says="that is R (p - t)",
-            code=plane(T="T").replace(
-                "    h, w = size",
-                "    R, t = T_camera_from_grid[:3, :3], T_camera_from_grid[:3, 3]\n"
-                "    T = np.vstack([np.column_stack([R, -R @ t]), [0, 0, 0, 1]])\n"
-                "    h, w = size",
+            says="the rays meet no wall, and the number is N = 5",
+            code=walls(none="0"),
+        ),
+        mistake(
+            "the ground plane, always",
+            task="shown",
+            loses=5,
+            says="a plane at 1 m",
+            code=walls(ray="z_cam - z_cam * x[i] / x[j]"),
+        ),
+        mistake(
+            "top changed in place",
+            task="shown",
+            loses=3,
+            says="shown changed an argument",
+            code=walls(before="top -= z_cam", ray="(delta - z_cam) * x[i] / x[j]").replace(
+                "shown(x, top, z_cam, delta) ==", "shown(x, top.copy(), z_cam, delta) =="
             ),
         ),
         mistake(
-            "skew ignored",
-            task="plane-pixels",
+            "every plane below the camera",
+            task="shown",
             loses=3,
-            says="on inputs you haven't seen: wrong where K[0, 1] isn't 0",
-            code=plane(result="f_u * X / Z + c_u, f_v * Y / Z + c_v"),
+            says="on inputs you haven't seen: a wrong wall, on a plane above the camera",
+            code=walls(ray="z_cam - abs(delta - z_cam) * x[i] / x[j]"),
         ),
         mistake(
-            "nearer than half a metre is behind",
-            task="plane-pixels",
+            "no wall higher than the camera",
+            task="shown",
+            loses=5,
+            says="on inputs you haven't seen: a wrong wall",
+            code=walls(meets="z_cam > top[i] >= ray"),
+        ),
+        mistake(
+            "the height of the plane",
+            task="shown",
             loses=2,
-            says="on inputs you haven't seen: a point just in front of the camera has no pixel",
-            code=plane(front="Z > 0.5"),
+            says="return the number of the plane, not its height",
+            code=walls(choose="heights[np.argmax(counts)]"),
         ),
         mistake(
-            "a level camera taken for granted",
-            task="plane-pixels",
-            loses=3,
-            says="on inputs you haven't seen: wrong pixels (no camera is quite level",
-            code=plane(T="T_level").replace(
-                "    h, w = size",
-                "    z_cam = T_camera_from_grid[1, 3]\n"
-                "    T_level = np.array([[0, -1, 0, 0], [0, 0, -1, z_cam], [1, 0, 0, 0], [0, 0, 0, 1]])\n"
-                "    h, w = size",
-            ),
-        ),
-        mistake(
-            "behind taken for in front",
-            task="plane-pixels",
+            "not hidden is enough",
+            task="shown",
             loses=2,
-            says="look at the sign of Z",
-            code=plane(front="Z != 0"),
+            says="return 1, the first of these",
+            code=walls(count="np.sum(shown(x, top, z_cam, delta) >= np.arange(len(x)))"),
         ),
         mistake(
-            "behind not visible, but with a pixel",
-            task="plane-pixels",
+            "not flown over is enough",
+            task="shown",
             loses=2,
-            says="points not in front of the camera have no pixel: NaN",
-            code=plane(front="Z != 0", inside="Z > 0 and 0 <= u <= w - 1 and 0 <= v <= h - 1"),
+            says="a cell must be seen IN PLACE to count",
+            code=walls(count="np.sum(shown(x, top, z_cam, delta) <= np.arange(len(x)))"),
         ),
         mistake(
-            "everything in front is visible",
-            task="plane-pixels",
+            "the last of the best",
+            task="shown",
             loses=2,
-            says="to the left of the first pixel's centre",
-            code=plane(inside="True"),
+            says="return 1, the first of these",
+            code=walls(choose="len(counts) - 1 - np.argmax(counts[::-1])"),
         ),
         mistake(
-            "w and h swapped",
-            task="plane-pixels",
+            "the lowest of the best",
+            task="shown",
             loses=2,
-            says="is `size` (h, w), and u compared with w?",
-            code=plane(inside="0 <= u <= h - 1 and 0 <= v <= w - 1"),
-        ),
-        mistake(
-            "up to the image's edge",
-            task="plane-pixels",
-            loses=2,
-            says="the last pixel's centre is at w - 1",
-            code=plane(inside="0 <= u < w and 0 <= v < h"),
-        ),
-        mistake(
-            "without the border, on the left",
-            task="plane-pixels",
-            loses=2,
-            says="the border belongs to the image",
-            code=plane(inside="0 < u <= w - 1 and 0 <= v <= h - 1"),
-        ),
-        mistake(
-            "without the border, below",
-            task="plane-pixels",
-            loses=2,
-            says="on inputs you haven't seen: wrong at the lower border of the image",
-            code=plane(inside="0 <= u <= w - 1 and 0 <= v < h - 1"),
-        ),
-        mistake(
-            "rounded to whole pixels",
-            task="plane-pixels",
-            loses=3,
-            says="by hand, Z = 10, 20 and 10",
-            code=plane(result="round((f_u * X + skew * Y) / Z + c_u), round(f_v * Y / Z + c_v)"),
-        ),
-        mistake(
-            "outside the image no pixel",
-            task="plane-pixels",
-            loses=2,
-            says="a point beside the image has a pixel all the same",
-            code=plane().replace(
-                "            pixels[n]",
-                "            if 0 <= u <= w - 1 and 0 <= v <= h - 1:\n                pixels[n]",
-            ),
-        ),
-        mistake(
-            "one border too early",
-            task="plane-pixels",
-            loses=2,
-            says="on inputs you haven't seen: wrong at a border of the image",
-            code=plane(inside="0 <= u <= w - 1 and 0 <= v < h - 2"),
-        ),
-        mistake(
-            "nearer than 0.2 m is behind",
-            task="plane-pixels",
-            loses=2,
-            says="on inputs you haven't seen: a point just in front of the camera has no pixel",
-            code=plane(front="Z > 0.2"),
-        ),
-        mistake(
-            "no pixel beyond 1500 m",
-            task="plane-pixels",
-            loses=2,
-            says="on inputs you haven't seen: a point 5 km ahead has no pixel",
-            code=plane(front="0 < Z < 1500"),
-        ),
-        mistake(
-            "borders a fifth of a pixel too wide",
-            task="plane-pixels",
-            loses=2,
-            says="on inputs you haven't seen: wrong at the",
-            code=plane(inside="-0.2 <= u <= w - 0.8 and -0.2 <= v <= h - 0.8"),
-        ),
-        mistake(
-            "one height for all",
-            task="plane-pixels",
-            loses=3,
-            says="by hand, Z = 10, 20 and 10",
-            code=plane().replace("    h, w = size", "    h, w = size\n    z = np.full(len(xy), z[0])"),
+            says="on inputs you haven't seen: an earlier plane is as good",
+            code=walls(choose="min(range(len(counts)), key=lambda k: (-counts[k], heights[k] if k > 3 else k))"),
         ),
         # ---- task 4
         right("by shares, NaN from a mask", task="heights-of", code=high()),
@@ -721,5 +655,64 @@ def heights_of(x, x_drawn, z_cam, delta):
             loses=2,
             says="on inputs you haven't seen: the wrong amount",
             code=fault(amounts="np.linspace(-1, 1, 201)"),
+        ),
+        # ---- task 6
+        right("the table of task 5", task="repaired", code=mended()),
+        right(
+            "a search of one's own",
+            task="repaired",
+            code="""
+def repaired(points, pixels, K, T_camera_from_lidar, find=None):
+    T = T_camera_from_lidar
+    best = [(K, np.linalg.inv(T))]
+    for amount in np.arange(-2, 2.005, 0.01):
+        shifted = np.array(K, float)
+        shifted[:2, 2] -= amount
+        best += [(shifted, T), (K, turned(T, "x", amount)), (K, turned(T, "y", amount))]
+    return min(best, key=lambda both: np.nan_to_num(np.abs(project_points(points, *both) - pixels), nan=1e9).sum())""",
+        ),
+        mistake(
+            "found, but not repaired",
+            task="repaired",
+            loses=3,
+            says="nothing was repaired",
+            code=mended(result="K, T_camera_from_lidar"),
+        ),
+        mistake("turned the wrong way", task="repaired", loses=3, says="it has grown", code=mended(turn="-amount")),
+        mistake(
+            "shifted the wrong way",
+            task="repaired",
+            loses=3,
+            says="fault SHIFT: it has grown",
+            code=mended(shift="amount"),
+        ),
+        mistake(
+            "the inverse forgotten",
+            task="repaired",
+            loses=3,
+            says="fault INVERSE: nothing was repaired",
+            code=mended(inverse="T"),
+        ),
+        mistake("T alone", task="repaired", loses=3, says="return two matrices", code=mended(result="T")),
+        mistake(
+            "K changed in place",
+            task="repaired",
+            loses=3,
+            says="repaired changed an argument",
+            code=mended(result="K, T").replace("np.array(K, float)", "K"),
+        ),
+        mistake(
+            "half a degree at a time",
+            task="repaired",
+            loses=3,
+            says="a return is seen up to",
+            code=mended(turn="round(2 * amount) / 2"),
+        ),
+        mistake(
+            "only what the visible test asks",
+            task="repaired",
+            loses=3,
+            says="on inputs you haven't seen: a return that nobody clicked",
+            code=mended(turn="abs(amount) if kind == PITCH else -abs(amount)"),
         ),
     )

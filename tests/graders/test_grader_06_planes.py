@@ -14,42 +14,87 @@ def four_pixels(u, v, h, w):
     return [top, top, bottom, bottom], [left, right, left, right], {weights}"""
 
 
-def plane(n="v - np.arange(h)", m="u - np.arange(w)", kernel="np.maximum(0, 1 - np.abs(t))", seen="visible[r, c]"):
-    """Return an answer to task 2 with these distances from rows and columns, this kernel and this condition."""
+def means(
+    n="v - np.arange(h)",
+    m="u - np.arange(w)",
+    kernel="np.maximum(0, 1 - np.abs(t))",
+    seen="visible[cell, k]",
+    mean="total / max(visible[cell].sum(), 1)",
+):
+    """Return an answer to task 2 with these distances, this kernel, this condition and this mean."""
     return f"""
-def sample_plane(s, pixels, visible):
+def cell_means(s, pixels, visible):
     C, h, w = s.shape
-    H, W = visible.shape
-    def k(t):
+    N, K = visible.shape
+    def kernel(t):
         return {kernel}
-    p = np.zeros((C, H, W))
-    for r in range(H):
-        for c in range(W):
+    result = np.zeros((C, N))
+    for cell in range(N):
+        total = np.zeros(C)
+        for k in range(K):
             if {seen}:
-                u, v = pixels[r, c]
-                p[:, r, c] = np.einsum("cnm,n,m->c", s, k({n}), k({m}))
-    return p"""
+                u, v = pixels[cell, k]
+                total = total + np.einsum("cnm,n,m->c", s, kernel({n}), kernel({m}))
+        result[:, cell] = {mean}
+    return result"""
 
 
-def back(add="s_bar[k] += p_bar[k, r, c] * x", before="", after="", seen="visible[r, c]", uv="u, v"):
-    """Return an answer to task 3 that does `add` for each class k and each visible point (r, c) with weights x."""
+def boxed(s="rng.normal(size=(h, w))", p_bar="rng.normal(size=n)", right="np.isclose(left, there)", kind=None):
+    """Return an answer to task 3: this test for a pair, and these lines that find the kind."""
+    kind = (
+        kind
+        or """
+    shares = A * p_bar[:, None]
+    total, n_read = shares.sum(axis=0), (A > 0).sum(axis=1)
+    got = np.ravel(backward(p_bar))
+    if np.allclose(got, total):
+        return PAIR
+    if np.allclose(got, total / n):
+        return MEAN
+    last = np.zeros(h * w)
+    for share in shares:
+        last = np.where(share != 0, share, last)
+    return OVERWRITES if np.allclose(got, last) else NEAREST"""
+    )
     return f"""
-def give_back(p_bar, pixels, visible, h, w):
-    C, H, W = p_bar.shape
-    s_bar, n_read, total = np.zeros((C, h, w)), np.zeros((h, w)), np.zeros((h, w))
-    {before or "pass"}
-    for r in range(H):
-        for c in range(W):
+def is_pair(forward, backward, h, w, n):
+    rng = np.random.default_rng(3)
+    s, p_bar = {s}, {p_bar}
+    there, left = np.sum(np.ravel(forward(s)) * p_bar), np.sum(np.asarray(backward(p_bar)) * s)
+    return bool({right})
+
+
+def which_kind(forward, backward, h, w, n):
+    A = np.array([np.ravel(forward(one)) for one in np.eye(h * w).reshape(-1, h, w)]).T
+    p_bar = np.random.default_rng(3).uniform(1, 2, n)
+    {kind}"""
+
+
+def matrix(
+    number="r * w + c", weight="x / seen.sum()", seen="seen[k]", sparse="csr_matrix((x, (i, j)), shape=(N, h * w))"
+):
+    """Return an answer to task 6 that collects these numbers and weights."""
+    return f"""
+from scipy.sparse import csr_matrix
+
+def cell_matrix(pixels, visible, h, w, weights_of):
+    N, K = visible.shape
+    i, j, all_weights = [], [], []
+    for cell in range(N):
+        seen = visible[cell]
+        for k in range(K):
             if {seen}:
-                {uv} = pixels[r, c]
-                down = np.maximum(0, 1 - np.abs(v - np.arange(h)))
-                across = np.maximum(0, 1 - np.abs(u - np.arange(w)))
-                x = np.outer(down, across)
-                n_read, total = n_read + (x > 0), total + x
-                for k in range(C):
-                    {add}
-    {after or "pass"}
-    return s_bar"""
+                for r, c, x in zip(*weights_of(*pixels[cell, k], h, w)):
+                    i.append(cell)
+                    j.append(int({number}))
+                    all_weights.append({weight})
+    x = all_weights
+    return {sparse}
+
+
+def there_and_back(s, p_bar, pixels, visible, weights_of=None):
+    A = cell_matrix(pixels, visible, *s.shape[1:], weights_of)
+    return (A @ s.reshape(len(s), -1).T).T, (A.T @ p_bar.T).T.reshape(s.shape)"""
 
 
 def yaw(
@@ -248,263 +293,233 @@ def four_pixels(u, v, h, w):
             code=four(top="min(int(v), h - 2)", left="min(int(u), w - 2)"),
         ),
         # ---- task 2
-        right("a loop over points", task="sample-plane", code=plane()),
+        right("a loop over cells and points", task="cell-means", code=means()),
         right(
-            "gather four rows, no loop",
-            task="sample-plane",
-            code="""
-def sample_plane(s, pixels, visible):
-    C, h, w = s.shape
-    u, v = pixels[visible].T
-    m, n = np.minimum(u.astype(int), w - 2), np.minimum(v.astype(int), h - 2)
-    a, b = u - m, v - n
-    p = np.zeros((C, *visible.shape))
-    p[:, visible] = (1 - b) * ((1 - a) * s[:, n, m] + a * s[:, n, m + 1]) + b * (
-        (1 - a) * s[:, n + 1, m] + a * s[:, n + 1, m + 1]
-    )
-    return p""",
-        ),
-        right(
-            "scipy interpolates",
-            task="sample-plane",
+            "scipy interpolates all, then sums",
+            task="cell-means",
             code="""
 from scipy.ndimage import map_coordinates
 
-def sample_plane(s, pixels, visible):
-    p = np.zeros((len(s), *visible.shape))
+def cell_means(s, pixels, visible):
+    values = np.zeros((len(s), *visible.shape))
     for c, image in enumerate(s):
-        p[c, visible] = map_coordinates(image, pixels[visible].T[::-1], order=1)
-    return p""",
+        values[c, visible] = map_coordinates(image, pixels[visible].T[::-1], order=1)
+    return values.sum(axis=2) / np.maximum(visible.sum(axis=1), 1)""",
+        ),
+        right(
+            "np.nanmean where there is something",
+            task="cell-means",
+            code="""
+def cell_means(s, pixels, visible):
+    u, v = np.where(visible[..., None], pixels, np.nan).transpose(2, 0, 1)
+    down = np.maximum(0, 1 - np.abs(v[..., None] - np.arange(s.shape[1])))
+    across = np.maximum(0, 1 - np.abs(u[..., None] - np.arange(s.shape[2])))
+    values = np.einsum("ikn,cnm,ikm->cik", down, s, across)
+    return np.nan_to_num(np.nanmean(values, axis=2))""",
+        ),
+        mistake(
+            "the sum",
+            task="cell-means",
+            loses=2,
+            says="that is the sum of its two points",
+            code=means(mean="total"),
+        ),
+        mistake(
+            "read once, in the middle",
+            task="cell-means",
+            loses=3,
+            says="you read once, at the mean place",
+            code=means(mean="np.einsum('cnm,n,m->c', s, kernel(y - np.arange(h)), kernel(x - np.arange(w)))").replace(
+                "        total = np.zeros(C)",
+                "        total = np.zeros(C)\n        x, y = pixels[cell].mean(axis=0)",
+            ),
+        ),
+        mistake(
+            "the first point",
+            task="cell-means",
+            loses=2,
+            says="that is its first point alone",
+            code=means(seen="visible[cell, k] and k == np.argmax(visible[cell])", mean="total"),
         ),
         mistake(
             "u and v swapped",
-            task="sample-plane",
+            task="cell-means",
             loses=2,
             says="u and v are swapped",
-            code=plane(n="u - np.arange(h)", m="v - np.arange(w)"),
+            code=means(n="u - np.arange(h)", m="v - np.arange(w)"),
         ),
         mistake(
             "weights crossed",
-            task="sample-plane",
+            task="cell-means",
             loses=2,
             says="the weights are crossed",
-            code=plane(kernel="np.where(np.abs(t) < 1, np.abs(t), 0) + (t == 0)"),
-        ),
-        mistake(
-            "nearest pixel",
-            task="sample-plane",
-            loses=2,
-            says="that is the nearest pixel",
-            code=plane(kernel="(np.abs(t) <= 0.5).astype(float)"),
+            code=means(kernel="np.where(np.abs(t) < 1, np.abs(t), 0) + (t == 0)"),
         ),
         mistake(
             "a kernel of ones",
-            task="sample-plane",
+            task="cell-means",
             loses=2,
-            says="the weights must sum to 1",
-            code=plane(kernel="(np.abs(t) < 1).astype(float)"),
+            says="the weights of a point must sum to 1",
+            code=means(kernel="(np.abs(t) < 1).astype(float)"),
         ),
         mistake(
             "the kernel without max",
-            task="sample-plane",
+            task="cell-means",
             loses=2,
             says="a kernel below zero",
-            code=plane(kernel="1 - np.abs(t)"),
+            code=means(kernel="1 - np.abs(t)"),
         ),
         mistake(
             "half a pixel added",
-            task="sample-plane",
+            task="cell-means",
             loses=2,
             says="you read half a pixel too far right and down",
-            code=plane(n="np.minimum(v + 0.5, h - 1) - np.arange(h)", m="np.minimum(u + 0.5, w - 1) - np.arange(w)"),
+            code=means(n="np.minimum(v + 0.5, h - 1) - np.arange(h)", m="np.minimum(u + 0.5, w - 1) - np.arange(w)"),
         ),
         mistake(
-            "points first",
-            task="sample-plane",
+            "cells first",
+            task="cell-means",
             loses=3,
-            says="expected one value a class and point",
-            code=plane().replace("return p", "return p.transpose(1, 2, 0)"),
+            says="expected one value for each class and cell",
+            code=means().replace("return result", "return result.T"),
         ),
         mistake(
-            "one class", task="sample-plane", loses=3, says="expected one value a class and point", code=plane() + "[0]"
+            "divided by all points",
+            task="cell-means",
+            loses=1,
+            says="divide by the number of VISIBLE points",
+            code=means(mean="total / K"),
+        ),
+        mistake(
+            "nothing by nothing",
+            task="cell-means",
+            loses=1,
+            says="nothing divided by nothing is NaN",
+            code=means(mean="total / visible[cell].sum()"),
+        ),
+        mistake("visible ignored", task="cell-means", loses=1, says="NaN times 0 is NaN", code=means(seen="True")),
+        mistake(
+            "inside the image, so visible",
+            task="cell-means",
+            loses=1,
+            says="lies in the image, but isn't visible",
+            code=means(
+                seen="0 <= pixels[cell, k, 0] <= w - 1 and 0 <= pixels[cell, k, 1] <= h - 1",
+                mean="total / max(((pixels[cell] >= 0) & (pixels[cell] <= [w - 1, h - 1])).all(axis=1).sum(), 1)",
+            ),
         ),
         mistake(
             "last row and column left out",
-            task="sample-plane",
+            task="cell-means",
             loses=2,
-            says="point (2, 2) lies on the last pixel",
-            code=plane(seen="visible[r, c] and pixels[r, c, 0] < w - 1 and pixels[r, c, 1] < h - 1"),
-        ),
-        mistake("visible ignored", task="sample-plane", loses=1, says="NaN times 0 is NaN", code=plane(seen="True")),
-        mistake(
-            "weighed by visible",
-            task="sample-plane",
-            loses=1,
-            says="Leave such points out, don't weigh them",
-            code=plane(seen="True").replace("return p", "return p * visible"),
-        ),
-        mistake(
-            "inside the image, so visible",
-            task="sample-plane",
-            loses=1,
-            says="isn't visible (something hides it)",
-            code=plane(seen="0 <= pixels[r, c, 0] <= w - 1 and 0 <= pixels[r, c, 1] <= h - 1"),
+            says="(2, 2) lies on the last pixel",
+            code=means(seen="visible[cell, k] and pixels[cell, k, 0] < w - 1 and pixels[cell, k, 1] < h - 1"),
         ),
         mistake(
             "the width of the example written in",
-            task="sample-plane",
+            task="cell-means",
             loses=2,
-            says="on inputs you haven't seen: wrong values",
-            code=plane(m="np.minimum(u, 2) - np.arange(w)"),
+            says="on inputs you haven't seen: wrong means",
+            code=means(m="np.minimum(u, 2) - np.arange(w)"),
         ),
         mistake(
             "pixels overwritten",
-            task="sample-plane",
+            task="cell-means",
             loses=1,
             says="it changes an argument",
-            code=plane().replace("    H, W = visible.shape", "    H, W = visible.shape\n    pixels[~visible] = 0"),
-        ),
-        # ---- task 3
-        right("a loop over points and classes", task="give-back", code=back()),
-        right(
-            "np.add.at on four pixels",
-            task="give-back",
-            code="""
-def give_back(p_bar, pixels, visible, h, w):
-    s_bar = np.zeros((len(p_bar), h, w))
-    u, v = pixels[visible].T
-    m, n = np.minimum(u.astype(int), w - 2), np.minimum(v.astype(int), h - 2)
-    for dn in (0, 1):
-        for dm in (0, 1):
-            weight = np.abs(1 - dn - (v - n)) * np.abs(1 - dm - (u - m))
-            np.add.at(s_bar, (slice(None), n + dn, m + dm), p_bar[:, visible] * weight)
-    return s_bar""",
-        ),
-        right(
-            "the transpose of the matrix",
-            task="give-back",
-            code="""
-def give_back(p_bar, pixels, visible, h, w):
-    u, v = pixels[visible].T
-    down = np.maximum(0, 1 - np.abs(v[:, None] - np.arange(h)))
-    across = np.maximum(0, 1 - np.abs(u[:, None] - np.arange(w)))
-    A = (down[:, :, None] * across[:, None, :]).reshape(-1, h * w)
-    return (A.T @ p_bar[:, visible].T).T.reshape(-1, h, w)""",
+            code=means().replace("    N, K = visible.shape", "    N, K = visible.shape\n    pixels[~visible] = 0"),
         ),
         mistake(
-            "assigned, not added",
-            task="give-back",
-            loses=2,
-            says="replaces that of the first",
-            code=back("s_bar[k] = np.where(x > 0, p_bar[k, r, c] * x, s_bar[k])"),
-        ),
-        mistake(
-            "+= with repeated indices",
-            task="give-back",
-            loses=2,
-            says="adds once a pixel",
-            code="""
-def give_back(p_bar, pixels, visible, h, w):
-    s_bar = np.zeros((len(p_bar), h, w))
-    u, v = pixels[visible].T
-    m, n = np.minimum(u.astype(int), w - 2), np.minimum(v.astype(int), h - 2)
-    for dn in (0, 1):
-        for dm in (0, 1):
-            weight = np.abs(1 - dn - (v - n)) * np.abs(1 - dm - (u - m))
-            s_bar[:, n + dn, m + dm] += p_bar[:, visible] * weight
-    return s_bar""",
-        ),
-        mistake(
-            "divided by the number of points",
-            task="give-back",
-            loses=2,
-            says="a sum has no mean in it",
-            code=back(after="s_bar = s_bar / visible.sum()"),
-        ),
-        mistake(
-            "mean over the readers",
-            task="give-back",
-            loses=2,
-            says="you take the mean over a pixel's readers",
-            code=back(after="s_bar = s_bar / np.maximum(n_read, 1)"),
-        ),
-        mistake(
-            "divided by the weights",
-            task="give-back",
-            loses=2,
-            says="you divide by the sum of the weights",
-            code=back(after="s_bar = s_bar / np.where(total > 0, total, 1)"),
-        ),
-        mistake(
-            "weights squared",
-            task="give-back",
-            loses=2,
-            says="the weights are squared",
-            code=back("s_bar[k] += p_bar[k, r, c] * x * x"),
-        ),
-        mistake(
-            "weights without blame",
-            task="give-back",
-            loses=2,
-            says="that is the sum of the weights",
-            code=back("s_bar[k] += x"),
-        ),
-        mistake(
-            "sign turned",
-            task="give-back",
-            loses=2,
-            says="the sign is turned",
-            code=back("s_bar[k] -= p_bar[k, r, c] * x"),
-        ),
-        mistake(
-            "classes added up",
-            task="give-back",
-            loses=2,
-            says="you add up the classes",
-            code=back("s_bar[:] += p_bar[k, r, c] * x"),
-        ),
-        mistake(
-            "u and v swapped", task="give-back", loses=2, says="u counts columns, v counts rows", code=back(uv="v, u")
-        ),
-        mistake(
-            "all to the nearest pixel",
-            task="give-back",
-            loses=2,
-            says="all blame goes to the nearest pixel",
-            code=back("s_bar[k, int(v + 0.5), int(u + 0.5)] += p_bar[k, r, c]"),
-        ),
-        mistake(
-            "NaN let in",
-            task="give-back",
-            loses=1,
-            says="Leave it out, don't weigh it",
-            code=back("s_bar[k] += visible[r, c] * p_bar[k, r, c] * x", seen="True"),
-        ),
-        mistake(
-            "NaN sent to the first pixel",
-            task="give-back",
-            loses=1,
-            says="the point that isn't visible teaches a pixel",
-            code=back(seen="True").replace("= pixels[r, c]", "= np.nan_to_num(pixels[r, c])"),
-        ),
-        mistake(
-            "NaN taken for not visible",
-            task="give-back",
-            loses=1,
-            says="on inputs you haven't seen: points that aren't visible teach somebody",
-            code=back(seen="not np.isnan(pixels[r, c]).any()"),
-        ),
-        mistake(
-            "waits for a loss of zero",
-            task="give-back",
+            "waits for a sum of zero",
+            task="cell-means",
             loses=3,
             says="no reply before timeout",
             code="""
-def give_back(p_bar, pixels, visible, h, w):
-    s_bar = np.zeros((len(p_bar), h, w))
-    while np.abs(p_bar).sum() > 0:
-        s_bar -= 0.01 * s_bar
-    return s_bar""",
+def cell_means(s, pixels, visible):
+    result = np.ones((len(s), len(pixels)))
+    while np.abs(result).sum() > 0:
+        result = result + 0.01 * result
+    return result""",
+        ),
+        # ---- task 3
+        right("a random test, and what is left over", task="which-kind", code=boxed()),
+        right(
+            "the whole matrix both ways",
+            task="which-kind",
+            code="""
+def is_pair(forward, backward, h, w, n):
+    return which_kind(forward, backward, h, w, n) == PAIR
+
+
+def which_kind(forward, backward, h, w, n):
+    A = np.array([np.ravel(forward(one)) for one in np.eye(h * w).reshape(-1, h, w)]).T
+    units = np.array([np.ravel(backward(one)) for one in np.eye(n)])
+    together = np.ravel(backward(np.ones(n)))
+    if np.allclose(units, A) and np.allclose(together, A.sum(axis=0)):
+        return PAIR
+    if np.allclose(units * n, A):
+        return MEAN
+    nearest = np.allclose(np.sort(units, axis=1)[:, :-1], 0) and np.allclose(units.sum(axis=1), 1)
+    return NEAREST if nearest else OVERWRITES""",
+        ),
+        mistake(
+            "an image of ones",
+            task="which-kind",
+            loses=1,
+            says="the backward pass is NEAREST, and you call it a pair",
+            code=boxed(s="np.ones((h, w))"),
+        ),
+        mistake(
+            "the last point alone",
+            task="which-kind",
+            loses=1,
+            says="do two points share a pixel in your test?",
+            code=boxed(p_bar="np.eye(n)[-1]"),
+        ),
+        mistake(
+            "always a pair",
+            task="which-kind",
+            loses=1,
+            says="and you call it a pair",
+            code=boxed(right="True"),
+        ),
+        mistake(
+            "the sign of the difference",
+            task="which-kind",
+            loses=1,
+            says="the test is p_bar . forward(s)",
+            code=boxed(right="np.isclose(left, -there)"),
+        ),
+        mistake(
+            "mean and overwriting confused",
+            task="which-kind",
+            loses=2,
+            says="the backward pass is OVERWRITES, and you find MEAN",
+            code=boxed(
+                kind="return PAIR if is_pair(forward, backward, h, w, n) else MEAN if np.count_nonzero("
+                "backward(p_bar)) > n else NEAREST"
+            ),
+        ),
+        mistake(
+            "never the nearest",
+            task="which-kind",
+            loses=2,
+            says="the backward pass is NEAREST, and you find OVERWRITES",
+            code=boxed().replace("return OVERWRITES if np.allclose(got, last) else NEAREST", "return OVERWRITES"),
+        ),
+        mistake(
+            "a square image taken for granted",
+            task="which-kind",
+            loses=1,
+            says="on inputs you haven't seen",
+            code=boxed(s="rng.normal(size=(h, h))"),
+        ),
+        mistake(
+            "five points taken for granted",
+            task="which-kind",
+            loses=2,
+            says="on inputs you haven't seen: the wrong kind",
+            code=boxed().replace("total / n)", "total / 5)"),
         ),
         # ---- task 4
         right("the chain rule, point by point", task="yaw-slope", code=yaw()),
@@ -654,5 +669,71 @@ def convention(sampler, h, w):
             loses=1,
             says="convention is wrong for a sampler that swaps",
             code=probe(swap="True").replace("np.array([at]), np.array([1.0])", "np.array([at]), np.array([3.0])"),
+        ),
+        # ---- task 6
+        right("point by point", task="cell-matrix", code=matrix()),
+        right(
+            "a full matrix",
+            task="cell-matrix",
+            code=matrix(sparse="full").replace(
+                "    x = all_weights\n",
+                "    full = np.zeros((N, h * w))\n    np.add.at(full, (i, j), all_weights)\n",
+            ),
+        ),
+        mistake(
+            "the sum over points",
+            task="cell-matrix",
+            loses=3,
+            says="that is the sum over a cell's points",
+            code=matrix(weight="x"),
+        ),
+        mistake(
+            "divided by all points",
+            task="cell-matrix",
+            loses=3,
+            says="you divide by all points of a cell",
+            code=matrix(weight="x / K"),
+        ),
+        mistake(
+            "n * h + m",
+            task="cell-matrix",
+            loses=3,
+            says="Is the number of a pixel n * w + m?",
+            code=matrix(number="min(r * h + c, h * w - 1)"),
+        ),
+        mistake(
+            "columns first",
+            task="cell-matrix",
+            loses=3,
+            says="Is the number of a pixel n * w + m?",
+            code=matrix(number="c * h + r"),
+        ),
+        mistake(
+            "entries that meet replace each other",
+            task="cell-matrix",
+            loses=3,
+            says="not the means of the visible points",
+            code=matrix(sparse="full").replace(
+                "    x = all_weights\n",
+                "    full = np.zeros((N, h * w))\n    full[i, j] = all_weights\n",
+            ),
+        ),
+        mistake(
+            "the sizes of the example written in",
+            task="cell-matrix",
+            loses=3,
+            says="on inputs you haven't seen",
+            code=matrix(number="r * 80 + c"),
+        ),
+        mistake(
+            "in the image, so visible",
+            task="cell-matrix",
+            loses=3,
+            says="on inputs you haven't seen: wrong means",
+            code=matrix(
+                seen="np.isfinite(pixels[cell, k]).all() and 0 <= pixels[cell, k, 0] <= w - 1 and "
+                "0 <= pixels[cell, k, 1] <= h - 1",
+                weight="x / max(seen.sum(), 1)",
+            ),
         ),
     )

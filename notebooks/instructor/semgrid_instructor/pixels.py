@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu.answers import answer_array
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
+from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_instructor import close, generator, hidden, keeping
 
 AXES = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
@@ -72,88 +73,58 @@ def _camera(rng: np.random.Generator) -> Camera:
     return Camera(_intrinsics(rng), rigid_transform(tilt @ AXES, rng.uniform(-0.5, 0.5, 3)), size=(130, 320))
 
 
-def _seen_from(camera: Camera, xy: NDArray, z: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return depths (N,), pixels (N, 2) and which of them are in view (N,), for points of a road."""
-    points = transform_points(camera.T_camera_from_grid, np.column_stack([xy, z]))
-    return points[:, 2], *project(points, camera)
+def _first_walls(x: NDArray, top: NDArray, z_cam: float, delta: float) -> tuple[list[int], float]:
+    """Return the first wall on each cell's ray, one ray at a time, and by how much the closest call was decided."""
+    firsts, closest = [], np.inf
+    for goal in x:
+        sinks = (z_cam - delta) / goal
+        above = top - (z_cam - sinks * x)
+        closest = min(closest, np.abs(above).min())
+        firsts.append(next((wall for wall, height in enumerate(above) if height > 0), len(x)))
+    return firsts, closest
 
 
-def _judge_pixels(road_pixels: Callable, camera: Camera, xy: NDArray, z: NDArray, complaint: str) -> None:
-    """Compare pixels within the image; those of other points are what check_visible judges."""
-    _, wanted, in_view = _seen_from(camera, xy, z)
-    got = answer_array(road_pixels(xy.copy(), z.copy(), camera.K.copy(), camera.T_camera_from_grid, camera.size)[0])
-    assert got.shape == wanted.shape, f"shape {got.shape} instead of {wanted.shape}"
-    assert close(got[in_view], wanted[in_view]), complaint
-
-
-@hidden
-def check_road_pixels(road_pixels: Callable) -> None:
-    """Tilted cameras, roads below and above them, and one point alone; then a camera with a skew."""
-    rng = generator(54)
-    for height, n_points in ((0.0, 40), (1.2, 1), (3.4, 25)):
-        camera, xy = _camera(rng), rng.uniform((3, -12), (60, 12), size=(n_points, 2))
-        if n_points == 1:
-            xy = rng.uniform((10, -1), (20, 1), size=(1, 2))
-        z = height + rng.uniform(-0.4, 0.4, n_points)
-        wrong = "wrong pixels (no camera is quite level, no pixel quite whole)"
-        _judge_pixels(road_pixels, camera, xy, z, wrong)
-    camera.K[0, 1] = rng.uniform(5, 10)
-    skewed = "wrong where K[0, 1] isn't 0: u = (f_u X + K[0, 1] Y) / Z + c_u, so multiply by the whole K"
-    _judge_pixels(road_pixels, camera, xy, z, skewed)
+def _row(rng: np.random.Generator) -> tuple[NDArray, NDArray, float]:
+    """Return x, top and z_cam of a road that rises or falls, with things on it, some higher than the camera."""
+    n, z_cam = int(rng.integers(1, 13)), rng.uniform(1.0, 2.5)
+    x = np.sort(rng.uniform(3, 60, n))
+    return x, rng.uniform(-0.02, 0.01) * x + np.where(rng.random(n) < 0.3, rng.uniform(0, 3, n), 0), z_cam
 
 
 @hidden
-def check_visible(road_pixels: Callable) -> None:
-    """Many points all around the camera, several heights; each border of the image, on it and a little beside it.
-
-    What is visible goes by the pixels that the answer itself found, and behind is what lies well behind, whatever the
-    answer makes of height and shift: check_road_pixels judges those.
-    """
-    rng = generator(55)
-    for height in (0.0, 1.0, 2.6):
-        camera, xy = _camera(rng), rng.uniform((-30, -20), (40, 20), size=(600, 2))
-        z = height + rng.uniform(-0.4, 0.4, len(xy))
-        Z, _, _ = _seen_from(camera, xy, z)
-        got, visible = road_pixels(xy.copy(), z.copy(), camera.K.copy(), camera.T_camera_from_grid, camera.size)
-        pixels, visible = answer_array(got), answer_array(visible, dtype=bool)
-        assert not visible[Z < -8].any(), "a point behind the camera is called visible"
-        assert np.isnan(pixels[Z < -8]).all(), "a point behind the camera has a pixel"
-        assert np.isfinite(pixels[Z > 8]).all(), "a point in front of the camera, but beside the image, has no pixel"
-        assert np.ptp(pixels[Z > 8], axis=0).min() > 0, "all points have the same row or column"
-        assert np.array_equal(visible, _within(pixels, camera.size)), "wrong at a border of the image"
-    _judge_borders(road_pixels)
+@keeping
+def check_shown(shown: Callable) -> None:
+    """Judge roads that rise and fall, things of all heights, planes below the ground and above the camera."""
+    rng, judged = generator(54), 0
+    while judged < 30:
+        (x, top, z_cam), delta = _row(rng), rng.uniform(-1.2, 3.0)
+        wanted, closest = _first_walls(x, top, z_cam, delta)
+        if closest < 1e-3:
+            continue
+        judged += 1
+        got = answer_array(shown(x, top, z_cam, delta))
+        assert got.shape == (len(x),), f"shape {got.shape} instead of {(len(x),)}"
+        which = "above" if delta > z_cam else "below"
+        assert np.array_equal(got, wanted), f"a wrong wall, on a plane {which} the camera (walls may be higher than it)"
 
 
-def _within(pixels: NDArray, size: tuple[int, int]) -> NDArray:
-    """Return which pixels lie among the centres of the image's, (N,)."""
-    return ((pixels >= 0) & (pixels <= np.array(size)[::-1] - 1)).all(axis=1)
-
-
-def _judge_borders(road_pixels: Callable) -> None:
-    """Walk across the four borders of a small image; powers of two, so that the borders are met without rounding."""
-    K = np.array([[64.0, 0, 32], [0, 64, 16], [0, 0, 1]])
-    T, size = rigid_transform(AXES, np.array([0.0, 1.0, 0.0])), (33, 97)
-    h, w = size
-    borders = {
-        "left or right": [
-            ((8.0, (32 - u) / 8), 0.0)
-            for u in (-0.25, -0.0625, 0, 0.0625, 0.25, w - 1.25, w - 1.0625, w - 1, w - 0.9375, w - 0.75)
-        ]
-    }
-    borders["lower"] = [((64 / (v - 16), 0.0), 0.0) for v in (h - 1.25, h - 1, h - 0.9375, h - 0.75)]
-    borders["upper"] = [((64 / (16 - v), 0.0), 2.0) for v in (-0.25, -0.0625, 0, 0.25)]
-    for border, places in borders.items():
-        for xy, height in places:
-            got, visible = road_pixels(np.array([xy]), np.array([height]), K, T, size)
-            right = np.array_equal(answer_array(visible, dtype=bool), _within(answer_array(got), size))
-            assert right, f"wrong at the {border} border of the image"
-    lone = np.array([[0.0625, 0.0], [0.25, 0.0], [-0.0625, 0.0], [-0.25, 0.0], [5000.0, 0.0]])
-    closest, near, just, behind, far = answer_array(road_pixels(lone, np.full(5, 0.5), K, T, size)[0])
-    assert np.isfinite([near, closest]).all(), (
-        "a point just in front of the camera has no pixel (Z > 0 is all it takes)"
-    )
-    assert np.isnan([behind, just]).all(), "a point just behind the camera has a pixel"
-    assert np.isfinite(far).all(), "a point 5 km ahead has no pixel (Z > 0 is all it takes)"
+@hidden
+@keeping
+def check_best_plane(best_plane: Callable) -> None:
+    """Judge planes in no order; where several are equally good it must be the first."""
+    rng, judged = generator(55), 0
+    while judged < 20:
+        (x, top, z_cam), heights = _row(rng), rng.permutation(np.linspace(-1.1, 0.7, 10))
+        found = [_first_walls(x, top, z_cam, delta) for delta in heights]
+        in_place = [np.sum(np.array(walls) == np.arange(len(x))) for walls, _ in found]
+        if min(closest for _, closest in found) < 1e-3 or len(x) < 3:
+            continue
+        judged += 1
+        got = answer_array(best_plane(x, top, z_cam, heights)).ravel()
+        assert got.shape == (1,), f"{got.size} numbers instead of one"
+        assert got[0] in range(10), "it isn't the number of a plane"
+        assert in_place[int(got[0])] == max(in_place), "another plane shows more cells in place"
+        assert got[0] == np.argmax(in_place), "an earlier plane is as good"
 
 
 @hidden
@@ -225,3 +196,41 @@ def check_amount(find_fault: Callable) -> None:
         got = answer_array(find_fault(*given)).ravel()
         assert got.shape == (2,), f"{got.size} numbers instead of two"
         assert close(got[1], amount, rtol=0, atol=0.05), "the wrong amount"
+
+
+@hidden
+@keeping
+def check_repaired(repaired: Callable) -> None:
+    """Judge other frames of both streets, all faults and other amounts, by returns that nobody clicked."""
+    rng = generator(60)
+    for drive, number in ((sample_drive(), 7), (real_drive(), 3)):
+        frame = drive[number]
+        in_view = project(transform_points(frame.camera.T_camera_from_lidar, frame.points[:, :3]), frame.camera)[1]
+        points = rng.permutation(np.asarray(frame.points[in_view, :3], float))[:400]
+        for fault in range(4):
+            amount = rng.choice([-1, 1]) * rng.uniform(0.4, 1.8)
+            K_true, T_true = frame.camera.K, frame.camera.T_camera_from_lidar
+            pixels = _pixels(points, K_true, T_true)
+            K, T = _with_fault(K_true, T_true, fault, amount)
+            got = repaired(points[:70], pixels[:70], K, T, lambda *_, told=(fault, amount): told)
+            assert len(got) == 2, f"{len(got)} results instead of two"
+            K_got, T_got = (answer_array(one) for one in got)
+            assert (K_got.shape, T_got.shape) == ((3, 3), (4, 4)), "wrong shapes"
+            off = np.abs(_pixels(points[70:], K_got, T_got) - pixels[70:]).max()
+            assert off < 1, "a return that nobody clicked is seen more than a pixel from where it is"
+
+
+def _pixels(points: NDArray, K: NDArray, T: NDArray) -> NDArray:
+    """Return the pixels of points, (N, 2), in front of the camera or not."""
+    triples = transform_points(T, points) @ K.T
+    return triples[:, :2] / triples[:, 2:]
+
+
+def _with_fault(K: NDArray, T: NDArray, fault: int, amount: float) -> tuple[NDArray, NDArray]:
+    """Return a calibration of which the table of task 5 says that this is wrong, by this amount."""
+    if fault == 0:
+        return K + amount * np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]]), T
+    if fault == 3:
+        return K, invert_rigid(T)
+    turn = Rotation.from_euler("x" if fault == 1 else "y", -amount, degrees=True).as_matrix()
+    return K, rigid_transform(turn, np.zeros(3)) @ T

@@ -71,77 +71,101 @@ def check_border(four_pixels: Callable) -> None:
     assert len(heaviest) > 4, "the same pixel has most weight, wherever the point is"
 
 
-def _plane(seed: int, all_visible: bool = False) -> tuple[NDArray, NDArray, NDArray]:
-    """Return scores (3, 7, 5), pixels (6, 4, 2) with corners of the image among them, and what is visible."""
+def _cells(seed: int, all_visible: bool = False) -> tuple[NDArray, NDArray, NDArray]:
+    """Return scores (3, 7, 5), pixels (6, 4, 2) of cells with corners of the image among them, and what is visible."""
     rng = generator(seed)
     scores, pixels = rng.normal(size=(3, 7, 5)), rng.uniform(0, 1, size=(6, 4, 2)) * (4, 6)
     pixels[0, :3] = [[0, 0], [4, 6], [4, 0]]
-    visible = np.ones((6, 4), bool) if all_visible else rng.random((6, 4)) < 0.6
+    visible = np.ones((6, 4), bool) if all_visible else rng.random((6, 4)) < 0.5
+    if not all_visible:
+        visible[1], visible[2] = [True, False, False, False], False
     pixels[~visible] = rng.choice([np.nan, -3.2, 1e6, 1.5], size=(np.sum(~visible), 2))
     for row, col in np.argwhere(~visible)[:2]:
         pixels[row, col] = 1.5  # in the image: something hides it
     return scores, pixels, visible
 
 
+def _means(scores: NDArray, pixels: NDArray, visible: NDArray) -> NDArray:
+    """Return the mean of each cell's visible points, (C, N)."""
+    return _read(scores, pixels, visible).sum(axis=2) / np.maximum(visible.sum(axis=1), 1)
+
+
 @hidden
 @keeping
-def check_sample_plane(sample_plane: Callable) -> None:
-    """Random scores of an image that is higher than wide, at all of whose corners somebody reads."""
-    scores, pixels, visible = _plane(62, all_visible=True)
-    got = answer_array(sample_plane(scores.copy(), pixels.copy(), visible.copy()))
-    assert got.shape == (3, 6, 4), f"shape {got.shape} instead of (3, 6, 4)"
-    right = _read(scores, pixels, visible)
-    inner = np.ones((6, 4), bool)
-    inner[0, :3] = False
-    assert close(got[:, inner], right[:, inner]), "wrong values"
+def check_cell_means(cell_means: Callable) -> None:
+    """Random scores of an image that is higher than wide, with points on all corners; and cells of one point."""
+    scores, pixels, visible = _cells(62, all_visible=True)
+    got = answer_array(cell_means(scores.copy(), pixels.copy(), visible.copy()))
+    assert got.shape == (3, 6), f"shape {got.shape} instead of (3, 6)"
+    right = _means(scores, pixels, visible)
+    assert close(got[:, 1:], right[:, 1:]), "wrong means"
     assert close(got, right), "points on the last row or column read wrong values"
+    alone = answer_array(cell_means(scores, pixels[:, :1].copy(), visible[:, :1].copy()))
+    assert close(alone, _means(scores, pixels[:, :1], visible[:, :1])), "wrong where a cell has one point"
 
 
 @hidden
 @keeping
-def check_invisible(sample_plane: Callable) -> None:
-    """Not visible for every reason: behind the camera (NaN), outside, hidden by something; or nothing visible."""
-    scores, pixels, visible = _plane(63)
-    full = answer_array(sample_plane(scores.copy(), _plane(63, all_visible=True)[1], np.ones((6, 4), bool)))
-    got = answer_array(sample_plane(scores.copy(), pixels.copy(), visible.copy()))
-    assert got.shape == full.shape, "the shape depends on what is visible"
-    twice = answer_array(sample_plane(2 * scores, _plane(63, all_visible=True)[1], np.ones((6, 4), bool)))
-    assert not close(full, twice), "it doesn't matter what the scores are"
-    assert (got[..., ~visible] == 0).all(), "points that aren't visible don't take 0"
-    assert close(got[..., visible], full[..., visible]), "other values where not all is visible"
-    nothing = answer_array(sample_plane(scores, np.full_like(pixels, np.nan), np.zeros_like(visible)))
-    assert nothing.shape == (3, 6, 4), "the shape is wrong where nothing is visible"
+def check_invisible(cell_means: Callable) -> None:
+    """Not visible for every reason: behind the camera (NaN), outside, hidden by something; or no point of a cell."""
+    scores, pixels, visible = _cells(63)
+    got = answer_array(cell_means(scores.copy(), pixels.copy(), visible.copy()))
+    assert got.shape == (3, 6), f"shape {got.shape} instead of (3, 6)"
+    assert not np.isnan(got).any(), "NaN got in from points that aren't visible, or from a cell without any"
+    assert (got[:, ~visible.any(axis=1)] == 0).all(), "a cell without visible points doesn't take 0"
+    some = np.flatnonzero(visible.any(axis=1))
+    for cell in some:
+        seen = np.s_[cell : cell + 1], visible[cell]
+        alone = answer_array(cell_means(scores, pixels[seen[0]][:, seen[1]], np.ones((1, seen[1].sum()), bool)))
+        assert close(got[:, cell], alone[:, 0]), "another mean than that of the visible points alone"
+    assert np.ptp(got[:, some]) > 0, "all cells have the same mean"
+    nothing = answer_array(cell_means(scores, np.full_like(pixels, np.nan), np.zeros_like(visible)))
+    assert nothing.shape == (3, 6), "the shape is wrong where nothing is visible"
     assert (nothing == 0).all(), "not all 0 where nothing is visible"
 
 
-@hidden
-@keeping
-def check_give_back(give_back: Callable) -> None:
-    """Compare random blame with a pixel at a time; test <A s, p_bar> = <s, A^T p_bar>."""
-    scores, pixels, visible = _plane(64, all_visible=True)
-    p_bar = generator(65).normal(size=(3, 6, 4))
-    got = answer_array(give_back(p_bar.copy(), pixels.copy(), visible.copy(), 7, 5))
-    assert got.shape == (3, 7, 5), f"shape {got.shape} instead of (3, 7, 5)"
-    read = _read(scores, pixels, visible)
-    assert close((p_bar * read).sum(), (got * scores).sum()), "it isn't the transpose of equation (2)"
-    one_pixel = np.eye(35).reshape(35, 7, 5)
-    weights = _read(one_pixel, pixels, visible)
-    assert close(got, np.einsum("nrc,krc->kn", weights, p_bar).reshape(3, 7, 5)), "wrong gradient"
+def _boxes(rng: np.random.Generator, kind: int, h: int, w: int, n: int) -> tuple[Callable, Callable]:
+    """Return forward and backward: 0 a pair, 1 overwrites, 2 divided by n, 3 to the nearest pixel."""
+    places = rng.integers(0, (w - 1, h - 1), size=(n, 2)) + rng.choice([0.2, 0.3, 0.6, 0.7], size=(n, 2))
+    places[-1] = np.floor(places[0]) + 0.7  # so that two of them share pixels
+    A = np.array([_right(u, v, h, w).ravel() for u, v in places])
+
+    def forward(s: NDArray) -> NDArray:
+        return A @ np.asarray(s, float).reshape(h * w)
+
+    def backward(p_bar: NDArray) -> NDArray:
+        shares, s_bar = A * np.asarray(p_bar, float).reshape(-1, 1), np.zeros(h * w)
+        if kind == 1:
+            for one, read in zip(shares, A > 0, strict=True):
+                s_bar[read] = one[read]
+        elif kind == 3:
+            np.add.at(s_bar, A.argmax(axis=1), np.asarray(p_bar, float).ravel())
+        else:
+            s_bar = shares.sum(axis=0) / (1 if kind == 0 else n)
+        return s_bar.reshape(h, w)
+
+    return forward, backward
 
 
 @hidden
-@keeping
-def check_give_back_invisible(give_back: Callable) -> None:
-    """Place what isn't visible anywhere: it changes nothing, as if the visible points were all there are."""
-    _, pixels, visible = _plane(68)
-    p_bar = generator(69).normal(size=(3, 6, 4))
-    got = answer_array(give_back(p_bar.copy(), pixels.copy(), visible.copy(), 7, 5))
-    assert not np.isnan(got).any(), "NaN got in from points that aren't visible"
-    alone = p_bar[:, visible][:, None], pixels[visible][None], np.ones((1, visible.sum()), bool)
-    wanted = answer_array(give_back(*alone, 7, 5))
-    fewer = answer_array(give_back(*(part[..., :3] if part is alone[0] else part[:, :3] for part in alone), 7, 5))
-    assert not close(wanted, fewer), "the same, however many points there are"
-    assert close(got, wanted), "points that aren't visible teach somebody"
+def check_is_pair(is_pair: Callable) -> None:
+    """Judge images of other sizes, higher than wide and wider than high, with few points and with many."""
+    rng = generator(64)
+    for h, w, n in ((7, 5, 12), (3, 9, 2), (6, 4, 30)):
+        for kind in range(4):
+            told = answer_array(is_pair(*_boxes(rng, kind, h, w, n), h, w, n)).ravel()
+            assert told.shape == (1,), "it doesn't return True or False"
+            assert bool(told[0]) == (kind == 0), "wrong about boxes with another image and other points"
+
+
+@hidden
+def check_which_kind(which_kind: Callable) -> None:
+    """Judge other images and points, each kind more than once."""
+    rng = generator(65)
+    for h, w, n in ((7, 5, 12), (3, 9, 2), (6, 4, 30)):
+        found = [answer_array(which_kind(*_boxes(rng, kind, h, w, n), h, w, n)).ravel() for kind in range(4)]
+        assert all(one.shape == (1,) for one in found), "it doesn't return one number"
+        assert np.array_equal(np.ravel(found), range(4)), "the wrong kind for another image and other points"
 
 
 @hidden
@@ -210,3 +234,25 @@ def check_swaps(swaps: Callable, convention: Callable) -> None:
             if answer_array(convention(_black_box(kind), h, w)).ravel()[0] == kind:  # check_convention judges others
                 found = answer_array(convention(_black_box(kind, True), h, w)).ravel()[0]
                 assert found == kind, "convention is wrong for a sampler that swaps"
+
+
+def _four(u: float, v: float, h: int, w: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Return rows, columns and weights of the four pixels that a point reads."""
+    heaviest = np.argsort(-_right(u, v, h, w), axis=None)[:4]
+    return heaviest // w, heaviest % w, _right(u, v, h, w).ravel()[heaviest]
+
+
+@hidden
+@keeping
+def check_cell_matrix(there_and_back: Callable) -> None:
+    """Judge values and gradients of other images and cells; where pixels meet, and where nothing is visible."""
+    for seed in (68, 69):
+        scores, pixels, visible = _cells(seed)
+        p_bar = generator(seed + 10).normal(size=(3, 6))
+        given = scores.copy(), p_bar.copy(), pixels.copy(), visible.copy()
+        p, s_bar = map(answer_array, there_and_back(*given, _four))
+        assert p.shape == (3, 6), f"shape {p.shape} instead of (3, 6)"
+        assert close(p, _means(scores, pixels, visible)), "wrong means (an image may be higher than wide)"
+        units = np.eye(35).reshape(35, 7, 5)
+        wanted = np.einsum("kn,cn->ck", _means(units, pixels, visible), p_bar).reshape(3, 7, 5)
+        assert close(s_bar, wanted), "wrong gradient in the scores"

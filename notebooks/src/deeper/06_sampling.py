@@ -81,14 +81,14 @@ print(f"there and back: grid_sample {1000 * scatter:.0f} ms, PlaneSampler {1000 
 #
 # ## On a pixel's centre there is a kink
 #
-# In lecture 06's row of scores 2, 6, 0 the slope is +4 before u = 1 and -6 behind it. At u = 1 no number is right.
+# In lecture 06's row of scores 2, 6, 0 the slope is +4 before u = 1 and -6 after it. At u = 1 there is no slope.
 #
 # **Predict before you run.** What do autograd through `relu`, `grid_sample`, and central finite differences say there?
 #
 # <details><summary>Answer</summary>
 #
-# Three things: 0 (half of each kernel's edges is switched off), the slope on the right, -6, and the mean of both sides,
-# -1.
+# Three things. Autograd: 0, because PyTorch takes 0 for the slope of $|t|$ and of `relu` at 0, so no pixel contributes.
+# `grid_sample`: -6, the slope on the right. Finite differences: -1, the mean of both sides.
 #
 # </details>
 
@@ -176,8 +176,9 @@ ax.legend(fontsize="small")
 plt.show()
 
 # %% [markdown]
-# Near by, the area mean has less than a quarter of the bilinear error. The gain shrinks with the distance: 24 m ahead,
-# where a cell covers one pixel's area (but several pixels across), it is .37 for .65, and 40 m ahead .47 for .65. So
+# Near by, the area mean has less than a quarter of the bilinear error. The waves come from the rows of the image: a cell
+# whose centre falls on a row's centre reads two pixels instead of four. The gain shrinks with the distance: 24 m ahead,
+# where a cell covers one pixel's area (but several pixels across), it is 0.37 instead of 0.65, and 40 m ahead 0.47. So
 # the price of equation (2) is largest where the map is best anyway, and a cheap remedy exists: several points per cell,
 # or a blurred image for near cells. On the drive's own image the two differ by a tenth to a sixth of the contrast.
 #

@@ -1,16 +1,17 @@
 # %% [markdown]
 # # Exercise 06: sampling that learns
 #
-# Five small functions: equation (2), the way back, a camera that learns, a black box; and one question in words. About 75 minutes. The lecture is [06: sampling that learns](../06_planes.ipynb).
+# Eight small functions: equation (2), a mean over a cell, two black boxes, a camera that learns; and one question in words. About 75 minutes. The lecture is [06: sampling that learns](../06_planes.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
 # | 1 | four pixels and their weights | 2 + 1 |
-# | 2 | a plane | 2 + 1 |
-# | 3 | the way back | 2 + 1 |
+# | 2 | a cell is more than a point | 2 + 1 |
+# | 3 | a bug in the way back | 1 + 2 |
 # | 4 | a camera that learns: the slope of a loss in the yaw | 3 |
 # | 5 | half a pixel: which convention a black box has | 2 + 1 |
-# | 6 | in your own words | 2 |
+# | 6 | put together: your sampler on two streets | 3 |
+# | 7 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -136,56 +137,59 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 2: a plane (2 + 1 points)
+# ## Task 2: a cell is more than a point (2 + 1 points)
 #
-# `s` are scores, `(C, h, w)`. `pixels` holds u and v of each point of one plane, `(H, W, 2)`, and `visible` says which points the camera sees, `(H, W)`.
+# Seven metres ahead a cell covers some forty pixels, and its centre reads four of them. So let each of N cells read K points, spread over its area, and take the
+# mean of what they read. `s` are scores, `(C, h, w)`; `pixels` holds u and v of the points, `(N, K, 2)`, and `visible` says which of them the camera sees,
+# `(N, K)`. Points may lie on the last row or column.
 #
-# Complete `sample_plane`: it returns what the points read, `(C, H, W)`, by equation (2). For one more point: a point that isn't visible takes 0. Its u and
-# v may be anything, also NaN.
+# Complete `cell_means`: it returns each cell's mean, `(C, N)`, where each point reads by equation (2). For one more point: only visible points count, in the
+# sum and in the number by which you divide. A cell without any visible point takes 0. The u and v of points that aren't visible may be anything, also NaN.
 
 
-# %% nbgrader={"grade": false, "grade_id": "sample-plane", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def sample_plane(s, pixels, visible):
-    """Return the scores on one plane, (C, H, W)."""
+# %% nbgrader={"grade": false, "grade_id": "cell-means", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def cell_means(s, pixels, visible):
+    """Return the mean score of each cell's visible points, (C, N)."""
     ### BEGIN SOLUTION
     n, m = np.arange(s.shape[1]), np.arange(s.shape[2])
-    p = np.zeros((s.shape[0], *visible.shape))
-    for j in zip(*np.nonzero(visible), strict=True):
-        u, v = pixels[j]
-        p[:, *j] = np.maximum(0, 1 - np.abs(v - n)) @ s @ np.maximum(0, 1 - np.abs(u - m))
-    return p
+    means = np.zeros((len(s), len(pixels)))
+    for cell, (places, seen) in enumerate(zip(pixels, visible, strict=True)):
+        for u, v in places[seen]:
+            value = np.maximum(0, 1 - np.abs(v - n)) @ s @ np.maximum(0, 1 - np.abs(u - m))
+            means[:, cell] += value / seen.sum()
+    return means
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "plane-scores", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "cell-scores", "locked": true, "schema_version": 3, "solution": false, "task": false}
 def _scores():
-    """Return scores of two classes in an image of 3 x 3, and six points in it, (3, 2, 2)."""
+    """Return scores of two classes in an image of 3 x 3, and three cells with two points each, (3, 2, 2)."""
     s = np.array([[[0.0, 10, 20], [2, 7, 20], [1, 6, 15]], [[0, 0, 0], [5, 0, 0], [0, 0, 0]]])
     return s, np.array([[[0.25, 1.0], [1.25, 0.5]], [[2.0, 2.0], [0.0, 1.5]], [[1.0, 0.0], [1.5, 1.5]]])
 
 
-# %% nbgrader={"grade": true, "grade_id": "plane-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "cell-means-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    got = answer_array(sample_plane(*_scores(), np.ones((3, 2), bool)), "sample_plane")
-    assert got.shape == (2, 3, 2), f"expected one value a class and point, shape (2, 3, 2), got {got.shape}"
-    slips = {  # of class 0, point (0, 0), at u = 0.25, v = 1: by hand 0.75 * 2 + 0.25 * 7 = 3.25
-        9.25: "u and v are swapped: u counts columns, v counts rows",
-        5.75: "the weights are crossed: column 0 is nearer than column 1",
-        2.0: "that is the nearest pixel",
-        9.0: "you add the two pixels: the weights must sum to 1",
-        -11.75: "a kernel below zero: a pixel farther than 1 away has the weight 0, not less: max(0, 1 - |t|)",
-        5.25: "you read half a pixel too far right and down: the centre of the first pixel is (0, 0)",
+    got = answer_array(cell_means(*_scores(), np.ones((3, 2), bool)), "cell_means")
+    assert got.shape == (2, 3), f"expected one value for each class and cell, shape (2, 3), got {got.shape}"
+    slips = {  # of class 0, cell 0: by hand 0.75 * 2 + 0.25 * 7 = 3.25 and 0.5 * (7.5 + 15.25) = 11.375, mean 7.3125
+        14.625: "that is the sum of its two points: take the mean",
+        6.1875: "you read once, at the mean place: read at every point, and take the mean of what is read",
+        3.25: "that is its first point alone",
+        11.375: "that is its second point alone, or the largest: take the mean",
+        6.75: "u and v are swapped: u counts columns, v counts rows",
+        11.4375: "the weights are crossed: the nearer pixel has the larger one",
+        33.0: "you add pixels without weights: the weights of a point must sum to 1",
+        -2.3125: "a kernel below zero: a pixel farther than 1 away has the weight 0, not less: max(0, 1 - |t|)",
+        11.0: "you read half a pixel too far right and down: the centre of the first pixel is (0, 0)",
     }
-    first, last = got[0, 0, 0], got[0, 1, 0]
-    _explain("point (0.25, 1) reads in class 0", first, slips)
-    assert np.isclose(first, 3.25), f"point (0.25, 1): expected 3/4 of 2 and 1/4 of 7, 3.25, got {first:.3f}"
-    assert np.isclose(last, 15), f"point (2, 2) lies on the last pixel and reads 15, got {last:.3f}"
-    by_hand = [[[3.25, 11.375], [15, 1.5], [10, 12]], [[3.75, 0], [0, 2.5], [0, 0]]]
-    np.testing.assert_allclose(got, by_hand, atol=1e-6, err_msg="all points of both classes, by hand")
+    _explain("cell 0 has in class 0", got[0, 0], slips)
+    by_hand = "all cells of both classes, by hand; (2, 2) lies on the last pixel and reads 15"
+    np.testing.assert_allclose(got, [[7.3125, 8.25, 11], [1.875, 1.25, 0]], atol=1e-6, err_msg=by_hand)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import planes
 
-    complaint = planes.check_sample_plane(sample_plane)
+    complaint = planes.check_cell_means(cell_means)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -196,24 +200,25 @@ _test()
 # %% nbgrader={"grade": true, "grade_id": "invisible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     s, inside = _scores()
-    full = answer_array(sample_plane(s.copy(), inside.copy(), np.ones((3, 2), bool)), "sample_plane")
-    pixels, visible = inside.copy(), np.array([[False, True], [False, False], [True, True]])
-    pixels[0, 0], pixels[1, 1] = np.nan, (-7.5, 400.0)
-    got = answer_array(sample_plane(s, pixels, visible), "sample_plane")
-    assert got.shape == full.shape == (2, 3, 2), f"expected one value a class and point, (2, 3, 2), got {got.shape}"
-    assert not np.isnan(got).any(), (
-        "NaN: NaN times 0 is NaN, and so is NaN in a sum. Leave such points out, don't weigh them"
+    alone = answer_array(cell_means(s.copy(), inside[:, :1].copy(), np.ones((3, 1), bool)), "cell_means")
+    pixels, visible = inside.copy(), np.array([[True, False], [True, True], [False, False]])
+    pixels[0, 1], pixels[2, 0] = np.nan, (-7.5, 400.0)
+    got = answer_array(cell_means(s, pixels, visible), "cell_means")
+    assert got.shape == alone.shape == (2, 3), f"expected one value for each class and cell, (2, 3), got {got.shape}"
+    assert not np.isnan(got[:, 0]).any(), "NaN: NaN times 0 is NaN, and so is NaN in a sum. Leave such points out"
+    assert not np.isnan(got[:, 2]).any(), (
+        "cell 2 has no visible point, and nothing divided by nothing is NaN: it takes 0"
     )
-    hidden = f"point (1, 0) lies in the image but isn't visible (something hides it): 0, not {got[0, 1, 0]}"
-    assert got[0, 1, 0] == 0, hidden
-    assert got[0, 1, 1] == 0, f"point (1, 1) lies outside the image: 0, not {got[0, 1, 1]}"
-    assert got[:, visible].any(), "the visible points read 0: only those that aren't visible do"
-    same = "the visible points read what they read when all are visible"
-    np.testing.assert_allclose(got[:, visible], full[:, visible], err_msg=same)
+    whole = "one of cell 0's two points is visible: divide by the number of VISIBLE points, which is 1"
+    assert not np.allclose(got[:, 0], alone[:, 0] / 2), whole
+    assert not got[:, 2].any(), (
+        f"cell 2 has no visible point, yet takes {got[0, 2]:.3g}: {inside[2, 1]} lies in the image, but isn't visible"
+    )
+    np.testing.assert_allclose(got[:, 0], alone[:, 0], atol=1e-6, err_msg="cell 0 reads what its visible point reads")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import planes
 
-    complaint = planes.check_invisible(sample_plane)
+    complaint = planes.check_invisible(cell_means)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -221,63 +226,94 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: the way back (2 + 1 points)
+# ## Task 3: a bug in the way back (1 + 2 points)
 #
-# Now the loss speaks. `p_bar` says by how much the loss grows when a value on the plane grows, `(C, H, W)`. What does that mean for the scores? Nudge a
-# pixel in your mind: who reads it, and how much of it?
+# A wrong backward pass stops nothing: the network still learns, a little worse. Somebody hands you two black boxes. `forward(s)` takes an image `(h, w)` and
+# returns what n points read, `(n,)`, by equation (2). The points are fixed, but nobody tells you where they are: all between pixels, and some pixels are read by more
+# than one point. `backward(p_bar)` takes a gradient `(n,)` and returns one for the image, `(h, w)`. It is one of four:
 #
-# Complete `give_back`: it returns $\bar s$, `(C, h, w)`. No automatic differentiation: numpy is enough. For one more point: points
-# that aren't visible teach nobody, whatever their u and v are.
+# | kind | what it returns |
+# |---|---|
+# | `PAIR` | what it should: for each pixel weight times gradient, added up over all points that read it |
+# | `OVERWRITES` | the share of the last point (the highest number) that reads a pixel; the shares of the others are lost |
+# | `MEAN` | the right sums, divided by n |
+# | `NEAREST` | the whole gradient of each point goes to the pixel with its largest weight, added up |
+#
+# Complete `is_pair`: it returns whether `backward` is the adjoint of `forward`. For two more points, complete `which_kind`: it returns one of the four. You may call the boxes with
+# whatever you like, as often as you like.
 
 
-# %% nbgrader={"grade": false, "grade_id": "give-back", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def give_back(p_bar, pixels, visible, h, w):
-    """Return the gradient of the loss in the scores, (C, h, w)."""
+# %% nbgrader={"grade": false, "grade_id": "boxes", "locked": true, "schema_version": 3, "solution": false, "task": false}
+PAIR, OVERWRITES, MEAN, NEAREST = range(4)
+_POINTS = np.array([[0.3, 0.4], [0.7, 0.2], [1.2, 1.7], [2.6, 2.3], [0.4, 0.8]])
+
+
+def _boxes(kind, points=_POINTS, h=4, w=4):
+    """Return forward and backward of a kind, for points (n, 2) in an image of h rows and w columns."""
+    down = np.maximum(0, 1 - np.abs(points[:, 1:] - np.arange(h)))
+    across = np.maximum(0, 1 - np.abs(points[:, :1] - np.arange(w)))
+    A = (down[:, :, None] * across[:, None, :]).reshape(len(points), h * w)
+
+    def forward(s):
+        return A @ np.asarray(s, float).reshape(h * w)
+
+    def backward(p_bar):
+        p_bar, s_bar = np.asarray(p_bar, float).reshape(-1, 1), np.zeros(h * w)
+        if kind == OVERWRITES:
+            for weights, share in zip(A, A * p_bar, strict=True):
+                s_bar[weights > 0] = share[weights > 0]
+        elif kind == NEAREST:
+            np.add.at(s_bar, A.argmax(axis=1), p_bar[:, 0])
+        else:
+            s_bar = (A * p_bar).sum(axis=0) / (len(points) if kind == MEAN else 1)
+        return s_bar.reshape(h, w)
+
+    return forward, backward
+
+
+# %% nbgrader={"grade": false, "grade_id": "which-kind", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def is_pair(forward, backward, h, w, n):
+    """Return whether backward (n,) -> (h, w) is the adjoint of forward (h, w) -> (n,)."""
     ### BEGIN SOLUTION
-    n, m = np.arange(h), np.arange(w)
-    s_bar = np.zeros((len(p_bar), h, w))
-    for j in zip(*np.nonzero(visible), strict=True):
-        u, v = pixels[j]
-        weights = np.outer(np.maximum(0, 1 - np.abs(v - n)), np.maximum(0, 1 - np.abs(u - m)))
-        s_bar += p_bar[:, *j, None, None] * weights
-    return s_bar
+    rng = np.random.default_rng(0)
+    s, p_bar = rng.normal(size=(h, w)), rng.normal(size=n)
+    return bool(np.isclose(p_bar @ forward(s), np.sum(backward(p_bar) * s)))
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "back-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _blame():
-    """Return p_bar (2, 1, 3) and pixels (1, 3, 2): three points, two of them between columns 0 and 1 of row 0."""
-    pixels = np.array([[[0.5, 0.0], [0.25, 0.0], [1.25, 0.5]]])
-    return np.array([[[1.0, 2.0, 4.0]], [[10.0, 20.0, 40.0]]]), pixels
+def which_kind(forward, backward, h, w, n):
+    """Return PAIR, OVERWRITES, MEAN or NEAREST."""
+    ### BEGIN SOLUTION
+    A = np.array([forward(one) for one in np.eye(h * w).reshape(-1, h, w)]).T  # (n, h * w)
+    p_bar = np.linspace(1, 2, n)
+    guess = {PAIR: p_bar @ A, MEAN: p_bar @ A / n, OVERWRITES: np.zeros(h * w), NEAREST: np.zeros(h * w)}
+    for weights, gradient in zip(A, p_bar, strict=True):
+        guess[OVERWRITES][weights > 0] = (weights * gradient)[weights > 0]
+        guess[NEAREST][weights.argmax()] += gradient
+    got = np.ravel(backward(p_bar))
+    return min(guess, key=lambda kind: np.abs(guess[kind] - got).sum())
+    ### END SOLUTION
 
 
-_BACK_SLIPS = {  # of pixel (0, 0): by hand 0.5 * 1 + 0.75 * 2 = 2.0
-    1.5: "the second reader's blame replaces that of the first: add them up (`a[rows, cols] +=` adds once a pixel)",
-    0.5: "only the first reader counts: add up all of them (or do you divide by the number of points?)",
-    0.667: "you divide by the number of points: a sum has no mean in it",
-    1.0: "you take the mean over a pixel's readers: add them up",
-    1.6: "you divide by the sum of the weights: add up, a pixel that is read twice gets blamed twice",
-    1.375: "the weights are squared: blame times weight, once",
-    1.25: "that is the sum of the weights: multiply each with what the loss says of its reader",
-    -2.0: "the sign is turned: this is the gradient; the step against it comes later",
-    22.0: "you add up the classes: each has its own gradient",
-}
-
-
-# %% nbgrader={"grade": true, "grade_id": "give-back-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "is-pair-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    p_bar, pixels = _blame()
-    got = answer_array(give_back(p_bar, pixels, np.ones((1, 3), bool), h=3, w=4), "give_back")
-    assert got.shape == (2, 3, 4), f"expected one number a class and pixel, shape (2, 3, 4), got {got.shape}"
-    assert got[0, 1, 0] == 0, "pixel (1, 0) is read by nobody, yet it learns: u counts columns, v counts rows"
-    _explain("pixel (0, 0) gets in class 0", got[0, 0, 0], _BACK_SLIPS)
-    assert not np.allclose(got, np.round(got)), "all blame goes to the nearest pixel, but a point reads up to four"
-    by_hand = np.array([[2.0, 2.5, 0.5, 0], [0, 1.5, 0.5, 0], [0, 0, 0, 0]])
-    np.testing.assert_allclose(got, [by_hand, 10 * by_hand], atol=1e-6, err_msg="by hand, both classes")
+    names = ("PAIR", "OVERWRITES", "MEAN", "NEAREST")
+    ones = "with s or p_bar all ones NEAREST passes as well: take random numbers for both"
+    hints = (
+        "the test is p_bar . forward(s) = backward(p_bar) . s",
+        "do two points share a pixel in your test?",
+        ones,
+        ones,
+    )
+    for kind, name in enumerate(names):
+        told = answer_array(is_pair(*_boxes(kind), 4, 4, 5), "is_pair").ravel()
+        assert told.size == 1, f"return True or False, got {told}"
+        says = "a pair" if told[0] else "no pair"
+        assert bool(told[0]) == (kind == 0), f"the backward pass is {name}, and you call it {says}: {hints[kind]}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import planes
 
-    complaint = planes.check_give_back(give_back)
+    complaint = planes.check_is_pair(is_pair)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -285,23 +321,19 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "give-back-invisible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "which-kind-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # The same three points, and one that isn't visible, whose place is NaN.
-    p_bar, pixels = _blame()
-    wanted = answer_array(give_back(p_bar.copy(), pixels.copy(), np.ones((1, 3), bool), h=3, w=4), "give_back")
-    more = np.concatenate([[[[np.nan, np.nan]]], pixels], axis=1)
-    blame = np.concatenate([[[[100.0]], [[1000.0]]], p_bar], axis=2)
-    got = answer_array(give_back(blame, more, np.array([[False, True, True, True]]), h=3, w=4), "give_back")
-    assert wanted.any(), "the points that are visible teach nobody: only those that aren't have no part"
-    assert got.shape == wanted.shape, f"one point more, and the shape {wanted.shape} becomes {got.shape}"
-    assert not np.isnan(got).any(), "NaN: the point that isn't visible got in. Leave it out, don't weigh it"
-    sent = "the point that isn't visible teaches a pixel: leave it out, don't send it somewhere"
-    np.testing.assert_allclose(got, wanted, atol=1e-6, err_msg=sent)
+    names = ("PAIR", "OVERWRITES", "MEAN", "NEAREST")
+    hint = "find out by unit images which point reads which pixel, and compare what the four kinds would return"
+    for kind, name in enumerate(names):
+        got = answer_array(which_kind(*_boxes(kind), 4, 4, 5), "which_kind").ravel()
+        assert got.size == 1, f"return one of the four, got {got}"
+        found = names[int(got[0])] if got[0] in range(4) else f"{got[0]:g}, which is none of the four"
+        assert got[0] == kind, f"the backward pass is {name}, and you find {found}: {hint}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import planes
 
-    complaint = planes.check_give_back_invisible(give_back)
+    complaint = planes.check_which_kind(which_kind)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -481,14 +513,174 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 6: in your own words (2 points)
+# ## Task 6: put together, your sampler on two streets (3 points)
+#
+# Task 2 computes the weights anew for every image. For one camera they never change, so build them once. Complete `cell_matrix`: it returns the sparse matrix,
+# `(N, h * w)`, that takes a vector of scores to the means of the cells, as in task 2. `weights_of` tells which four pixels a point reads, as your
+# `four_pixels` does, which it is unless the tests hand something else over. The pixel in row n and column m has the number n * w + m. Collect the numbers of the cells, those of the pixels, and the weights in three lists, and give them to
+# `csr_matrix((weights, (cells, numbers)), shape=(N, h * w))`, which adds up entries that meet. The tests call `there_and_back`, with cells of the two streets; leave it as it is.
+
+
+# %% nbgrader={"grade": false, "grade_id": "cell-matrix", "locked": false, "schema_version": 3, "solution": true, "task": false}
+from scipy.sparse import csr_matrix
+
+
+def cell_matrix(pixels, visible, h, w, weights_of=four_pixels):
+    """Return the sparse matrix (N, h * w) from scores to the means of the cells."""
+    ### BEGIN SOLUTION
+    cells, numbers, weights = [], [], []
+    for cell, (places, seen) in enumerate(zip(pixels, visible, strict=True)):
+        for u, v in places[seen]:
+            rows, cols, four = weights_of(u, v, h, w)
+            cells += [cell] * 4
+            numbers += [n * w + m for n, m in zip(rows, cols, strict=True)]
+            weights += [weight / seen.sum() for weight in four]
+    return csr_matrix((weights, (cells, numbers)), shape=(len(pixels), h * w))
+    ### END SOLUTION
+
+
+def there_and_back(s, p_bar, pixels, visible, weights_of=four_pixels):
+    """Return what cells read of s (C, h, w), (C, N), and what their gradient p_bar (C, N) sends back, (C, h, w)."""
+    A = cell_matrix(pixels, visible, *s.shape[1:], weights_of)
+    return (A @ s.reshape(len(s), -1).T).T, (A.T @ p_bar.T).T.reshape(s.shape)
+
+
+# %% nbgrader={"grade": false, "grade_id": "streets", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _cells(frame, size, cell=16.0, side=3):
+    """Return u and v of side x side points in each cell of the ground, (N, K, 2), and which are in view, (N, K)."""
+    from semgrid_edu.camera import project, transform_points
+    from semgrid_edu.grid import GridSpec
+
+    camera, points = frame.camera.resized(size), GridSpec(0, 64, -16, 16, cell / side).centers()
+    on_ground = np.dstack([points, np.zeros(points.shape[:2])])
+    pixels, visible = project(transform_points(camera.T_camera_from_grid, on_ground), camera)
+    H, W = (n // side for n in visible.shape)
+    by_cell = [a.reshape(H, side, W, side, -1).swapaxes(1, 2).reshape(H * W, side**2, -1) for a in (pixels, visible)]
+    return by_cell[0], by_cell[1][..., 0]
+
+
+def _four_read(u, v, h, w):
+    """Return rows, columns and weights of the four pixels that a point reads."""
+    top, left = min(int(v), h - 2), min(int(u), w - 2)
+    down, across = v - top, u - left
+    weights = [(1 - down) * (1 - across), (1 - down) * across, down * (1 - across), down * across]
+    return [top, top, top + 1, top + 1], [left, left + 1, left, left + 1], weights
+
+
+# %% nbgrader={"grade": true, "grade_id": "cell-matrix-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    from semgrid_edu.datasets.samples import real_drive, sample_drive
+
+    for street, frame in (("simulated", sample_drive()[0]), ("real", real_drive()[0])):
+        s = np.random.default_rng(0).normal(size=(2, 24, 80))
+        pixels, visible = _cells(frame, s.shape[1:])
+        p_bar = np.random.default_rng(1).normal(size=(2, len(pixels)))
+        got = there_and_back(s, p_bar, pixels, visible, _four_read)
+        p, s_bar = (answer_array(one, "there_and_back") for one in got)
+        assert p.shape == p_bar.shape, f"{len(pixels)} cells of the {street} street, got the shape {p.shape}"
+        assert not np.isnan(p).any(), "NaN: leave points that aren't visible out, and cells without any are 0"
+        down = np.maximum(0, 1 - np.abs(pixels[visible][:, 1:] - np.arange(24)))
+        across = np.maximum(0, 1 - np.abs(pixels[visible][:, :1] - np.arange(80)))
+        sums, counts = np.zeros(p.shape), visible.sum(axis=1)
+        np.add.at(sums, (slice(None), np.nonzero(visible)[0]), np.einsum("jn,cnm,jm->cj", down, s, across))
+        hints = {
+            "that is the sum over a cell's points: divide by the number of visible ones": sums,
+            "you divide by all points of a cell: divide by the number of visible ones": sums / visible.shape[1],
+        }
+        for hint, wrong in hints.items():
+            assert not np.allclose(p, wrong, atol=1e-6), hint
+        means = f"{street} street: not the means of the visible points. Is the number of a pixel n * w + m?"
+        np.testing.assert_allclose(p, sums / np.maximum(counts, 1), atol=1e-5, err_msg=means)
+        adjoint = f"{street} street: backward isn't the adjoint of forward: leave `there_and_back` as it is"
+        np.testing.assert_allclose((p_bar * p).sum(), (s_bar * s).sum(), rtol=1e-5, err_msg=adjoint)
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import planes
+
+    complaint = planes.check_cell_matrix(there_and_back)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# Now it becomes the stage `sample` of the pipeline: twenty planes, and four points in each cell. The pipeline doesn't tell this stage which camera it has, but the
+# filter sees every frame first, so `track` notes it there and builds your matrix once. Take the `#` away from the last line (about a minute) to see how many cells of the
+# simulated street get their true class. Then set `SIDE` to 1, which is the package's own sampling. Does the mean make the map better? The network was trained with one point
+# in each cell.
+
+
+# %%
+SIDE = 2  # points of a cell along each side
+noted = {}
+
+
+def matrix_of(frame):
+    """Return your matrix for all cells of all planes of the street's camera."""
+    from semgrid_edu.grid import GridSpec
+    from semgrid_edu.planes import plane_heights, plane_pixels
+
+    grid, camera = GridSpec.compact(), frame.camera.resized((96, 320))
+    fine = GridSpec(grid.x_min, grid.x_max, grid.y_min, grid.y_max, grid.cell / SIDE)
+    pixels, visible = plane_pixels(fine, plane_heights(), camera)
+    H, W = grid.shape
+    pixels = pixels.reshape(-1, H, SIDE, W, SIDE, 2).swapaxes(2, 3).reshape(-1, SIDE**2, 2)
+    return cell_matrix(pixels, visible.reshape(-1, H, SIDE, W, SIDE).swapaxes(2, 3).reshape(-1, SIDE**2), 96, 320)
+
+
+# %%
+def track(frames, spec):
+    """Yield the package's beliefs, and note the camera."""
+    from semgrid_edu.occupancy import track_drive
+
+    def looked_at():
+        for frame in frames:
+            if "matrix" not in noted:
+                noted.update(matrix=matrix_of(frame), shape=spec.shape)
+            yield frame
+
+    noted.clear()
+    return track_drive(looked_at(), spec)
+
+
+def sample(s):
+    """Return the scores on the planes, (C, D, H, W)."""
+    return (noted["matrix"] @ s.reshape(len(s), -1).T).T.reshape(len(s), -1, *noted["shape"])
+
+
+# %%
+def right_cells():
+    """Print how many cells of the simulated street get their true class, with your stage."""
+    from semgrid_edu.datasets.samples import sample_drive
+    from semgrid_edu.grid import GridSpec
+    from semgrid_edu.pipeline import Stages, run_pipeline
+
+    spec, frames = GridSpec.compact(), [sample_drive()[k] for k in range(0, 20, 4)]
+    shares = []
+    for result in run_pipeline(frames, Stages(track=track, sample=sample)):
+        labels = result.frame.labels
+        in_view = labels.visible_on(spec)
+        shares.append((result.grid.argmax(axis=0) == labels.birdseye_on(spec))[in_view].mean())
+    print(f"{100 * np.mean(shares):.0f} % of the cells that the camera sees have their true class")
+
+
+# right_cells()
+
+# %% [markdown]
+# Put `import numpy as np`, your `four_pixels` and `cell_matrix` with its import, and the two cells with `matrix_of` and `sample` into a file `my_stages.py`, and run
+#
+#     semgrid-edu demo --stages my_stages.py
+#
+# It shows both streets, the real one too, with your planes and with the package's. Where do the maps differ, near by or far ahead?
+#
+# ## Task 7: in your own words (2 points)
 #
 # To save time, a colleague lets each point read its nearest pixel instead of four. The network still trains, nearly as well. Why does it, although the
 # stairs have no slope? What can't be learnt any more? And where on the map would you look for the damage: near the vehicle, or far away? Five sentences are
 # enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "nearest", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
-# The scores are what learns, and for them the sampling stays linear: a matrix with a single 1 in each row, whose transpose hands the whole blame to the one
+# The scores are what learns, and for them the sampling stays linear: a matrix with a single 1 in each row, whose transpose hands the whole gradient to the one
 # pixel that was read. No slope in u and v is needed while the calibration is fixed. What can't be learnt any more is whatever moves the points: the
 # calibration, the height of a plane, the pose of the vehicle, for the gradient in u and v is zero. The damage is a rounding of up to half a pixel:
 # centimetres near the vehicle, where a pixel is small, but up to five metres of ground at 60 m, where edges jump in steps a pixel deep. One point for the
