@@ -147,7 +147,7 @@ def test_the_house_stays_small():
         lines[storey] += code_lines(module)
     assert modules["book"] <= 173
     assert modules["workshop"] <= 127
-    assert lines["book"] <= 12_310
+    assert lines["book"] <= 12_470
     assert lines["workshop"] <= 10_890
 
 
