@@ -1,9 +1,10 @@
 """Each stage of the paper as a model of toy size, built from the functions that the pipeline itself calls.
 
 In the order of the lectures: `line` (01); `cell` (02, 04), `beam`, `thick_walls` (02); `cells_in_a_row`, `joint_row`,
-`bof` (03); `cmcdot`, `cmcdot_graph` (04); `pixel_ray` (05, 06); `ground_truth_label` (09); `crf` (10); the
-whole, `system_world` and `system`; and `class_memory`, an edge that the whole cuts. `stage_graph` holds what each of
-them builds: a model, its drawing, and the edges that are cut, whose ledger it lists. `prices` measures what those cost.
+`bof` (03); `cmcdot`, `cmcdot_graph` (04); `pixel_ray` (05, 06); `late_fusion` (08); `ground_truth_label` (09); `crf`
+(10); the whole, `system_world` and `system`; and `class_memory`, an edge that the whole cuts. `stage_graph` holds what
+each of them builds: a model, its drawing, and the edges that are cut, whose ledger it lists. `prices` measures what
+those cost.
 """
 
 from semgrid_edu.stage_models.beam import BeamWorld, beam_over_cells
@@ -26,6 +27,7 @@ from semgrid_edu.stage_models.ground_truth_label import (
     scan_with_pose_error,
     wrong_label,
 )
+from semgrid_edu.stage_models.late_fusion import TwoSensors, car_by_both, late_fusion
 from semgrid_edu.stage_models.line import bayes_on_a_line
 from semgrid_edu.stage_models.pixel_ray import RayWorld, pixel_height, pixel_ray, shared_pixel
 from semgrid_edu.stage_models.stage_graph import CutEdge, LedgerLine, Price, StageGraph, ledger, ledger_table
@@ -43,15 +45,18 @@ __all__ = [
     "RayWorld",
     "StageGraph",
     "SystemWorld",
+    "TwoSensors",
     "bayes_on_a_line",
     "beam_beliefs",
     "beam_over_cells",
     "bof_stage",
+    "car_by_both",
     "class_over_time",
     "cmcdot_stage",
     "count_rings",
     "crf_stage",
     "exact_cell",
+    "late_fusion",
     "ledger",
     "ledger_table",
     "lidar_label_stage",

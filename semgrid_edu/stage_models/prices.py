@@ -27,6 +27,7 @@ from semgrid_edu.stage_models.cmcdot_graph import cmcdot_stage
 from semgrid_edu.stage_models.crf import UNDECIDED, all_free, two_classes
 from semgrid_edu.stage_models.ground_truth_label import LabelWorld, count_rings, wrong_label
 from semgrid_edu.stage_models.joint_row import exact_beliefs
+from semgrid_edu.stage_models.late_fusion import CAR, UNKNOWN, car_by_both
 from semgrid_edu.stage_models.line import bayes_on_a_line, filtered, smoothed
 from semgrid_edu.stage_models.pixel_ray import believed_by_readers, cell_by_cell, exact_ray, pixel_height
 from semgrid_edu.stage_models.stage_graph import Price, StageGraph
@@ -119,6 +120,12 @@ def four_readers() -> Price:
     """Lecture 06: what four cells know that read one pixel."""
     exact, system = believed_by_readers(4)
     return Price(exact, system, "P(car) when four cells read car")
+
+
+def hidden_from_both() -> Price:
+    """Lecture 08: the cell whose pixel shows a car, and which no beam reached."""
+    exact, late = car_by_both(CAR, UNKNOWN)
+    return Price(exact, late, "P(car), pixel says car, o UNKNOWN")
 
 
 def nine_votes() -> Price:
