@@ -62,30 +62,30 @@ def late_fusion(world: TwoSensors | None = None) -> StageGraph:
     Returns
     -------
     StageGraph
-        Variables m (what stands in the cell: 0 road, 1 car), s (0 seen, 1 hidden), a (the label of its pixel, like m)
+        Variables m (what stands in the cell: 0 road, 1 car), hid (1 when it is hidden), a (label of its pixel, like m)
         and o (0 FREE, 1 occupied, 2 UNKNOWN).
     """
     world = world or TwoSensors()
-    factors = [binary("m", world.prior), binary("s", world.hidden)]
-    factors += [Factor(("m", "s", "a"), _label(world)), Factor(("m", "s", "o"), _state(world))]
+    factors = [binary("m", world.prior), binary("hid", world.hidden)]
+    factors += [Factor(("m", "hid", "a"), _label(world)), Factor(("m", "hid", "o"), _state(world))]
     return StageGraph(
         "A cell, seen or hidden, and what both sensors say",
         directed(factors),
         observed=("a", "o"),
-        positions={"m": (0.0, 0.0), "s": (2.4, 0.0), "a": (0.0, -1.4), "o": (2.4, -1.4)},
-        equations={"s": "seen or hidden", "o": "occupancy state"},
+        positions={"m": (0.0, 0.0), "hid": (3.0, 0.0), "a": (0.0, -1.4), "o": (3.0, -1.4)},
+        equations={"m": "what stands there", "hid": "hidden or not", "a": "the pixel's label", "o": "occupancy state"},
         cut=cut_edges("fusion"),
     )
 
 
 def _label(world: TwoSensors) -> NDArray[np.float64]:
-    """Return P(a | m, s), (2, 2, 2)."""
+    """Return P(a | m, hid), (2, 2, 2)."""
     car = np.array([[1 - world.right, world.hider_is_car], [world.right, world.hider_is_car]])
     return np.stack([1 - car, car], axis=-1)
 
 
 def _state(world: TwoSensors) -> NDArray[np.float64]:
-    """Return P(o | m, s), (2, 2, 3)."""
+    """Return P(o | m, hid), (2, 2, 3)."""
     unknown = np.broadcast_to(world.unknown, (2, 2))
     occupied = (1 - unknown) * np.array([[1 - world.right], [world.right]])
     return np.stack([1 - unknown - occupied, occupied, unknown], axis=-1)

@@ -19,10 +19,10 @@ def test_a_cell_whose_pixel_shows_a_car_and_that_no_beam_reached():
 
 def test_the_sensors_are_independent_only_once_it_is_known_whether_the_cell_is_hidden():
     model = late_fusion().model
-    assert d_separated(model, "m", "s")
-    assert not d_separated(model, "m", "s", given=("a",))
+    assert d_separated(model, "m", "hid")
+    assert not d_separated(model, "m", "hid", given=("a",))
     assert not d_separated(model, "a", "o", given=("m",))
-    assert d_separated(model, "a", "o", given=("m", "s"))
+    assert d_separated(model, "a", "o", given=("m", "hid"))
 
 
 @pytest.mark.parametrize("world", [TwoSensors(hidden=0.0), TwoSensors(hidden=1.0)], ids=["seen", "hidden"])
