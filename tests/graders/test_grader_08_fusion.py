@@ -3,65 +3,111 @@
 from grader_checks import GraderChecks, mistake, right
 
 
-def reduction(body):
-    """Return an answer to task 1 with this body."""
-    return f"def reduce_planes(planes, theta, beta):\n    return {body}"
+def table(same="(columns[:n] == column[:n, None]).all(axis=0)", pick="np.bincount(truth[same]).argmax()", counts="-1"):
+    """Return an answer to task 1 with these parts."""
+    return f"""
+def name_cells(columns, truth, new):
+    columns, truth = columns[:, truth != 255], truth[truth != 255]
+    named = np.zeros(new.shape[1], int)
+    for j, column in enumerate(new.T):
+        for n in range(len(column), {counts}, -1):
+            same = {same}
+            if same.any():
+                named[j] = {pick}
+                break
+    return named"""
+
+
+def gradient_check(
+    behind="rng.normal(size=np.shape(forward(planes, theta, beta)))",
+    wrong="not np.allclose(told, by_nudging, rtol=1e-3, atol=1e-6)",
+    order="{'planes': planes, 'theta': theta, 'beta': beta}",
+    kept="values.copy()",
+):
+    """Return an answer to task 2 with these parts."""
+    return f"""
+def wrong_derivative(forward, back, planes, theta, beta):
+    rng, inputs = np.random.default_rng(5), {order}
+    behind = {behind}
+    for (name, values), told in zip(inputs.items(), back(planes, theta, behind)):
+        by_nudging = np.zeros(values.shape)
+        for place in np.ndindex(values.shape):
+            losses = []
+            for sign in (1, -1):
+                nudged = {kept}
+                nudged[place] += sign * 1e-3
+                losses.append((forward(**{{**inputs, name: nudged}}) * behind).sum())
+            by_nudging[place] = (losses[0] - losses[1]) / 2e-3
+        if {wrong}:
+            return name
+    return "none\""""
+
+
+def shares(weight="cells * np.clip(alpha, 1 / limit, limit)", share="weight / weight.sum()"):
+    """Return an answer to the first half of task 3 with these parts."""
+    return f"def shares(cells, alpha, limit):\n    weight = {weight}\n    return {share}"
+
+
+def limit(
+    order="sorted(limits)",
+    weight="np.clip(alpha, 1 / limit, limit)",
+    enough="cells[c] * weight[c] >= at_least * total",
+    small="weight[cells > 0].max() <= at_most * total",
+    none="0",
+):
+    """Return an answer to the second half of task 3 with these parts."""
+    return f"""
+def choose_limit(cells, alpha, limits, c, at_least, at_most):
+    for limit in {order}:
+        weight = {weight}
+        total = (cells * weight).sum()
+        if {enough} and {small}:
+            return limit
+    return {none}"""
 
 
 def back(
-    theta_bar="np.einsum('khw,cdhw->kcd', blamed, planes)",
-    beta_bar="blamed.sum(axis=(1, 2))",
-    planes_bar="np.einsum('kcd,khw->cdhw', theta, blamed)",
-):
-    """Return an answer to task 2 with these three derivatives."""
-    return f"""
-def reduce_back(planes, theta, blamed):
-    return {theta_bar}, {beta_bar}, {planes_bar}"""
-
-
-def balance(
-    below="sum((m != 255).sum() for m in where)", alpha="np.median(f[f > 0]) / f[f > 0]", where="if (m == c).any()"
-):
-    """Return an answer to task 3 with these parts."""
-    return f"""
-def balance(maps, n_classes):
-    f = np.zeros(n_classes)
-    for c in range(n_classes):
-        where = [m for m in maps {where}]
-        if any((m == c).any() for m in maps):
-            f[c] = sum((m == c).sum() for m in where) / ({below})
-    weights = np.zeros(n_classes)
-    weights[f > 0] = {alpha}
-    return weights"""
-
-
-def loss(
-    result="-(w * of_truth).sum() / w.sum()",
-    log_g="logits - m - np.log(np.exp(logits - m).sum(axis=0))",
     m="logits.max(axis=0)",
+    g="e / e.sum(axis=0)",
+    weight="np.where(labelled, alpha[true], 0)",
+    result="weight * (g - one_hot) / weight.sum()",
+    true="np.where(labelled, truth, 0)",
 ):
-    """Return an answer to task 4 with these parts; w are the weights of labelled cells."""
+    """Return an answer to task 4 with these parts."""
     return f"""
-def weighted_loss(logits, truth, alpha):
-    m = {m}
-    log_g = {log_g}
-    rows, cols = np.nonzero(truth != 255)
-    true = truth[rows, cols]
-    of_truth, w = log_g[true, rows, cols], alpha[true]
+def loss_back(logits, truth, alpha):
+    e = np.exp(logits - {m})
+    g = {g}
+    labelled = truth != 255
+    true = {true}
+    one_hot = (np.arange(len(logits))[:, None, None] == true) * 1.0
+    weight = {weight}
     return {result}"""
 
 
-def step(delta="kappa * delta + gradient", theta="theta - eta * new", returned="new"):
-    """Return an answer to task 5 with these parts; `new` is the new delta."""
+def optimiser(
+    before="np.concatenate([np.zeros((1, steps.shape[1])), steps[:-1]])",
+    solved="np.linalg.lstsq(np.stack([-gradients.ravel(), before.ravel()], axis=1), steps.ravel(), rcond=None)[0]",
+    returned="found[0], found[1]",
+):
+    """Return an answer to the first half of task 5 with these parts."""
     return f"""
-def momentum_step(theta, delta, gradient, eta, kappa):
-    new = {delta}
-    return {theta}, {returned}"""
+def rate_and_momentum(path, gradients):
+    steps = np.diff(path, axis=0)
+    before = {before}
+    found = {solved}
+    return {returned}"""
 
 
-def rate(factor):
-    """Return an answer to the second half of task 5 with this factor."""
-    return f"def cosine_rate(eta, step, steps):\n    return eta * {factor}"
+def rates(delta="kappa * delta + gradient", rate="-(step * delta).sum() / (delta**2).sum()"):
+    """Return an answer to the second half of task 5 with these parts."""
+    return f"""
+def rates(path, gradients, kappa):
+    delta, found = np.zeros(path.shape[1]), []
+    for step, gradient in zip(np.diff(path, axis=0), gradients):
+        delta = {delta}
+        found.append({rate})
+    return np.array(found)"""
 
 
 class TestFusion(GraderChecks):
@@ -69,903 +115,563 @@ class TestFusion(GraderChecks):
     entries = (
         # ---- task 1
         right(
-            "four loops",
-            task="reduce-planes",
+            "a dictionary of counters, by the beginning of a column",
+            task="name-cells",
             code="""
-def reduce_planes(planes, theta, beta):
-    K, C, D = theta.shape
-    maps = np.zeros((K, *planes.shape[2:]))
-    for k in range(K):
-        maps[k] += beta[k]
-        for c in range(C):
-            for d in range(D):
-                maps[k] += theta[k, c, d] * planes[c, d]
-    return maps""",
+from collections import Counter, defaultdict
+
+def name_cells(columns, truth, new):
+    counters = defaultdict(Counter)
+    for *column, c in np.vstack([columns, truth]).T.tolist():
+        if c != 255:
+            for n in range(len(column) + 1):
+                counters[tuple(column[:n])][c] += 1
+    named = []
+    for column in new.T.tolist():
+        while tuple(column) not in counters:
+            column = column[:-1]
+        counts = counters[tuple(column)]
+        named.append(min(c for c in counts if counts[c] == max(counts.values())))
+    return named""",
         ),
         right(
-            "a list of maps",
-            task="reduce-planes",
-            code=reduction("[(t[..., None, None] * planes).sum(axis=(0, 1)) + b for t, b in zip(theta, beta)]"),
-        ),
-        right(
-            "a product of two matrices",
-            task="reduce-planes",
+            "helpers with everyday names, in floats",
+            task="name-cells",
             code="""
-def reduce_planes(planes, theta, beta):
-    C, D, H, W = planes.shape
-    column = planes.reshape(C * D, H * W)
-    return (theta.reshape(len(theta), C * D) @ column + beta.reshape(-1, 1)).reshape(-1, H, W)""",
-        ),
-        right(
-            "tensordot", task="reduce-planes", code=reduction("np.tensordot(theta, planes, 2) + beta[:, None, None]")
-        ),
-        mistake(
-            "class and plane swapped",
-            task="reduce-planes",
-            loses=2,
-            says="class and plane are swapped",
-            code=reduction("np.einsum('kdc,cdhw->khw', theta, planes) + beta[:, None, None]"),
+def got(columns, truth, column):
+    while True:
+        same = np.all(columns[: len(column)].T == column, axis=1)
+        if same.any():
+            classes, counts = np.unique(truth[same], return_counts=True)
+            return float(classes[np.argmax(counts)])
+        column = column[:-1]
+
+
+def name_cells(columns, truth, new):
+    known = truth < 255
+    return [got(columns[:, known], truth[known], column) for column in new.T]""",
         ),
         mistake(
-            "no bias",
-            task="reduce-planes",
-            loses=2,
-            says="the bias is missing",
-            code=reduction("np.einsum('kcd,cdhw->khw', theta, planes)"),
-        ),
-        mistake(
-            "bias by column",
-            task="reduce-planes",
-            loses=2,
-            says="your bias changes along the columns",
-            code=reduction("np.einsum('kcd,cdhw->khw', theta, planes) + beta"),
-        ),
-        mistake(
-            "bias with every term",
-            task="reduce-planes",
-            loses=2,
-            says="the bias is added with every term",
-            code=reduction("(theta[..., None, None] * planes + beta[:, None, None, None, None]).sum(axis=(1, 2))"),
-        ),
-        mistake(
-            "bias with every plane",
-            task="reduce-planes",
-            loses=2,
-            says="the bias is added with every plane",
-            code=reduction("(np.einsum('kcd,cdhw->kdhw', theta, planes) + beta[:, None, None, None]).sum(axis=1)"),
-        ),
-        mistake(
-            "mean instead of sum",
-            task="reduce-planes",
-            loses=2,
-            says="that is a mean over classes and planes",
-            code=reduction("(theta[..., None, None] * planes).mean(axis=(1, 2)) + beta[:, None, None]"),
-        ),
-        mistake(
-            "the best plane and class",
-            task="reduce-planes",
-            loses=2,
-            says="that is the largest term",
-            code=reduction("(theta[..., None, None] * planes).max(axis=(1, 2)) + beta[:, None, None]"),
-        ),
-        mistake(
-            "ground plane alone",
-            task="reduce-planes",
-            loses=2,
-            says="that is the ground plane alone",
-            code=reduction("np.einsum('kc,chw->khw', theta[:, :, 0], planes[:, 0]) + beta[:, None, None]"),
-        ),
-        mistake(
-            "weights left out",
-            task="reduce-planes",
-            loses=2,
-            says="the weights are missing",
-            code=reduction("planes.sum(axis=(0, 1)) + beta[:, None, None]"),
-        ),
-        mistake(
-            "soft-max of the scores first",
-            task="reduce-planes",
-            loses=2,
-            says="you apply a soft-max over classes",
-            code="""
-def reduce_planes(planes, theta, beta):
-    g = np.exp(planes) / np.exp(planes).sum(axis=0)
-    return np.einsum("kcd,cdhw->khw", theta, g) + beta[:, None, None]""",
-        ),
-        mistake(
-            "soft-max over planes",
-            task="reduce-planes",
-            loses=2,
-            says="you apply a soft-max over planes",
-            code="""
-def reduce_planes(planes, theta, beta):
-    g = np.exp(planes) / np.exp(planes).sum(axis=1, keepdims=True)
-    return np.einsum("kcd,cdhw->khw", theta, g) + beta[:, None, None]""",
-        ),
-        mistake(
-            "ReLU already",
-            task="reduce-planes",
-            loses=2,
-            says="the ReLU comes later",
-            code=reduction("np.maximum(0, np.einsum('kcd,cdhw->khw', theta, planes) + beta[:, None, None])"),
-        ),
-        mistake(
-            "two classes and planes written in",
-            task="reduce-planes",
-            loses=2,
-            says="on inputs you haven't seen: wrong sums when C, D and K are other numbers",
-            code="""
-def reduce_planes(planes, theta, beta):
-    maps = beta[:, None, None] + np.zeros((len(theta), *planes.shape[2:]))
-    for c, d in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        if c < len(planes) and d < planes.shape[1]:
-            maps = maps + theta[:, c, d, None, None] * planes[c, d]
-    return maps""",
-        ),
-        # ---- task 2
-        right(
-            "loops that add up",
-            task="reduce-back",
-            code="""
-def reduce_back(planes, theta, blamed):
-    theta_bar, planes_bar = np.zeros_like(theta), np.zeros_like(planes)
-    for k, c, d in np.ndindex(theta.shape):
-        theta_bar[k, c, d] = np.sum(planes[c, d] * blamed[k])
-        planes_bar[c, d] += theta[k, c, d] * blamed[k]
-    return theta_bar, [np.sum(b) for b in blamed], planes_bar""",
-        ),
-        right(
-            "lists of numbers and maps",
-            task="reduce-back",
-            code="""
-def reduce_back(planes, theta, blamed):
-    K, C, D = theta.shape
-    theta_bar = [[[(planes[c, d] * blamed[k]).sum() for d in range(D)] for c in range(C)] for k in range(K)]
-    planes_bar = [[sum(theta[k, c, d] * blamed[k] for k in range(K)) for d in range(D)] for c in range(C)]
-    return theta_bar, [b.sum() for b in blamed], planes_bar""",
-        ),
-        right(
-            "transposed matrices",
-            task="reduce-back",
-            code="""
-def reduce_back(planes, theta, blamed):
-    K, C, D = theta.shape
-    B, P, T = blamed.reshape(K, -1), planes.reshape(C * D, -1), theta.reshape(K, C * D)
-    return (B @ P.T).reshape(K, C, D), B @ np.ones(B.shape[1]), (T.T @ B).reshape(planes.shape)""",
-        ),
-        right(
-            "finite differences",
-            task="reduce-back",
-            code="""
-def reduce_back(planes, theta, blamed):
-    def total(planes, theta):
-        return (np.einsum("kcd,cdhw->khw", theta, planes) * blamed).sum()
-    by = np.zeros_like(theta), np.zeros_like(planes)
-    for place in np.ndindex(theta.shape):
-        step = np.zeros_like(theta); step[place] = 1.0
-        by[0][place] = total(planes, theta + step) - total(planes, theta)
-    for place in np.ndindex(planes.shape):
-        step = np.zeros_like(planes); step[place] = 1.0
-        by[1][place] = total(planes + step, theta) - total(planes, theta)
-    return by[0], blamed.sum(axis=(1, 2)), by[1]""",
-        ),
-        mistake(
-            "mean over cells",
-            task="reduce-back",
-            loses=2,
-            says="that is the mean over cells",
-            code=back(theta_bar="np.einsum('khw,cdhw->kcd', blamed, planes) / blamed[0].size"),
-        ),
-        mistake(
-            "sums multiplied",
-            task="reduce-back",
-            loses=2,
-            says="blame is lost: sum planes times blamed",
-            code=back(theta_bar="blamed.sum(axis=(1, 2))[:, None, None] * planes.sum(axis=(2, 3))"),
-        ),
-        mistake(
-            "first cell only",
-            task="reduce-back",
-            loses=2,
-            says="that is the first cell alone",
-            code=back(theta_bar="blamed[:, 0, 0][:, None, None] * planes[:, :, 0, 0]"),
-        ),
-        mistake(
-            "summed over maps",
-            task="reduce-back",
-            loses=2,
-            says="you sum over the reduced maps too",
-            code=back(theta_bar="np.einsum('lhw,cdhw->cd', blamed, planes)[None].repeat(len(theta), axis=0)"),
-        ),
-        mistake(
-            "theta for its derivative",
-            task="reduce-back",
-            loses=2,
-            says="that is theta itself",
-            code=back(theta_bar="theta"),
-        ),
-        mistake(
-            "class and plane swapped",
-            task="reduce-back",
-            loses=2,
-            says="class and plane are swapped in the derivative with respect to theta",
-            code=back(theta_bar="np.einsum('khw,cdhw->kdc', blamed, planes)"),
-        ),
-        mistake(
-            "mean for the bias",
-            task="reduce-back",
-            loses=2,
-            says="by beta: that is the mean over cells",
-            code=back(beta_bar="blamed.mean(axis=(1, 2))"),
-        ),
-        mistake(
-            "one for the bias",
-            task="reduce-back",
-            loses=2,
-            says="by beta: 1 is that of a map by its bias",
-            code=back(beta_bar="np.ones(len(blamed))"),
-        ),
-        mistake(
-            "first map only, back to the planes",
-            task="reduce-back",
+            "no way out",
+            task="name-cells",
             loses=1,
-            says="that is the blame of map 0 alone",
-            code=back(planes_bar="theta[0][..., None, None] * blamed[0]"),
+            says="of the cells with label 1 classes 1 and 3 are most frequent",
+            code=table(counts="len(column) - 1"),
         ),
         mistake(
-            "later maps overwrite",
-            task="reduce-back",
+            "the first row left out first",
+            task="name-cells",
             loses=1,
-            says="that is the blame of map 1 alone",
-            code="""
-def reduce_back(planes, theta, blamed):
-    theta_bar, planes_bar = np.zeros_like(theta), np.zeros_like(planes)
-    for k, c, d in np.ndindex(theta.shape):
-        theta_bar[k, c, d] = np.sum(planes[c, d] * blamed[k])
-        planes_bar[c, d] = theta[k, c, d] * blamed[k]
-    return theta_bar, blamed.sum(axis=(1, 2)), planes_bar""",
+            says="leave out the state",
+            code=table(same="(columns[len(columns) - n :] == column[len(columns) - n :, None]).all(axis=0)"),
         ),
         mistake(
-            "mean over maps",
-            task="reduce-back",
-            loses=1,
-            says="that is the mean over maps",
-            code=back(planes_bar="np.einsum('kcd,khw->cdhw', theta, blamed) / len(theta)"),
+            "first row alone",
+            task="name-cells",
+            loses=3,
+            says="the first row alone",
+            code=table(same="(columns[: min(n, 1)] == column[: min(n, 1), None]).all(axis=0)"),
         ),
         mistake(
-            "weights left out on the way back",
-            task="reduce-back",
-            loses=1,
-            says="what comes from behind goes back by the weight",
-            code=back(planes_bar="np.broadcast_to(blamed.sum(axis=0), planes.shape)"),
-        ),
-        mistake(
-            "class and plane swapped on the way back",
-            task="reduce-back",
-            loses=1,
-            says="class and plane are swapped: theta[k, c, d]",
-            code=back(planes_bar="np.einsum('kdc,khw->cdhw', theta, blamed)"),
-        ),
-        mistake(
-            "two maps written in",
-            task="reduce-back",
-            loses=1,
+            "the lecture's table, which knows two rows",
+            task="name-cells",
+            loses=3,
             says="on inputs you haven't seen",
-            code=back(planes_bar="np.einsum('kcd,khw->cdhw', theta[:2], blamed[:2])"),
-        ),
-        mistake(
-            "one row written in",
-            task="reduce-back",
-            loses=2,
-            says="on inputs you haven't seen: wrong derivatives by theta",
-            code=back(theta_bar="np.einsum('kw,cdw->kcd', blamed[:, 0], planes[:, :, 0])"),
-        ),
-        # ---- task 3
-        right(
-            "np.unique, map by map, in dictionaries",
-            task="balance",
             code="""
-def balance(maps, n_classes):
-    cells, below = {}, {}
-    for m in maps:
-        classes, counts = np.unique(m[m != IGNORE], return_counts=True)
-        for c, n in zip(classes, counts):
-            cells[c] = cells.get(c, 0) + n
-            below[c] = below.get(c, 0) + counts.sum()
-    f = {c: cells[c] / below[c] for c in cells}
-    middle = np.median(list(f.values()))
-    return np.array([middle / f[c] if c in f else 0.0 for c in range(n_classes)])""",
-        ),
-        right(
-            "bincount and NaN",
-            task="balance",
-            code="""
-def balance(maps, n_classes):
-    counts = np.array([np.bincount(m[m < n_classes].astype(int), minlength=n_classes) for m in maps])
-    below = ((counts > 0) * counts.sum(axis=1, keepdims=True)).sum(axis=0)
-    f = np.where(below > 0, counts.sum(axis=0) / below, np.nan)
-    return np.nan_to_num(np.nanmedian(f) / f)""",
-        ),
-        mistake(
-            "counted over all maps",
-            task="balance",
-            loses=2,
-            says="every class is counted over all maps",
-            code=balance(where=""),
+def name_cells(columns, truth, new):
+    use = truth != 255
+    counts = np.zeros((256, 4, 14))
+    np.add.at(counts, (columns[0][use], columns[1][use], truth[use]), 1)
+    return counts.argmax(axis=2)[new[0], new[1]]""",
         ),
         mistake(
             "unlabelled cells counted",
-            task="balance",
-            loses=2,
-            says="unlabelled cells are counted below",
-            code=balance(below="sum(m.size for m in where)"),
-        ),
-        mistake(
-            "mean instead of median",
-            task="balance",
-            loses=2,
-            says="that is the mean of the frequencies over f",
-            code=balance(alpha="np.mean(f[f > 0]) / f[f > 0]"),
-        ),
-        mistake(
-            "mean of the maps' frequencies",
-            task="balance",
-            loses=2,
-            says="you average the frequencies of the maps",
-            code="""
-def balance(maps, n_classes):
-    f = np.zeros(n_classes)
-    for c in range(n_classes):
-        each = [(m == c).sum() / (m != 255).sum() for m in maps if (m == c).any()]
-        f[c] = np.mean(each) if each else 0
-    alpha = np.zeros(n_classes)
-    alpha[f > 0] = np.median(f[f > 0]) / f[f > 0]
-    return alpha""",
-        ),
-        mistake(
-            "upside down",
-            task="balance",
-            loses=2,
-            says="what is frequent must weigh less",
-            code=balance(alpha="f[f > 0] / np.median(f[f > 0])"),
-        ),
-        mistake("no median", task="balance", loses=2, says="that is 1 / f", code=balance(alpha="1 / f[f > 0]")),
-        mistake(
-            "frequencies returned",
-            task="balance",
-            loses=2,
-            says="that is the frequency f itself",
-            code=balance(alpha="f[f > 0]"),
-        ),
-        mistake(
-            "the upper one in the middle",
-            task="balance",
-            loses=2,
-            says="you take the upper one",
-            code=balance(alpha="np.sort(f[f > 0])[(f > 0).sum() // 2] / f[f > 0]"),
-        ),
-        mistake(
-            "the lower one in the middle",
-            task="balance",
-            loses=2,
-            says="you take the lower one",
-            code=balance(alpha="np.sort(f[f > 0])[((f > 0).sum() - 1) // 2] / f[f > 0]"),
-        ),
-        mistake(
-            "absent classes in the median",
-            task="balance",
-            loses=1,
-            says="absent class 4 pulls the median down",
-            code=balance(alpha="np.median(f) / f[f > 0]"),
-        ),
-        mistake(
-            "divided by the frequency 0",
-            task="balance",
-            loses=1,
-            says="don't divide by its frequency",
-            code="""
-def balance(maps, n_classes):
-    f = np.zeros(n_classes)
-    for c in range(n_classes):
-        where = [m for m in maps if (m == c).any()]
-        f[c] = sum((m == c).sum() for m in where) / max(1, sum((m != 255).sum() for m in where))
-    return np.median(f[f > 0]) / f""",
-        ),
-        mistake(
-            "absent classes weigh one",
-            task="balance",
-            loses=1,
-            says="so its weight is 0, got 1",
-            code="""
-def balance(maps, n_classes):
-    f = np.zeros(n_classes)
-    for c in range(n_classes):
-        where = [m for m in maps if (m == c).any()]
-        if where:
-            f[c] = sum((m == c).sum() for m in where) / sum((m != 255).sum() for m in where)
-    alpha = np.ones(n_classes)
-    alpha[f > 0] = np.median(f[f > 0]) / f[f > 0]
-    return alpha""",
-        ),
-        mistake(
-            "maps of one size only",
-            task="balance",
-            loses=2,
-            says="on inputs you haven't seen: it raises an error in line",
-            code="""
-def balance(maps, n_classes):
-    maps = np.stack(maps)
-    f = np.zeros(n_classes)
-    for c in range(n_classes):
-        where = maps[(maps == c).any(axis=(1, 2))]
-        if len(where):
-            f[c] = (where == c).sum() / (where != 255).sum()
-    alpha = np.zeros(n_classes)
-    alpha[f > 0] = np.median(f[f > 0]) / f[f > 0]
-    return alpha""",
-        ),
-        mistake(
-            "a step ahead",
-            task="cosine-rate",
-            loses=1,
-            says="is a step ahead",
-            code=rate("(1 + np.cos(np.pi * (step + 1) / steps)) / 2"),
-        ),
-        mistake(
-            "endless loop",
-            task="balance",
+            task="name-cells",
             loses=3,
-            says="no reply before timeout",
+            says="255 isn't a class",
+            code=table().replace("columns, truth = columns[:, truth != 255], truth[truth != 255]", "pass"),
+        ),
+        mistake(
+            "the last of equally frequent classes",
+            task="name-cells",
+            loses=3,
+            says="equally frequent",
+            code=table(pick="255 - np.bincount(255 - truth[same]).argmax()"),
+        ),
+        mistake(
+            "the last that was met",
+            task="name-cells",
+            loses=3,
+            says="label 0 with state 1 is mostly class 2",
+            code=table(pick="truth[same][-1]"),
+        ),
+        mistake(
+            "cells sorted in place",
+            task="name-cells",
+            loses=2,
+            says="it changes an argument",
+            code=table().replace(
+                "    columns, truth =",
+                "    columns[:], truth[:] = columns[:, ::-1].copy(), truth[::-1].copy()\n    columns, truth =",
+            ),
+        ),
+        # ---- task 2
+        right("nudges of a thousandth", task="wrong-derivative", code=gradient_check()),
+        right(
+            "one map and one cell at a time",
+            task="wrong-derivative",
             code="""
-def balance(maps, n_classes):
-    c, f = 0, np.zeros(n_classes)
-    while c < n_classes:
-        where = [m for m in maps if (m == c).any()]
-        if where:
-            f[c] = sum((m == c).sum() for m in where) / sum((m != 255).sum() for m in where)
-    return np.median(f) / f""",
+def wrong_derivative(forward, back, planes, theta, beta):
+    maps = forward(planes, theta, beta)
+    for place in np.ndindex(maps.shape):
+        behind = np.zeros(maps.shape)
+        behind[place] = 2.0
+        told = back(planes, theta, behind)
+        for number, name in enumerate(("planes", "theta", "beta")):
+            inputs = [planes, theta, beta]
+            for where in np.ndindex(inputs[number].shape):
+                nudge = np.zeros(inputs[number].shape)
+                nudge[where] = 1
+                nudged = list(inputs)
+                nudged[number] = inputs[number] + nudge
+                wanted = 2 * (forward(*nudged) - maps)[place]
+                if abs(wanted - told[number][where]) > 1e-3 * max(abs(wanted), 1e-3):
+                    return name
+    return "none\"""",
+        ),
+        right(
+            "written again by hand",
+            task="wrong-derivative",
+            code="""
+def wrong_derivative(forward, back, planes, theta, beta):
+    behind = np.random.default_rng(1).normal(size=(len(theta), *planes.shape[2:]))
+    by_planes = (theta[..., None, None] * behind[:, None, None]).sum(axis=0)
+    by_theta = (planes * behind[:, None, None]).sum(axis=(3, 4))
+    wanted = by_planes, by_theta, behind.sum(axis=(1, 2))
+    for name, a, b in zip(("planes", "theta", "beta"), wanted, back(planes, theta, behind)):
+        if not np.allclose(a, b):
+            return name
+    return "none\"""",
+        ),
+        mistake(
+            "ones from behind",
+            task="wrong-derivative",
+            loses=2,
+            says="All ones hide",
+            code=gradient_check(behind="np.ones(np.shape(forward(planes, theta, beta)))"),
+        ),
+        mistake(
+            "sums compared",
+            task="wrong-derivative",
+            loses=3,
+            says="",
+            code=gradient_check(wrong="not np.isclose(np.abs(told).sum(), np.abs(by_nudging).sum(), rtol=0.2)"),
+        ),
+        mistake(
+            "a coarse tolerance",
+            task="wrong-derivative",
+            loses=1,
+            says="compare each number by itself",
+            code=gradient_check(wrong="not np.allclose(told, by_nudging, rtol=0.1, atol=0.1)"),
+        ),
+        mistake(
+            "no tolerance",
+            task="wrong-derivative",
+            loses=3,
+            says="nothing is wrong here",
+            code=gradient_check(wrong="(told != by_nudging).any()"),
+        ),
+        mistake(
+            "another order of the derivatives",
+            task="wrong-derivative",
+            loses=3,
+            says="nothing is wrong here",
+            code=gradient_check(order="{'theta': theta, 'planes': planes, 'beta': beta}").replace(
+                "if not np", "if np.shape(told) != by_nudging.shape or not np"
+            ),
+        ),
+        mistake(
+            "nudged and not put back",
+            task="wrong-derivative",
+            loses=2,
+            says="it changes an argument",
+            code=gradient_check(kept="values").replace(
+                "            by_nudging[place] =",
+                "                nudged[place] -= 0.999 * sign * 1e-3\n            by_nudging[place] =",
+            ),
+        ),
+        mistake(
+            "always none",
+            task="wrong-derivative",
+            loses=3,
+            says='wrong is "planes"',
+            code="def wrong_derivative(forward, back, planes, theta, beta):\n    return 'none'",
+        ),
+        mistake(
+            "from behind in the shape of the visible test",
+            task="wrong-derivative",
+            loses=3,
+            says="on inputs you haven't seen",
+            code=gradient_check(behind="rng.normal(size=(2, 2, 3)) if planes.size == 36 else np.ones((2, 1, 2))"),
+        ),
+        mistake(
+            "a number",
+            task="wrong-derivative",
+            loses=3,
+            says="return",
+            code="def wrong_derivative(forward, back, planes, theta, beta):\n    return 0",
+        ),
+        # ---- task 3
+        right(
+            "minimum and maximum", task="shares", code=shares("cells * np.minimum(np.maximum(alpha, 1 / limit), limit)")
+        ),
+        right(
+            "class by class",
+            task="shares",
+            code="""
+def shares(cells, alpha, limit):
+    weights = [n * (limit if a > limit else 1 / limit if a < 1 / limit else a) for n, a in zip(cells, alpha)]
+    return [weight / sum(weights) for weight in weights]""",
+        ),
+        mistake(
+            "only large weights limited",
+            task="shares",
+            loses=2,
+            says="weights below 1 / limit",
+            code=shares("cells * np.minimum(alpha, limit)"),
+        ),
+        mistake(
+            "only small weights limited",
+            task="shares",
+            loses=2,
+            says="weights above the limit",
+            code=shares("cells * np.maximum(alpha, 1 / limit)"),
+        ),
+        mistake("no limit", task="shares", loses=2, says="nothing is limited", code=shares("cells * alpha")),
+        mistake("cells alone", task="shares", loses=2, says="the weights don't count", code=shares("cells * 1.0")),
+        mistake("not divided", task="shares", loses=2, says="divide it by the sum", code=shares(share="weight * 1.0")),
+        mistake(
+            "weights alone",
+            task="shares",
+            loses=2,
+            says="the cells don't count",
+            code=shares("np.clip(alpha, 1 / limit, limit) * (cells > 0)"),
+        ),
+        mistake(
+            "limited in place",
+            task="shares",
+            loses=2,
+            says="on inputs you haven't seen: it changes an argument",
+            code="""
+def shares(cells, alpha, limit):
+    np.clip(alpha, 1 / limit, limit, out=alpha)
+    return cells * alpha / (cells * alpha).sum()""",
+        ),
+        right(
+            "all that fit, then the smallest",
+            task="choose-limit",
+            code="""
+def choose_limit(cells, alpha, limits, c, at_least, at_most):
+    fit = []
+    for limit in limits:
+        w = np.array([min(max(a, 1 / limit), limit) if n else 0 for a, n in zip(alpha, cells)])
+        if w[c] * cells[c] / (w @ cells) >= at_least and max(w) / (w @ cells) <= at_most:
+            fit.append(limit)
+    return min(fit) if fit else 0""",
+        ),
+        right("an array of limits, sorted", task="choose-limit", code=limit(order="np.sort(limits)")),
+        mistake(
+            "in the order given", task="choose-limit", loses=2, says="8 will do as well", code=limit(order="limits")
+        ),
+        mistake("the largest", task="choose-limit", loses=2, says="", code=limit(order="sorted(limits)[::-1]")),
+        mistake(
+            "no single cell looked at",
+            task="choose-limit",
+            loses=2,
+            says="a cell of unknown-dynamic",
+            code=limit(small="True"),
+        ),
+        mistake(
+            "class c's cells alone looked at",
+            task="choose-limit",
+            loses=2,
+            says="a cell of unknown-dynamic",
+            code=limit(small="weight[c] <= at_most * total"),
+        ),
+        mistake(
+            "the class's share not looked at",
+            task="choose-limit",
+            loses=2,
+            says="reach a tenth with 8",
+            code=limit(enough="True"),
+        ),
+        mistake(
+            "small weights not limited",
+            task="choose-limit",
+            loses=2,
+            says="",
+            code=limit(weight="np.minimum(alpha, limit)"),
+        ),
+        mistake(
+            "the largest limit when none fits",
+            task="choose-limit",
+            loses=2,
+            says="stay below a tenth",
+            code=limit(none="max(limits)"),
+        ),
+        mistake(
+            "nothing when none fits",
+            task="choose-limit",
+            loses=2,
+            says="returned nothing",
+            code=limit(none="None"),
+        ),
+        mistake(
+            "limits sorted in place",
+            task="choose-limit",
+            loses=2,
+            says="on inputs you haven't seen: it changes an argument",
+            code=limit(order="limits").replace("    for limit", "    limits.sort()\n    for limit"),
+        ),
+        mistake(
+            "a bound on a class in place of a cell",
+            task="choose-limit",
+            loses=2,
+            says="",
+            code=limit(small="(cells * weight).max() <= at_most * total"),
         ),
         # ---- task 4
         right(
             "cell by cell",
-            task="weighted-loss",
+            task="loss-back",
             code="""
-def weighted_loss(logits, truth, alpha):
-    above, below = 0.0, 0.0
-    for r in range(truth.shape[0]):
-        for col in range(truth.shape[1]):
-            c = truth[r, col]
-            if c != IGNORE:
-                z = logits[:, r, col]
-                above += alpha[c] * (z.max() + np.log(np.exp(z - z.max()).sum()) - z[c])
-                below += alpha[c]
-    return above / below""",
+def loss_back(logits, truth, alpha):
+    result, total = np.zeros(logits.shape), 0
+    for r, c in np.ndindex(truth.shape):
+        if truth[r, c] != 255:
+            e = np.exp(logits[:, r, c] - max(logits[:, r, c]))
+            g = e / sum(e)
+            g[truth[r, c]] -= 1
+            result[:, r, c] = alpha[truth[r, c]] * g
+            total += alpha[truth[r, c]]
+    return result / total""",
         ),
         right(
-            "class by class, with logaddexp",
-            task="weighted-loss",
+            "scipy's soft-max, and a one-hot truth without unlabelled cells",
+            task="loss-back",
             code="""
-def weighted_loss(logits, truth, alpha):
-    log_g = logits - np.logaddexp.reduce(logits, axis=0)
-    sums = [(a * -log_g[c][truth == c].sum(), a * (truth == c).sum()) for c, a in enumerate(alpha)]
-    return sum(s for s, _ in sums) / sum(w for _, w in sums)""",
-        ),
-        right(
-            "one-hot, and scipy's log-soft-max",
-            task="weighted-loss",
-            code="""
-from scipy.special import log_softmax
+from scipy.special import softmax
 
-def weighted_loss(logits, truth, alpha):
+def loss_back(logits, truth, alpha):
     one_hot = truth == np.arange(len(logits))[:, None, None]
-    w = one_hot * alpha[:, None, None]
-    return -(w * log_softmax(logits, axis=0)).sum() / w.sum()""",
+    weight = (one_hot * alpha[:, None, None]).sum(axis=0)
+    return weight * (softmax(logits, axis=0) - one_hot) / weight.sum()""",
         ),
         mistake(
             "divided by the labelled cells",
-            task="weighted-loss",
+            task="loss-back",
             loses=3,
-            says="you divide by the number of cells: divide by the sum of their weights",
-            code=loss("-(w * of_truth).mean()"),
+            says="divide by the sum of their weights",
+            code=back(result="weight * (g - one_hot) / labelled.sum()"),
         ),
         mistake(
             "divided by all cells",
-            task="weighted-loss",
+            task="loss-back",
             loses=3,
-            says="you divide by the number of cells, unlabelled ones too",
-            code=loss("-(w * of_truth).sum() / truth.size"),
+            says="you divide by the number of cells",
+            code=back(result="weight * (g - one_hot) / truth.size"),
         ),
         mistake(
-            "no weights", task="weighted-loss", loses=3, says="the weights are missing", code=loss("-of_truth.mean()")
+            "no weights",
+            task="loss-back",
+            loses=3,
+            says="the weights are missing",
+            code=back(weight="labelled * 1.0"),
         ),
         mistake(
-            "the sum",
-            task="weighted-loss",
+            "not divided",
+            task="loss-back",
             loses=3,
-            says="that is the sum: divide it",
-            code=loss("-(w * of_truth).sum()"),
+            says="not yet divided",
+            code=back(result="weight * (g - one_hot)"),
         ),
         mistake(
             "sign swapped",
-            task="weighted-loss",
+            task="loss-back",
             loses=3,
             says="the sign is swapped",
-            code=loss("(w * of_truth).sum() / w.sum()"),
+            code=back(result="weight * (one_hot - g) / weight.sum()"),
         ),
         mistake(
-            "log10",
-            task="weighted-loss",
+            "each class its own weight",
+            task="loss-back",
             loses=3,
-            says="that is the logarithm to base 10",
-            code=loss("-(w * of_truth).sum() / w.sum() / np.log(10)"),
+            says="the weight of the *true* class",
+            code=back(result="labelled * alpha[:, None, None] * (g - one_hot) / weight.sum()"),
         ),
         mistake(
-            "unlabelled cells weigh below",
-            task="weighted-loss",
+            "the unlabelled cell's weight counted",
+            task="loss-back",
             loses=3,
-            says="the unlabelled cell is counted below",
-            code=loss("-(w * of_truth).sum() / alpha[np.minimum(truth, len(alpha) - 1)].sum()"),
-        ),
-        mistake(
-            "no logarithm",
-            task="weighted-loss",
-            loses=4,
-            says="that is the mean probability of the truth",
-            code=loss("(w * np.exp(of_truth)).sum() / w.sum()"),
-        ),
-        mistake(
-            "soft-max along the columns",
-            task="weighted-loss",
-            loses=4,
-            says="your soft-max runs along the row of cells",
-            code=loss(log_g="logits - np.log(np.exp(logits).sum(axis=2, keepdims=True))"),
-        ),
-        mistake(
-            "soft-max over everything",
-            task="weighted-loss",
-            loses=4,
-            says="your soft-max runs over all numbers at once",
-            code=loss(log_g="logits - np.log(np.exp(logits).sum())"),
-        ),
-        mistake(
-            "soft-max over the rows",
-            task="weighted-loss",
-            loses=4,
-            says="there is no soft-max, or it runs down the rows",
-            code=loss(log_g="logits - np.log(np.exp(logits).sum(axis=1, keepdims=True))"),
-        ),
-        mistake("no soft-max", task="weighted-loss", loses=4, says="there is no soft-max", code=loss(log_g="logits")),
-        mistake(
-            "255 as an index",
-            task="weighted-loss",
-            loses=4,
-            says="IndexError",
-            code="""
-def weighted_loss(logits, truth, alpha):
-    log_g = logits - np.logaddexp.reduce(logits, axis=0)
-    w = alpha[truth]
-    return -(w * np.take_along_axis(log_g, truth[None], axis=0)[0]).sum() / w.sum()""",
+            says="unlabelled cell's weight",
+            code=back(result="weight * (g - one_hot) / alpha[true].sum()"),
         ),
         mistake(
             "unlabelled is class 0",
-            task="weighted-loss",
+            task="loss-back",
             loses=3,
-            says="you count the unlabelled cell as class 0",
-            code=loss().replace("rows,", "truth = np.where(truth == 255, 0, truth)\n    rows,", 1),
+            says="the third cell isn't labelled",
+            code=back(weight="alpha[true]"),
         ),
         mistake(
-            "unlabelled clipped to the last class",
-            task="weighted-loss",
+            "1 not subtracted",
+            task="loss-back",
             loses=3,
-            says="you count the unlabelled cell as the last class",
-            code=loss().replace("rows,", "truth = np.minimum(truth, len(alpha) - 1)\n    rows,", 1),
+            says="sum to 0",
+            code=back(result="weight * g / weight.sum()"),
         ),
         mistake(
-            "unlabelled weighs as class 0 below",
-            task="weighted-loss",
-            loses=3,
-            says="weighs below as class 0",
-            code=loss("-(w * of_truth).sum() / alpha[np.where(truth == 255, 0, truth)].sum()"),
-        ),
-        mistake(
-            "soft-max of a soft-max",
-            task="weighted-loss",
+            "soft-max over everything",
+            task="loss-back",
             loses=4,
-            says="that is the soft-max of a soft-max",
-            code=loss().replace("    m =", "    logits = np.exp(logits) / np.exp(logits).sum(axis=0)\n    m ="),
+            says="sum to 0",
+            code=back(m="logits.max()", g="e / e.sum()"),
         ),
         mistake(
-            "divided by the weights of all classes",
-            task="weighted-loss",
-            loses=3,
-            says="you divide by the weights of all classes",
-            code=loss("-(w * of_truth).sum() / alpha.sum()"),
-        ),
-        mistake(
-            "logarithm of a probability that is zero",
-            task="weighted-loss",
-            loses=1,
-            says="keep log g, g itself is 0 here",
-            code=loss(log_g="np.log(np.exp(logits - m) / np.exp(logits - m).sum(axis=0))"),
+            "soft-max along the columns",
+            task="loss-back",
+            loses=4,
+            says="",
+            code=back(m="logits.max()", g="e / e.sum(axis=2, keepdims=True)"),
         ),
         mistake(
             "overflow",
-            task="weighted-loss",
+            task="loss-back",
             loses=1,
             says="subtract the largest logit of each cell first",
-            code=loss(m="0"),
-        ),
-        mistake(
-            "a small number against log 0",
-            task="weighted-loss",
-            loses=4,
-            says="on inputs you haven't seen",
-            code="""
-def weighted_loss(logits, truth, alpha):
-    m = logits.max(axis=0)
-    g = np.exp(logits - m) / np.exp(logits - m).sum(axis=0) + 1e-4
-    rows, cols = np.nonzero(truth != 255)
-    true = truth[rows, cols]
-    return -(alpha[true] * np.log(g[true, rows, cols])).sum() / alpha[true].sum()""",
+            code=back(m="0"),
         ),
         mistake(
             "one number subtracted from all cells",
-            task="weighted-loss",
+            task="loss-back",
             loses=1,
-            says="subtract the largest logit of each cell first",
-            code=loss(m="logits.max()"),
+            says="subtract",
+            code=back(m="logits.max()"),
+        ),
+        mistake("255 as an index", task="loss-back", loses=4, says="IndexError", code=back(weight="alpha[truth]")),
+        mistake(
+            "255 overwritten in place",
+            task="loss-back",
+            loses=3,
+            says="on inputs you haven't seen: it changes an argument",
+            code=back(true="truth").replace("    true =", "    truth[~labelled] = 0\n    true ="),
         ),
         # ---- task 5
+        right("least squares", task="rate-and-momentum", code=optimiser()),
         right(
-            "number by number",
-            task="momentum-step",
+            "the first step gives the rate",
+            task="rate-and-momentum",
             code="""
-def momentum_step(theta, delta, gradient, eta, kappa):
-    theta, delta = np.array(theta), np.array(delta)
-    for place in np.ndindex(theta.shape):
-        delta[place] = kappa * delta[place] + gradient[place]
-        theta[place] -= eta * delta[place]
-    return theta, delta""",
-        ),
-        right(
-            "the same sums in another order",
-            task="momentum-step",
-            code="""
-def momentum_step(theta, delta, gradient, eta, kappa):
-    return theta - eta * kappa * delta - eta * gradient, gradient + delta * kappa""",
-        ),
-        right(
-            "nested lists, and helpers with everyday names",
-            task="momentum-step",
-            code="""
-weights, read, loss, gradient, planes, first = "these were names of tests".split() + [0]
-
-
-def got(theta, delta, gradient, eta, kappa):
-    delta = [[kappa * d + g for d, g in zip(*rows)] for rows in zip(np.atleast_2d(delta), np.atleast_2d(gradient))]
-    return [[t - eta * d for t, d in zip(*rows)] for rows in zip(np.atleast_2d(theta), delta)], delta
-
-
-def momentum_step(theta, delta, gradient, eta, kappa):
-    return [np.reshape(part, np.shape(theta)).tolist() for part in got(theta, delta, gradient, eta, kappa)]""",
+def rate_and_momentum(path, gradients):
+    steps = path[1:] - path[:-1]
+    eta = -(steps[0] @ gradients[0]) / (gradients[0] @ gradients[0])
+    left = steps[1:] + eta * gradients[1:]
+    return [eta, (left * steps[:-1]).sum() / (steps[:-1] ** 2).sum()]""",
         ),
         mistake(
-            "a dictionary",
-            task="momentum-step",
+            "the sign of the rate",
+            task="rate-and-momentum",
             loses=2,
-            says="for delta momentum_step returned no array of numbers",
-            code="def momentum_step(theta, delta, gradient, eta, kappa):\n    return theta, {'delta': delta}",
+            says="mind the sign",
+            code=optimiser(returned="-found[0], found[1]"),
         ),
         mistake(
-            "uphill", task="momentum-step", loses=2, says="the step goes uphill", code=step(theta="theta + eta * new")
-        ),
-        mistake(
-            "dampening",
-            task="momentum-step",
+            "momentum first",
+            task="rate-and-momentum",
             loses=2,
-            says="the gradient is damped by 1 - kappa",
-            code=step(delta="kappa * delta + (1 - kappa) * gradient"),
+            says="rate and momentum are swapped",
+            code=optimiser(returned="found[1], found[0]"),
         ),
         mistake(
-            "rate twice",
-            task="momentum-step",
+            "no step before",
+            task="rate-and-momentum",
             loses=2,
-            says="the rate counts twice",
-            code=step(delta="kappa * delta + eta * gradient"),
+            says="rate and momentum of the path",
+            code=optimiser(before="np.zeros(steps.shape)"),
         ),
         mistake(
-            "rate inside delta",
-            task="momentum-step",
+            "gradients in place of steps before",
+            task="rate-and-momentum",
             loses=2,
-            says="the rate stands inside delta",
-            code=step(delta="kappa * delta + eta * gradient", theta="theta - new"),
+            says="rate and momentum of the path",
+            code=optimiser(before="np.concatenate([np.zeros((1, steps.shape[1])), -gradients[:-1]])"),
         ),
         mistake(
-            "Nesterov",
-            task="momentum-step",
-            loses=2,
-            says="that is Nesterov's momentum",
-            code=step(theta="theta - eta * (gradient + kappa * new)"),
-        ),
-        mistake(
-            "delta first",
-            task="momentum-step",
-            loses=2,
-            says="that is delta: return theta first",
-            code=step(theta="new", returned="theta - eta * new"),
-        ),
-        mistake(
-            "rate and momentum swapped",
-            task="momentum-step",
-            loses=2,
-            says="eta and kappa are swapped",
-            code=step(delta="eta * delta + gradient", theta="theta - kappa * new"),
-        ),
-        mistake(
-            "old delta",
-            task="momentum-step",
-            loses=2,
-            says="you step by the old delta",
-            code=step(theta="theta - eta * delta"),
-        ),
-        mistake(
-            "plain descent",
-            task="momentum-step",
-            loses=2,
-            says="that is plain descent",
-            code=step(theta="theta - eta * gradient"),
-        ),
-        mistake(
-            "momentum on all",
-            task="momentum-step",
-            loses=2,
-            says="kappa damps the new gradient too",
-            code=step(delta="kappa * (delta + gradient)"),
-        ),
-        mistake(
-            "gradients pile up",
-            task="momentum-step",
-            loses=2,
-            says="the old delta doesn't fade",
-            code=step(delta="delta + gradient"),
-        ),
-        mistake(
-            "two minus signs",
-            task="momentum-step",
-            loses=2,
-            says="two minus signs go uphill",
-            code=step(delta="kappa * delta - gradient"),
-        ),
-        mistake(
-            "step returned for delta",
-            task="momentum-step",
-            loses=2,
-            says="delta is returned with the rate in it",
-            code=step(returned="eta * new"),
-        ),
-        mistake(
-            "arguments changed in place",
-            task="momentum-step",
-            loses=2,
-            says="changed its argument `theta`",
-            code="""
-def momentum_step(theta, delta, gradient, eta, kappa):
-    delta *= kappa
-    delta += gradient
-    theta -= eta * delta
-    return theta, delta""",
-        ),
-        mistake(
-            "a row of parameters only",
-            task="momentum-step",
+            "the first two steps of one parameter alone",
+            task="rate-and-momentum",
             loses=2,
             says="on inputs you haven't seen",
             code="""
-def momentum_step(theta, delta, gradient, eta, kappa):
-    new = np.array([kappa * float(d) + float(g) for d, g in zip(delta, gradient)])
-    return theta - eta * new, new""",
+def rate_and_momentum(path, gradients):
+    eta = round((path[0, 0] - path[1, 0]) / gradients[0, 0], 1)
+    return eta, round(((path[2, 0] - path[1, 0]) + eta * gradients[1, 0]) / (path[1, 0] - path[0, 0]), 1)""",
         ),
+        right("projected on delta", task="rates", code=rates()),
         right(
-            "the square of half the angle's cosine",
-            task="cosine-rate",
-            code=rate("np.cos(np.pi * step / steps / 2) ** 2"),
-        ),
-        right(
-            "degrees made radians",
-            task="cosine-rate",
+            "the largest parameter of each delta",
+            task="rates",
             code="""
-import math
-
-def cosine_rate(eta, step, steps):
-    return 0.5 * eta + 0.5 * eta * math.cos(math.radians(180 * step / steps))""",
+def rates(path, gradients, kappa):
+    found = []
+    for k in range(len(gradients)):
+        delta = sum(kappa ** (k - i) * gradients[i] for i in range(k + 1))
+        n = np.abs(delta).argmax()
+        found.append((path[k, n] - path[k + 1, n]) / delta[n])
+    return found""",
         ),
+        mistake("no momentum", task="rates", loses=1, says="rates 0.5, 0.2, 0.1", code=rates(delta="gradient")),
         mistake(
-            "five steps written in",
-            task="cosine-rate",
+            "momentum of the last step",
+            task="rates",
             loses=1,
-            says="on inputs you haven't seen: wrong in other steps",
-            code=rate("(1 + np.cos(np.pi * step / 5)) / 2"),
-        ),
-        mistake(
-            "no 1 +", task="cosine-rate", loses=1, says="it falls to -eta", code=rate("np.cos(np.pi * step / steps)")
-        ),
-        mistake(
-            "not halved",
-            task="cosine-rate",
-            loses=1,
-            says="the first step would have twice the rate",
-            code=rate("(1 + np.cos(np.pi * step / steps))"),
-        ),
-        mistake(
-            "a whole cosine",
-            task="cosine-rate",
-            loses=1,
-            says="that is a whole cosine",
-            code=rate("(1 + np.cos(2 * np.pi * step / steps)) / 2"),
-        ),
-        mistake(
-            "a quarter of a cosine",
-            task="cosine-rate",
-            loses=1,
-            says="that is a quarter of a cosine",
-            code=rate("np.cos(np.pi * step / steps / 2)"),
-        ),
-        mistake(
-            "a straight line",
-            task="cosine-rate",
-            loses=1,
-            says="that is a straight line",
-            code=rate("(1 - step / steps)"),
-        ),
-        mistake(
-            "degrees",
-            task="cosine-rate",
-            loses=1,
-            says="the angle is in degrees",
-            code=rate("(1 + np.cos(180 * step / steps)) / 2"),
-        ),
-        mistake(
-            "the last step is the end",
-            task="cosine-rate",
-            loses=1,
-            says="the last step gets rate 0",
-            code=rate("(1 + np.cos(np.pi * step / (steps - 1))) / 2"),
-        ),
-        # ---- passed, or lost, when somebody tried who had not written the tests
-        mistake(
-            "255 overwritten in place",
-            task="weighted-loss",
-            loses=3,
-            says="it changes an argument",
+            says="not the last step",
             code="""
-def weighted_loss(logits, truth, alpha):
-    logits = logits - logits.max(axis=0)
-    weight = np.where(truth == 255, 0, alpha[np.where(truth == 255, 0, truth)])
-    truth[truth == 255] = 0
-    log_g = logits - np.log(np.exp(logits).sum(axis=0))
-    return -(weight * np.take_along_axis(log_g, truth[None], axis=0)[0]).sum() / weight.sum()""",
+def rates(path, gradients, kappa):
+    steps = np.diff(path, axis=0)
+    before = np.concatenate([np.zeros((1, steps.shape[1])), steps[:-1]])
+    return -((steps - kappa * before) * gradients).sum(axis=1) / (gradients**2).sum(axis=1)""",
         ),
         mistake(
-            "labels made to indices in place",
-            task="balance",
-            loses=2,
-            says="it changes an argument",
-            code="""
-def balance(maps, n_classes):
-    for m in maps:
-        m[m == 255] = n_classes
-    counts = np.array([np.bincount(m.ravel(), minlength=n_classes + 1)[:n_classes] for m in maps])
-    below = (counts > 0).T @ counts.sum(axis=1)
-    f = counts.sum(axis=0) / np.maximum(below, 1)
-    return np.where(f > 0, np.median(f[f > 0]) / np.where(f > 0, f, 1), 0)""",
+            "rounded to a digit",
+            task="rates",
+            loses=1,
+            says="on inputs you haven't seen",
+            code=rates().replace("np.array(found)", "np.round(found, 1)"),
         ),
-        right(
-            "a rate as a fraction",
-            task="cosine-rate",
+        mistake(
+            "endless loop",
+            task="rates",
+            loses=1,
+            says="no reply before timeout",
             code="""
-from fractions import Fraction
-
-def cosine_rate(eta, step, steps):
-    return Fraction(eta) * Fraction((1 + np.cos(np.pi * step / steps)) / 2)""",
+def rates(path, gradients, kappa):
+    found = np.ones(len(gradients))
+    while found.any():
+        found += 1
+    return found""",
+        ),
+        mistake(
+            "the sign",
+            task="rates",
+            loses=1,
+            says="the first step has the rate 0.5",
+            code=rates(rate="(step @ delta) / (delta @ delta)"),
+        ),
+        mistake(
+            "one rate for all",
+            task="rates",
+            loses=1,
+            says="rates 0.5, 0.2, 0.1",
+            code=rates().replace("return np.array(found)", "return np.full(len(found), found[0])"),
         ),
     )

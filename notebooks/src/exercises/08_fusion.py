@@ -1,16 +1,17 @@
 # %% [markdown]
-# # Exercise 08: reduction, fusion, training
+# # Exercise 08: fusion and training
 #
-# Six small functions that training is made of, and one question to answer in words. About 80 minutes.
-# The lecture is [08: reduction, fusion, training end to end](../08_fusion.ipynb).
+# Small functions around the network: a baseline, a check of a gradient, a decision about the loss, the first step of backpropagation, an optimiser
+# that gives itself away; and one question in words. About 85 minutes. The lecture is
+# [08: reduction, fusion, training end to end](../08_fusion.ipynb), its companion [training](../deeper/08_training.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | the 1x1 reduction | 2 |
-# | 2 | its way back | 2 + 1 |
-# | 3 | median frequency balancing | 2 + 1 |
-# | 4 | a weighted loss | 3 + 1 |
-# | 5 | one step with momentum, and its rate | 2 + 1 |
+# | 1 | a table with a way out: the number to beat | 2 + 1 |
+# | 2 | which derivative is wrong? | 2 + 1 |
+# | 3 | choose the limit of the weights | 2 + 2 |
+# | 4 | the gradient of the weighted loss | 3 + 1 |
+# | 5 | rate and momentum, from the path | 2 + 1 |
 # | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
@@ -24,7 +25,7 @@ import warnings
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array
+from semgrid_edu.answers import answer_array, answer_number
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 IGNORE = 255
@@ -37,59 +38,79 @@ def _explain(what, got, slips):
 
 
 # %% [markdown]
-# ## Task 1: the 1x1 reduction (2 points)
+# ## Task 1: a table with a way out (2 + 1 points)
 #
-# `planes` holds the scores $p$ of C classes on D planes, `(C, D, H, W)`. `theta` holds a weight for each reduced map, class and plane, `(K, C, D)`, `beta` a
-# bias for each reduced map, `(K,)`. In every cell $j$ alike
+# The lecture's table knows two things about a cell. Yours takes any number: `columns` holds whole numbers, `(n, N)`, one row for each thing that is known
+# (the label on the ground, the state, the label on another plane, ...), one column for each cell; `truth` is `(N,)`, with 255 where a cell isn't labelled.
+# `new` are the columns of other cells, `(n, M)`.
 #
-# $$ \tilde p_{k,j} = \beta_k + \sum_c \sum_d \theta_{k,c,d}\; p_{c,d,j} $$
-#
-# Complete `reduce_planes`: it returns the reduced maps, `(K, H, W)`, before any normalisation or ReLU.
+# Complete `name_cells`: it returns a class for each new cell, `(M,)`: the most frequent true class among the labelled cells with *the same column*; of
+# equally frequent classes the one with the smallest number. For one more point: a column that didn't occur among the labelled cells. Then leave out
+# its last row and look for cells that agree in the others; if there are none, the last two rows, and so on. When nothing is left, take the most
+# frequent class of all.
 
 
-# %% nbgrader={"grade": false, "grade_id": "reduce-planes", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def reduce_planes(planes, theta, beta):
-    """Return K maps, each a weighted sum of all planes of all classes, (K, H, W)."""
+# %% nbgrader={"grade": false, "grade_id": "name-cells", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def name_cells(columns, truth, new):
+    """Return the class of each new cell by a table of the labelled ones, (M,)."""
     ### BEGIN SOLUTION
-    return np.einsum("kcd,cdhw->khw", theta, planes) + beta[:, None, None]
+    labelled = truth != IGNORE
+    columns, truth = columns[:, labelled], truth[labelled]
+    named = np.zeros(new.shape[1], int)
+    for j, column in enumerate(new.T):
+        for n in range(len(column), -1, -1):
+            same = (columns[:n] == column[:n, None]).all(axis=0)
+            if same.any():
+                named[j] = np.bincount(truth[same]).argmax()
+                break
+    return named
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "reduction", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _reduction():
-    """Return planes (2, 2, 1, 2), theta (2, 2, 2) and beta (2,): two classes, two planes, one row of two cells, two maps."""
-    planes = np.array([[[[3.0, 1.0]], [[1.0, 0.0]]], [[[0.0, 4.0]], [[2.0, 2.0]]]])
-    return planes, np.array([[[1.0, -1.0], [2.0, 0.5]], [[0.0, 1.0], [1.0, 1.0]]]), np.array([0.5, -4.0])
+# %% nbgrader={"grade": false, "grade_id": "table-cells", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _labelled_cells():
+    """Return columns (2, 13) and truth (13,): label and state of each cell, and its true class."""
+    label = [0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1]
+    state = [0, 0, 0, 1, 1, 1, 1, 1, 0, 0, 2, 2, 2]
+    truth = [0, 0, 2, 2, 2, 0, 1, 1, 0, 3, 3, 255, 255]
+    return np.array([label, state]), np.array(truth)
 
 
-_REDUCED_SLIPS = {
-    -1.5: "class and plane are swapped: theta is (K, C, D), planes (C, D, H, W), so theta[k, c, d] belongs to planes[c, d]",
-    10.0: "the bias is missing: add beta[k], once",
-    6.0: "your bias changes along the columns: beta[k] belongs to map k, to all cells of it",
-    12.0: "the bias is added with every term: add beta[k] once, after the sum",
-    11.0: "the bias is added with every plane or class: add beta[k] once, after the sum",
-    3.0: "that is a mean over classes and planes: take the sum, the weights know how much each counts",
-    8.5: "that is the largest term: the sum of all four is asked for",
-    9.5: "that is the ground plane alone: sum over d as well",
-    1.5: "that is the first class alone: sum over c as well",
-    7.5: "the weights are missing: multiply each plane by its theta before you sum",
-    2.774: "you apply a soft-max over classes: planes hold scores, and they stay scores",
-    2.783: "you apply a soft-max over planes: planes hold scores, and they stay scores",
-}
-
-
-# %% nbgrader={"grade": true, "grade_id": "reduce-planes-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "name-cells-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # By hand, map 0 in the second cell: 0.5 + 1 * 1 - 1 * 0 + 2 * 4 + 0.5 * 2 = 10.5.
-    got = answer_array(reduce_planes(*_reduction()), "reduce_planes")
-    assert got.shape == (2, 1, 2), f"expected K maps of one row and two columns, (2, 1, 2), got {got.shape}"
-    _explain("map 0, second cell:", got[0, 0, 1], _REDUCED_SLIPS)
-    assert not np.isclose(got[1, 0, 0], 0), "map 1, first cell is 0 where -1 is right: the ReLU comes later"
-    np.testing.assert_allclose(got, [[[3.5, 10.5]], [[-1, 2]]], err_msg="the four sums, by hand")
+    new = np.array([[0, 0, 1, 1, 1], [0, 1, 1, 0, 2]])
+    got = answer_array(name_cells(*_labelled_cells(), new), "name_cells").astype(float)
+    assert got.shape == (5,), f"expected one class for each new cell, shape (5,), got {got.shape}"
+    assert not (got == IGNORE).any(), "255 isn't a class: leave out the cells without a label"
+    assert got[1] != 0, "label 0 with state 1 is mostly class 2: does your table look at the first row alone?"
+    assert got[0] != 2, "label 0 with state 0 is mostly class 0: does your table look at the last row alone?"
+    assert got[3] != 3, "classes 0 and 3 are equally frequent there: take the smaller number"
+    np.testing.assert_array_equal(got, [0, 2, 1, 0, 3], err_msg="the most frequent class of each pair, by hand")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fusion
 
-    complaint = fusion.check_reduce_planes(reduce_planes)
+    complaint = fusion.check_name_cells(name_cells)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+
+# %% nbgrader={"grade": true, "grade_id": "way-out-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    columns, truth = _labelled_cells()
+    got = answer_array(name_cells(columns, truth, np.array([[1, 0, 7], [7, 0, 1]])), "name_cells")
+    assert got.shape == (3,), f"expected one class for each new cell, shape (3,), got {got.shape}"
+    assert got[1] == 0, f"label 0 with state 0 has been met, and is mostly class 0, got {got[1]:g}"
+    met = "the pair (1, 7) hasn't been met: leave out the state; of the cells with label 1 classes 1 and 3 are most frequent"
+    assert got[0] == 1, f"{met}, so 1, got {got[0]:g}"
+    nothing = "label 7 hasn't been met: leave out state and label; most frequent of all is class 0"
+    assert got[2] == 0, f"{nothing}, got {got[2]:g} (class 2 or 1: you kept the state)"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
+
+    complaint = fusion.check_way_out(name_cells)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -97,88 +118,114 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 2: its way back (2 + 1 points)
+# ## Task 2: which derivative is wrong? (2 + 1 points)
 #
-# Training asks for the derivative of the loss by everything that went into the reduction. What comes from behind is `blamed`, `(K, H, W)`: the derivative
-# by each reduced map in each cell. Since each $\tilde p_{k,j}$ is a sum, its derivatives can be read off the formula of task 1; what was used in many
-# places gets the sum of what comes from all of them.
+# A colleague has written the reduction and its way back:
 #
-# Complete `reduce_back`: it returns three arrays, the derivatives of the loss by `theta`, `(K, C, D)`, by `beta`, `(K,)`, and by `planes`, `(C, D, H, W)`.
+# - `forward(planes, theta, beta)` returns the reduced maps, `(K, H, W)`, of planes `(C, D, H, W)`, theta `(K, C, D)` and beta `(K,)`. It is right.
+# - `back(planes, theta, from_maps)` takes the derivative of a loss with respect to the maps, `(K, H, W)`, and returns three arrays: the derivatives of
+#   this loss with respect to `planes`, to `theta` and to `beta`. At most one of them is wrong.
+#
+# Complete `wrong_derivative`: it returns `"planes"`, `"theta"`, `"beta"`, or `"none"`. You choose `from_maps`; think about which one shows the most. For
+# one more point: a single number of a derivative may be wrong, and by as little as three per cent; and a deviation of a billionth is rounding.
 
 
-# %% nbgrader={"grade": false, "grade_id": "reduce-back", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def reduce_back(planes, theta, blamed):
-    """Return the derivatives by theta (K, C, D), by beta (K,) and by the planes (C, D, H, W)."""
+# %% nbgrader={"grade": false, "grade_id": "wrong-derivative", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def wrong_derivative(forward, back, planes, theta, beta):
+    """Return which of the three derivatives is wrong: "planes", "theta", "beta" or "none"."""
     ### BEGIN SOLUTION
-    theta_bar = np.einsum("khw,cdhw->kcd", blamed, planes)
-    planes_bar = np.einsum("kcd,khw->cdhw", theta, blamed)
-    return theta_bar, blamed.sum(axis=(1, 2)), planes_bar
+    inputs = {"planes": planes, "theta": theta, "beta": beta}
+    from_maps = np.random.default_rng(0).normal(size=np.shape(forward(planes, theta, beta)))
+    for (name, values), told in zip(inputs.items(), back(planes, theta, from_maps), strict=True):
+        by_nudging = np.zeros(np.shape(values))
+        for place in np.ndindex(by_nudging.shape):
+            nudge = np.zeros(by_nudging.shape)
+            nudge[place] = 0.5
+            up, down = (forward(**inputs | {name: values + sign * nudge}) for sign in (1, -1))
+            by_nudging[place] = ((up - down) * from_maps).sum()
+        if not np.allclose(told, by_nudging, rtol=1e-3, atol=1e-6):
+            return name
+    return "none"
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "theta-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_THETA_SLIPS = {
-    2.5: "that is the mean over cells: a weight that is used in every cell gets the sum",
-    4.0: "blame is lost: sum planes times blamed over cells, not each by itself",
-    6.0: "that is the first cell alone: the weight is used in every cell, so sum over them",
-    8.0: "you sum over the reduced maps too: theta[k] is used in map k alone",
-    1.0: "that is theta itself: the derivative of theta * p by theta is p",
-}
+# %% nbgrader={"grade": false, "grade_id": "ways-back", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _forward(planes, theta, beta):
+    """Reduce the planes."""
+    return np.einsum("kcd,cdhw->khw", theta, planes) + np.asarray(beta)[:, None, None]
 
 
-# %% nbgrader={"grade": true, "grade_id": "theta-bar-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _way_back(bug=""):
+    """Return a way back with one bug, by the name of what is wrong in it."""
+
+    def back(planes, theta, from_maps):
+        by_planes = np.einsum("kcd,khw->cdhw", theta, from_maps)
+        by_theta = np.einsum("khw,cdhw->kcd", from_maps, planes)
+        by_beta = from_maps.sum(axis=(1, 2))
+        if bug == "planes":
+            by_planes = np.einsum("cd,khw->cdhw", theta[0], from_maps)  # as if map 0 had all weights
+        if bug == "theta":
+            by_theta = by_theta / from_maps[0].size  # a mean where a sum is right
+        if bug == "beta":
+            by_beta = np.full(len(theta), float(from_maps[0].size))  # forgets what comes from behind
+        return by_planes, by_theta, by_beta
+
+    return back
+
+
+# %% nbgrader={"grade": false, "grade_id": "some-inputs", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _inputs(seed, K, C, D, H, W):
+    """Return planes, theta and beta of some sizes."""
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(C, D, H, W)), rng.normal(size=(K, C, D)), rng.normal(size=K)
+
+
+# %% nbgrader={"grade": true, "grade_id": "wrong-derivative-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # The planes of task 1. By hand, theta[0, 0, 0] was multiplied by 3 in the first cell and by 1 in the second: 2 * 3 - 1 * 1 = 5.
-    planes, theta, _ = _reduction()
-    got = reduce_back(planes, theta, np.array([[[2.0, -1.0]], [[0.0, 3.0]]]))
-    assert got is not None, "reduce_back returned nothing: did you forget `return`?"
-    assert np.iterable(got), "return three arrays: by theta, by beta, by the planes"
-    assert len(got) >= 2, "return three arrays: by theta, by beta, by the planes"
-    theta_bar, beta_bar = answer_array(got[0], "by theta reduce_back"), answer_array(got[1], "by beta reduce_back")
-    assert theta_bar.shape == (2, 2, 2), f"by theta: one number a weight, shape (2, 2, 2), got {theta_bar.shape}"
-    assert beta_bar.shape == (2,), f"by beta: one number a map, (K,) = (2,), got {beta_bar.shape}"
-    _explain("by theta[0, 0, 0]:", theta_bar[0, 0, 0], _THETA_SLIPS)
-    by_hand = [[[5, 2], [-4, 2]], [[3, 0], [12, 6]]]
-    swapped = np.allclose(theta_bar, np.swapaxes(by_hand, 1, 2))
-    assert not swapped, "class and plane are swapped in the derivative with respect to theta"
-    np.testing.assert_allclose(theta_bar, by_hand, err_msg="by theta: sum over cells of planes[c, d] * blamed[k]")
-    assert not np.allclose(beta_bar, [0.5, 1.5]), "by beta: that is the mean over cells, take the sum"
-    assert not np.allclose(beta_bar, 1), "by beta: 1 is that of a map by its bias; multiply by what comes from behind"
-    np.testing.assert_allclose(beta_bar, [1, 3], err_msg="by beta: the sum over cells of blamed[k]")
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import fusion
-
-    complaint = fusion.check_theta_bar(reduce_back)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-
-# %% nbgrader={"grade": true, "grade_id": "planes-bar-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    # By hand, the score of class 1 on plane 0 in the second cell went into map 0 by 2 and into map 1 by 1: 2 * -1 + 1 * 3 = 1.
-    planes, theta, _ = _reduction()
-    got = reduce_back(planes, theta, np.array([[[2.0, -1.0]], [[0.0, 3.0]]]))
-    assert np.iterable(got), "return three arrays: by theta, by beta, by the planes"
-    assert len(got) == 3, "return three arrays: by theta, by beta, by the planes"
-    got = answer_array(got[2], "by planes reduce_back")
-    assert got.shape == (2, 2, 1, 2), f"by planes: one number a score, (C, D, H, W) = (2, 2, 1, 2), got {got.shape}"
-    slips = {
-        -2.0: "that is the blame of map 0 alone: a score went into all K maps, so sum over k",
-        3.0: "that is the blame of map 1 alone: a score went into all K maps, so sum over k",
-        0.5: "that is the mean over maps: sum over k",
-        2.0: "the weights are missing: what comes from behind goes back by the weight by which the score went in",
-        4.0: "class and plane are swapped: theta[k, c, d] belongs to planes[c, d]",
+    hints = {
+        "planes": "nudge each score, and compare with what back says of it",
+        "theta": "nudge each weight, and compare with what back says of it",
+        "beta": "does your from_maps differ from cell to cell? All ones hide a way back that forgets what comes from behind",
+        "none": "nothing is wrong here: compare with a tolerance, and put each number back after its nudge",
     }
-    _explain("class 1, plane 0, second cell:", got[1, 0, 0, 1], slips)
-    by_hand = [[[[2, -1]], [[-2, 4]]], [[[4, 1]], [[1, 2.5]]]]
-    np.testing.assert_allclose(got, by_hand, err_msg="by planes: sum over k of theta[k, c, d] * blamed[k]")
+    for seed, bug in enumerate(("none", "planes", "theta", "beta")):
+        got = wrong_derivative(_forward, _way_back(bug), *_inputs(seed, K=2, C=3, D=2, H=2, W=3))
+        assert isinstance(got, str), f'return "planes", "theta", "beta" or "none", got {got!r}'
+        assert got in hints, f'return "planes", "theta", "beta" or "none", got {got!r}'
+        assert got == bug, f'wrong is "{bug}", and you say "{got}": {hints[bug]}'
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fusion
 
-    complaint = fusion.check_planes_bar(reduce_back)
+    complaint = fusion.check_wrong_derivative(wrong_derivative)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+
+# %% nbgrader={"grade": true, "grade_id": "one-number-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    def slightly(part, place, factor):
+        """Return a way back in which one number is wrong by a factor."""
+
+        def back(*arguments):
+            derivatives = [np.array(each) for each in _way_back()(*arguments)]
+            derivatives[part].flat[place] *= factor
+            return derivatives
+
+        return back
+
+    for part, name in enumerate(("planes", "theta", "beta")):
+        for place in (0, 1, -1):
+            for factor, wanted in ((1.03, name), (0.97, name), (1 + 1e-9, "none")):
+                got = wrong_derivative(_forward, slightly(part, place, factor), *_inputs(9, K=2, C=2, D=2, H=1, W=2))
+                what = f'number {place} of "{name}" is multiplied by {factor}, and you say "{got}"'
+                assert got == wanted, f"{what}: compare each number by itself, with a tolerance in between"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import fusion
+
+    complaint = fusion.check_one_number(wrong_derivative)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -186,62 +233,45 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: median frequency balancing (2 + 1 points)
+# ## Task 3: choose the limit of the weights (2 + 2 points)
 #
-# `maps` is a list of maps of classes, integer arrays that may differ in size. The number 255 means unlabelled: such a cell counts nowhere, neither above
-# nor below.
+# `cells` holds the number of labelled cells of each class, `alpha` its weight from median frequency balancing, both `(C,)`; a class that doesn't occur has 0
+# in both. With a limit $L \ge 1$ each weight above $L$ becomes $L$, and each below $1/L$ becomes $1/L$. A class's share of the loss is its
+# cells times its weight, over the sum of that over all classes.
 #
-# $$ f(c) = \frac{\text{cells of } c \text{ in all maps}}{\text{labelled cells of the maps in which } c \text{ occurs}}, \qquad
-#    \alpha_c = \frac{\operatorname{median}_{c'} f(c')}{f(c)} $$
-#
-# Complete `balance`: it returns the weights, `(n_classes,)`. For one more point: a class that occurs in no map gets the weight 0, and has no part in the
-# median.
+# Complete `shares`: it returns the share of each class with a limit, `(C,)`. Then complete `choose_limit`: of several `limits`, in any order, it returns the
+# *smallest* one with which class `c` has at least the share `at_least`, and no single cell of any class has more than the share `at_most` of all weight. If
+# none does, it returns 0.
 
 
-# %% nbgrader={"grade": false, "grade_id": "balance", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def balance(maps, n_classes):
-    """Return the weight of each class, (n_classes,)."""
+# %% nbgrader={"grade": false, "grade_id": "shares", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def shares(cells, alpha, limit):
+    """Return the share of the loss that each class has with a limit of the weights, (C,)."""
     ### BEGIN SOLUTION
-    f = np.zeros(n_classes)
-    for c in range(n_classes):
-        where = [m for m in maps if (m == c).any()]
-        if where:
-            f[c] = sum((m == c).sum() for m in where) / sum((m != IGNORE).sum() for m in where)
-    alpha = np.zeros(n_classes)
-    alpha[f > 0] = np.median(f[f > 0]) / f[f > 0]
-    return alpha
+    weight = cells * np.clip(alpha, 1 / limit, limit)
+    return weight / weight.sum()
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "class-maps", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _maps():
-    """Return two maps of classes, one with 8 labelled cells, one with 10."""
-    first = np.array([[0, 0, 0, 0], [0, 0, 1, 1], [255, 255, 255, 255]])
-    return [first, np.array([[0, 0, 0, 0], [2, 2, 2, 2], [2, 3, 255, 255]])]
-
-
-# %% nbgrader={"grade": true, "grade_id": "balance-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "shares-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # By hand: f = 10/18, 2/8, 5/10, 1/10, their median 0.375.
-    got = answer_array(balance(_maps(), n_classes=4), "balance")
-    assert got.shape == (4,), f"expected one weight a class, shape (4,), got {got.shape}"
-    slips = {
-        0.350: "every class is counted over all maps: below stand the cells of the maps in which it occurs",
-        0.700: "unlabelled cells are counted below: only labelled ones are",
-        0.632: "that is the mean of the frequencies over f: take their median",
-        0.652: "you average the frequencies of the maps: count the cells of all maps first, then divide once",
-        1.481: "that is f / median: what is frequent must weigh less",
-        1.800: "that is 1 / f: the median stands above",
-        0.556: "that is the frequency f itself: the weight is median / f",
-        0.900: "of an even number of frequencies the median is the mean of the two in the middle, you take the upper one",
-        0.450: "of an even number of frequencies the median is the mean of the two in the middle, you take the lower one",
+    cells, alpha = np.array([800, 100, 20, 0]), np.array([0.125, 1.0, 5.0, 0.0])
+    got = answer_array(shares(cells, alpha, 2), "shares")
+    assert got.shape == (4,), f"expected one share per class, shape (4,), got {got.shape}"
+    slips = {  # by hand: 800 * 0.5 = 400, 100, 20 * 2 = 40, together 540
+        0.4167: "class 0 keeps its small weight: weights below 1 / limit become 1 / limit",
+        0.3333: "nothing is limited there",
+        0.6667: "class 2 keeps its large weight: weights above the limit become the limit",
+        0.8696: "the weights don't count there: cells times weight",
+        0.1429: "the cells don't count there: cells times weight",
+        400.0: "that is the weight: divide it by the sum",
     }
-    _explain("class 0 weighs", got[0], slips)
-    np.testing.assert_allclose(got, [0.675, 1.5, 0.75, 3.75], err_msg="0.375 over 10/18, 2/8, 5/10, 1/10")
+    _explain("class 0 has the share", got[0], slips)
+    np.testing.assert_allclose(got, np.array([400, 100, 40, 0]) / 540, atol=1e-6, err_msg="400, 100 and 40 of 540")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fusion
 
-    complaint = fusion.check_balance(balance)
+    complaint = fusion.check_shares(shares)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -249,21 +279,40 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "absent-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "choose-limit", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def choose_limit(cells, alpha, limits, c, at_least, at_most):
+    """Return the smallest of the limits that gives class c enough and no cell too much; 0 when none does."""
+    ### BEGIN SOLUTION
+    for limit in np.sort(limits):
+        weight = np.clip(alpha, 1 / limit, limit)
+        total = (cells * weight).sum()
+        if cells[c] * weight[c] >= at_least * total and weight[cells > 0].max() <= at_most * total:
+            return limit
+    return 0
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": true, "grade_id": "choose-limit-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    before = answer_array(balance(_maps(), n_classes=4), "balance")
-    got = answer_array(balance(_maps(), n_classes=5), "balance")  # no cell is of class 4
-    assert np.isfinite(got).all(), f"the weights are {got}: class 4 doesn't occur, so don't divide by its frequency"
-    assert got.shape == (5,), f"expected one weight a class, shape (5,), got {got.shape}"
-    pulled = f"class 0 weighs {got[0]:.3g} in place of {before[0]:.3g}: absent class 4 pulls the median down, leave it out there"
-    assert np.isclose(got[0], before[0]), pulled
-    assert got[4] == 0, f"class 4 doesn't occur, so its weight is 0, got {got[4]:g}"
-    assert got.any(), "all weights are 0: those of classes that occur aren't"
-    np.testing.assert_allclose(got[:4], before, err_msg="the others weigh as much as without class 4")
+    # As in the lecture's six frames: road, sidewalk, car, pedestrian, unknown-dynamic, unobserved, and one that is absent.
+    cells = np.array([10909, 4549, 1807, 119, 25, 19585, 0])
+    alpha = np.array([0.09, 0.21, 0.54, 8.2, 39.04, 0.05, 0.0])
+
+    def chosen(limits, at_least, at_most):
+        return answer_number(choose_limit(cells, alpha, np.array(limits), 3, at_least, at_most), "choose_limit")
+
+    got = chosen([16, 2, 8, 4, 32], 0.10, 0.005)
+    assert got != 16, "8 will do as well, and is smaller: the limits come in any order"
+    assert got == 8, f"limits 2, 4, 8, 16, 32: pedestrians (119 cells) reach a tenth with 8, got {got:g}"
+    got = chosen([2, 4], 0.10, 0.005)
+    assert got == 0, f"with 2 and 4 pedestrians stay below a tenth: 0, got {got:g}"
+    got = chosen([8, 16, 32], 0.15, 0.002)
+    hint = "16 and 32 give pedestrians 15 %, but then one cell of unknown-dynamic has more than 0.2 % of all weight"
+    assert got == 0, f"{hint}: 0, got {got:g}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fusion
 
-    complaint = fusion.check_absent(balance)
+    complaint = fusion.check_choose_limit(choose_limit)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -271,27 +320,28 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: a weighted loss (3 + 1 points)
+# ## Task 4: the gradient of the weighted loss (3 + 1 points)
 #
-# `logits` are what the network gives, `(C, H, W)`; a soft-max over the classes turns them into probabilities $g_{c,j}$. `truth` is `(H, W)`, with 255 where a
-# cell isn't labelled; `alpha` holds the weights of the classes, `(C,)`. With $c(j)$ the true class of cell $j$, and the sums over labelled cells,
+# Here backpropagation begins. `logits` are what the network gives, `(C, H, W)`; a soft-max over the classes makes them probabilities $g_{c,j}$. `truth` is
+# `(H, W)`, with 255 where a cell isn't labelled; `alpha` holds the weights of the classes, `(C,)`. The loss is that of the lecture,
 #
 # $$ \text{loss} = -\frac{\sum_j \alpha_{c(j)} \log g_{c(j),j}}{\sum_j \alpha_{c(j)}} $$
 #
-# Complete `weighted_loss`: it returns one number. For one more point: logits may be 1000 or -1000, where $e^{1000}$ is more than a computer holds and $e^{-1000}$ less, and the
-# true class may trail by as much. You may add any number to all logits of a cell without changing its soft-max.
+# Complete `loss_back`: it returns the derivative of the loss with respect to each logit, `(C, H, W)`. (The derivative of $-\log g_{t}$ with respect to
+# logit $c$ is $g_c$, less 1 when $c = t$.) For one more point: logits may be 1000 or -1000, and $e^{1000}$ is more than a computer holds.
 
 
-# %% nbgrader={"grade": false, "grade_id": "weighted-loss", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def weighted_loss(logits, truth, alpha):
-    """Return the weighted cross-entropy of one map over its labelled cells."""
+# %% nbgrader={"grade": false, "grade_id": "loss-back", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def loss_back(logits, truth, alpha):
+    """Return the derivative of the weighted cross-entropy with respect to the logits, (C, H, W)."""
     ### BEGIN SOLUTION
-    shifted = logits - logits.max(axis=0)
-    log_g = shifted - np.log(np.exp(shifted).sum(axis=0))
+    g = np.exp(logits - logits.max(axis=0))
+    g = g / g.sum(axis=0)
     labelled = truth != IGNORE
-    true = truth[labelled]
-    of_truth = log_g[:, labelled][true, np.arange(true.size)]
-    return -(alpha[true] * of_truth).sum() / alpha[true].sum()
+    true = np.where(labelled, truth, 0)
+    one_hot = np.arange(len(logits))[:, None, None] == true
+    weight = np.where(labelled, alpha[true], 0)
+    return weight * (g - one_hot) / weight.sum()
     ### END SOLUTION
 
 
@@ -302,40 +352,36 @@ def _cells():
     return logits, np.array([[0, 1, IGNORE]]), np.array([1.0, 3.0])
 
 
-_LOSS_SLIPS = {
-    2.426: "you divide by the number of cells: divide by the sum of their weights",
-    1.617: "you divide by the number of cells, unlabelled ones too: divide by the sum of the weights of labelled ones",
-    1.040: "the weights are missing, or cancel: each cell counts by the alpha of its true class",
-    4.852: "that is the sum: divide it by the sum of the weights",
-    -1.213: "the sign is swapped: log of a probability is negative, a loss positive",
-    0.527: "that is the logarithm to base 10: take the natural one",
-    0.693: "the unlabelled cell is counted below",
-    0.996: "you count the unlabelled cell as class 0: 255 means that nobody knows",
-    1.605: "you count the unlabelled cell as the last class: 255 means that nobody knows",
-    0.970: "the unlabelled cell weighs below as class 0: leave it out there too",
-    0.904: "that is the soft-max of a soft-max: once is enough",
-    0.3125: "that is the mean probability of the truth: take its logarithm",
-    1.432: "your soft-max runs along the row of cells: it is over the classes, axis 0",
-    2.666: "your soft-max runs over all numbers at once: each cell has its own, over the classes, axis 0",
-    0.0: "there is no soft-max, or it runs down the rows of the map: it is over the classes, axis 0",
+_BACK_SLIPS = {  # of class 0 in the second cell, by hand 3 * (3/4 - 0) / (1 + 3) = 0.5625
+    1.125: "you divide by the number of cells: divide by the sum of their weights",
+    0.75: "you divide by the number of cells, unlabelled ones too, or leave the weights out and don't divide",
+    0.375: "the weights are missing: each cell counts by the alpha of its true class",
+    2.25: "that is not yet divided by the sum of the weights",
+    -0.5625: "the sign is swapped: this is the gradient, and the step against it comes later",
+    0.1875: "class 0 gets its own alpha: it is the weight of the *true* class that counts",
+    0.45: "the unlabelled cell's weight is counted below",
+    0.3214: "the unlabelled cell's weight is counted below",
+    -0.1875: "1 is subtracted from class 0: subtract it from the true class, here 1",
+    0.5466: "your soft-max runs along the row of cells: it is over the classes, axis 0",
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "weighted-loss-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "loss-back-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # By hand, truth 0 and 1: (1 * log 2 + 3 * log 4) / (1 + 3) = 1.213.
-    got = answer_array(weighted_loss(*_cells()), "weighted_loss")
-    assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
-    _explain("the loss is", got.item(), _LOSS_SLIPS)
-    np.testing.assert_allclose(got, 1.213, atol=1e-3, err_msg="(1 * log 2 + 3 * log 4) / 4")
-    logits, _, alpha = _cells()
-    got = answer_array(weighted_loss(logits, np.array([[0, IGNORE, IGNORE]]), alpha), "weighted_loss")
-    hint = "with the first cell alone labelled it is 1 * log 2 / 1; 0.173: you divide by the weights of all classes"
-    np.testing.assert_allclose(got, 0.693, atol=1e-3, err_msg=hint)
+    got = answer_array(loss_back(*_cells()), "loss_back")
+    assert got.shape == (2, 1, 3), f"expected one derivative per logit, shape (2, 1, 3), got {got.shape}"
+    assert not np.abs(got[:, 0, 2]).any(), f"the third cell isn't labelled: its derivatives are 0, got {got[:, 0, 2]}"
+    _explain("class 0, second cell:", got[0, 0, 1], _BACK_SLIPS)
+    by_class = got.sum(axis=0)
+    assert np.allclose(by_class, 0), (
+        f"over the classes of a cell the derivatives sum to 0, yours to {by_class.round(3)}"
+    )
+    by_hand = [[[-0.125, 0.5625, 0]], [[0.125, -0.5625, 0]]]
+    np.testing.assert_allclose(got, by_hand, atol=1e-6, err_msg="alpha of the truth times (g - 1 at the truth), over 4")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fusion
 
-    complaint = fusion.check_weighted_loss(weighted_loss)
+    complaint = fusion.check_loss_back(loss_back)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -345,29 +391,20 @@ _test()
 
 # %% nbgrader={"grade": true, "grade_id": "large-logits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    def loss(*logits, truth=(0,)):
-        """Return the answer's loss for a row of cells: the logits of class 0, then those of class 1."""
-        got = weighted_loss(np.array(logits, float)[:, None], np.array([truth]), np.array([1.0, 3.0]))
-        return answer_array(got, "weighted_loss").mean()
-
-    got = loss([1000, -1000], [1000 + np.log(3), -1000], truth=(0, 1))
-    small = loss([0, 0], [np.log(3), 0], truth=(0, 1))  # the same soft-max, (1/4, 3/4) and (1/2, 1/2)
-    assert np.isfinite(got), (
-        f"the loss is {got}: e^1000 overflows and e^-1000 vanishes; subtract the largest logit of each cell first"
+    small, truth, alpha = _cells()
+    wanted = answer_array(loss_back(small.copy(), truth.copy(), alpha.copy()), "loss_back")
+    shift = np.array([[1000.0, -1000.0, 500.0]])
+    got = answer_array(loss_back(small + shift, truth, alpha), "loss_back")
+    assert np.isfinite(got).all(), (
+        "e^1000 overflows and e^-1000 vanishes: subtract the largest logit of each cell first"
     )
-    hint = "if you added a small number against log 0, or subtracted one number from all cells, don't: subtract each cell's largest"
-    np.testing.assert_allclose(got, small, atol=1e-6, err_msg=f"logits of 1000 and -1000 against 0; {hint}")
-    got, half = loss([-1000], [0]), loss([-500], [0])
-    assert np.isfinite(got), (
-        f"the loss is {got}: a truth that trails by 1000 costs 1000; keep log g, g itself is 0 here"
-    )
-    cut = "a truth that trails by 1000 must cost twice as much as by 500: don't add a small number against log 0"
-    assert abs(got) > 100, f"the loss is {got:.4g}; {cut}"
-    np.testing.assert_allclose(got, 2 * half, rtol=1e-3, err_msg=cut)
+    assert wanted.any(), "all derivatives are 0"
+    hint = "the same number added to all logits of a cell changes nothing; subtract each cell's own largest"
+    np.testing.assert_allclose(got, wanted, atol=1e-6, err_msg=hint)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fusion
 
-    complaint = fusion.check_large_logits(weighted_loss)
+    complaint = fusion.check_large_logits(loss_back)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -375,105 +412,78 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: one step with momentum, and its rate (2 + 1 points)
+# ## Task 5: rate and momentum, from the path (2 + 1 points)
 #
-# $$ \Delta \leftarrow \kappa\,\Delta + \frac{\partial\,\text{loss}}{\partial \theta}, \qquad
-#    \theta \leftarrow \theta - \eta\,\Delta $$
+# Somebody has trained with momentum, $\Delta \leftarrow \kappa\,\Delta + \text{gradient}$, $\theta \leftarrow \theta - \eta\,\Delta$, from $\Delta = 0$ on, and has
+# kept the parameters before, between and after the steps, `path` `(T + 1, n)`, and the gradient of each step, `gradients` `(T, n)`. Rate and momentum got lost.
 #
-# Complete `momentum_step`: it takes parameters `theta`, the last `delta` and the new `gradient`, arrays of one shape, the rate `eta` and the momentum `kappa`,
-# and returns the new `theta` and the new `delta`, without changing its arguments.
+# Complete `rate_and_momentum`: it returns $\eta$ and $\kappa$, which were the same in all steps. (What is left of a step when you subtract $\kappa$ times the step
+# before?) For one more point complete `rates`: now $\kappa$ is known and the rate was another one in each step; it returns all of them, `(T,)`.
 
 
-# %% nbgrader={"grade": false, "grade_id": "momentum-step", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def momentum_step(theta, delta, gradient, eta, kappa):
-    """Return theta and delta after one step of gradient descent with momentum."""
+# %% nbgrader={"grade": false, "grade_id": "rate-and-momentum", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def rate_and_momentum(path, gradients):
+    """Return the learning rate and the momentum of an optimiser."""
     ### BEGIN SOLUTION
-    delta = kappa * delta + gradient
-    return theta - eta * delta, delta
+    steps = np.diff(path, axis=0)
+    before = np.concatenate([np.zeros((1, steps.shape[1])), steps[:-1]])
+    parts = np.stack([-gradients.ravel(), before.ravel()], axis=1)
+    eta, kappa = np.linalg.lstsq(parts, steps.ravel(), rcond=None)[0]
+    return eta, kappa
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "momentum-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_STEP_SLIPS = {
-    1.130: "the step goes uphill: theta - eta * delta",
-    0.906: "the gradient is damped by 1 - kappa: add it whole",
-    0.902: "the rate counts twice: delta has none, only the step has",
-    0.510: "the rate stands inside delta: when the rate falls, old gradients would keep their old, larger one",
-    0.843: "that is Nesterov's momentum: step by delta as it is after its update",
-    0.900: "you step by the old delta: update it first",
-    0.960: "that is plain descent: step by delta, not by the gradient",
-    0.874: "kappa damps the new gradient too: only the old delta fades",
-    0.650: "that is delta: return theta first",
-    0.730: "eta and kappa are swapped: eta is the rate of the step, kappa what is left of the old delta",
-    0.860: "the old delta doesn't fade: multiply it by kappa",
-    0.950: "the gradient is subtracted from delta and delta from theta: two minus signs go uphill",
-}
-
-
-# %% nbgrader={"grade": true, "grade_id": "momentum-step-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "rate-and-momentum-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    theta, delta, gradient = np.array([1.0, 2.0]), np.array([0.5, -1.0]), np.array([0.2, 0.4])
-    got = momentum_step(theta, delta, gradient, eta=0.2, kappa=0.9)
-    assert got is not None, "momentum_step returned nothing: did you forget `return`?"
-    assert np.iterable(got), "return two arrays: the new theta and the new delta"
-    assert len(got) == 2, "return two arrays: the new theta and the new delta"
-    assert np.array_equal(theta, [1, 2]), "momentum_step changed its argument `theta`: make a new array (no -=)"
-    same = np.array_equal(delta, [0.5, -1])
-    assert same, "momentum_step changed its argument `delta`: make a new array (no *= or +=)"
-    new_theta, new_delta = (
-        answer_array(got[0], "for theta momentum_step"),
-        answer_array(got[1], "for delta momentum_step"),
-    )
-    assert new_theta.shape == (2,), f"theta has two parameters, and became {new_theta.shape}"
-    _explain("the first parameter is", new_theta[0], _STEP_SLIPS)
-    np.testing.assert_allclose(new_theta, [0.87, 2.1], err_msg="theta by hand: 1 - 0.2 * 0.65, 2 + 0.2 * 0.5")
-    assert not np.allclose(new_delta, [0.13, -0.1]), "delta is returned with the rate in it: give back delta itself"
-    np.testing.assert_allclose(new_delta, [0.65, -0.5], err_msg="delta by hand: 0.45 + 0.2, -0.9 + 0.4")
+    # By hand, eta = 0.5 and kappa = 0.5: delta is (2, 1), then (1, 0.5) + (2, 3) = (3, 3.5), then (1.5, 1.75) + (0, 1) = (1.5, 2.75).
+    gradients = np.array([[2.0, 1.0], [2.0, 3.0], [0.0, 1.0]])
+    path = np.array([[1.0, 1.0], [0.0, 0.5], [-1.5, -1.25], [-2.25, -2.625]])
+    got = answer_array(rate_and_momentum(path, gradients), "rate_and_momentum").ravel()
+    assert got.shape == (2,), f"return two numbers, the rate and the momentum, got {got.shape}"
+    assert got[0] > 0, f"the rate is {got[0]:.3g}: theta goes down by eta times delta, so mind the sign"
+    np.testing.assert_allclose(got, [0.5, 0.5], atol=1e-6, err_msg="rate and momentum of the path made by hand")
+    path, gradients = np.array([[1.0], [0.9], [0.72], [0.486]]), np.array([[1.0], [0.9], [0.72]])
+    got = answer_array(rate_and_momentum(path, gradients), "rate_and_momentum").ravel()
+    swapped = np.allclose(got, [0.9, 0.1], atol=1e-4)
+    assert not swapped, "rate and momentum are swapped: return eta first"
+    np.testing.assert_allclose(got, [0.1, 0.9], atol=1e-4, err_msg="the companion's path: 1, 0.9, 0.72, 0.486")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fusion
 
-    complaint = fusion.check_momentum_step(momentum_step)
+    complaint = fusion.check_rate_and_momentum(rate_and_momentum)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
 
 _test()
 
-# %% [markdown]
-# Complete `cosine_rate`: in training step `step` of `steps`, the first being 0, it returns `eta` times a factor that falls from 1 to 0 along half a cosine:
-# 1 in step 0, 1/2 in the middle, and 0 if there were a step number `steps`.
 
-
-# %% nbgrader={"grade": false, "grade_id": "cosine-rate", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def cosine_rate(eta, step, steps):
-    """Return the rate in one step."""
+# %% nbgrader={"grade": false, "grade_id": "rates", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def rates(path, gradients, kappa):
+    """Return the learning rate of each step, (T,)."""
     ### BEGIN SOLUTION
-    return eta * (1 + np.cos(np.pi * step / steps)) / 2
+    delta, found = np.zeros(path.shape[1]), []
+    for step, gradient in zip(np.diff(path, axis=0), gradients, strict=True):
+        delta = kappa * delta + gradient
+        found.append(-(step @ delta) / (delta @ delta))
+    return np.array(found)
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "cosine-rate-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "rates-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # By hand: cos 72 degrees = 0.309, so 0.4 * (1 + 0.309) / 2 = 0.262.
-    got = answer_array(cosine_rate(eta=0.4, step=2, steps=5), "cosine_rate").mean()
-    slips = {
-        0.1236: "that is eta * cos: it falls to -eta. Add 1, then halve",
-        0.5236: "halve it: the first step would have twice the rate",
-        0.0382: "that is a whole cosine, which comes up again: the angle runs from 0 to pi",
-        0.3236: "that is a quarter of a cosine, which ends at full slope: the angle runs from 0 to pi",
-        0.2400: "that is a straight line",
-        0.2000: "the last step gets rate 0: only a step number `steps` would have none",
-        0.1382: "the angle runs backwards, or is a step ahead: step 0 has the full rate",
-        0.0066: "the angle is in degrees, and numpy takes radians",
-    }
-    _explain("0.4 in step 2 of 5 becomes", got, slips)
-    np.testing.assert_allclose(got, 0.2618, atol=1e-4, err_msg="0.4 * (1 + cos 72 degrees) / 2")
-    first = answer_array(cosine_rate(0.4, 0, 5), "cosine_rate").mean()
-    assert np.isclose(first, 0.4), f"step 0 has the full rate, 0.4, got {first:.3f}"
+    # By hand, kappa = 0.5, rates 0.5, 0.2 and 0.1: delta is (2, 1), (3, 3.5) and (1.5, 2.75).
+    gradients = np.array([[2.0, 1.0], [2.0, 3.0], [0.0, 1.0]])
+    path = np.array([[1.0, 1.0], [0.0, 0.5], [-0.6, -0.2], [-0.75, -0.475]])
+    got = answer_array(rates(path, gradients, 0.5), "rates").ravel()
+    assert got.shape == (3,), f"expected one rate per step, shape (3,), got {got.shape}"
+    by_steps = "the momentum multiplies delta, which holds gradients without a rate, not the last step"
+    assert np.isclose(got[0], 0.5), f"the first step has the rate 0.5, got {got[0]:.3g}"
+    np.testing.assert_allclose(got, [0.5, 0.2, 0.1], atol=1e-6, err_msg=f"rates 0.5, 0.2, 0.1: {by_steps}")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fusion
 
-    complaint = fusion.check_cosine_rate(cosine_rate)
+    complaint = fusion.check_rates(rates)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -483,13 +493,13 @@ _test()
 # %% [markdown]
 # ## Task 6: in your own words (2 points)
 #
-# In the lecture the planes above 1 m could fall silent, and the shipped network found nearly as much as before. A colleague concludes: "what stands above 1 m isn't
-# needed to see a street from above, so ten planes will do, also for our lorry, whose camera sits 3 m high." What does the measurement say, and what
-# doesn't it? Name one experiment that would tell. Five sentences are enough.
+# On the lecture's two drives, late fusion by a table is half a point worse than the best table of label and state. A colleague concludes: "Then a
+# network that fuses image and occupancy grid is a waste. Let each sensor decide, and multiply." What does the measurement say, and what doesn't it? Name
+# one experiment that would tell. Five sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "what-it-says", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
-# It says that *this* trained network, on *these* streets, with this camera and with the occupancy grid beside it, loses little over all cells without those planes (of some classes more: a fifth
-# of the buildings' cells, and half of what cars gain over the ground plane alone); nothing about what a network needs that is trained without them, or could make of them. It listens to the foot of things, and the occupancy grid tells it where they stand; where feet are hidden (dense traffic), or the
-# occupancy grid is worse, higher planes may be all there is. From 3 m up the camera looks down on roofs, and other planes are right: by geometry, not by what was learnt here.
-# The experiment: train anew with the lowest planes only and with all of them, several seeds each, for the lorry's camera, and compare on streets that neither has seen. One point for the limits of the
-# measurement (this network, this camera, correlated inputs), one for a training that would tell.
+# It says that, given the class, label and state share little (.05 and .11 bits), so that multiplying what one cell and one plane say of each sensor loses little against
+# the best use of *these two numbers*. It doesn't say that the two numbers are enough: the network, which sees all planes and the neighbours, gets many more semantic cells right
+# than either table. Nor does it say that the price is small where it matters: the toy's cell behind a car is wrong by a tenth, and rare classes or hidden cells may pay more than the average over all cells shows.
+# The experiment: train a network that fuses late (one network per sensor, with planes and neighbours, their probabilities multiplied) and one that fuses early, with as many weights, several seeds
+# each, and compare them on streets that neither has seen, over all cells and over hidden ones. One point for what the measurement is about (one cell and plane, an average), one for a comparison that would tell.
