@@ -16,7 +16,7 @@
 # **Prerequisites.** Lectures [05](05_pixels.ipynb) and [06](06_planes.ipynb) (equations (1) and (2), the adjoint) and
 # [07](07_segmentation.ipynb) (image networks, raw scores, skips). The chain rule.
 #
-# **Time.** 75 minutes; the computer needs two.
+# **Time.** 75 minutes; the computer needs one.
 #
 # **Paper.** Sections 3.4 and 4.1, figures 4 and 5; claims 7 and 9.
 
@@ -458,8 +458,8 @@ Markdown(as_table(drive_rows))
 # The last row is a table that could really be used: it has seen neither a true label of a pixel nor this drive.
 #
 # Two cautions. The truth of the *unknown* classes is defined by $o$ (lecture 09), so over all cells a table that knows
-# $o$ starts with a gift; that is why the second column counts semantic cells alone. And late fusion has the *better*
-# class accuracy: it gives rare classes more of a chance than a table that takes the most frequent one.
+# $o$ starts with a gift; that is why the second column counts semantic cells alone. And by class accuracy late
+# fusion is the *better* of the two: which way wins depends on what is counted.
 #
 # The same in bits: how much of the class is still open, and how much do label and state share once the class is known,
 # $I(a; o \mid m)$? Late fusion assumes that this is zero.
@@ -483,8 +483,8 @@ print(f"class: {bits(m):.2f} bits; open with label {by_label:.2f}, with o {by_st
 print(f"label and state share {shared(a, b, m):.2f} bits once the class is known")
 
 # %% [markdown]
-# The pair leaves a whole bit open, because the pixel on the ground plane often shows what stands *in front of* the
-# cell. That is why the network gets all planes, and neighbours.
+# The pair leaves a whole bit open. The pixel on the ground plane often shows what stands *in front of* the cell: in more
+# than half of the cells in view (lecture 05). That is why the network gets all planes, and neighbours.
 #
 # Does the trained network use both? Give it, in place of $o$, the mean of $o$ over all cells, the same everywhere; then
 # do the same with the planes.
@@ -495,7 +495,8 @@ print(f"label and state share {shared(a, b, m):.2f} bits once the class is known
 # <details><summary>Answer</summary>
 #
 # Without $o$ what stands is lost, cars and buildings: the image knows their direction, not their distance. Without the
-# image the names suffer: road and sidewalk are both FREE, so $o$ can't tell them apart (claim 7).
+# image buildings lose most, and of the sidewalk a third is gone: road and sidewalk are both FREE, so in a single cell $o$
+# can't tell them apart (claim 7). What is left of the sidewalk comes from the neighbours' $o$.
 #
 # </details>
 
@@ -847,8 +848,8 @@ Markdown(
 # %% [markdown]
 # With every seed end to end gets more cells right, by half a point, has the lower class accuracy, and far worse labels
 # of pixels. So here it pays a little in the counts that large areas decide, and no further. Our stage one is a strong
-# one: it learns true labels of every pixel of the same images. The paper starts from ImageNet weights, so it had more
-# to gain.
+# one: it learns true labels of every pixel of the same images. The paper starts from ImageNet weights, so it may have
+# had more to gain.
 #
 # ## A real street
 #
@@ -858,31 +859,29 @@ Markdown(
 # %% jupyter={"source_hidden": true}
 results = Path("../docs/results")
 variants = json.loads((results / "reduced/ablations.json").read_text(encoding="utf-8"))["variants"]
-simulated = {v["what"]: v["scores"]["true"]["semantic"]["pixel accuracy"] for v in variants}
+simulated = {v["what"]: v["scores"]["true"]["semantic"] for v in variants}
 left_out = json.loads((results / "real_streets.json").read_text(encoding="utf-8"))["scores"]["two cameras left out"]
-real = {name: [score["pixel accuracy"][k] for k in ("low", "mean", "high")] for name, score in left_out.items()}
 
 
 def row_of_scores(name, scores):
-    """Return a row of the table: mean and interval of each score, per cent."""
-    texts = [f"{100 * mean:.0f} ({100 * max(low, 0):.0f} to {100 * high:.0f})" for low, mean, high in scores]
+    """Return a row of the table: mean and interval of each score's pixel accuracy, per cent."""
+    each = [[100 * score["pixel accuracy"][k] for k in ("mean", "low", "high")] for score in scores]
+    texts = [f"{mean:.0f} ({max(low, 0):.0f} to {high:.0f})" for mean, low, high in each]
     return f"| {name} | " + " | ".join(texts + [""] * (3 - len(texts))) + " |"
 
 
 head = "| semantic cells right, per cent | with $o$ | without $o$ | a table of $o$ alone |\n|---|---|---|---|"
+real = [left_out[name] for name in ("real only", "real only, without occupancy", "occupancy state alone")]
 rows = [
     row_of_scores("simulated, true labels", [simulated["usual"], simulated["no occupancy grid"]]),
-    row_of_scores(
-        "two real cameras left out, real labels",
-        [real["real only"], real["real only, without occupancy"], real["occupancy state alone"]],
-    ),
+    row_of_scores("two real cameras left out, real labels", real),
 ]
 Markdown("\n".join([head, *rows]))
 
 # %% [markdown]
-# In brackets 95 % intervals. By true labels $o$ brings six points of semantic cells; by real labels thirty, but with
-# intervals so wide that they overlap, and one network without $o$. Part of the difference is the judge: a real cell is
-# labelled only where a *LIDAR return* lies, which is where $o$ knows most. And look at the last column: on cameras that
+# In brackets 95 % intervals. By true labels $o$ brings about six points; by real labels about thirty, but with
+# intervals so wide that they overlap, and one network without $o$. The judges differ, too: a real cell is labelled
+# only where a *LIDAR return* lies, and there $o$ has evidence. And look at the last column: on cameras that
 # no network has seen, a table of $o$ alone is as good as the network.
 #
 # Is late fusion nearly free on the real street, too? Labels by the shipped real network, state by the filter, truth by
@@ -1026,6 +1025,7 @@ guessed, sighted = sure[nobody & named], sure[semantic & named & ~dark]
 ranks = np.searchsorted(np.sort(sighted), guessed)
 print(f"of the cells that nobody sees {100 * named[nobody].mean():.0f} % get a name")
 print(f"mean confidence there {guessed.mean():.2f}, of named cells that a beam has reached {sighted.mean():.2f}")
+assert guessed.mean() < sighted.mean() - 0.1
 print(f"a sight is surer than a guess in {100 * (1 - ranks.mean() / len(sighted)):.0f} % of pairs")
 fig, ax = plt.subplots(figsize=(5.4, 2.4), layout="constrained")
 for values, style, name in ((sighted, "-", "a beam has been there"), (guessed, "--", "nobody has looked")):

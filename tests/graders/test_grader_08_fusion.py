@@ -388,14 +388,14 @@ def choose_limit(cells, alpha, limits, c, at_least, at_most):
             "no single cell looked at",
             task="choose-limit",
             loses=2,
-            says="a cell of unknown-dynamic",
+            says="one cell of unknown-dynamic",
             code=limit(small="True"),
         ),
         mistake(
             "class c's cells alone looked at",
             task="choose-limit",
             loses=2,
-            says="a cell of unknown-dynamic",
+            says="one cell of unknown-dynamic",
             code=limit(small="weight[c] <= at_most * total"),
         ),
         mistake(

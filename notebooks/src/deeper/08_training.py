@@ -13,7 +13,7 @@
 #
 # **Prerequisites.** Lecture [08](../08_fusion.ipynb): the loss, the gradient from map to pixels.
 #
-# **Time.** 48 minutes; the computer needs three.
+# **Time.** 35 minutes; the computer needs three.
 
 # %% jupyter={"source_hidden": true}
 import json
@@ -448,8 +448,8 @@ plt.show()
 # %% [markdown]
 # A: where each class is right. For a road that is the ground plane, and even there only in 56 of 100 cells, because
 # things stand in the way and because beyond the crest of this street the road lies below the plane. B: the norms of the
-# weights. From 1 m up they look as they did when they were drawn at random. But the weights themselves have changed there
-# by a third to a half of that norm, as the printed line says: a norm doesn't show what was learnt. C: what is found when
+# weights. From 1 m up they differ little from what was drawn at random. But the weights themselves have changed there by
+# 0.3 to 0.6 of that norm, as the printed line says: a norm doesn't show what was learnt. C: what is found when
 # all higher planes fall silent.
 #
 # So does it use the right heights? For the road, yes: the ground plane alone finds it. Cars gain seven points from the
@@ -482,8 +482,8 @@ Markdown("\n".join(lines))
 
 # %% [markdown]
 # With the planes up to 1 m the three lose at most 4 points of semantic cells and 2 to 7 of class accuracy, and keep road
-# and sidewalk, but a third or more of the buildings are gone. Without these planes all lose much more, and not alike:
-# FCN loses two fifths of its road, the other two next to nothing. We don't know why.
+# and sidewalk, but two fifths of the buildings or more are gone. Without these planes all lose 14 points or more, and not
+# alike: FCN loses two fifths of its road, SegNet five points, DeepLab nothing. We don't know why.
 #
 # ## What this does not show
 #
