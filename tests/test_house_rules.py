@@ -145,9 +145,9 @@ def test_the_house_stays_small():
         storey = "workshop" if module.startswith(("workshop/", "__main__")) else "book"
         modules[storey] += not module.endswith("__init__.py")
         lines[storey] += code_lines(module)
-    assert modules["book"] <= 173
+    assert modules["book"] <= 174
     assert modules["workshop"] <= 127
-    assert lines["book"] <= 12_470
+    assert lines["book"] <= 12_520
     assert lines["workshop"] <= 10_890
 
 
