@@ -414,7 +414,7 @@ first = build_net(net.architecture, drive.camera, seed=0).fusion.reduce[0].weigh
 norms = [np.linalg.norm(weight, axis=0).mean(axis=0) for weight in (trained, first)]
 changed = np.linalg.norm(trained - first, axis=(0, 1)) / np.linalg.norm(first, axis=(0, 1))
 
-# %% jupyter={"outputs_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
 shown_tops = [tops.index(top) for top in (0, 3, 5, 7, 10, 12, 19)]
 print(
     "true labels say the class, at 0, 0.2, 1.0, 1.4, 2.0, 2.4 m; then: found with planes up to 0, .6, 1, 1.4, 2, 2.4, 3.8 m"
@@ -461,7 +461,7 @@ plt.show()
 #
 # One network is one sample. The same on the three shipped ones, which differ in their image network alone:
 
-# %% jupyter={"source_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 low, rows = heights < 1.1, []
 for name in ("segnet", "fcn", "deeplab"):
     other = load_net(sample_weights(name), drive.camera).requires_grad_(False)
