@@ -162,8 +162,10 @@ assert d_separated(stage.model, "x1", "x5", given=(*scores_known, "x3"))
 is_post = truths == POST
 below, beside = (a[b].mean() for a, b in ((is_post[:, 1:], is_post[:, :-1]), (is_post[..., 1:], is_post[..., :-1])))
 print(
-    f"on the drive, the pixel below a pixel of signage is signage with {below:.2f}, the one beside it with {beside:.2f}"
+    f"on the drive {is_post.mean():.0%} of the pixels are signage; below one of them is signage with {below:.2f}",
+    end=", ",
 )
+print(f"beside it with {beside:.2f}")
 
 # %% [markdown]
 # So one strength for all directions is wrong on a street: a chain would need one along posts and another across. The
@@ -732,6 +734,7 @@ print(f"strided, 1200 steps in place of 150: IoU {100 * longer.iou:.0f} %")
 assert reached["strided"].iou < min(reached["nearest"].iou, reached["bilinear"].iou)
 assert reached["indices"].iou < min(reached["skips"].iou, reached["atrous"].iou)
 assert reached["strided"].iou < longer.iou < 0.55
+assert sum(weights.numel() for weights in train_pole_net("atrous", steps=1).parameters()) == 3242
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three unseen pictures in rows, with truth and what the six networks draw: nearest and bilinear draw some posts too wide, indices one with a gap and a speck, skips and atrous whole posts, strided misses one and draws two as blobs"
 fig, axes = plt.subplots(3, 8, figsize=(8.8, 3.5), layout="constrained")
@@ -744,8 +747,8 @@ plt.show()
 
 # %% [markdown]
 # Each row is one unseen picture; the thin bar of the second column is the post, the other bar of the image is the wall.
-# Learning closes a part of the gap and keeps the order of the groups. Atrous pays with time: it computes nearly three
-# times as much as the networks that pool. So a mechanism decides what *needn't* be learnt; and on this task, the strided
+# Learning closes a part of the gap and keeps the order of the groups. Atrous pays with time,
+# because its maps keep all their pixels. So a mechanism decides what *needn't* be learnt; and on this task, the strided
 # network with 1200 steps hasn't reached what indices have after 150.
 #
 # ## A post of the drive
@@ -772,7 +775,7 @@ for name, labels in called.items():
 
 # %% [markdown]
 # No network draws the sign's post. So keeping *where* is necessary, and it isn't enough: two pixels in a hundred are
-# signage, and there are a dozen other classes to learn from 142 images. The
+# signage, and there are a dozen other classes to learn. The
 # [companion](deeper/07_trained_networks.ipynb) has their tables, fields and failures.
 #
 # ## A real street
