@@ -543,7 +543,7 @@ print("off by", (interpolate_row(ramp, 8, 64) - enlarge_row(ramp, 8))[8:56].mean
 # On the drive: by how much does *signage* lead over the best other class? First in FCN's scores at 1/32 of the image's
 # size, then with the scores of pool4 added (1/16), then with those of pool3 (1/8), and enlarged to the image.
 
-# %% jupyter={"source_hidden": true} alt="four maps of the lead of signage, orange where it leads: A at 1/32 some cells at the right border; B at 1/16 none; C at 1/8 small patches; D the same enlarged, smooth blobs, with arrows to a distant street lamp and the lamp post"
+# %% jupyter={"source_hidden": true} alt="four maps of the lead of signage, orange where it leads: A at 1/32 some large cells on the right; B at 1/16 none; C at 1/8 small patches; D the same enlarged, smooth blobs, with arrows to a distant street lamp, the sign and the lamp post"
 fcn = nets["fcn"]
 
 
@@ -567,13 +567,14 @@ for ax, (name, part) in zip(axes.flat, parts.items(), strict=True):
 style = {"arrowprops": {"arrowstyle": "->", "color": "white"}, "fontsize": 9, "color": "white"}
 axes[1, 1].annotate("lamp post", (227, 66), (245, 88), **style)
 axes[1, 1].annotate("street lamp", (168, 25), (70, 20), **style)
+axes[1, 1].annotate("sign", (210, 27), (258, 46), **style)
 fig.colorbar(axes[0, 0].images[0], ax=axes, label="lead of signage", fraction=0.02)
 plt.show()
 
 # %% [markdown]
-# Orange is where signage leads. In A it leads in a few cells at the border, where no sign is; in B it leads nowhere.
-# pool3 brings it to the lamp post and to a distant street lamp. But the finest map has cells of 8 pixels, and the sign's
-# post is one or two pixels wide: there signage leads nowhere. A skip gives back what its finest map holds, and no more.
+# Orange is where signage leads. In A it leads in a few large cells on the right; in B it leads nowhere. pool3 brings it to
+# the lamp post, a distant street lamp and the sign. But the finest map has cells of 8 pixels, and the sign's post is one
+# or two pixels wide: there signage leads nowhere. A skip gives back what its finest map holds, and no more.
 #
 # ## DeepLab: don't halve, spread the kernel
 #
@@ -662,7 +663,7 @@ plt.show()
 #
 # </details>
 
-# %% jupyter={"outputs_hidden": true}
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 
 
 def posts(column, width=1, height=16):

@@ -1145,6 +1145,20 @@ def loss_and_gradient(scores, truth):
             code=loss(),
         ),
         mistake(
+            "no shift, in long double",
+            task="loss",
+            loses=1,
+            says="on inputs you haven't seen",
+            code="""
+def loss_and_gradient(scores, truth):
+    odds = np.exp(np.asarray(scores, np.longdouble))
+    log_P = np.log(odds / odds.sum(axis=0))
+    labelled = truth != 255
+    is_true = np.arange(len(scores))[:, None, None] == truth
+    gradient = labelled * (np.exp(log_P) - is_true) / labelled.sum()
+    return float(-log_P[is_true].mean()), gradient.astype(float)""",
+        ),
+        mistake(
             "logarithm of a probability that is zero",
             task="loss",
             loses=1,

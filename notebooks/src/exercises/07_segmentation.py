@@ -456,7 +456,7 @@ _test()
 # | `INDICES` | max-pooling, one to three times, and unpooling by the indices |
 # | `SKIPS` | max-pooling, one to three times; on the way up, interpolation, and each finer map added with a weight |
 # | `STRIDED` | a positive kernel with stride 2, one to three times, then interpolation |
-# | `ATROUS` | the same kernels without stride, with rates 1, 2, 4 |
+# | `ATROUS` | the same kernels without stride, with rates 1, then 2, then 4: an output sees at most 7 pixels to either side |
 #
 # Complete `name_mechanism`: it returns one of the four. You may feed the box as many images as you like. Don't compare with the lecture's numbers, because the boxes of the
 # tests have other kernels, weights and depths. Ask for *properties*: what is true of every box of a kind, and of no box of the others? Is the answer to a sum the sum of the
@@ -612,8 +612,8 @@ _test()
 # It runs on any image and raises no error. Four things are wrong: one in the soft-max, one in what is done with unlabelled pixels, one in the gradient, and one that shows
 # only where scores are large. Write it rightly. The mistakes aren't independent: mending one may show the next. `scores` stays as it is.
 #
-# For the last point both results must stay right where scores are thousands, of either sign, or thousands apart: adding the same to all scores of a pixel changes nothing,
-# so add something that keeps $e^s$ small.
+# For the last point both results must stay right where scores are ten thousands, of either sign, or thousands apart: adding the same to all scores of a pixel changes
+# nothing, so add something that keeps $e^s$ small.
 
 
 # %% nbgrader={"grade": false, "grade_id": "loss", "locked": false, "schema_version": 3, "solution": true, "task": false}
