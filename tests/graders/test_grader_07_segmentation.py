@@ -1056,14 +1056,11 @@ def name_mechanism(box, size):
             code=probing(empty="np.mean(box(1 + one) == 0) > 0.9"),
         ),
         mistake(
-            "a symmetric answer expected",
+            "the sizes of the visible tests written in",
             task="boxes",
-            loses=2,
-            says="this box is ATROUS, and you say STRIDED",
-            code=probing(
-                moves="np.allclose(box(dot)[:, 1:], box(dot)[:, :0:-1])"
-                " and not np.isclose(box(np.roll(dot, 1, axis=1)).max(), box(dot).max() / 2)"
-            ),
+            loses=3,
+            says="on inputs you haven't seen: a box gets the name of another mechanism",
+            code=probing().replace("    if np", "    if size not in (16, 24):\n        return SKIPS\n    if np"),
         ),
         mistake(
             "a text",

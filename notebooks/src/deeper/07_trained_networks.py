@@ -205,7 +205,7 @@ with torch.inference_mode():
 #
 # <details><summary>Answer</summary>
 #
-# None draws the sign's thin post: where one stands, there is a yellow patch at best. And two points of a hundred lie
+# None draws the sign's thin post: where one stands, there is a yellow patch at best. And two or three points of a hundred lie
 # between the best and the last.
 #
 # </details>
@@ -332,7 +332,7 @@ assert max(cost["noise of 10 %", name] for name in ("segnet", "fcn")) < 0.5 < co
 assert all(cost["upside down", name] == min(cost[change, name] for change in changes) for name in TRAINED)
 
 # %% [markdown]
-# Noise that a human hardly minds costs the two networks that pool maxima most of their accuracy, and DeepLab little. Its
+# Noise that a human hardly minds costs the two networks that pool maxima half of their accuracy or more, and DeepLab little. Its
 # first layer sums over 7x7 pixels before anything else is done, while a maximum of noisy values is the noisiest; that may
 # be why. Two colours swapped is a common bug (OpenCV reads blue first): it raises no error, and it costs all three more
 # than ten points. A changed world is what lecture 07's real street was; lecture [13](../13_real_drive.ipynb) measures it.
