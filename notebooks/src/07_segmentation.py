@@ -58,6 +58,8 @@ torch.set_num_threads(1)  # on maps this small, two threads wait for each other;
 POST, SIZE, rng = KITTI_14.index("signage"), (96, 320), np.random.default_rng(0)
 NAMES = {"segnet": "SegNet", "fcn": "FCN-8s", "deeplab": "DeepLab v2"}
 
+# %% jupyter={"source_hidden": true}
+
 
 def seen_by_networks(frames):
     """Return images (B, 96, 320, 3) and labels (B, 96, 320) at the size that the compact networks see."""
@@ -545,13 +547,6 @@ print("off by", (interpolate_row(ramp, 8, 64) - enlarge_row(ramp, 8))[8:56].mean
 
 # %% jupyter={"source_hidden": true} alt="four maps of the lead of signage, orange where it leads: A at 1/32 some large cells on the right; B at 1/16 none; C at 1/8 small patches; D the same enlarged, smooth blobs, with arrows to a distant street lamp, the sign and the lamp post"
 fcn = nets["fcn"]
-
-
-def lead_of(c, scores):
-    """Return by how much class c leads, (C, h, w) -> (h, w); negative where another one does."""
-    return scores[c] - torch.cat([scores[:c], scores[c + 1 :]]).max(dim=0).values
-
-
 with torch.inference_mode():
     _, _, pool3, pool4, pool5 = fcn.backbone((as_input(images[NOW : NOW + 1]) - fcn.mean) / fcn.std)
     at_32 = fcn.score_conv7(fcn.conv7(fcn.conv6(pool5)))
@@ -562,8 +557,8 @@ with torch.inference_mode():
 parts = {"A: 1/32": at_32, "B: 1/16, pool4 added": at_16, "C: 1/8, pool3 added": at_8, "D: enlarged": whole}
 fig, axes = plt.subplots(2, 2, figsize=(8.4, 3.1), layout="constrained")
 for ax, (name, part) in zip(axes.flat, parts.items(), strict=True):
-    lead = lead_of(POST, part[0])
-    draw_image(lead, ax=ax, cmap="PuOr_r", vmin=-4, vmax=4).set_title(name, fontsize="medium")
+    others = torch.cat([part[0, :POST], part[0, POST + 1 :]]).max(dim=0).values
+    draw_image(part[0, POST] - others, ax=ax, cmap="PuOr_r", vmin=-4, vmax=4).set_title(name, fontsize="medium")
 style = {"arrowprops": {"arrowstyle": "->", "color": "white"}, "fontsize": 9, "color": "white"}
 axes[1, 1].annotate("lamp post", (227, 66), (245, 88), **style)
 axes[1, 1].annotate("street lamp", (168, 25), (70, 20), **style)
@@ -681,7 +676,7 @@ for column in (8, 9, 10, 11):
 
 # %% [markdown]
 # Play with it: move the post, and make it wider. From which width on do all six ways show it? (Without a running kernel
-# there are no dials, and the picture shows one post.) The orange band is where it truly stands.
+# there are no dials; the animation at the top shows a thin and a thicker post.) The orange band is where it truly stands.
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="a post and what six ways make of it, each as a picture above and as bars of brightness below, with the true place as an orange band"

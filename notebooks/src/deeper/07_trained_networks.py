@@ -35,6 +35,7 @@ from semgrid_edu.networks import build_segmenter, load_net
 from semgrid_edu.networks.imagenet import imagenet_tensors
 from semgrid_edu.plotting.images import draw_image
 
+# %% jupyter={"source_hidden": true}
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 plt.rcParams["image.interpolation"] = "nearest"  # pixels stay pixels
 torch.set_num_threads(1)
@@ -46,6 +47,8 @@ frames = [drive[k] for k in range(len(drive))]
 images = np.stack([resize_image(frame.image, SIZE) for frame in frames])
 truths = np.stack([resize_labels(frame.labels.image, SIZE) for frame in frames])
 nets = {name: load_net(sample_image_stage(name), drive.camera).segmenter for name in TRAINED}
+
+# %% jupyter={"source_hidden": true}
 
 
 def as_input(images):
@@ -97,6 +100,8 @@ CHAINS = {
     "unet": [CONV, CONV, *down * 4, *up * 4],
 }
 EVERY = {"segnet": 1, "fcn": 8, "deeplab": 8, "unet": 1}
+
+# %% jupyter={"source_hidden": true}
 
 
 def receptive_field(layers):
