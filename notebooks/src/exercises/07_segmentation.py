@@ -487,7 +487,7 @@ def _pooled(image):
     return windows.max(axis=-1), (2 * v + row) * w + 2 * u + column
 
 
-# % nbgrader={"grade": false, "grade_id": "box-insides", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "box-insides", "locked": true, "schema_version": 3, "solution": false, "task": false}
 def _maxima(image, depth, weight=None):
     """Return an image that was pooled and came back: by its indices, or with a weight of the finer maps by skips."""
     if depth == 0:
@@ -513,7 +513,7 @@ def _sums(image, depth, kernel, stride):
     return _resized(image, places)
 
 
-# % nbgrader={"grade": false, "grade_id": "box-of-a-kind", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "box-of-a-kind", "locked": true, "schema_version": 3, "solution": false, "task": false}
 def _box(kind, depth=2, kernel=(0.25, 0.5, 0.25), weight=1.0, size=16):
     """Return a box of a kind for images of `size` x `size` pixels."""
 
