@@ -628,8 +628,8 @@ axes[0].set_ylabel("rows down [pixels]")
 plt.show()
 
 # %% [markdown]
-# Coloured are the pixels that the output in the middle depends on; in the middle picture three of four pixels are never
-# looked at (*gridding*). The other price is computing time, since each map keeps all its pixels. So DeepLab compromises:
+# Coloured are the pixels that the output in the middle depends on. In the middle picture these are 7 · 7 of 13 · 13; the
+# others are never looked at (*gridding*). The other price is computing time, since each map keeps all its pixels. So DeepLab compromises:
 # it halves three times, goes atrous for the rest, and scores every eighth pixel. At its end four kernels of different
 # rates look at one map, and their scores are summed. (A single one of the four means nothing by itself: training asked
 # only that the sum be right.)
@@ -779,8 +779,8 @@ for name, labels in called.items():
 # The same three networks on a real image, from PandaSet. They have seen simulated streets only. Half of the image's
 # pixels have a label, from LIDAR returns that people have labelled. Let us train on some of them: 40 steps of gradient
 # descent on six frames, and on the points of the *left* half of the image alone. Then we judge two later frames, the
-# left half and the right half apart. The vehicle stands still, so the left half of the later frames is nearly the image
-# that was learnt; the right half is another part of the same street.
+# left half and the right half apart. The vehicle moves by a decimetre only, so the left half of the later frames is
+# nearly the image that was learnt; the right half is another part of the same street.
 #
 # **Predict before you run.** How will the accuracy change on the left half? On the right half? And if the networks learn
 # on the right half instead, what happens on the left?
@@ -798,6 +798,8 @@ street = real_drive()
 real_images, real_truths = seen_by_networks([street[k] for k in range(10)])
 halves = {"left": np.arange(320) < 160, "right": np.arange(320) >= 160}
 labels_of = {half: np.where(columns, real_truths, IGNORE) for half, columns in halves.items()}
+way = np.linalg.norm(street[9].T_world_from_lidar[:3, 3] - street[0].T_world_from_lidar[:3, 3])
+print(f"{(real_truths != IGNORE).mean():.0%} of the pixels have a label; the vehicle has moved by {way:.1f} m")
 
 
 def after_learning(name, half, steps=40):
