@@ -129,8 +129,8 @@ plotting.animate(moving(), period=0.6, alt="a thin post moves by single pixels a
 #
 # ### The graph
 #
-# A network gives each pixel scores, and a soft-max (next section) turns the scores of *one* pixel into probabilities,
-# without asking the neighbours' labels. But labels along a post depend on each other:
+# A network gives each pixel scores, and a soft-max (next section) turns the scores of *one* pixel into probabilities. The
+# network has seen the pixels around, but nobody asks for their *labels*. And labels along a post depend on each other:
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: labels x1 to x5 in a chain, below each an observed score s1 to s5; the edge from x2 to x3 is dashed with its price, .66 to .27"
 stage = post_pixels()
@@ -272,8 +272,8 @@ for lead in (0, 6, 12):
 # <details><summary>Answer</summary>
 #
 # With 1 added about a tenth of the cells change, and with 5 a quarter to a half. Shifting the mean to 0 changes two to
-# four cells in a hundred, because training has left that mean close to 0. Log-probabilities instead of scores,
-# which are all negative, change half of the map or more.
+# four cells in a hundred, because that mean is already close to 0. Log-probabilities instead of scores, which are all
+# negative, change half of the map or more.
 #
 # </details>
 
@@ -303,10 +303,13 @@ for name, change in CHANGES.items():
     print(f"{name:<40}" + "".join(f"{share:10.0f}" for share in shares))
     low, high = {"1 added": (5, 20), "5 added": (20, 60), "mean shifted to 0": (1, 6)}.get(name, (25, 75))
     assert low < min(shares) <= max(shares) < high
+with torch.inference_mode():
+    means = [net.segmenter(as_input(images[NOW : NOW + 1])).mean(dim=1).abs().mean() for net in wholes]
+print("how far the mean of a pixel's scores lies from 0:", *(f"{mean:.1f}" for mean in means))
 
 # %% [markdown]
-# So the networks' scores carry more than the soft-max shows: they have learnt on which side of "nobody looked" each
-# class stands. When you put in your own network, don't hand over log-probabilities.
+# So the scores carry more than a soft-max shows: the next layers have learnt what lies above and below "nobody looked". If
+# you put a network of your own before layers that were trained with scores, don't hand over log-probabilities.
 #
 # ## Down: to see what is around
 #
