@@ -277,7 +277,7 @@ for lead in (0, 6, 12):
 #
 # </details>
 
-# %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
+# %%
 for belief in track_drive(drive[: NOW + 1], spec := load_net(sample_weights(), drive.camera).architecture.grid):
     occupancy = torch.tensor(belief.probability, dtype=torch.float32)[None]
 CHANGES = {
@@ -289,6 +289,7 @@ CHANGES = {
 }
 
 
+# %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
 @torch.inference_mode()
 def map_of(net, change):
     """Return the classes of the map when the scores are changed before they go to the planes, (H, W)."""
@@ -746,9 +747,9 @@ plt.show()
 
 # %% [markdown]
 # Each row is one unseen picture; the thin bar of the second column is the post, the other bar of the image is the wall.
-# Learning closes a part of the gap and keeps the order of the groups. Atrous pays with time,
-# because its maps keep all their pixels. So a mechanism decides what *needn't* be learnt; and on this task, the strided
-# network with 1200 steps hasn't reached what indices have after 150.
+# Learning closes a part of the gap and keeps the order of the groups. Atrous pays with time, because its maps
+# keep all their pixels. So a mechanism decides what *needn't* be learnt; and on this task, the strided network with 1200
+# steps hasn't reached what indices have after 150.
 #
 # ## A post of the drive
 #
