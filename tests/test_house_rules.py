@@ -147,7 +147,7 @@ def test_the_house_stays_small():
         lines[storey] += code_lines(module)
     assert modules["book"] <= 174
     assert modules["workshop"] <= 127
-    assert lines["book"] <= 12_520
+    assert lines["book"] <= 12_550
     assert lines["workshop"] <= 10_890
 
 
