@@ -792,8 +792,8 @@ for name, labels in called.items():
 # <details><summary>Answer</summary>
 #
 # The half that was learnt: all three networks reach more than nine of ten labelled pixels. The other half: learning on
-# the left, SegNet and FCN gain in pixel accuracy and DeepLab loses, and all three lose class accuracy. Learning on the
-# right, SegNet forgets most of the left half. On a view that they have learnt, all look excellent.
+# the left, SegNet and FCN gain in pixel accuracy and DeepLab loses; SegNet and DeepLab lose ten points and more of class
+# accuracy, FCN hardly any. Learning on the right, SegNet forgets most of the left half.
 #
 # </details>
 
@@ -841,7 +841,8 @@ for view in views.values():
     before, left, right = (view[key][1] for key in ("before", "left", "right"))  # rows: halves; pixel, class accuracy
     assert left[0, 0] > max(90, before[0, 0])
     assert right[1, 0] > max(90, before[1, 0])
-    assert left[1, 1] < before[1, 1]
+for name in ("segnet", "deeplab"):
+    assert views[name]["left"][1][1, 1] < views[name]["before"][1][1, 1] - 5
 assert views["segnet"]["right"][1][0, 0] < 50 < views["segnet"]["before"][1][0, 0]
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="a real street in a grid of pictures: A the image, B its labelled points with a line through the middle, then for SegNet, FCN and DeepLab the classes before (C, E, G) and after (D, F, H) learning from the left half: before, road and cars are roughly there with many wrong patches; after, the left half agrees with the points"
