@@ -1,7 +1,7 @@
 """Each stage of the paper as a model of toy size, built from the functions that the pipeline itself calls.
 
 In the order of the lectures: `line` (01); `cell` (02, 04), `beam`, `thick_walls` (02); `cells_in_a_row`, `joint_row`,
-`bof` (03); `cmcdot`, `cmcdot_graph` (04); `pixel_ray` (05, 06); `late_fusion` (08); `ground_truth_label` (09); `crf`
+`bof` (03); `cmcdot`, `cmcdot_graph` (04); `pixel_ray` (05 to 07); `late_fusion` (08); `ground_truth_label` (09); `crf`
 (10); the whole, `system_world` and `system`; and `class_memory`, an edge that the whole cuts. `stage_graph` holds what
 each of them builds: a model, its drawing, and the edges that are cut, whose ledger it lists. `prices` measures what
 those cost.
@@ -29,7 +29,7 @@ from semgrid_edu.stage_models.ground_truth_label import (
 )
 from semgrid_edu.stage_models.late_fusion import TwoSensors, car_by_both, late_fusion
 from semgrid_edu.stage_models.line import bayes_on_a_line
-from semgrid_edu.stage_models.pixel_ray import RayWorld, pixel_height, pixel_ray, shared_pixel
+from semgrid_edu.stage_models.pixel_ray import RayWorld, pixel_height, pixel_ray, post_pixels, shared_pixel
 from semgrid_edu.stage_models.stage_graph import CutEdge, LedgerLine, Price, StageGraph, ledger, ledger_table
 from semgrid_edu.stage_models.system import system_gain, whole_system
 from semgrid_edu.stage_models.system_world import SystemWorld
@@ -67,6 +67,7 @@ __all__ = [
     "package_log_odds_cell",
     "pixel_height",
     "pixel_ray",
+    "post_pixels",
     "read_scans",
     "scan_with_pose_error",
     "shared_pixel",

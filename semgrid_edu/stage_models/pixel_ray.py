@@ -1,12 +1,13 @@
-"""What pixels say of the cells that read them, and what equations (1) and (2) make of it (lectures 05 and 06).
+"""What pixels say of the cells that read them and of each other, and what the system makes of it (lectures 05 to 07).
 
 A camera sees the first thing on each ray. Equation (1) gives every cell a pixel, whatever stands in front of the cell,
 and a plane gives every pixel one height, whatever height the pixel shows. Cells that read one pixel
-share its error.
+share its error. And pixels along a post have one label, which a soft-max per pixel doesn't know.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from itertools import product as every_combination
 
 import numpy as np
@@ -198,3 +199,55 @@ def believed_by_readers(readers: int = 4, right: float = 0.8, prior: float = 0.5
     exact = eliminate(model, ("m",), {f"x{k}": 1 for k in range(1, readers + 1)}).normalised().table[1]
     car, road = prior * right**readers, (1 - prior) * (1 - right) ** readers
     return np.array([exact, car / (car + road)])
+
+
+def post_pixels(pixels: int = 5, stays: float = 0.8, lead: float = 1.0) -> StageGraph:
+    """Build the graph of the labels of neighbouring pixels along a post, and what a network says of each.
+
+    Parameters
+    ----------
+    pixels : int
+        Number of pixels, at least 1.
+    stays : float
+        Probability that the next pixel has the same label.
+    lead : float
+        By how much the network's score of the class it names leads, so that it is right with probability
+        1 / (1 + exp(-lead)).
+
+    Returns
+    -------
+    StageGraph
+        Variables x1, x2, ... (the labels: 0 something else, 1 post) and s1, s2, ... (the class with the larger score).
+    """
+    if pixels < 1:
+        raise ArgumentError("pixels", "at least 1", pixels)
+    labels, scores = ([f"{letter}{k}" for k in range(1, pixels + 1)] for letter in "xs")
+    right = 1 / (1 + np.exp(-lead))
+    factors = [binary(labels[0], 0.5)]
+    factors += [Factor(pair, [[stays, 1 - stays], [1 - stays, stays]]) for pair in pairwise(labels)]
+    factors += [Factor(pair, [[right, 1 - right], [1 - right, right]]) for pair in zip(labels, scores, strict=True)]
+    return StageGraph(
+        "Labels of pixels along a post",
+        directed(factors),
+        observed=tuple(scores),
+        positions=in_rows(labels, (), scores),
+        equations={labels[-1]: "labels of the pixels", scores[-1]: "what the scores say"},
+        cut=cut_edges("network"),
+    )
+
+
+def believed_of_post(says: Sequence[int], stays: float = 0.8, lead: float = 1.0) -> NDArray[np.float64]:
+    """Return P(post) of each pixel: exactly, and by a soft-max of its own scores alone, (2, K).
+
+    Parameters
+    ----------
+    says : (K,) int
+        The class with the larger score in each pixel: 0 something else, 1 post.
+    stays, lead : float
+        Those of `post_pixels`.
+    """
+    model = post_pixels(len(says), stays, lead).model
+    known = {f"s{k}": int(one) for k, one in enumerate(says, 1)}
+    exact = [eliminate(model, (f"x{k}",), known).normalised().table[1] for k in range(1, len(says) + 1)]
+    alone = 1 / (1 + np.exp(-lead * (2 * np.asarray(says) - 1)))
+    return np.array([exact, alone])

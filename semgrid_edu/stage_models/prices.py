@@ -29,7 +29,13 @@ from semgrid_edu.stage_models.ground_truth_label import LabelWorld, count_rings,
 from semgrid_edu.stage_models.joint_row import exact_beliefs
 from semgrid_edu.stage_models.late_fusion import CAR, UNKNOWN, car_by_both
 from semgrid_edu.stage_models.line import bayes_on_a_line, filtered, smoothed
-from semgrid_edu.stage_models.pixel_ray import believed_by_readers, cell_by_cell, exact_ray, pixel_height
+from semgrid_edu.stage_models.pixel_ray import (
+    believed_by_readers,
+    believed_of_post,
+    cell_by_cell,
+    exact_ray,
+    pixel_height,
+)
 from semgrid_edu.stage_models.stage_graph import Price, StageGraph
 from semgrid_edu.stage_models.system import street, system_gain
 from semgrid_edu.stage_models.system_world import STATE_OF, SystemWorld
@@ -120,6 +126,12 @@ def four_readers() -> Price:
     """Lecture 06: what four cells know that read one pixel."""
     exact, system = believed_by_readers(4)
     return Price(exact, system, "P(car) when four cells read car")
+
+
+def gap_in_a_post() -> Price:
+    """Lecture 07: a pixel of a post that the network takes for something else, between four that it names rightly."""
+    exact, alone = believed_of_post([1, 1, 0, 1, 1])[:, 2]
+    return Price(exact, alone, "P(post) of a gap in a post")
 
 
 def hidden_from_both() -> Price:

@@ -3,23 +3,38 @@
 from grader_checks import GraderChecks, mistake, right
 
 
-def field(
-    start="1, 1, 0",
-    adds="reach * jump",
-    moves="(reach / 2 - padding) * jump",
-    then="jump *= stride",
-    result="field, jump, centre",
-):
-    """Return an answer to task 1 that begins, adds, moves the centre and multiplies like this."""
+def chain(largest="2 * sum(rates) + 1", to_see="(field - 1) // 2", result="rates"):
+    """Return an answer to task 1 that takes this for the largest rate without a gap, or ends like this."""
     return f"""
-def receptive_field(layers):
-    field, jump, centre = {start}
-    for kernel, stride, rate, padding in layers:
-        reach = (kernel - 1) * rate
-        field += {adds}
-        centre += {moves}
-        {then}
+def fewest_rates(field):
+    to_see, rates = {to_see}, []
+    while sum(rates) < to_see:
+        rates.append(min({largest}, to_see - sum(rates)))
     return {result}"""
+
+
+def probing(
+    linear="np.allclose(box(one + other), box(one) + box(other))",
+    moves="np.allclose(box(np.roll(dot, 1, axis=1)), np.roll(box(dot), 1, axis=1))",
+    empty="np.mean(box(1 + one) == 0) > 0.5",
+):
+    """Return an answer to task 4 that asks for these properties."""
+    return f"""
+def name_mechanism(box, size):
+    one, other = np.random.default_rng(1).random((2, size, size))
+    dot = np.zeros((size, size))
+    dot[size // 2, size // 2] = 1
+    if {linear}:
+        return ATROUS if {moves} else STRIDED
+    return INDICES if {empty} else SKIPS"""
+
+
+COLLEAGUE = """
+def loss_and_gradient(scores, truth):
+    P = np.exp(scores) / np.exp(scores).sum(axis=1, keepdims=True)
+    true = np.clip(truth, 0, len(scores) - 1)
+    one_hot = np.arange(len(scores))[:, None, None] == true
+    return -np.log(P[one_hot]).sum() / truth.size, P - one_hot"""
 
 
 MAX_POOL = """
@@ -111,318 +126,133 @@ def loss_and_gradient(scores, truth):
     return {result}, {gradient}"""
 
 
-def enlarging(places="2 * np.arange(len(values)) + 0.5", result="up + fine"):
-    """Return an answer to task 4 in which the values belong to these places, or that ends like this."""
-    return f"""
-def add_skip(coarse, fine):
-    def enlarge(values):
-        return np.interp(np.arange(2 * len(values)), {places}, values)
-
-    up = np.apply_along_axis(enlarge, 2, np.apply_along_axis(enlarge, 1, coarse))
-    C, H, W = fine.shape
-    whole, up = up, up[:, :H, :W]
-    return {result}"""
-
-
 class TestSegmentation(GraderChecks):
     exercise = "07_segmentation"
     entries = (
         # ---- task 1
         right(
-            "first and last pixel, from the last layer back to the first",
-            task="field",
+            "powers of three, and what is left wherever it fits, in an array",
+            task="chain",
             code="""
-def receptive_field(layers):
-    first = last = 0
-    for kernel, stride, rate, padding in reversed(layers):
-        first = stride * first - padding
-        last = stride * last - padding + rate * (kernel - 1)
-    return last - first + 1, int(np.prod([layer[1] for layer in layers])), (first + last) / 2""",
+def fewest_rates(field):
+    n = 0
+    while 3**n < field:
+        n += 1
+    rates = [3**k for k in range(n - 1)]
+    left = (field - 1) // 2 - sum(rates)
+    return np.sort(rates + [left] * (left > 0))""",
         ),
         right(
-            "no loop, and a list",
-            task="field",
+            "from the far end: the last layer takes two thirds",
+            task="chain",
             code="""
-def receptive_field(layers):
-    kernel, stride, rate, padding = np.array(layers, int).reshape(-1, 4).T
-    jumps = np.cumprod([1, *stride])
-    reach = (kernel - 1) * rate * jumps[:-1]
-    return [1 + reach.sum(), jumps[-1], reach.sum() / 2 - padding @ jumps[:-1]]""",
-        ),
-        right(
-            "recursion",
-            task="field",
-            code="""
-def receptive_field(layers):
-    if not layers:
-        return 1, 1, 0
-    field, jump, centre = receptive_field(layers[:-1])
-    kernel, stride, rate, padding = layers[-1]
-    reach = (kernel - 1) * rate
-    return field + reach * jump, jump * stride, centre + jump * (reach - 2 * padding) / 2""",
+def fewest_rates(field):
+    if field == 1:
+        return []
+    inner = -(-field // 3)
+    inner += 1 - inner % 2
+    return [*fewest_rates(inner), (field - inner) // 2]""",
         ),
         mistake(
-            "jump forgotten",
-            task="field",
-            loses=1,
-            says="the jump is forgotten: after a halving each step of a kernel",
-            code=field(adds="(kernel - 1) * rate"),
-        ),
-        mistake(
-            "a layer's own stride counted in it",
-            task="field",
-            loses=1,
-            says="a layer's own stride counts from the next layer on: first the field",
-            code=field(adds="(kernel - 1) * rate * jump * stride"),
-        ),
-        mistake(
-            "kernel instead of kernel - 1",
-            task="field",
-            loses=1,
-            says="a kernel of 3 adds its two neighbours",
-            code=field(adds="kernel * rate * jump"),
-        ),
-        mistake(
-            "rate forgotten",
-            task="field",
-            loses=1,
-            says="the rate is forgotten",
-            code=field(adds="(kernel - 1) * jump"),
-        ),
-        mistake(
-            "field starts at 0", task="field", loses=1, says="start with a field of 1", code=field(start="0, 1, 0")
-        ),
-        mistake("strides added", task="field", loses=3, says="strides multiply", code=field(then="jump += stride")),
-        mistake(
-            "rate applied to the stride",
-            task="field",
-            loses=3,
-            says="it is no part of the jump",
-            code=field(then="jump *= stride * rate"),
-        ),
-        mistake(
-            "kernels added up",
-            task="field",
-            loses=3,
-            says="you add up the kernels",
-            code="""def receptive_field(layers):
-    return sum(layer[0] for layer in layers), 4, 6.5""",
-        ),
-        mistake(
-            "a kernel of 3 with rate 2 taken for one of 6",
-            task="field",
-            loses=1,
-            says="spans 5 pixels, not 6",
-            code=field(adds="(kernel * rate - 1) * jump"),
-        ),
-        mistake(
-            "padding added to the field",
-            task="field",
-            loses=1,
-            says="the field doesn't know of it",
-            code=field(adds="((kernel - 1) * rate + 2 * padding) * jump"),
-        ),
-        mistake(
-            "the lecture's two numbers",
-            task="field",
+            "all rates 1",
+            task="chain",
             loses=2,
-            says="return three numbers",
-            code=field(result="field, jump"),
+            says="field 9: 2 layers are enough, you take 4",
+            code="def fewest_rates(field):\n    return [1] * ((field - 1) // 2)",
         ),
         mistake(
-            "jump of one stride",
-            task="field",
-            loses=1,
-            says="so outputs lie 4 pixels apart",
-            code=field(result="field, 2, centre"),
+            "doubled rates, as in the lecture",
+            task="chain",
+            loses=2,
+            says="field 9: 2 layers are enough, you take 3",
+            code=chain("2 ** len(rates)"),
         ),
         mistake(
-            "from the last layer to the first, by the formula of the first to the last",
-            task="field",
+            "one layer",
+            task="chain",
             loses=3,
-            says="you walk from the last layer to the first: `layers` begins at the image, where the jump is 1",
-            code=field().replace("in layers", "in layers[::-1]"),
+            says="only 3 of its pixels count",
+            code="def fewest_rates(field):\n    return [(field - 1) // 2] if field > 1 else []",
         ),
         mistake(
-            "rate and stride swapped",
-            task="field",
+            "one pixel too greedy",
+            task="chain",
             loses=3,
-            says="each layer is (kernel, stride, rate, padding)",
-            code=field().replace("kernel, stride, rate, padding in", "kernel, rate, stride, padding in"),
+            says="as in the lecture's gridding",
+            code=chain("2 * sum(rates) + 2"),
         ),
         mistake(
-            "jump first",
-            task="field",
-            loses=1,
-            says="return the field first, then the jump",
-            code=field(result="jump, field, centre"),
+            "greedy by three times",
+            task="chain",
+            loses=3,
+            says="as in the lecture's gridding",
+            code=chain("3 * sum(rates) + 1"),
         ),
         mistake(
-            "pixels counted without the holes",
-            task="field",
-            loses=1,
-            says="on inputs you haven't seen: wrong field (from the first pixel to the last",
+            "powers of three, not cut to the field",
+            task="chain",
+            loses=3,
+            says="have a field of",
             code="""
-def receptive_field(layers):
-    seen, jump = {0}, 1
-    for kernel, stride, rate, padding in reversed(layers):
-        seen = {stride * place + rate * k - padding for place in seen for k in range(kernel)}
-        jump *= stride
-    return len(seen), jump, (min(seen) + max(seen)) / 2""",
+def fewest_rates(field):
+    rates = []
+    while 1 + 2 * sum(rates) < field:
+        rates.append(3 ** len(rates))
+    return rates""",
         ),
         mistake(
-            "strides are 2 or nothing",
-            task="field",
+            "the rates sum to the field",
+            task="chain",
             loses=3,
-            says="on inputs you haven't seen: wrong jump",
-            code=field(then="jump *= 2 if stride > 1 else 1"),
+            says="the rates sum to (field - 1) / 2",
+            code=chain(to_see="field - 1"),
         ),
         mistake(
-            "waits for the list to be empty",
-            task="field",
+            "the output's own pixel forgotten",
+            task="chain",
+            loses=3,
+            says="the output's own pixel is part of the field",
+            code=chain(to_see="(field + 1) // 2"),
+        ),
+        mistake(
+            "how many instead of which",
+            task="chain",
+            loses=3,
+            says="return a list of rates",
+            code=chain(result="len(rates)"),
+        ),
+        mistake(
+            "a rate of zero at the end",
+            task="chain",
+            loses=3,
+            says="a rate is a whole number from 1",
+            code=chain(result="rates + [0]"),
+        ),
+        mistake(
+            "fractions",
+            task="chain",
+            loses=3,
+            says="a rate is a whole number from 1",
+            code="def fewest_rates(field):\n    return [(field - 1) / 4] * 2",
+        ),
+        mistake(
+            "the fields of the visible tests written in",
+            task="chain",
+            loses=3,
+            says="on inputs you haven't seen",
+            code=chain(to_see="(field - 1) // 2 if field in (1, 3, 7, 9, 13, 27, 29, 61, 243) else 1"),
+        ),
+        mistake(
+            "takes nothing away",
+            task="chain",
             loses=3,
             says="no reply before timeout",
             code="""
-def receptive_field(layers):
-    field, jump = 1, 1
-    while layers:
-        kernel, stride, rate, padding = layers[0]
-        field += (kernel - 1) * rate * jump
-        jump *= stride
-    return field, jump, 0""",
-        ),
-        mistake(
-            "padding forgotten",
-            task="field",
-            loses=2,
-            says="the padding is forgotten",
-            code=field(moves="reach / 2 * jump"),
-        ),
-        mistake(
-            "padding not in pixels",
-            task="field",
-            loses=2,
-            says="a zero is as wide as the jump",
-            code=field(moves="reach / 2 * jump - padding"),
-        ),
-        mistake(
-            "centre without the jump",
-            task="field",
-            loses=2,
-            says="the jump is forgotten: after a halving each step is two",
-            code=field(moves="reach / 2 - padding"),
-        ),
-        mistake(
-            "centre with the layer's own stride",
-            task="field",
-            loses=2,
-            says="first the centre, then the jump",
-            code=field(moves="(reach / 2 - padding) * jump * stride"),
-        ),
-        mistake(
-            "centre without the rate",
-            task="field",
-            loses=2,
-            says="the rate spreads the kernel",
-            code=field(moves="((kernel - 1) / 2 - padding) * jump"),
-        ),
-        mistake(
-            "padding spread by the rate",
-            task="field",
-            loses=2,
-            says="padding stays",
-            code=field(moves="(reach / 2 - padding * rate) * jump"),
-        ),
-        mistake(
-            "half a kernel too wide",
-            task="field",
-            loses=2,
-            says="of two half a step: (kernel - 1) / 2",
-            code=field(moves="(kernel * rate / 2 - padding) * jump"),
-        ),
-        mistake(
-            "rounded down",
-            task="field",
-            loses=2,
-            says="half a pixel is lost",
-            code=field(moves="(reach // 2 - padding) * jump"),
-        ),
-        mistake(
-            "kernel // 2",
-            task="field",
-            loses=2,
-            says="half a pixel too far",
-            code=field(moves="(kernel // 2 * rate - padding) * jump"),
-        ),
-        mistake(
-            "padding added",
-            task="field",
-            loses=2,
-            says="the sign of the padding",
-            code=field(moves="(reach / 2 + padding) * jump"),
-        ),
-        mistake(
-            "padding on both sides",
-            task="field",
-            loses=2,
-            says="the padding counts twice",
-            code=field(moves="(reach / 2 - 2 * padding) * jump"),
-        ),
-        mistake(
-            "half of the padding",
-            task="field",
-            loses=2,
-            says="half of the padding is lost",
-            code=field(moves="(reach - padding) / 2 * jump"),
-        ),
-        mistake(
-            "the first pixel",
-            task="field",
-            loses=2,
-            says="that is the first pixel of the field",
-            code=field(moves="-padding * jump"),
-        ),
-        mistake(
-            "the last pixel",
-            task="field",
-            loses=2,
-            says="that is the last pixel of the field",
-            code=field(moves="(reach - padding) * jump"),
-        ),
-        mistake(
-            "sign of the centre",
-            task="field",
-            loses=2,
-            says="what a kernel reaches to the right is added",
-            code=field(moves="(padding - reach / 2) * jump"),
-        ),
-        mistake(
-            "pixel 0 lies at a half",
-            task="field",
-            loses=2,
-            says="half a pixel too far: pixel 0 lies at 0",
-            code=field(start="1, 1, 0.5"),
-        ),
-        mistake(
-            "half the field",
-            task="field",
-            loses=2,
-            says="that is half the field",
-            code=field(result="field, jump, field / 2"),
-        ),
-        mistake(
-            "the middle of the field, padding forgotten",
-            task="field",
-            loses=2,
-            says="the padding is forgotten",
-            code=field(result="field, jump, (field - 1) / 2"),
-        ),
-        mistake(
-            "rounded only where it is negative",
-            task="field",
-            loses=2,
-            says="on inputs you haven't seen: wrong centre (it may lie between pixels, or below 0)",
-            code=field(result="field, jump, max(0, centre)"),
+def fewest_rates(field):
+    left, rates = (field - 1) // 2, []
+    while left >= 0:
+        rates = [1]
+    return rates""",
         ),
         # ---- task 2
         right(
@@ -1123,134 +953,121 @@ def atrous(maps, kernels, bias, stride, rate):
     return out""",
         ),
         # ---- task 4
+        right("three properties", task="boxes", code=probing()),
         right(
-            "scipy's spline of order 1",
-            task="skip",
+            "zeros first, then the negative of an image, then two dots",
+            task="boxes",
             code="""
-from scipy.ndimage import map_coordinates
-
-def add_skip(coarse, fine):
-    C, H, W = fine.shape
-    places = np.stack(np.meshgrid((np.arange(H) - 0.5) / 2, (np.arange(W) - 0.5) / 2, indexing="ij"))
-    return np.array([map_coordinates(s, places, order=1, mode="nearest") for s in coarse]) + fine""",
+def name_mechanism(box, size):
+    image = np.random.default_rng(3).random((size, size))
+    if (box(image + 1) == 0).mean() > 0.7:
+        return 0
+    if not np.allclose(box(-image), -box(image)):
+        return 1
+    dots = []
+    for column in range(size // 2, size // 2 + 2):
+        dot = np.zeros((size, size))
+        dot[size // 2, column] = 1.0
+        dots.append(box(dot).sum(axis=0))
+    return 3 if np.allclose(dots[0][:-1], dots[1][1:]) else 2""",
         ),
         right(
-            "three quarters of the near, one of the far",
-            task="skip",
+            "by the answers to all dots of a row: a matrix",
+            task="boxes",
             code="""
-def double(values):
-    before = np.concatenate([values[:, :1], values[:, :-1]], axis=1)
-    after = np.concatenate([values[:, 1:], values[:, -1:]], axis=1)
-    both = np.stack([0.75 * values + 0.25 * before, 0.75 * values + 0.25 * after], axis=2)
-    return both.reshape(values.shape[0], -1, values.shape[2])
-
-def add_skip(coarse, fine):
-    up = double(double(coarse).swapaxes(1, 2)).swapaxes(1, 2)
-    return fine + up[:, : fine.shape[1], : fine.shape[2]]""",
+def name_mechanism(box, size):
+    rows, middle = np.eye(size), size // 2
+    answers = np.array([box(np.outer(rows[middle], row)) for row in rows])
+    image = np.outer(rows[middle], np.arange(size) + 1.0)
+    if not np.allclose(box(image), np.tensordot(np.arange(size) + 1.0, answers, axes=1)):
+        return INDICES if (box(np.ones((size, size))) != 0).mean() < 0.4 else SKIPS
+    return ATROUS if np.allclose(answers[middle][:, :-1], answers[middle + 1][:, 1:]) else STRIDED""",
         ),
-        right("np.interp along both axes", task="skip", code=enlarging()),
         mistake(
-            "nearest",
-            task="skip",
+            "always the same",
+            task="boxes",
             loses=3,
-            says="each value is repeated (nearest)",
+            says="this box is ATROUS, and you say INDICES",
+            code="def name_mechanism(box, size):\n    return INDICES",
+        ),
+        mistake(
+            "skips taken for a sum of products",
+            task="boxes",
+            loses=3,
+            says="is the answer to a sum of two images the sum of the answers?",
             code="""
-def add_skip(coarse, fine):
-    return coarse.repeat(2, axis=1).repeat(2, axis=2)[:, : fine.shape[1], : fine.shape[2]] + fine""",
+def name_mechanism(box, size):
+    one = np.random.default_rng(1).random((size, size))
+    dot = np.zeros((size, size))
+    dot[size // 2, size // 2] = 1
+    if np.mean(box(1 + one) == 0) > 0.5:
+        return INDICES
+    return ATROUS if box(dot).max() == box(dot)[size // 2, size // 2] else STRIDED""",
         ),
         mistake(
-            "value i at pixel 2i",
-            task="skip",
+            "a post that isn't moved",
+            task="boxes",
             loses=3,
-            says="you put value i at column 2i",
-            code=enlarging("2 * np.arange(len(values))"),
+            says="move it by one pixel",
+            code=probing(moves="box(dot).max() == box(dot)[size // 2, size // 2]"),
         ),
         mistake(
-            "align_corners",
-            task="skip",
+            "moved by four pixels",
+            task="boxes",
             loses=3,
-            says="(align_corners)",
-            code=enlarging("np.linspace(0, 2 * len(values) - 1, len(values))"),
+            says="move it by one pixel",
+            code=probing(moves="np.allclose(box(np.roll(dot, 4, axis=1)), np.roll(box(dot), 4, axis=1))"),
         ),
         mistake(
-            "stretched to the fine map's size",
-            task="skip",
+            "twice an image instead of a sum of two",
+            task="boxes",
             loses=3,
-            says="double it to eight, then cut one off",
-            code="""
-from scipy.ndimage import map_coordinates
-
-def add_skip(coarse, fine):
-    C, H, W = fine.shape
-    rows, cols = (np.arange(H) + 0.5) * coarse.shape[1] / H - 0.5, (np.arange(W) + 0.5) * coarse.shape[2] / W - 0.5
-    places = np.stack(np.meshgrid(rows, cols, indexing="ij"))
-    return np.array([map_coordinates(s, places, order=1, mode="nearest") for s in coarse]) + fine""",
+            says="and you say",
+            code=probing(linear="np.allclose(box(2 * one), 2 * box(one))"),
         ),
         mistake(
-            "cropped at the wrong end",
-            task="skip",
+            "zeros in a dark image",
+            task="boxes",
             loses=3,
-            says="the first column is cut off",
-            code=enlarging(result="whole[:, -H:, -W:] + fine"),
+            says="which of them leaves three of four pixels at zero, even in a bright image?",
+            code=probing(empty="np.mean(box(dot) == 0) > 0.5"),
         ),
         mistake(
-            "not cropped",
-            task="skip",
-            loses=3,
-            says="a column too many",
-            code=enlarging(result="whole + np.pad(fine, ((0, 0), (0, whole.shape[1] - H), (0, whole.shape[2] - W)))"),
-        ),
-        mistake(
-            "zeros outside",
-            task="skip",
-            loses=3,
-            says="before the first place, 1/2, the value stays at 4",
-            code="""
-def add_skip(coarse, fine):
-    def enlarge(values):
-        places = 2 * np.arange(-1, len(values) + 1) + 0.5
-        return np.interp(np.arange(2 * len(values)), places, [0, *values, 0])
-
-    rows = np.apply_along_axis(enlarge, 1, coarse) if coarse.shape[1] > 1 else coarse.repeat(2, axis=1)
-    up = np.apply_along_axis(enlarge, 2, rows)
-    return up[:, : fine.shape[1], : fine.shape[2]] + fine""",
-        ),
-        mistake("the mean of both", task="skip", loses=3, says="a skip adds", code=enlarging(result="(up + fine) / 2")),
-        mistake("fine forgotten", task="skip", loses=3, says="the coarse map alone", code=enlarging(result="up")),
-        mistake(
-            "multiplied",
-            task="skip",
-            loses=3,
-            says="it doesn't multiply them",
-            code=enlarging(result="up * np.where(fine == 0, 1, fine)"),
-        ),
-        mistake(
-            "coarse forgotten",
-            task="skip",
-            loses=3,
-            says="the coarse scores got lost",
-            code=enlarging(result="fine + 0"),
-        ),
-        mistake(
-            "added in place",
-            task="skip",
+            "the lecture's numbers: how bright a post comes back",
+            task="boxes",
             loses=2,
-            says="add_skip changed its argument",
-            code=enlarging(result="np.add(fine, up, out=fine)"),
+            says="and you say",
+            code="""
+def name_mechanism(box, size):
+    post = np.zeros((size, size))
+    post[:, size // 2 + 1] = 1
+    row = box(post).max(axis=0)
+    if np.isclose(row.max(), 1):
+        return INDICES
+    if row.max() > 1:
+        return SKIPS
+    return ATROUS if row.argmax() == size // 2 + 1 else STRIDED""",
         ),
         mistake(
-            "rows repeated, columns interpolated",
-            task="skip",
-            loses=1,
-            says="rows are interpolated too",
-            code=enlarging().replace("np.apply_along_axis(enlarge, 1, coarse)", "coarse.repeat(2, axis=1)"),
+            "nine of ten pixels zero",
+            task="boxes",
+            loses=2,
+            says="this box is INDICES, and you say SKIPS",
+            code=probing(empty="np.mean(box(1 + one) == 0) > 0.9"),
         ),
         mistake(
-            "one or two classes written in",
-            task="skip",
+            "the sizes of the visible tests written in",
+            task="boxes",
             loses=3,
-            says="on inputs you haven't seen: not the shape of the fine map",
-            code=enlarging(result="(up + fine)[:2]"),
+            says="on inputs you haven't seen: a box gets the name of another mechanism",
+            code=probing().replace("    if np", "    if size not in (16, 24):\n        return SKIPS\n    if np"),
+        ),
+        mistake(
+            "a text",
+            task="boxes",
+            loses=3,
+            says="returned no array of numbers",
+            code="def name_mechanism(box, size):\n    return 'atrous'",
         ),
         # ---- task 5
         right(
@@ -1293,11 +1110,50 @@ def loss_and_gradient(scores, truth):
     return (total - s[c, np.arange(count)]).mean(), gradient""",
         ),
         mistake(
+            "the colleague's loss as it is",
+            task="loss",
+            loses=4,
+            says="",
+            code=COLLEAGUE,
+        ),
+        mistake(
+            "the colleague's loss, the soft-max mended",
+            task="loss",
+            loses=4,
+            says="you count the unlabelled pixel as the last class",
+            code=COLLEAGUE.replace("axis=1, keepdims=True", "axis=0"),
+        ),
+        mistake(
+            "the colleague's loss, unlabelled pixels mended in the loss alone",
+            task="loss",
+            loses=3,
+            says="the pixel that isn't labelled has no part in the loss",
+            code="""
+def loss_and_gradient(scores, truth):
+    P = np.exp(scores) / np.exp(scores).sum(axis=0)
+    one_hot = np.arange(len(scores))[:, None, None] == truth
+    return -np.log(P[one_hot]).mean(), P - one_hot""",
+        ),
+        mistake(
             "no protection against large scores",
             task="loss",
             loses=1,
             says="subtract the pixel's largest score",
             code=loss(),
+        ),
+        mistake(
+            "no shift, in long double",
+            task="loss",
+            loses=1,
+            says="on inputs you haven't seen",
+            code="""
+def loss_and_gradient(scores, truth):
+    odds = np.exp(np.asarray(scores, np.longdouble))
+    log_P = np.log(odds / odds.sum(axis=0))
+    labelled = truth != 255
+    is_true = np.arange(len(scores))[:, None, None] == truth
+    gradient = labelled * (np.exp(log_P) - is_true) / labelled.sum()
+    return float(-log_P[is_true].mean()), gradient.astype(float)""",
         ),
         mistake(
             "logarithm of a probability that is zero",

@@ -13,41 +13,39 @@ from semgrid_edu.answers import answer_array
 from semgrid_instructor import close, generator, hidden, keeping
 
 
-def _pixels_seen(layers: list[tuple[int, int, int, int]]) -> set[int]:
-    """Return the pixels of a row that output 0 of a chain depends on, walked from the last layer to the first."""
-    seen = {0}
-    for kernel, stride, rate, padding in reversed(layers):
-        seen = {stride * place + rate * k - padding for place in seen for k in range(kernel)}
-    return seen
+def _rates(fewest_rates: Callable, field: int) -> list[int]:
+    """Return the rates for a field, after checking that they have this field without a gap."""
+    rates = answer_array(fewest_rates(field))
+    assert rates.ndim == 1, "it doesn't return a list of rates"
+    assert np.all(rates == np.round(rates)), "a rate isn't a whole number"
+    assert np.all(rates >= 1), "a rate is below 1"
+    assert 1 + 2 * rates.sum() == field, "the chain hasn't the field that was asked for"
+    counts = np.ones(1)
+    for rate in rates.astype(int):
+        counts = np.convolve(counts, np.isin(np.arange(2 * rate + 1), (0, rate, 2 * rate)))
+        counts = np.minimum(counts, 1)
+    assert counts.all(), "the chain has a gap"
+    return rates.tolist()
 
 
-def _chains(seed: int) -> list[list[tuple[int, int, int, int]]]:
-    """Return random chains of five layers, kernels from 1 to 4, paddings from 0 to 3."""
-    layers = generator(seed).integers((1, 1, 1, 0), (5, 4, 4, 4), size=(12, 5, 4))
-    return [[tuple(layer) for layer in chain] for chain in layers.tolist()]
-
-
-@hidden
-def check_field(receptive_field: Callable) -> None:
-    """No layer, and random chains, whose pixels are counted one by one."""
-    assert answer_array(receptive_field([])).ravel()[:2].tolist() == [1, 1], (
-        "an empty chain sees its own pixel: field 1, jump 1"
-    )
-    for chain in _chains(71):
-        field, jump = answer_array(receptive_field(list(chain))).ravel()[:2]
-        seen = _pixels_seen(chain)
-        assert jump == np.prod([stride for _, stride, _, _ in chain]), "wrong jump (strides need not be 1 or 2)"
-        assert field == max(seen) - min(seen) + 1, "wrong field (from the first pixel to the last, holes and all)"
+def _fields(seed: int) -> list[int]:
+    """Return odd fields, small and large, and those around the powers of three."""
+    return [5, 11, 25, 31, 79, 81, 83, 729, *(2 * generator(seed).integers(4, 1000, size=6) + 1).tolist()]
 
 
 @hidden
-def check_centre(receptive_field: Callable) -> None:
-    """No layer, and random chains, kernels of even size among them."""
-    assert answer_array(receptive_field([])).ravel()[2] == 0, "output 0 of an empty chain is pixel 0"
-    for chain in _chains(72):
-        seen = _pixels_seen(chain)
-        centre = answer_array(receptive_field(list(chain))).ravel()[2]
-        assert close(centre, (min(seen) + max(seen)) / 2), "wrong centre (it may lie between pixels, or below 0)"
+def check_chain(fewest_rates: Callable) -> None:
+    """Other fields; the layers may be too many."""
+    for field in _fields(71):
+        _rates(fewest_rates, field)
+
+
+@hidden
+def check_fewest(fewest_rates: Callable) -> None:
+    """Other fields: n layers see at most 3^n pixels without a gap."""
+    for field in _fields(72):
+        layers = len(_rates(fewest_rates, field))
+        assert 3 ** (layers - 1) < field, "a chain could be shorter"
 
 
 def _pool(maps: NDArray, kernel: int, stride: int) -> tuple[NDArray, NDArray]:
@@ -163,29 +161,68 @@ def check_stride(atrous: Callable) -> None:
         assert close(got, wanted), f"not every output number {stride} of stride 1, with N {size}, rate {rate}"
 
 
-def _check_skip(add_skip: Callable, seed: int, cases: tuple) -> None:
-    """Random scores of several classes, with these sizes of coarse and fine maps."""
+def _pooling(kind: int, depth: int, weight: float) -> Callable:
+    """Return a box of maxima: 0 indices, 1 skips."""
+
+    def box(image: NDArray) -> NDArray:
+        image = np.asarray(image, float)
+        pooled, levels = image, []
+        for _ in range(depth):
+            levels.append((pooled, _pool(pooled[None], 2, 2)[1][0]))
+            pooled = _pool(pooled[None], 2, 2)[0][0]
+        for before, places in reversed(levels):
+            if kind == 0:
+                pooled, small = np.zeros(before.shape), pooled
+                pooled.flat[places.ravel()] = small.ravel()
+            else:
+                finer = np.mgrid[: before.shape[0], : before.shape[1]] / 2 - 0.25
+                pooled = map_coordinates(pooled, finer, order=1, mode="nearest") + weight * before
+        return pooled
+
+    return box
+
+
+def _convolving(kind: int, depth: int, kernels: NDArray) -> Callable:
+    """Return a box of sums: 2 strided, 3 atrous."""
+
+    def box(image: NDArray) -> NDArray:
+        result = np.asarray(image, float)
+        for level in range(depth):
+            rate = 1 if kind == 2 else 2**level
+            spread = np.zeros((2 * rate + 1, 2 * rate + 1))
+            spread[::rate, ::rate] = kernels[level]
+            result = correlate(result, spread, mode="constant")
+            result = result[::2, ::2] if kind == 2 else result
+        places = np.mgrid[: len(image), : len(image)] / 2**depth
+        return map_coordinates(result, places, order=1, mode="nearest") if kind == 2 else result
+
+    return box
+
+
+def _check_boxes(name_mechanism: Callable, seed: int, depths: tuple[int, ...], plain: bool) -> None:
+    """Judge boxes of each kind in a random order: with the lecture's kernel, or with random ones and weights."""
     rng = generator(seed)
-    for n_classes, (h, w), (height, width) in cases:
-        coarse, fine = rng.normal(size=(n_classes, h, w)), rng.normal(size=(n_classes, height, width))
-        got = answer_array(add_skip(coarse.copy(), fine.copy()))
-        assert got.shape == fine.shape, "not the shape of the fine map"
-        places = np.mgrid[:height, :width] / 2 - 0.25
-        enlarged = [map_coordinates(scores, places, order=1, mode="nearest") for scores in coarse]
-        assert close(got, enlarged + fine), f"wrong sums with {n_classes} classes"
+    binomial = np.outer([1, 2, 1], [1, 2, 1]) / 16
+    for depth in depths:
+        for kind in rng.permutation(4):
+            kernels = np.array([binomial] * 3) if plain else rng.uniform(0.05, 1, size=(3, 3, 3))
+            weight = 1.0 if plain else rng.uniform(0.2, 3)
+            box = _pooling(kind, depth, weight) if kind < 2 else _convolving(kind, depth, kernels)
+            got = answer_array(name_mechanism(box, int(8 * rng.integers(3, 6)))).ravel()
+            assert got.shape == (1,), "it doesn't return one name"
+            assert got[0] == kind, "a box gets the name of another mechanism"
 
 
 @hidden
-@keeping
-def check_skip_columns(add_skip: Callable) -> None:
-    """One row, even and odd numbers of columns."""
-    _check_skip(add_skip, 80, ((3, (1, 5), (2, 10)), (4, (1, 3), (1, 5)), (3, (1, 6), (2, 11))))
+def check_boxes(name_mechanism: Callable) -> None:
+    """Judge boxes with the lecture's kernel and depth, for images of other sizes."""
+    _check_boxes(name_mechanism, 80, (2, 2), plain=True)
 
 
 @hidden
-def check_skip_rows(add_skip: Callable) -> None:
-    """Several rows and columns, even and odd numbers of them."""
-    _check_skip(add_skip, 92, ((3, (3, 5), (6, 10)), (4, (4, 3), (7, 5)), (3, (6, 1), (11, 2))))
+def check_strange_boxes(name_mechanism: Callable) -> None:
+    """Other depths, kernels and weights."""
+    _check_boxes(name_mechanism, 92, (1, 2, 3, 3), plain=False)
 
 
 def _labelled(seed: int, shape: tuple[int, int, int], unlabelled: float) -> tuple[NDArray, NDArray]:
@@ -228,9 +265,9 @@ def check_gradient(loss_and_gradient: Callable) -> None:
 
 @hidden
 def check_large(loss_and_gradient: Callable) -> None:
-    """Scores of thousands, of both signs, of which each pixel has its own; everybody is labelled."""
+    """Scores of ten thousands, of both signs: even a long double can't hold e^30000; everybody is labelled."""
     scores, truth = _labelled(87, (5, 4, 3), 0.0)
-    shift = np.linspace(-4000, 4000, 12).reshape(4, 3)
+    shift = np.linspace(-30000, 30000, 12).reshape(4, 3)
     small, large = (
         [answer_array(part) for part in loss_and_gradient(scores + added, truth.copy())] for added in (0, shift)
     )

@@ -1,16 +1,17 @@
 # %% [markdown]
 # # Exercise 07: three networks for segmentation
 #
-# Six functions, the parts that tell SegNet, FCN and DeepLab apart and the loss that teaches all of them, and one question to answer in words. Where the lecture
-# has a row, a channel or a pixel, you take them a step further, to what a network computes. About 100 minutes. The lecture is [07: three networks for segmentation](../07_segmentation.ipynb).
+# No function of this exercise stands in the lecture. You design a chain of layers, take pooling and atrous convolution a step further than the lecture's toy, find out
+# which mechanism works inside a black box, repair a loss with four mistakes, and answer one question in words. About 100 minutes. The lecture is
+# [07: three networks for segmentation](../07_segmentation.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | how far a chain of layers sees, and where it looks | 1 + 2 |
+# | 1 | the shortest chain that sees everything | 1 + 2 |
 # | 2 | pooling with windows that overlap, and the way back | 1 + 1 + 1 |
 # | 3 | a layer, with channels, holes and stride | 1 + 1 + 1 |
-# | 4 | a skip: enlarge, crop, add | 2 + 1 |
-# | 5 | the loss of an image, and its gradient | 1 + 2 + 1 |
+# | 4 | which mechanism is in the box? | 1 + 2 |
+# | 5 | a loss with four mistakes | 1 + 2 + 1 |
 # | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
@@ -34,105 +35,91 @@ def _explain(what, got, slips):
 
 
 # %% [markdown]
-# ## Task 1: how far a chain of layers sees, and where it looks (1 + 2 points)
+# ## Task 1: the shortest chain that sees everything (1 + 2 points)
 #
-# `layers` is a list of `(kernel, stride, rate, padding)`, the first layer of the network first. Each layer puts `padding` zeros before the first of its inputs and
-# as many after the last; for output 0, the first weight of its kernel meets the first of these zeros. Complete `receptive_field`: it returns three numbers.
+# You may build a chain of 3x3 convolutions, all of stride 1, and you may choose the *rate* of each. A customer names the field, an odd number of pixels. She wants a
+# chain
 #
-# - The **field**: how many pixels a side of the image one output of the chain depends on, zeros of the padding included, as if the image went on.
-# - The **jump**: how many pixels of the image two neighbouring outputs lie apart.
-# - The **centre**: where output 0 lies in the image, in the middle between the first and the last pixel of its field. Pixel 0 lies at 0, a zero before it at -1; so
-#   a centre may be a half, or less than 0.
+# - that has exactly this field: the output depends on nothing farther away;
+# - without gaps: the output depends on *every* pixel of its field;
+# - with as few layers as possible.
 #
-# Field and jump are in the lecture. For the centre ask of each layer: how far from *input* 0 does its output 0 lie, and how many *pixels* wide is a step there? A 3x3
-# convolution with padding 1 leaves output 0 where input 0 was; a 2x2 window moves it by half a step. That is why a pooled map has to be enlarged in another way than a
-# strided one. Do the chain of the test on paper first.
+# Complete `fewest_rates`: it returns the list of rates, first layer first. Three layers of rate 1 have a field of 7 without gaps; three of rate 2 a field of 13 with gaps.
+# One point is for the first two wishes, two are for the third. Ask: if the layers so far see $r$ pixels to either side without a gap, what is the largest rate of the next
+# layer that leaves none?
 
 
-# %% nbgrader={"grade": false, "grade_id": "field", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def receptive_field(layers):
-    """Return field, jump and centre of a chain of layers, in pixels of the image."""
+# %% nbgrader={"grade": false, "grade_id": "chain", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def fewest_rates(field):
+    """Return the rates of the shortest chain of 3x3 layers with this field and no gap."""
     ### BEGIN SOLUTION
-    field, jump, centre = 1, 1, 0
-    for kernel, stride, rate, padding in layers:
-        reach = (kernel - 1) * rate
-        field += reach * jump
-        centre += (reach / 2 - padding) * jump
-        jump *= stride
-    return field, jump, centre
+    to_see, rates = (field - 1) // 2, []  # to either side
+    while sum(rates) < to_see:
+        rates.append(min(2 * sum(rates) + 1, to_see - sum(rates)))
+    return rates
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "field-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_FIELD_SLIPS = {
-    14: "the jump is forgotten: after a halving each step of a kernel is two pixels of the image",
-    37: "a layer's own stride counts from the next layer on: first the field, then the jump",
-    40: "a kernel of 3 adds its two neighbours, not three: kernel - 1",
-    24: "the rate is forgotten: a kernel of 3 with rate 2 spans 5",
-    27: "without any layer an output is its own pixel: start with a field of 1",
-    55: "strides multiply: two halvings make a jump of 4, three of 8",
-    36: "the rate spreads a kernel, it doesn't move outputs apart: it is no part of the jump",
-    16: "you add up the kernels: each adds kernel - 1, in steps of rate times jump",
-    30: "a kernel of 3 with rate 2 spans 5 pixels, not 6: it adds (3 - 1) * 2",
-    25: "you walk from the last layer to the first: `layers` begins at the image, where the jump is 1",
-    17: "rate and stride are swapped: each layer is (kernel, stride, rate, padding)",
-    42: "padding makes a map longer, not a kernel: the field doesn't know of it",
-    4: "that is the jump: return the field first, then the jump, then the centre",
-}
+# %% nbgrader={"grade": false, "grade_id": "chain-rules", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _rates(answer, field):
+    """Return the rates that an answer gives for a field, after a look at what they are."""
+    rates = answer_array(answer(field), "fewest_rates")
+    assert rates.ndim == 1, f"return a list of rates, one per layer; got shape {rates.shape}"
+    whole = np.all(rates == np.round(rates)) and np.all(rates >= 1)
+    assert whole, f"field {field}: a rate is a whole number from 1; got {rates}"
+    return rates.astype(int).tolist()
 
 
-# %% nbgrader={"grade": true, "grade_id": "field-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+def _seen(rates):
+    """Return how far from the output the pixels lie that it depends on, in order."""
+    places = {0}
+    for rate in rates:
+        places = {place + step for place in places for step in (-rate, 0, rate)}
+    return sorted(places)
+
+
+# %% nbgrader={"grade": true, "grade_id": "chain-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # Field by hand: 1 + 2 = 3; halve: + 1 = 4, jump 2; + 4 * 2 = 12; rate 2, stride 2: + 2 * 2 * 2 = 20, jump 4; + 2 * 4 = 28.
-    layers = [(3, 1, 1, 1), (2, 2, 1, 0), (5, 1, 1, 2), (3, 2, 2, 1), (3, 1, 1, 0)]
-    got = answer_array(receptive_field(layers), "receptive_field").ravel()
-    assert got.size >= 2, f"return three numbers, field, jump and centre; got {got}"
-    _explain("a field of", got[0], _FIELD_SLIPS)
-    assert got[0] == 28, f"expected a field of 28 pixels, got {got[0]:g}"
-    assert got[1] == 4, f"two layers have stride 2, so outputs lie 4 pixels apart; got {got[1]:g}"
+    for field in (1, 7, 3, 13, 27, 61):
+        rates = _rates(fewest_rates, field)
+        got = 1 + 2 * sum(rates)
+        slips = {
+            2 * field
+            - 1: "a layer of rate r adds 2 r to the field, r to either side: the rates sum to (field - 1) / 2",
+            field + 2: "one pixel too far to either side: the output's own pixel is part of the field",
+            field - 2: "one pixel short to either side: the rates sum to (field - 1) / 2",
+        }
+        hint = slips.get(got, "each layer of rate r adds 2 r, and the output sees its own pixel")
+        assert got == field, f"rates {rates} have a field of {got}, not {field}: {hint}"
+        seen = _seen(rates)
+        text = f"field {field}, rates {rates}: only {len(seen)} of its pixels count, those at {seen[:9]} ..."
+        assert len(seen) == field, f"{text}, as in the lecture's gridding"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import segmentation
 
-    complaint = segmentation.check_field(receptive_field)
+    complaint = segmentation.check_chain(fewest_rates)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
 
 _test()
 
-# %% nbgrader={"grade": false, "grade_id": "centre-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_CENTRE_SLIPS = {
-    13.5: "the padding is forgotten: zeros before a map move output 0 to the left",
-    9.5: "padding counts in steps of its layer's input: a zero is as wide as the jump",
-    2.5: "the jump is forgotten: after a halving each step is two pixels of the image",
-    9.0: "a layer's own stride counts from the next layer on: first the centre, then the jump",
-    4.5: "the rate spreads the kernel, whose middle is (kernel - 1) * rate / 2 from its first weight; padding stays",
-    12.5: "from the first to the middle of three it is one step, of two half a step: (kernel - 1) / 2",
-    6.0: "half a pixel is lost: the middle of a 2x2 window lies between two pixels, so don't round",
-    7.0: "half a pixel too far: pixel 0 lies at 0, the middle of a 2x2 window half a step on, not a whole one",
-    20.5: "the sign of the padding: zeros before a map move output 0 to the left",
-    -0.5: "the padding counts twice: zeros after the map don't move output 0",
-    10.0: "half of the padding is lost: `padding` zeros stand before the map, and as many after it",
-    -7.0: "that is the first pixel of the field: its middle is asked for",
-    20.0: "that is the last pixel of the field: its middle is asked for",
-    14.0: "that is half the field: from the first to the middle of 28 pixels it is 13.5, and padding counts too",
-    3.0: "you walk from the last layer to the first: `layers` begins at the image, where the jump is 1",
-    -6.5: "the sign: what a kernel reaches to the right is added, padding is subtracted",
-}
 
-
-# %% nbgrader={"grade": true, "grade_id": "centre-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "fewest-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # By hand: 0; the window of 2: + 1/2; + 0; reaching 2 to either side, padded by 1 only: + 1 * 2 = 2.5; not padded: + 1 * 4 = 6.5.
-    layers = [(3, 1, 1, 1), (2, 2, 1, 0), (5, 1, 1, 2), (3, 2, 2, 1), (3, 1, 1, 0)]
-    got = answer_array(receptive_field(layers), "receptive_field").ravel()
-    assert got.size == 3, f"return three numbers, field, jump and centre; got {got}"
-    _explain("a centre of", got[2], _CENTRE_SLIPS)
-    assert got[2] == 6.5, f"expected a centre of 1/2 + 2 + 4 = 6.5, got {got[2]:g}"
+    for field, fewest in ((3, 1), (9, 2), (27, 3), (29, 4), (243, 5)):
+        rates = _rates(fewest_rates, field)
+        whole = 1 + 2 * sum(rates) == field == len(_seen(rates))
+        assert whole, f"rates {rates}: first mend the field, {field}, or its gaps"
+        hint = (
+            "the lecture's rates 1, 2, 4 see 7 to either side; is 4 the largest rate that leaves no gap after 1 and 2?"
+        )
+        few = len(rates) <= fewest
+        assert few, f"field {field}: {fewest} layers are enough, you take {len(rates)}; {hint}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import segmentation
 
-    complaint = segmentation.check_centre(receptive_field)
+    complaint = segmentation.check_fewest(fewest_rates)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -459,57 +446,130 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: a skip: enlarge, crop, add (2 + 1 points)
+# ## Task 4: which mechanism is in the box? (1 + 2 points)
 #
-# `coarse` are the scores of a deep map, `(C, h, w)`, and `fine` those of the map above it, `(C, H, W)`, where H is 2h or 2h - 1, and W is 2w or 2w - 1. Cell i of the
-# coarse map covers rows (or columns) 2i and 2i + 1 of the fine one, so its value belongs between the two, at 2i + ½. In between, interpolate bilinearly; beyond the
-# first and the last of these places the value stays constant. A last row or column that the fine map hasn't got is cut off.
+# Somebody hands you a box. `box(image)` takes an image `(h, w)` whose sides are multiples of 8, makes it smaller or blurs it, and returns an image of the same size. Inside
+# works one of four mechanisms, with fixed weights:
 #
-# Complete `add_skip`: it returns the enlarged coarse scores plus the fine ones, `(C, H, W)`, and leaves its arguments as they are.
+# | name | inside |
+# |---|---|
+# | `INDICES` | max-pooling, one to three times, and unpooling by the indices |
+# | `SKIPS` | max-pooling, one to three times; on the way up, interpolation, and each finer map added with a weight |
+# | `STRIDED` | a positive kernel with stride 2, one to three times, then interpolation |
+# | `ATROUS` | the same kernels without stride, with rates 1, then 2, then 4: an output sees at most 7 pixels to either side |
+#
+# Complete `name_mechanism`: it returns one of the four. You may feed the box as many images as you like. Don't compare with the lecture's numbers, because the boxes of the
+# tests have other kernels, weights and depths. Ask for *properties*: what is true of every box of a kind, and of no box of the others? Is the answer to a sum the sum of the
+# answers? What becomes of the answer when the image moves by one pixel? How many pixels of it are zero? One point is for boxes like the lecture's, two are for strange ones.
 
 
-# %% nbgrader={"grade": false, "grade_id": "skip", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def add_skip(coarse, fine):
-    """Return the sum of a coarse map, enlarged twofold, and a fine one."""
+# %% nbgrader={"grade": false, "grade_id": "box-maker", "locked": true, "schema_version": 3, "solution": false, "task": false}
+INDICES, SKIPS, STRIDED, ATROUS = range(4)
+_NAMES = ("INDICES", "SKIPS", "STRIDED", "ATROUS")
 
+
+def _along(image, change):
+    """Return an image after a change of its columns, and then of its rows."""
+    return change(change(image).T).T
+
+
+def _resized(image, places):
+    """Return an image read at these places, down and across, bilinearly; beyond the border it stays constant."""
+    return _along(image, lambda one: np.array([np.interp(places, np.arange(len(row)), row) for row in one]))
+
+
+def _pooled(image):
+    """Return the maxima of 2 x 2 windows, and for each where it was, row * width + column."""
+    h, w = image.shape
+    windows = image.reshape(h // 2, 2, w // 2, 2).swapaxes(1, 2).reshape(h // 2, w // 2, 4)
+    row, column = np.divmod(windows.argmax(axis=-1), 2)
+    v, u = np.ogrid[: h // 2, : w // 2]
+    return windows.max(axis=-1), (2 * v + row) * w + 2 * u + column
+
+
+# %% nbgrader={"grade": false, "grade_id": "box-insides", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _maxima(image, depth, weight=None):
+    """Return an image that was pooled and came back: by its indices, or with a weight of the finer maps by skips."""
+    if depth == 0:
+        return image
+    pooled, places = _pooled(image)
+    small = _maxima(pooled, depth - 1, weight)
+    if weight is not None:
+        return _resized(small, (np.arange(len(image)) - 0.5) / 2) + weight * image
+    back = np.zeros(image.size)
+    back[places.ravel()] = small.ravel()
+    return back.reshape(image.shape)
+
+
+def _sums(image, depth, kernel, stride):
+    """Return an image after kernels with stride 2, interpolated to its old size, or without stride and with holes."""
+    places = np.arange(len(image)) / stride**depth
+    for level in range(depth):
+        rate = 1 if stride == 2 else 2**level
+        padded = np.pad(image, rate)
+        n, holes = len(image), rate * np.arange(3)
+        across = sum(k * padded[:, hole : hole + n] for k, hole in zip(kernel, holes, strict=True))
+        image = sum(k * across[hole : hole + n] for k, hole in zip(kernel, holes, strict=True))[::stride, ::stride]
+    return _resized(image, places)
+
+
+# %% nbgrader={"grade": false, "grade_id": "box-of-a-kind", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _box(kind, depth=2, kernel=(0.25, 0.5, 0.25), weight=1.0, size=16):
+    """Return a box of a kind for images of `size` x `size` pixels."""
+
+    def box(image):
+        image = np.array(image, float)
+        assert image.shape == (size, size), f"this box takes images of {size} x {size} pixels, got {image.shape}"
+        if kind in (0, 1):
+            return _maxima(image, depth, weight if kind else None)
+        return _sums(image, depth, kernel, stride=2 if kind == 2 else 1)
+
+    return box
+
+
+# %% nbgrader={"grade": false, "grade_id": "boxes", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def name_mechanism(box, size):
+    """Return INDICES, SKIPS, STRIDED or ATROUS; the box takes images of `size` x `size` pixels."""
     ### BEGIN SOLUTION
-    def enlarge(values, size):
-        places = 2 * np.arange(len(values)) + 0.5
-        return np.interp(np.arange(size), places, values)
-
-    _, height, width = fine.shape
-    taller = np.apply_along_axis(enlarge, 1, coarse, height)
-    return np.apply_along_axis(enlarge, 2, taller, width) + fine
+    one, other = np.random.default_rng(0).random((2, size, size))
+    if np.allclose(box(one + other), box(one) + box(other)):
+        dot = np.zeros((size, size))
+        dot[size // 2, size // 2] = 1
+        moves = np.allclose(box(np.roll(dot, 1, axis=1)), np.roll(box(dot), 1, axis=1))
+        return ATROUS if moves else STRIDED
+    return INDICES if np.mean(box(1 + one) == 0) > 0.5 else SKIPS
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "skip-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "box-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_BOX_HINTS = {  # by the two kinds that are confused
+    (0, 1): "both find a bright post; which of them leaves three of four pixels at zero, even in a bright image?",
+    (2, 3): "a post in one column doesn't tell them apart: move it by one pixel, and see whether the answer moves",
+    (
+        1,
+        3,
+    ): "one is a sum of products, the other takes maxima: is the answer to a sum of two images the sum of the answers?",
+}
+
+
+def _named(answer, kind, size=16, **parts):
+    """Stop with a hint when an answer gives a box another name."""
+    got = answer_array(answer(_box(kind, size=size, **parts), size), "name_mechanism").ravel()
+    assert got.size == 1, f"return one of the four names, got {got}"
+    assert got[0] in range(4), f"return INDICES, SKIPS, STRIDED or ATROUS, got {got[0]:g}"
+    confused = tuple(sorted((kind, int(got[0]))))
+    hint = _BOX_HINTS.get(confused, "which property do maxima have, and which have sums of products?")
+    assert got[0] == kind, f"this box is {_NAMES[kind]}, and you say {_NAMES[int(got[0])]}: {hint}"
+
+
+# %% nbgrader={"grade": true, "grade_id": "boxes-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    coarse, fine = np.array([[[4.0, 8, 0, 8]]]), np.zeros((1, 2, 7))
-    fine[0, :, 3] = 10
-    got = answer_array(add_skip(coarse, fine), "add_skip")
-    assert np.count_nonzero(fine) == 2, "add_skip changed its argument `fine`: make a new array (no +=)"
-    assert got.shape != (1, 2, 8), "a column too many: the fine map has only seven, cut off the last one"
-    assert got.shape == (1, 2, 7), f"expected the shape of the fine map, (1, 2, 7), got {got.shape}"
-    assert not np.allclose(got, fine), "the coarse scores got lost"
-    slips = {  # of columns 0 to 2; by hand 4, a quarter of the way from 4 to 8, three quarters of it
-        (4, 4, 8): "each value is repeated (nearest): interpolate between the places 2i + 1/2",
-        (4, 6, 8): "you put value i at column 2i: it covers 2i and 2i + 1, so it belongs between them",
-        (4, 5.714, 7.429): "the ends are aligned (align_corners): the first value belongs to 1/2, not to 0",
-        (5, 7, 6): "the first column is cut off: cut at the right end",
-        (4, 5.429, 7.714): "you stretch the coarse map to seven columns: double it to eight, then cut one off",
-        (3, 5, 7): "before the first place, 1/2, the value stays at 4: neither extrapolate nor mix with zeros",
-        (2, 2.5, 3.5): "that is the mean: a skip adds",
-    }
-    for slip, hint in slips.items():
-        assert not np.allclose(got[0, 0, :3], slip, atol=1e-3), f"columns 0 to 2 are {got[0, 0, :3].round(2)}: {hint}"
-    assert not np.isclose(got[0, 0, 3], 6), "column 3 is 6, the coarse map alone: add the fine scores"
-    assert not np.isclose(got[0, 0, 3], 60), "column 3 is 60: a skip adds scores, it doesn't multiply them"
-    np.testing.assert_allclose(got[0, 0], [4, 5, 7, 16, 2, 2, 6], err_msg="row 0; coarse alone: 4 5 7 6 2 2 6")
+    for kind in (3, 0, 2, 1):
+        _named(name_mechanism, kind)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import segmentation
 
-    complaint = segmentation.check_skip_columns(add_skip)
+    complaint = segmentation.check_boxes(name_mechanism)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -517,20 +577,16 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "rows-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "strange-boxes-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    coarse, fine = np.array([[[0.0], [4]], [[8], [0]]]), np.full((2, 3, 2), 10.0)  # two classes, two rows, one column
-    got = answer_array(add_skip(coarse, fine), "add_skip")
-    assert got.shape == (2, 3, 2), f"expected the shape of the fine map, (2, 3, 2), got {got.shape}: cut rows too"
-    assert not np.allclose(got[0, :, 0], [10, 10, 14]), "the rows are repeated: rows are interpolated too"
-    hand = "by hand 0 1 3 and 8 6 2, and 10 to each"
-    np.testing.assert_allclose(got[:, :, 0], [[10, 11, 13], [18, 16, 12]], err_msg=hand)
-    hand = "the coarse map has one column, so both columns are alike"
-    np.testing.assert_allclose(got[:, :, 1], got[:, :, 0], err_msg=hand)
+    for depth in (1, 3):
+        for kernel in ((0.2, 0.7, 0.1), (0.0, 1.0, 0.5)):
+            for kind in (1, 2, 0, 3):
+                _named(name_mechanism, kind, size=24, depth=depth, kernel=kernel, weight=0.3)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import segmentation
 
-    complaint = segmentation.check_skip_rows(add_skip)
+    complaint = segmentation.check_strange_boxes(name_mechanism)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -538,18 +594,25 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: the loss of an image, and its gradient (1 + 2 + 1 points)
+# ## Task 5: a loss with four mistakes (1 + 2 + 1 points)
 #
-# `scores` has the shape `(C, h, w)`, `truth` the shape `(h, w)`: the class of each pixel, or 255 where it isn't labelled. The loss is the mean of $-\log P(c^*)$ over
-# the labelled pixels, natural logarithm, where $P$ is the soft-max of the pixel's scores.
+# A colleague's network learns badly. Here is her loss. `scores` has the shape `(C, h, w)`, `truth` the shape `(h, w)`: the class of each pixel, or 255 where it isn't
+# labelled. The function should return the mean of $-\log P(c^*)$ over the labelled pixels (natural logarithm, $P$ the soft-max of the pixel's scores), and the derivative of
+# this mean with respect to each score, `(C, h, w)`.
 #
-# $$ P(c) = \frac{e^{s_c}}{\sum_{c'} e^{s_{c'}}} $$
+# ```python
+# def loss_and_gradient(scores, truth):
+#     P = np.exp(scores) / np.exp(scores).sum(axis=1, keepdims=True)
+#     true = np.clip(truth, 0, len(scores) - 1)
+#     one_hot = np.arange(len(scores))[:, None, None] == true
+#     return -np.log(P[one_hot]).sum() / truth.size, P - one_hot
+# ```
 #
-# Complete `loss_and_gradient`: it returns two things, the loss and its derivative with respect to each score, `(C, h, w)`. The lecture has the derivative of one pixel's loss; what
-# becomes of it in a mean, and what does a pixel teach that nobody has labelled? `scores` stays as it is.
+# It runs on any image and raises no error. Four things are wrong: one in the soft-max, one in what is done with unlabelled pixels, one in the gradient, and one that shows
+# only where scores are large. Write it rightly. The mistakes aren't independent: mending one may show the next. `scores` stays as it is.
 #
-# For the last point both must stay right where scores are thousands, of either sign, or thousands apart: adding the same to all scores of a pixel changes nothing, so add
-# something that keeps $e^s$ small.
+# For the last point both results must stay right where scores are ten thousands, of either sign, or thousands apart: adding the same to all scores of a pixel changes
+# nothing, so add something that keeps $e^s$ small.
 
 
 # %% nbgrader={"grade": false, "grade_id": "loss", "locked": false, "schema_version": 3, "solution": true, "task": false}
