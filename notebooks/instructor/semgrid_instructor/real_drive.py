@@ -9,6 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.camera import invert_rigid, rigid_transform, transform_points
+from semgrid_edu.datasets.samples import real_drive, sample_weights
+from semgrid_edu.networks import load_net
+from semgrid_edu.pipeline import run_pipeline
+from semgrid_edu.workshop.studies.new_drive.own_street import semantic_truths
 from semgrid_instructor import close, generator, hidden
 
 
@@ -100,3 +104,22 @@ def check_refine(refine: Callable) -> None:
         assert np.allclose(got.sum(axis=0), 1, atol=1e-4), "the classes of a cell don't sum to 1"
         same = np.array_equal(log_g, kept[0]) and np.array_equal(o, kept[1])
         assert same, "it changes an argument: make new arrays"
+
+
+@hidden
+def check_better_map(refine: Callable) -> None:
+    """Two later frames of the street, with left and right exchanged."""
+    drive = real_drive()
+    net = load_net(sample_weights(), drive.camera)
+    results = list(run_pipeline(drive[:6], net))
+    beliefs = [result.belief.probability for result in results]
+    truths = semantic_truths(drive, beliefs, net.architecture.grid)
+    shares = []
+    for k in (4, 5):
+        g, counted = results[k].grid[..., ::-1], truths[k, :, ::-1] != 255
+        refined = answer_array(refine(np.log(np.maximum(g, 1e-12)), beliefs[k][..., ::-1].copy()))
+        assert refined.shape == g.shape, "another shape in a frame of the real street"
+        right = [(one.argmax(axis=0) == truths[k, :, ::-1])[counted].mean() for one in (refined, g)]
+        shares.append(right)
+    new, old = np.mean(shares, axis=0)
+    assert new > old, "no gain in later frames, with left and right exchanged"

@@ -305,7 +305,7 @@ _test()
 #
 # The open end. The network from simulated streets has 55 % of the labelled cells of the real street right, and you have seen how its map fails: the road before us is called *unknown-free*
 # or vegetation, cars are called *unknown-static*. Exchange one stage: write a `refine` that makes this map better. It gets `log_g` (14, H, W), natural logarithms of the network's probabilities, and `o` (4, H, W), the
-# probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, and returns probabilities (14, H, W) that sum to 1 in each cell. It doesn't see the labels, and it must work on grids of any size.
+# probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, and returns probabilities (14, H, W) that sum to 1 in each cell. It doesn't see the labels, must work on grids of any size, and leaves its arguments as they are.
 #
 # What counts as better is fixed before you begin. Over squares of 8 m of the street, in the labelled cells:
 #
@@ -385,6 +385,12 @@ def _test():
     assert gain["class accuracy"][2] >= 0, (
         f"class accuracy is clearly lost: {says}. Which small classes did you give up?"
     )
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import real_drive as _hidden
+
+    complaint = _hidden.check_better_map(refine)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
 
 
 _test()
