@@ -187,15 +187,11 @@ def slope_and_lean(ground, wall):
             code=leaning(wall_plane="w[:, 2], w[:, :2]"),
         ),
         mistake(
-            "a wall exactly along x",
+            "a sign that follows the side of the wall",
             task="slope-and-lean",
             loses=3,
             says="on inputs you haven't seen",
-            code="""
-def slope_and_lean(ground, wall):
-    reading = np.degrees(np.arctan(np.polyfit(ground[:, 1], ground[:, 2], 1)[0]))
-    lean = -np.degrees(np.arctan(np.polyfit(wall[:, 2], wall[:, 1], 1)[0]))
-    return reading - lean, lean""",
+            code=leaning(sign="np.sign(w[:, 1].mean()) * "),
         ),
         # ---- task 3
         right("a tree for each motion", task="judge-motion", code=judged()),
@@ -212,9 +208,7 @@ def judge_motion(before, now, T):
         return True
     return False if min(errors[1:]) < errors[0] - 0.05 else None""",
         ),
-        mistake(
-            "the mean", task="judge-motion", loses=3, says="the median doesn't mind", code=judged(middle="np.mean")
-        ),
+        mistake("the mean", task="judge-motion", loses=3, says="the poses are right", code=judged(middle="np.mean")),
         mistake(
             "two answers", task="judge-motion", loses=3, says="nothing can be told", code=judged(verdict="margin > 0")
         ),
@@ -338,7 +332,7 @@ return out"""),
             "a blur",
             task="refine",
             loses=2,
-            says="no clear gain",
+            says="class accuracy is clearly lost",
             code=refined("""
 from scipy.ndimage import gaussian_filter
 g = gaussian_filter(np.exp(log_g), (0, 0.7, 0.7))

@@ -119,6 +119,7 @@ def check_better_map(refine: Callable) -> None:
         g, counted = results[k].grid[..., ::-1], truths[k, :, ::-1] != 255
         refined = answer_array(refine(np.log(np.maximum(g, 1e-12)), beliefs[k][..., ::-1].copy()))
         assert refined.shape == g.shape, "another shape in a frame of the real street"
+        assert np.allclose(refined.sum(axis=0), 1, atol=1e-4), "no probabilities in a frame of the real street"
         right = [(one.argmax(axis=0) == truths[k, :, ::-1])[counted].mean() for one in (refined, g)]
         shares.append(right)
     new, old = np.mean(shares, axis=0)
