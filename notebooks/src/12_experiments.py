@@ -662,8 +662,9 @@ print("\n" + ", ".join(f"{verdict}: {n}" for verdict, n in count.items()))
 
 # %% [markdown]
 # A verdict is the beginning of reading, not its end. Choose a claim and look at its statements. Each number is drawn as
-# its distance from its limit, on the claimed side to the right. Ask: *which* statement decides? By how much? Is a "?" a
-# wide bar (too little data) or a short one around zero (hardly any effect)?
+# its distance from its limit, on the claimed side to the right (for claim 4 on a logarithmic scale beyond five points).
+# Ask: *which* statement decides? By how much? Is a "?" a wide bar (too little data) or a short one around zero (hardly
+# any effect)?
 
 
 # %% jupyter={"source_hidden": true}
@@ -700,6 +701,7 @@ sizes = [len(claim["statements"]) + 1.3 for claim in claims["claims"].values()]
 fig, axes = plt.subplots(9, 1, figsize=(10, 0.27 * sum(sizes)), layout="constrained", height_ratios=sizes)
 for ax, number in zip(axes, claims["claims"], strict=True):
     draw_claim(number, ax)
+axes[3].set_xscale("symlog", linthresh=5)  # claim 4: a bar of 200 points beside one of two
 axes[-1].set_xlabel("points on the claimed side of the limit (each panel has its own scale)")
 plt.show()
 
