@@ -16,7 +16,7 @@
 # **Prerequisites.** The metrics of lecture [00](00_tour.ipynb), training of lecture [08](08_fusion.ipynb). Mean,
 # variance, normal distribution.
 #
-# **Time.** 75 minutes, of which the computer needs one.
+# **Time.** 70 minutes, of which the computer needs one.
 #
 # **Paper.** Section 4: its Tables 1 and 2, and nine of its claims. Table 3, what the paper leaves open, and how sure
 # the maps are stand in the companion [more tables](deeper/12_more_tables.ipynb).
@@ -200,9 +200,13 @@ for other in ("y12", "y21"):
 # frames of a drive by 2. A 95 % interval should contain the true value (75 %) in 95 of 100 experiments. How often does
 # it when it is made from the 400,000 cells? From the 200 frames? From the 20 drives?
 #
-# <details><summary>Answer</summary>About 8 %, 48 % and 95 %. The standard deviation of the mean is mostly that of the
+# <details><summary>Answer</summary>
+#
+# About 8 %, 48 % and 95 %. The standard deviation of the mean is mostly that of the
 # drives, 6 / √20 = 1.3 points. The interval over cells reaches 0.13 points to each side, that over frames
-# 0.9.</details>
+# 0.9.
+#
+# </details>
 
 
 # %% tags=["coverage"] jupyter={"outputs_hidden": true}
@@ -394,9 +398,13 @@ assert narrow["high"] - narrow["low"] < 0.005
 #
 # **Predict before you run.** Can one say which method is better?
 #
-# <details><summary>Answer</summary>Yes. M wins on every drive: by 2, 3, 1 and 2 points. The mean difference is 2.0, the
+# <details><summary>Answer</summary>
+#
+# Yes. M wins on every drive: by 2, 3, 1 and 2 points. The mean difference is 2.0, the
 # standard deviation of the four differences 0.82, the standard error 0.41. With Student's factor 3.18 the interval goes
-# from 0.7 to 3.3, above zero.</details>
+# from 0.7 to 3.3, above zero.
+#
+# </details>
 
 
 # %% tags=["paired"] jupyter={"outputs_hidden": true}
@@ -551,8 +559,12 @@ assert [what for what, behind in lost.items() if behind] == ["geometry with true
 # **Predict before you run.** You compare twenty pairs of methods that are all equal, independently of each other. How
 # probable is it that at least one interval excludes zero?
 #
-# <details><summary>Answer</summary>1 - 0.95²⁰ = 64 %. If you report the one "significant" difference and not the
-# nineteen others, you report chance.</details>
+# <details><summary>Answer</summary>
+#
+# 1 - 0.95²⁰ = 64 %. If you report the one "significant" difference and not the
+# nineteen others, you report chance.
+#
+# </details>
 #
 # A simple remedy is **Bonferroni's**: with $n$ comparisons, ask each for a level of $1 - 0.05/n$ in place of 0.95. Then
 # the probability of *any* false alarm is at most 5 %, also when the comparisons depend on each other. The price is
@@ -912,13 +924,17 @@ live = {name: np.array([retrain(variant, seed) for seed in range(3)]) for name, 
 # of the two will be clear with three seeds and ten drives? And what will our rule say of each, if the claim is "the
 # former is better, in every metric"?
 #
-# <details><summary>Answer</summary>The occupancy grid tells nearly by itself which kind of unknown a cell is, and about
+# <details><summary>Answer</summary>
+#
+# The occupancy grid tells nearly by itself which kind of unknown a cell is, and about
 # half of the test cells are unknown. In the run stored here, this comparison was clear in all three metrics:
 # *reproduced*. The upper ten planes lie 2 m and more above the ground, higher than road and most cars. The differences
 # were a point and a half or less, in favour of ten planes, and all three intervals contained zero: *cannot tell*, with
 # Holm's correction or without. On another machine rounding differs. If one interval ended just below zero there, the
 # uncorrected rule would say *not reproduced*. Would you bet on it, after six comparisons, on one drive to learn
-# from?</details>
+# from?
+#
+# </details>
 
 # %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
 for other in ("no occupancy grid", "10 planes"):
@@ -1023,5 +1039,5 @@ for share in (0.8, 0.3, 0.1, 0.05):
 #
 # ## Exercise
 #
-# [Exercise 12](exercises/12_experiments.ipynb): which numbers share a parent, drives of unequal length, a claim with
-# "at most", how many drives a comparison needs, and a table that contradicts itself.
+# [Exercise 12](exercises/12_experiments.ipynb): scores of pooled frames, Holm's correction, drives that share a town, a
+# paired difference, and an expected calibration error.

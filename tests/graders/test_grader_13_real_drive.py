@@ -321,7 +321,7 @@ return out"""),
         mistake(
             "not normalised",
             task="refine",
-            loses=2,
+            loses=4,
             says="don't sum to 1",
             code=refined("return np.exp(log_g[:]) * np.r_[np.ones(10), np.zeros(4)][:, None, None]"),
         ),

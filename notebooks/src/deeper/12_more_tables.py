@@ -12,7 +12,7 @@
 # **Prerequisites.** Lecture [12](../12_experiments.ipynb), beside which this companion stands: intervals over drives
 # and seeds, paired differences.
 #
-# **Time.** 40 minutes, of which the computer needs less than one.
+# **Time.** 20 minutes, of which the computer needs less than one.
 #
 # All numbers are read from [docs/results/reduced](../../docs/results/reduced/), made on an earlier version of the
 # simulator, or come from code that you see.
