@@ -725,7 +725,8 @@ for name, what, mark in rows if labelled else ():
     )
     print(f"{name}, {what}: {100 * sure:.0f} % sure, off by {error:.0f} points")
 ax.set(xlabel="how sure", ylabel="how often right", xlim=(0, 1), ylim=(0, 1))
-ax.legend(frameon=False, fontsize=7)
+if labelled:
+    ax.legend(frameon=False, fontsize=7)
 plt.show()
 
 # %% [markdown]

@@ -136,6 +136,8 @@ def test_a_wall_tells_a_lidar_that_leans_from_a_street_that_slopes(frames):
     assert wall_lean(replace(frames[0], points=leaning), box) == pytest.approx(2, abs=0.1)
     with pytest.raises(ArgumentError, match="box"):
         wall_lean(replace(frames[0], points=wall[:50]), box)
+    with pytest.raises(ArgumentError, match="a wall"):
+        wall_lean(replace(frames[0], points=rng.uniform((5, -12, -0.5, 0), (20, -6, 6, 1), (500, 4))), box)
 
 
 def test_motion_of_the_poses_lays_scans_over_each_other(frames):

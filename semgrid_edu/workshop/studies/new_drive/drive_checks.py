@@ -157,7 +157,7 @@ def wall_lean(frame: Frame, box: tuple[float, float, float, float]) -> float:
     Raises
     ------
     ArgumentError
-        When fewer than 100 returns lie in the box.
+        When fewer than 100 returns lie in the box, or fewer than half of them within 10 cm of one plane.
     """
     x, y, z = frame.points_grid[:, :3].T.astype(np.float64)
     x_min, x_max, y_min, y_max = box
@@ -170,6 +170,8 @@ def wall_lean(frame: Frame, box: tuple[float, float, float, float]) -> float:
         plane = np.linalg.lstsq(columns[wall], y[wall])[0]
         error = np.abs(y - columns @ plane)
         wall = error < max(GROUND_ERROR / 2, float(np.median(error)))
+    if (share := (error < GROUND_ERROR).mean()) < 0.5:
+        raise ArgumentError("box", "a wall, most of it within 10 cm of a plane", f"{share:.0%} of the returns in {box}")
     return float(np.degrees(np.arctan(-plane[2])))
 
 
