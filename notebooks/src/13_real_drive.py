@@ -91,7 +91,7 @@ from semgrid_edu.workshop.studies.new_drive.own_street import (
     best_table, piece_confusions, semantic_truths, street_pieces,
 )  # fmt: skip
 from semgrid_edu.workshop.studies.new_drive.report_card import (
-    border_verdict, check_lines, draw_report_card, map_lines, motion_verdict,
+    MARKS, border_verdict, check_lines, draw_report_card, map_lines, motion_verdict,
 )  # fmt: skip
 from semgrid_edu.workshop.studies.new_drive.scan_borders import depth_edges, edge_contrast
 
@@ -536,7 +536,7 @@ for ax, (title, errors) in zip(axes, found.items(), strict=True):
     ax.barh(list(errors), list(errors.values()), color=["#1b9e77", *["0.6"] * 4])
     for place, value in enumerate(errors.values()):
         ax.text(value * 1.02, place, f" {value:.2f} m", va="center", fontsize=8)
-    ax.set(title=f"{title}: verdict {motion_verdict(errors)}", xlim=(0, 1.25 * max(errors.values())))
+    ax.set(title=f"{title}: {MARKS[motion_verdict(errors)][0]}", xlim=(0, 1.25 * max(errors.values())))
     ax.set_xlabel("distance between scans [m]")
 axes[0].invert_yaxis()
 plt.show()

@@ -60,6 +60,7 @@ def chart(ax, values):
     ax.set_xscale("symlog", linthresh=1)
     ticks = (-20, -5, -1, 0, 1, 5, 20)
     ax.set_xticks(ticks, list(map(str, ticks)))
+    ax.set_xlim(-35, 35)
     ax.grid(axis="x", alpha=0.3)
 
 

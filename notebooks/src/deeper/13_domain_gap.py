@@ -169,7 +169,7 @@ assert damage["colours matched"][0] == min(one[0] for one in damage.values())
 fig, ax = plt.subplots(figsize=(7.5, 3.2), layout="constrained")
 for name, (distance, accuracy, *_) in damage.items():
     ax.plot(distance, accuracy, "o", color="#d95f02")
-    below = name in ("as it is", "warmer")
+    below = name in ("as it is", "warmer", "colours matched")
     ax.annotate(name, (distance, accuracy), xytext=(6, -12 if below else 4), textcoords="offset points")
 ax.set(xlabel="colour distance to the training images", ylabel="share of right pixels", xlim=(0, 0.8), ylim=(0.2, 0.95))
 plt.show()
