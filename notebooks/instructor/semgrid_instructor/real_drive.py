@@ -101,7 +101,7 @@ def check_refine(refine: Callable) -> None:
         assert got.shape == (14, *shape), "another shape on a grid of another size"
         assert np.isfinite(got).all(), "no numbers where the map or the occupancy is sure"
         assert got.min() >= 0, "negative probabilities where the map or the occupancy is sure"
-        assert np.allclose(got.sum(axis=0), 1, atol=1e-4), "the classes of a cell don't sum to 1"
+        assert close(got.sum(axis=0), np.ones(shape), atol=1e-4), "the classes of a cell don't sum to 1"
         same = np.array_equal(log_g, kept[0]) and np.array_equal(o, kept[1])
         assert same, "it changes an argument: make new arrays"
 
@@ -119,7 +119,9 @@ def check_better_map(refine: Callable) -> None:
         g, counted = results[k].grid[..., ::-1], truths[k, :, ::-1] != 255
         refined = answer_array(refine(np.log(np.maximum(g, 1e-12)), beliefs[k][..., ::-1].copy()))
         assert refined.shape == g.shape, "another shape in a frame of the real street"
-        assert np.allclose(refined.sum(axis=0), 1, atol=1e-4), "no probabilities in a frame of the real street"
+        assert close(refined.sum(axis=0), np.ones(g.shape[1:]), atol=1e-4), (
+            "no probabilities in a frame of the real street"
+        )
         right = [(one.argmax(axis=0) == truths[k, :, ::-1])[counted].mean() for one in (refined, g)]
         shares.append(right)
     new, old = np.mean(shares, axis=0)
