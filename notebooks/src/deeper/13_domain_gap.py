@@ -213,6 +213,11 @@ for name, one in measured["drives"].items():
 #
 # Whichever you choose: hold back whole drives for testing, and report all checks beside the score.
 #
+# ## What this does not show
+#
+# Two real streets, a few seconds of each, and one network. That the seven changes of a simulated image do what
+# real light and real lenses do, we don't know; they only show that a distance and the damage can come apart.
+#
 # ## Further reading
 #
 # - Ben-David, Blitzer, Crammer, Kulesza, Pereira, Vaughan, *A theory of learning from different domains*, Machine
