@@ -24,24 +24,16 @@ def drive_scores(counts, drives):
     return {result}"""
 
 
-def rule(
-    few="seeds < 3 or drives < 10",
-    sides="(low > limit, high < limit) if above else (high < limit, low > limit)",
-    order="""
-    if any(no for _, no in sides):
-        return "not reproduced"
-    if all(yes for yes, _ in sides):
-        return "reproduced"
-    return "cannot tell\"""",
-):
+def holm(order="np.argsort(p_values)", limit="level / (m - place)", stop="break", keep="p_values[k] > "):
     """Return an answer to task 2 with these parts."""
     return f"""
-def judge(statements, seeds, drives):
-    if {few}:
-        return "cannot tell"
-    sides = []
-    for low, high, limit, above in statements:
-        sides.append({sides}){order}"""
+def given_up(p_values, level=0.025):
+    found, m = [False] * len(p_values), len(p_values)
+    for place, k in enumerate({order}):
+        if {keep}{limit}:
+            {stop}
+        found[k] = True
+    return found"""
 
 
 def jackknife(
@@ -51,12 +43,14 @@ def jackknife(
     quantile="(1 + level) / 2",
     freedom="V - 1",
     middle="metric(total)",
+    pooled="[sum(m for m, town in zip(matrices, towns) if town == one) for one in set(towns)]",
 ):
-    """Return an answer to task 3 with these parts."""
+    """Return an answer to task 3 with these parts; V is the number of towns."""
     return f"""
-def jackknife_interval(matrices, metric, level=0.95):
-    V, total = len(matrices), matrices.sum(axis=0)
-    w = np.array([{without} for m in matrices])
+def town_interval(matrices, towns, metric, level=0.95):
+    pooled = {pooled}
+    V, total = len(pooled), sum(matrices)
+    w = np.array([{without} for m in pooled])
     variance = {variance}
     t = stats.t.ppf({quantile}, {freedom})
     half, middle = {half}, {middle}
@@ -125,7 +119,8 @@ def on_own_jackknife(number):
         task="paired",
         code="""
 def paired_interval(a, b, metric, level=0.95):
-    return jackknife_interval(np.stack([a, b], axis=1), lambda two: metric(two[0]) - metric(two[1]), level)""",
+    names = [str(v) for v in range(len(a))]
+    return town_interval(np.stack([a, b], axis=1), names, lambda two: metric(two[0]) - metric(two[1]), level)""",
     )
 
 
@@ -226,240 +221,226 @@ def drive_scores(counts, drives):
             code=pooled(score="f'{np.trace(total) / total.sum():.1%}'"),
         ),
         # ---- task 2
-        right("pairs of sides", task="judge", code=rule()),
+        right("a loop with a break", task="given-up", code=holm()),
         right(
-            "signs",
-            task="judge",
+            "adjusted p-values",
+            task="given-up",
             code="""
-def judge(statements, seeds, drives):
-    worst = 1
-    for low, high, limit, above in statements:
-        ends = sorted((end - limit) * (1 if above else -1) for end in (low, high))
-        worst = min(worst, 1 if ends[0] > 0 else -1 if ends[1] < 0 else 0)
-    if min(seeds / 3, drives / 10) < 1:
-        worst = 0
-    return {1: "reproduced", 0: "cannot tell", -1: "not reproduced"}[worst]""",
+def given_up(p_values, level=0.025):
+    p = np.asarray(p_values)
+    order = p.argsort()
+    adjusted = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))
+    return (adjusted <= level)[np.argsort(order)]""",
         ),
-        mistake("few seeds forgotten", task="judge", loses=2, says="2 seeds are too few", code=rule(few="drives < 10")),
-        mistake("few drives forgotten", task="judge", loses=2, says="9 drives are too few", code=rule(few="seeds < 3")),
+        mistake("uncorrected", task="given-up", loses=2, says="without a correction", code=holm(limit="level")),
+        mistake("Bonferroni", task="given-up", loses=2, says="Bonferroni's correction", code=holm(limit="level / m")),
         mistake(
-            "three seeds are too few",
-            task="judge",
+            "goes on after the first that stays",
+            task="given-up",
             loses=2,
-            says="an interval that lies above its limit, as claimed",
-            code=rule(few="seeds <= 3 or drives <= 10"),
+            says="stop at the first",
+            code=holm(stop="continue"),
         ),
         mistake(
-            "direction ignored",
-            task="judge",
+            "the list's own order",
+            task="given-up",
             loses=2,
-            says="here the claim says *below*",
-            code=rule(sides="(low > limit, high < limit)"),
+            says="0.004 is at most",
+            code=holm(order="range(m)"),
         ),
         mistake(
-            "limit ignored",
-            task="judge",
+            "largest first",
+            task="given-up",
             loses=2,
-            says="the limit is 0.5, not 0",
-            code=rule(sides="(low > 0, high < 0) if above else (high < 0, low > 0)"),
+            says="0.004 is at most",
+            code=holm(order="np.argsort(p_values)[::-1]"),
         ),
         mistake(
-            "the middle decides",
-            task="judge",
+            "in sorted order",
+            task="given-up",
             loses=2,
-            says="an interval that holds its limit",
-            code=rule(sides="((low + high) / 2 > limit, (low + high) / 2 < limit)"),
+            says="not in sorted order",
+            code="""
+def given_up(p_values, level=0.025):
+    p = np.sort(p_values)
+    return np.cumprod(p <= level / np.arange(len(p), 0, -1)).astype(bool)""",
         ),
         mistake(
-            "one yes is enough",
-            task="judge",
+            "below, not at most",
+            task="given-up",
             loses=2,
-            says="*every* interval must lie on the claimed side",
-            code=rule(
-                order="""
-    if any(no for _, no in sides):
-        return "not reproduced"
-    return "reproduced" if any(yes for yes, _ in sides) else "cannot tell\""""
-            ),
+            says="equal to its limit",
+            code=holm(keep="p_values[k] >= "),
         ),
         mistake(
-            "unclear before no",
-            task="judge",
-            loses=2,
-            says="also beside an unclear one",
-            code=rule(
-                order="""
-    if any(not yes and not no for yes, no in sides):
-        return "cannot tell"
-    return "reproduced" if all(yes for yes, _ in sides) else "not reproduced\""""
-            ),
-        ),
-        mistake(
-            "all must fail",
-            task="judge",
-            loses=2,
-            says="one interval on the other side decides",
-            code=rule(
-                order="""
-    if all(no for _, no in sides):
-        return "not reproduced"
-    return "reproduced" if all(yes for yes, _ in sides) else "cannot tell\""""
-            ),
-        ),
-        mistake(
-            "two verdicts",
-            task="judge",
-            loses=2,
-            says="an interval that holds its limit",
-            code=rule(order='\n    return "reproduced" if all(yes for yes, _ in sides) else "not reproduced"'),
-        ),
-        mistake(
-            "a limit below zero turns the claim",
-            task="judge",
+            "five at most",
+            task="given-up",
             loses=2,
             says="on inputs you haven't seen",
-            code=rule(sides="(low > limit, high < limit) if above else (high < abs(limit), low > abs(limit))"),
+            code=holm(order="np.argsort(p_values)[:5]"),
         ),
         mistake(
-            "an array of verdicts",
-            task="judge",
+            "the level by heart",
+            task="given-up",
             loses=2,
-            says="return one of the three verdicts, as a string",
-            code="def judge(statements, seeds, drives):\n    return np.array(['reproduced'] * len(statements))",
+            says="level 0.05",
+            code=holm(limit="0.025 / (m - place)"),
         ),
         # ---- task 3
-        right("by the formula", task="jackknife", code=jackknife()),
+        right("by the formula", task="towns", code=jackknife()),
         right(
             "pseudo-values",
-            task="jackknife",
+            task="towns",
             code="""
-def jackknife_interval(matrices, metric, level=0.95):
-    V, score = len(matrices), metric(sum(matrices))
-    pseudo = [V * score - (V - 1) * metric(sum(matrices) - m) for m in matrices]
+def town_interval(matrices, towns, metric, level=0.95):
+    towns = np.array(towns)
+    V, score = len(set(towns)), metric(sum(matrices))
+    pseudo = [V * score - (V - 1) * metric(matrices[towns != one].sum(axis=0)) for one in set(towns)]
     half = stats.sem(pseudo) * stats.t.isf((1 - level) / 2, V - 1)
     return score - half, score, score + half""",
         ),
         right(
             "around the score",
-            task="jackknife",
+            task="towns",
             code=jackknife(variance="(V - 1) / V * ((w - metric(total)) ** 2).sum()"),
         ),
         mistake(
             "1.96",
-            task="jackknife",
+            task="towns",
             loses=3,
             says="1.96 is for very many drives",
             code=jackknife(half="1.96 * np.sqrt(variance)"),
         ),
         mistake(
             "no quantile",
-            task="jackknife",
+            task="towns",
             loses=3,
             says="that is the standard error",
             code=jackknife(half="np.sqrt(variance)"),
         ),
         mistake(
             "V degrees of freedom",
-            task="jackknife",
+            task="towns",
             loses=3,
-            says="V - 1 degrees of freedom, not V",
+            says="G - 1 degrees of freedom, not G",
             code=jackknife(freedom="V"),
         ),
-        mistake("one side", task="jackknife", loses=3, says="2.5 % on each side", code=jackknife(quantile="level")),
+        mistake("one side", task="towns", loses=3, says="2.5 % on each side", code=jackknife(quantile="level")),
         mistake(
             "standard error of what is left",
-            task="jackknife",
+            task="towns",
             loses=3,
             says="like independent scores",
             code=jackknife(variance="w.var(ddof=1) / V"),
         ),
         mistake(
             "variance of what is left",
-            task="jackknife",
+            task="towns",
             loses=3,
             says="must be scaled up",
             code=jackknife(variance="w.var(ddof=1)"),
         ),
         mistake(
             "mean of squares",
-            task="jackknife",
+            task="towns",
             loses=3,
             says="the mean of the squares isn't their sum",
             code=jackknife(variance="w.var()"),
         ),
         mistake(
             "factor forgotten",
-            task="jackknife",
+            task="towns",
             loses=3,
-            says="the factor (V - 1) / V is missing",
+            says="the factor (G - 1) / G is missing",
             code=jackknife(variance="((w - w.mean()) ** 2).sum()"),
         ),
         mistake(
             "factor upside down",
-            task="jackknife",
+            task="towns",
             loses=3,
-            says="not V / (V - 1)",
+            says="not G / (G - 1)",
             code=jackknife(variance="V / (V - 1) * ((w - w.mean()) ** 2).sum()"),
         ),
         mistake(
             "each drive alone",
-            task="jackknife",
+            task="towns",
             loses=3,
-            says="you use the score of each drive alone",
+            says="you use the score of each town alone",
             code=jackknife(without="metric(m)", variance="w.var(ddof=1) / V"),
         ),
         mistake(
-            "root forgotten", task="jackknife", loses=3, says="the root is missing", code=jackknife(half="t * variance")
+            "root forgotten", task="towns", loses=3, says="the root is missing", code=jackknife(half="t * variance")
         ),
         mistake(
             "mean of the drives' scores",
-            task="jackknife",
+            task="towns",
             loses=3,
             says="Sum the matrices first",
-            code=jackknife(middle="np.mean([metric(m) for m in matrices])"),
+            code=jackknife(middle="np.mean([metric(m) for m in pooled])"),
         ),
         mistake(
             "around what is left",
-            task="jackknife",
+            task="towns",
             loses=3,
             says="around the score of *all* drives",
             code=jackknife(middle="w.mean()"),
         ),
         mistake(
             "level ignored",
-            task="jackknife",
+            task="towns",
             loses=3,
             says="on inputs you haven't seen",
             code=jackknife(quantile="0.975"),
         ),
         mistake(
             "endless loop",
-            task="jackknife",
+            task="towns",
             loses=3,
             says="no reply before timeout",
             code="""
-def jackknife_interval(matrices, metric, level=0.95):
+def town_interval(matrices, towns, metric, level=0.95):
     while len(matrices):
         pass""",
         ),
         right(
             "a list, and helpers with everyday names",
-            task="jackknife",
+            task="towns",
             code=EVERYDAY + jackknife().replace("return", "return [").replace("+ half", "+ half]"),
         ),
         mistake(
             "two ends alone",
-            task="jackknife",
+            task="towns",
             loses=3,
-            says="jackknife_interval must return three numbers",
+            says="town_interval must return three numbers",
             code=jackknife().replace("middle, middle + half", "middle + half"),
         ),
         mistake(
             "a text",
-            task="jackknife",
+            task="towns",
             loses=3,
-            says="jackknife_interval returned no array of numbers but a str",
+            says="town_interval returned no array of numbers but a str",
             code=jackknife(middle="'69 %'", half="'30 %'").replace("middle - half, middle, ", ""),
+        ),
+        mistake(
+            "one drive at a time",
+            task="towns",
+            loses=3,
+            says="you leave out one drive at a time",
+            code=jackknife(pooled="matrices"),
+        ),
+        mistake(
+            "degrees of freedom of the drives",
+            task="towns",
+            loses=3,
+            says="what is left out are towns",
+            code=jackknife(freedom="len(matrices) - 1"),
+        ),
+        mistake(
+            "every town has two drives, side by side in the second half",
+            task="towns",
+            loses=3,
+            says="on inputs you haven't seen",
+            code=jackknife(pooled="list(matrices[: len(matrices) // 2] + matrices[len(matrices) // 2 :])"),
         ),
         # ---- task 4
         right("by the formula", task="paired", code=paired()),
@@ -468,7 +449,8 @@ def jackknife_interval(matrices, metric, level=0.95):
             task="paired",
             code="""
 def paired_interval(a, b, metric, level=0.95):
-    return jackknife_interval(np.stack([a, b], axis=1), lambda two: metric(two[0]) - metric(two[1]), level)""",
+    names = [str(v) for v in range(len(a))]
+    return town_interval(np.stack([a, b], axis=1), names, lambda two: metric(two[0]) - metric(two[1]), level)""",
         ),
         right(
             "pseudo-values",
@@ -715,52 +697,6 @@ def drive_scores(counts, drives):
         scores[drive] = np.mean(np.diag(total)[use] / cells[use])
     return scores""",
         ),
-        mistake(
-            "a majority of three decides",
-            task="judge",
-            loses=2,
-            says="one interval on the other side decides, also beside two",
-            code="""
-def judge(statements, seeds, drives):
-    if seeds < 3 or drives < 10:
-        return "cannot tell"
-    claimed = [low > limit if above else high < limit for low, high, limit, above in statements]
-    opposite = [high < limit if above else low > limit for low, high, limit, above in statements]
-    if 2 * sum(opposite) >= len(opposite):
-        return "not reproduced"
-    return "reproduced" if all(claimed) else "cannot tell"
-""",
-        ),
-        mistake(
-            "only the first two statements are read",
-            task="judge",
-            loses=2,
-            says="on inputs you haven't seen",
-            code="""
-def judge(statements, seeds, drives):
-    if seeds < 3 or drives < 10:
-        return "cannot tell"
-    claimed = [low > limit if above else high < limit for low, high, limit, above in statements]
-    opposite = [high < limit if above else low > limit for low, high, limit, above in statements]
-    if any(opposite[:2]):
-        return "not reproduced"
-    return "reproduced" if all(claimed[:2]) else "cannot tell"
-""",
-        ),
-        right(
-            "the lecture's words",
-            task="judge",
-            code="""
-def judge(statements, seeds, drives):
-    if seeds < 3 or drives < 10:
-        return "cannot tell (too small)"
-    claimed = [low > limit if above else high < limit for low, high, limit, above in statements]
-    opposite = [high < limit if above else low > limit for low, high, limit, above in statements]
-    if any(opposite):
-        return "not reproduced"
-    return "reproduced" if all(claimed) else "cannot tell"
-""",
-        ),
         right(
             "scores as Decimal",
             task="drive-scores",
@@ -779,5 +715,5 @@ def drive_scores(counts, drives):
 
     def test_a_wrong_jackknife_costs_nothing_in_task_4(self):
         built_on = [a for a in pack(self.entries) if "paired" in a and "that is wrong" in a["paired"].title]
-        assert all(answers["jackknife"].loses for answers in built_on)
+        assert all(answers["towns"].loses for answers in built_on)
         assert len(built_on) == 5

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.crf import expected_calibration_error, reliability
 from semgrid_edu.metrics import METRICS, class_accuracy
-from semgrid_edu.workshop.paper.reports.verdicts import TOO_SMALL, Statement
 from semgrid_edu.workshop.scoring.confusions import drive_confusions
-from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval
 from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 from semgrid_instructor import close, generator, hidden
 
@@ -41,46 +39,40 @@ def check_drive_scores(drive_scores: Callable) -> None:
         assert close(score, class_accuracy(matrix)), f"a wrong score, four classes, of a drive{absent}"
 
 
-def _uncorrected_verdict(said: list[tuple], seeds: int, drives: int) -> str:
-    """Return the verdict by the exercise's rule, which corrects nothing for the number of statements."""
-    if seeds < 3 or drives < 10:
-        return TOO_SMALL
-    claimed, opposite = (
-        [Statement("", _value(low, high), limit, above == as_said).confirmed for low, high, limit, above in said]
-        for as_said in (True, False)
-    )
-    return "not reproduced" if any(opposite) else "reproduced" if all(claimed) else "cannot tell"
-
-
 @hidden
-def check_judge(judge: Callable) -> None:
-    """One to five of many intervals, both directions, several limits."""
-    ends = [(-0.9, -0.6), (-0.9, 0.2), (-0.2, 0.4), (0.3, 0.4), (0.6, 0.9)]
-    some = [(low, high, limit, above) for (low, high), limit, above in product(ends, (-0.5, 0.5), (True, False))]
+def check_given_up(given_up: Callable) -> None:
+    """One to twelve statements, sure ones and doubtful ones, other levels."""
     rng = generator(119)
-    for count in rng.integers(1, 6, 150):
-        said = [some[k] for k in rng.choice(len(some), count)]
-        for seeds, drives in ((3, 10), (5, 110), (1, 110), (3, 2)):
-            wanted = _uncorrected_verdict(said, seeds, drives)
-            got = judge(said, seeds, drives)
-            sides = " and ".join("above" if one[3] else "below" for one in said)
-            right = isinstance(got, str) and got in (wanted, wanted.removesuffix(" (too small)"))
-            assert right, f"{got!r} instead of {wanted!r}, {seeds} seeds, {drives} drives, claimed {sides}"
+    for count in rng.integers(1, 13, 60):
+        p_values = rng.beta(0.3, 3, count)
+        for level in (0.025, 0.1):
+            wanted = _given_up(p_values, level)
+            got = answer_array(given_up(p_values.tolist(), level)).ravel().astype(bool)
+            right = got.shape == wanted.shape and (got == wanted).all()
+            assert right, f"other statements are given up, of {count} with level {level}"
 
 
-def _value(low: float, high: float) -> ScoreWithInterval:
-    """Return a number with its interval."""
-    return {"mean": (low + high) / 2, "low": low, "high": high, "seeds": []}
+def _given_up(p_values: NDArray, level: float) -> NDArray[np.bool_]:
+    """Return what Holm's correction gives up, by adjusted p-values."""
+    order = np.argsort(p_values)
+    adjusted = np.maximum.accumulate(p_values[order] * (len(p_values) - np.arange(len(p_values))))
+    found = np.zeros(len(p_values), np.bool_)
+    found[order] = adjusted <= level
+    return found
 
 
 @hidden
-def check_jackknife(jackknife_interval: Callable) -> None:
-    """Other numbers of drives and classes, other metrics and levels."""
-    for seed, (n, n_classes) in enumerate(((3, 2), (12, 4), (25, 3))):
-        matrices = _matrices(121 + seed, n, n_classes)
+def check_towns(town_interval: Callable) -> None:
+    """Other numbers of drives, towns and classes, towns of unlike size; other metrics and levels."""
+    for seed, (n, n_classes, n_towns) in enumerate(((6, 2, 3), (12, 4, 5), (25, 3, 8))):
+        matrices, rng = _matrices(121 + seed, n, n_classes), generator(131 + seed)
+        number = np.concatenate([np.arange(n_towns), rng.integers(0, n_towns, n - n_towns)])
+        rng.shuffle(number)
+        pooled = np.stack([matrices[number == g].sum(axis=0) for g in range(n_towns)])
         for (name, metric), level in product(METRICS.items(), (0.95, 0.8)):
-            got = answer_array(jackknife_interval(matrices.copy(), metric, level))
-            _compare(got, drive_interval(matrices[None], metric, level), f"{name}, {n} drives, level {level}")
+            got = answer_array(town_interval(matrices.copy(), [f"town {g}" for g in number], metric, level))
+            wanted = drive_interval(pooled[None], metric, level)
+            _compare(got, wanted, f"{name}, {n} drives in {n_towns} towns, level {level}")
 
 
 @hidden
@@ -108,7 +100,12 @@ def _by_own(jackknife: Callable, a: NDArray, b: NDArray, metric: Callable, level
     """Return what the jackknife of task 3 gives for the difference; NaN where it gives nothing."""
     try:
         return answer_array(
-            jackknife(np.stack([a, b], axis=1), lambda two: metric(two[0]) - metric(two[1]), level)
+            jackknife(
+                np.stack([a, b], axis=1),
+                [f"drive {v}" for v in range(len(a))],
+                lambda two: metric(two[0]) - metric(two[1]),
+                level,
+            )
         ).reshape(3)
     except Exception:
         return np.full(3, np.nan)
@@ -119,7 +116,9 @@ def _compare(got: NDArray, wanted: tuple, where: str) -> None:
     low, mean, high = wanted
     assert got.shape == (3,), f"{where}: not three numbers"
     assert close(got[1], mean, atol=1e-6), f"{where}: the number in the middle is wrong"
-    assert close(got, wanted, atol=(high - low) / 30), f"{where}: wrong width: does it follow the level and V?"
+    assert close(got, wanted, atol=(high - low) / 30), (
+        f"{where}: wrong width: does it follow the level and the number of what is left out?"
+    )
 
 
 @hidden

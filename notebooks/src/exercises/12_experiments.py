@@ -7,8 +7,8 @@
 # | task | about | points |
 # |---|---|---|
 # | 1 | frames pooled into drives, and class accuracy | 2 |
-# | 2 | the rule of verdicts | 2 |
-# | 3 | the jackknife over drives | 3 |
+# | 2 | which statements to give up | 2 |
+# | 3 | drives that share a town | 3 |
 # | 4 | a paired difference | 2 |
 # | 5 | expected calibration error | 3 |
 # | 6 | in your own words | 2 |
@@ -100,65 +100,56 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 2: the rule of verdicts (2 points)
+# ## Task 2: which statements to give up (2 points)
 #
-# A claim is a list of statements. Each is a tuple `(low, high, limit, above)`: the interval of a number, the limit that it is compared with, and whether the claim says
-# that the number is above the limit (`True`) or below it (`False`). Complete `judge`: it returns
+# `p_values` holds the p-value of each statement of a claim, in the claim's own order. Holm's correction gives up statements like this: sort them, smallest p-value first. Of $m$ statements, give up
+# the first if its p-value is at most level / $m$, then the second if it is at most level / $(m - 1)$, then the third if it is at most level / $(m - 2)$, and so on. **Stop at the first one that isn't given up**: those
+# after it stay as well.
 #
-# - `"cannot tell"` with fewer than 3 seeds or fewer than 10 drives, whatever the intervals are (the lecture's `"cannot tell (too small)"` is right here, too);
-# - `"not reproduced"` when at least one interval lies entirely on the other side of its limit than claimed;
-# - `"reproduced"` when every interval lies entirely on the claimed side of its limit;
-# - `"cannot tell"` otherwise.
+# Complete `given_up`: it returns for each statement, in the order of `p_values`, whether it is given up.
 
 
-# %% nbgrader={"grade": false, "grade_id": "judge", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def judge(statements, seeds, drives):
-    """Return the verdict on a claim."""
+# %% nbgrader={"grade": false, "grade_id": "given-up", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def given_up(p_values, level=0.025):
+    """Return whether Holm's correction gives up each statement."""
     ### BEGIN SOLUTION
-    if seeds < 3 or drives < 10:
-        return "cannot tell"
-    claimed = [low > limit if above else high < limit for low, high, limit, above in statements]
-    opposite = [high < limit if above else low > limit for low, high, limit, above in statements]
-    if any(opposite):
-        return "not reproduced"
-    return "reproduced" if all(claimed) else "cannot tell"
+    found, m = [False] * len(p_values), len(p_values)
+    for place, k in enumerate(np.argsort(p_values)):
+        if p_values[k] > level / (m - place):
+            break
+        found[k] = True
+    return found
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "judge-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "given-up-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    yes, unclear, no = (0.2, 1.0, 0.0, True), (-0.3, 0.9, 0.0, True), (-2.0, -0.4, 0.0, True)
-    cases = (
-        ([yes], "reproduced", "an interval that lies above its limit, as claimed"),
-        ([unclear], "cannot tell", "an interval that holds its limit"),
-        ([no], "not reproduced", "an interval that lies below, where above was claimed"),
-        ([yes, unclear], "cannot tell", "*every* interval must lie on the claimed side"),
-        ([unclear, no], "not reproduced", "one interval on the other side decides, also beside an unclear one"),
-        ([yes, no, yes], "not reproduced", "one interval on the other side decides, also beside two that hold"),
-        ([(-2.0, -0.4, 0.0, False)], "reproduced", "here the claim says *below*, and the interval lies below"),
-        ([(0.2, 1.0, 0.0, False)], "not reproduced", "here the claim says *below*, and the interval lies above"),
-        ([(0.2, 0.6, 0.5, True)], "cannot tell", "the limit is 0.5, not 0"),
-        (
-            [(-0.3, 0.4, -0.5, True)],
-            "reproduced",
-            "the limit is -0.5: a claim that something costs less than half a point",
-        ),
+    # Sorted: 0.004, 0.008, 0.013, 0.0135, 0.02, against 0.005, 0.00625, 0.0083, 0.0125, 0.025. The second stops it.
+    p_values = [0.02, 0.004, 0.013, 0.008, 0.0135]
+    got = answer_array(given_up(list(p_values)), "given_up").ravel()
+    assert got.shape == (5,), f"five statements, five answers; got {got.size}"
+    slips = {
+        (1, 1, 1, 1, 1): "this is without a correction: each p-value is compared with the level itself",
+        (1, 1, 0, 0, 0): "stop at the first that isn't given up: 0.02 lies below its limit, but comes after it",
+        (1, 0, 0, 0, 0): "answer in the order of `p_values`, not in sorted order",
+        (0, 0, 0, 0, 0): "0.004 is at most 0.025 / 5: it is given up",
+    }
+    found = tuple(got.astype(bool).astype(int).tolist())
+    assert found == (0, 1, 0, 0, 0), (
+        f"got {found}: {slips.get(found, 'only 0.004 is given up; is the order that of p_values?')}"
     )
-    for statements, wanted, hint in cases:
-        got = judge(list(statements), 3, 10)
-        assert got is not None, "judge returned nothing: did you forget `return`?"
-        assert isinstance(got, str), (
-            f"judge returned a {type(got).__name__}: return one of the three verdicts, as a string"
-        )
-        assert got == wanted, f"{statements} with 3 seeds and 10 drives: {got!r} instead of {wanted!r}: {hint}"
-    too_few = "cannot tell", "cannot tell (too small)"
-    assert judge([yes], 2, 110) in too_few, "2 seeds are too few, whatever the interval"
-    assert judge([no], 2, 110) in too_few, "2 seeds are too few, also for 'not reproduced'"
-    assert judge([yes], 5, 9) in too_few, "9 drives are too few, whatever the interval"
+    # 0.001 <= 0.025 / 3, 0.012 <= 0.025 / 2 and 0.02 <= 0.025: all go. Bonferroni would keep the last two.
+    got = answer_array(given_up([0.012, 0.001, 0.02]), "given_up").ravel().astype(bool).tolist()
+    assert got != [False, True, False], (
+        "this is Bonferroni's correction: the limit grows from one statement to the next"
+    )
+    assert got == [True, True, True], f"expected all three to be given up, got {got}"
+    equal = answer_array(given_up([0.05, 0.025], level=0.05), "given_up").ravel().astype(bool).tolist()
+    assert equal == [True, True], f"*at most*: a p-value equal to its limit is given up, with level 0.05; got {equal}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import experiments
 
-    complaint = experiments.check_judge(judge)
+    complaint = experiments.check_given_up(given_up)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -166,54 +157,63 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: the jackknife over drives (3 points)
+# ## Task 3: drives that share a town (3 points)
 #
-# `matrices` are the confusion matrices of V drives, `(V, C, C)`, `metric` is a function of one matrix, such as `pixel_accuracy`, and `level` how often the interval
-# should hold the true value. With $\theta$ the metric of the summed matrix, $\theta_{-v}$ that of the sum without drive $v$, and $\bar\theta$ the mean of the $\theta_{-v}$,
+# The lecture leaves out one drive at a time, because frames share a drive. Your drives were recorded in a few **towns**, and streets of one town look alike. So a drive has a parent, too: draw the graph. What must be left out now,
+# one at a time?
 #
-# $$ \theta \pm t \sqrt{\frac{V - 1}{V} \sum_{v} \left( \theta_{-v} - \bar\theta \right)^2} $$
+# `matrices` are the confusion matrices of V drives, `(V, C, C)`, `towns` is a list of V names, the town of each drive, in any order; `metric` is a function of one matrix, such as `pixel_accuracy`, and `level` says how often
+# the interval should contain the true value. With $\theta$ the metric of the sum of all matrices, $\theta_{-g}$ that of the sum without **all drives of town g**, $\bar\theta$ the mean of the $\theta_{-g}$, and $G$ towns,
 #
-# where $t$ is the quantile of Student's distribution with $V - 1$ degrees of freedom that leaves $(1 - \text{level})/2$ on *each* side.
+# $$ \theta \pm t \sqrt{\frac{G - 1}{G} \sum_{g} \left( \theta_{-g} - \bar\theta \right)^2} $$
 #
-# Complete `jackknife_interval`: it returns `low, score, high`.
+# where $t$ is the quantile of Student's distribution that leaves $(1 - \text{level})/2$ on *each* side. How many degrees of freedom does it have?
+#
+# Complete `town_interval`: it returns `low, score, high`.
 
 
-# %% nbgrader={"grade": false, "grade_id": "jackknife", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def jackknife_interval(matrices, metric, level=0.95):
+# %% nbgrader={"grade": false, "grade_id": "towns", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def town_interval(matrices, towns, metric, level=0.95):
     """Return low, score, high."""
     ### BEGIN SOLUTION
-    V, total = len(matrices), matrices.sum(axis=0)
-    without = np.array([metric(total - matrix) for matrix in matrices])
-    half = stats.t.ppf((1 + level) / 2, V - 1) * np.sqrt((V - 1) / V * ((without - without.mean()) ** 2).sum())
+    names, number = np.unique(towns, return_inverse=True)
+    G, total = len(names), matrices.sum(axis=0)
+    without = np.array([metric(matrices[number != g].sum(axis=0)) for g in range(G)])
+    half = stats.t.ppf((1 + level) / 2, G - 1) * np.sqrt((G - 1) / G * ((without - without.mean()) ** 2).sum())
     return metric(total) - half, metric(total), metric(total) + half
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "jackknife-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "towns-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _HALF_WIDTHS = {
+    0.1832: "you leave out one drive at a time: drives of a town look alike, so leave out a town",
+    0.2249: "what is left out are towns, so Student's quantile has G - 1 degrees of freedom",
     0.1864: "1.96 is for very many drives; Student's quantile for 3 degrees of freedom is 3.18",
     0.0951: "that is the standard error. Multiply it by Student's quantile",
-    0.2640: "Student's quantile has V - 1 degrees of freedom, not V",
+    0.2640: "Student's quantile has G - 1 degrees of freedom, not G",
     0.2238: "the quantile must leave 2.5 % on each side, so take the one of 0.975",
-    0.1009: "you treat the scores without one drive like independent scores. They differ little, so their squares are scaled *up*: see the formula",
-    0.2017: "the variance of the scores without one drive must be scaled up: see the formula",
+    0.1009: "you treat the scores without one town like independent scores. They differ little, so their squares are scaled *up*: see the formula",
+    0.2017: "the variance of the scores without one town must be scaled up: see the formula",
     0.1747: "the mean of the squares isn't their sum: see the formula",
-    0.3494: "the factor (V - 1) / V is missing",
-    0.4035: "the factor is (V - 1) / V, not V / (V - 1)",
-    0.2956: "you use the score of each drive alone. Use the score of all drives *without* it",
+    0.3494: "the factor (G - 1) / G is missing",
+    0.4035: "the factor is (G - 1) / G, not G / (G - 1)",
+    0.2956: "you use the score of each town alone. Use the score of all drives *without* it",
     0.0288: "the root is missing",
-    0.6052: "the factor is (V - 1) / V, not V - 1",
+    0.6052: "the factor is (G - 1) / G, not G - 1",
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "jackknife-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "towns-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # Four drives: 80 of 100, 150 of 200, 45 of 50 and 70 of 150 cells right. All: 345/500 = 0.69. Left out: 0.6625, 0.65, 0.6667, 0.7857.
-    matrices = np.array([[[80, 20], [0, 0]], [[150, 50], [0, 0]], [[45, 5], [0, 0]], [[70, 80], [0, 0]]])
-    low, score, high = _three(jackknife_interval(matrices.copy(), pixel_accuracy), "jackknife_interval")
+    # Four towns: 80 of 100, 150 of 200, 45 of 50 and 70 of 150 cells right. All: 345/500 = 0.69. Left out: 0.6625, 0.65, 0.6667, 0.7857.
+    right = np.array([30, 100, 20, 40, 50, 50, 25, 30])
+    cells = np.array([50, 120, 20, 80, 50, 80, 30, 70])
+    matrices = np.stack([np.stack([right, cells - right], axis=1), np.zeros((8, 2), int)], axis=1)
+    towns = ["Apt", "Bex", "Cluj", "Dax", "Apt", "Bex", "Cluj", "Dax"]
+    low, score, high = _three(town_interval(matrices.copy(), list(towns), pixel_accuracy), "town_interval")
     middles = {
-        0.7292: "that is the mean of the drives' scores. Sum the matrices first: a drive with more cells counts for more",
-        0.6912: "that is the mean of the scores without one drive. The interval is around the score of *all* drives",
+        0.7292: "that is the mean of the towns' scores. Sum the matrices first: a town with more cells counts for more",
+        0.6912: "that is the mean of the scores without one town. The interval is around the score of *all* drives",
     }
     _explain("the score is", score, middles, 1e-4)
     assert np.isclose(score, 0.69, atol=1e-4), f"the score is {score:.4f}; by hand 345/500 = 0.69"
@@ -224,7 +224,7 @@ def _test():
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import experiments
 
-    complaint = experiments.check_jackknife(jackknife_interval)
+    complaint = experiments.check_towns(town_interval)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -237,8 +237,8 @@ _test()
 # `a` and `b` are the confusion matrices of two methods on the **same** V drives, `(V, C, C)` each: `a[v]` and `b[v]` belong to the same drive. Leave a drive out of *both*
 # at once, and see what that does to `metric(a) - metric(b)`.
 #
-# Complete `paired_interval`: it returns `low, difference, high`, by the jackknife of task 3 with the difference in place of $\theta$. (You may call your
-# `jackknife_interval`, whose mistakes cost nothing here, or write the formula again. What could you hand to it, such that it leaves out both matrices of a drive?)
+# Complete `paired_interval`: it returns `low, difference, high`, by the lecture's jackknife, one drive left out at a time, with the difference in place of $\theta$. (You may call your
+# `town_interval`, whose mistakes cost nothing here, or write the formula again. Which towns, and what in place of the matrices, make it leave out both matrices of one drive?)
 
 
 # %% nbgrader={"grade": false, "grade_id": "paired", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -263,7 +263,8 @@ def _by_own_jackknife(jackknife, a, b):
     """Return what the jackknife of task 3 gives for the difference, be it right or not; NaN where it gives nothing."""
     try:
         pairs = np.stack([a, b], axis=1)
-        return _three(jackknife(pairs, lambda two: pixel_accuracy(two[0]) - pixel_accuracy(two[1])), "it")
+        names = [f"drive {v}" for v in range(len(pairs))]
+        return _three(jackknife(pairs, names, lambda two: pixel_accuracy(two[0]) - pixel_accuracy(two[1])), "it")
     except Exception:
         return np.full(3, np.nan)
 
@@ -292,7 +293,7 @@ def _test():
     wanted = [0.01127, 0.02444, 0.03762]
     if not np.allclose(got, wanted, atol=2e-4):
         # What is wrong in your task 3 has cost its points there, and costs none here.
-        own = _by_own_jackknife(jackknife_interval, a, b)
+        own = _by_own_jackknife(town_interval, a, b)
         if not np.allclose(got, own) or got[0] == got[2]:
             _explain_paired(*got)
             right, half = np.isclose(got[1], 0.02444, atol=2e-4), (got[2] - got[0]) / 2
@@ -302,7 +303,7 @@ def _test():
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import experiments
 
-    complaint = experiments.check_paired(paired_interval, jackknife_interval)
+    complaint = experiments.check_paired(paired_interval, town_interval)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 

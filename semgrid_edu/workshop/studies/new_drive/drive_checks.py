@@ -6,9 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import gaussian_gradient_magnitude, map_coordinates
 from scipy.spatial import KDTree
-from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
 from semgrid_edu.datasets import KittiRawDrive
@@ -20,8 +18,6 @@ LANE = (3.0, 20.0, 1.5)
 """Where the ground of the vehicle's own lane is looked for: from and to this far ahead, and to each side, metres."""
 GROUND_ERROR = 0.1
 """A return further than this from the fitted ground isn't part of it, metres."""
-ONE_COLUMN = 1.5
-"""Two successive returns closer than this, degrees, are neighbours on a ring of the scanner."""
 TALL = (0.5, 3.0)
 """Heights above the ground, metres, between which returns come from things that stand up, such as walls and poles."""
 NEAREST, FARTHEST = 3.0, 40.0
@@ -140,24 +136,43 @@ def ground_plane(points: NDArray, height: float) -> GroundPlane:
     return GroundPlane(-plane[0], *np.degrees(np.arctan(plane[1:])))
 
 
-def depth_edges(points: NDArray, jump: float = 0.5) -> NDArray[np.float64]:
-    """Find the returns (n, 3) at the left and right borders of things: the near ones where the distance jumps.
+def wall_lean(frame: Frame, box: tuple[float, float, float, float]) -> float:
+    """Fit a plane to a wall beside the road, and return by how much the LIDAR leans if the wall is upright.
+
+    The ground seems to rise to the left both when the street does and when the LIDAR leans to the right. A wall leans
+    in the second case alone, by the same angle.
 
     Parameters
     ----------
-    points : (N, 3+) float
-        Returns in the LIDAR frame, metres, ring by ring as KITTI's files hold them.
-    jump : float
-        Least difference of distance to the next return on the ring, metres.
+    frame : Frame
+        Its scan is used, from 1 to 8 m above the ground.
+    box : (float, float, float, float)
+        Where the wall stands: least and largest x, least and largest y, metres.
+
+    Returns
+    -------
+    float
+        Degrees; positive when the ground seems to rise to the left because of it.
+
+    Raises
+    ------
+    ArgumentError
+        When fewer than 100 returns lie in the box, or fewer than half of them within 10 cm of one plane.
     """
-    points = np.asarray(points[:, :3], dtype=np.float64)
-    distance = np.linalg.norm(points, axis=1)
-    direction = points / np.maximum(distance, 1e-6)[:, None]
-    neighbours = (direction[1:] * direction[:-1]).sum(axis=1) > np.cos(np.radians(ONE_COLUMN))
-    nearer, edge = np.diff(distance) * neighbours, np.zeros(len(points), np.bool_)
-    edge[1:] |= nearer < -jump
-    edge[:-1] |= nearer > jump
-    return points[edge]
+    x, y, z = frame.points_grid[:, :3].T.astype(np.float64)
+    x_min, x_max, y_min, y_max = box
+    inside = (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max) & (z > 1) & (z < 8)
+    if inside.sum() < 100:
+        raise ArgumentError("box", "a place with 100 or more returns from a wall", f"{inside.sum()} in {box}")
+    columns, y = np.column_stack([np.ones(inside.sum()), x[inside], z[inside]]), y[inside]
+    wall = np.ones(len(y), np.bool_)
+    for _ in range(30):
+        plane = np.linalg.lstsq(columns[wall], y[wall])[0]
+        error = np.abs(y - columns @ plane)
+        wall = error < max(GROUND_ERROR / 2, float(np.median(error)))
+    if (share := (error < GROUND_ERROR).mean()) < 0.5:
+        raise ArgumentError("box", "a wall, most of it within 10 cm of a plane", f"{share:.0%} of the returns in {box}")
+    return float(np.degrees(np.arctan(-plane[2])))
 
 
 def with_scan(frames: Sequence[Frame]) -> list[Frame]:
@@ -169,36 +184,6 @@ def with_scan(frames: Sequence[Frame]) -> list[Frame]:
         Frames of a drive.
     """
     return [frame for frame in frames if len(frame.points)]
-
-
-def edge_contrast(frame: Frame, yaws: ArrayLike) -> NDArray[np.float64]:
-    """Return how much the image changes where the scan has borders of things, for a camera turned to and fro.
-
-    With the right calibration a border in the scan falls on a border in the image (Levinson and Thrun, RSS 2013).
-    The scan's rings run sideways, so this checks the camera's yaw, and much less its pitch and roll.
-
-    Parameters
-    ----------
-    frame : Frame
-        A frame with an image.
-    yaws : (n,) float
-        Turns of the camera to try, degrees; 0 is the calibration as it is.
-
-    Returns
-    -------
-    (n,) float64
-        Mean gradient of the image at the borders over its mean gradient everywhere; 1 says that they have nothing
-        to do with each other.
-    """
-    image, camera = frame.need_image(), frame.camera
-    gradient = gaussian_gradient_magnitude(image.mean(axis=2), 1.6e-3 * camera.size[1])
-    in_camera = transform_points(camera.T_camera_from_lidar, depth_edges(frame.points))
-    found = []
-    for yaw in np.atleast_1d(yaws):
-        turned = in_camera @ Rotation.from_rotvec([0, yaw, 0], degrees=True).as_matrix().T
-        pixels, visible = project(turned, camera)
-        found.append(map_coordinates(gradient, pixels[visible, ::-1].T, order=1).mean() / gradient.mean())
-    return np.array(found)
 
 
 def standing_points(frame: Frame) -> NDArray[np.float64]:

@@ -11,6 +11,7 @@ from semgrid_edu.camera import rigid_transform, transform_points
 from semgrid_edu.frame import Frame
 from semgrid_edu.workshop.studies.new_drive import drive_checks as checks
 from semgrid_edu.workshop.studies.new_drive.domain import colour_distance, mean_histograms
+from semgrid_edu.workshop.studies.new_drive.scan_borders import edge_contrast
 
 TURN = 2.0
 """By how much a sensor is turned, degrees."""
@@ -102,7 +103,7 @@ def drive_readings(frames: Sequence[Frame], known: dict[str, NDArray], every: in
     """
     frames = checks.with_scan(frames)
     some = frames[::every]
-    contrast = np.mean([checks.edge_contrast(frame, YAWS) for frame in some], axis=0)
+    contrast = np.mean([edge_contrast(frame, YAWS) for frame in some], axis=0)
     errors, seen = checks.axes_errors(frames), mean_histograms([frame.need_image() for frame in some])
     return {
         "gaps": float(len(checks.time_gaps([frame.time for frame in frames]))),
