@@ -90,7 +90,8 @@ def page_html(
     """
     first, (near, far), comparison = record.views[0], DEPTH_RANGE, record.comparison
     panels = [Panel(name, **words) for name, words in table_beside(__file__, "captions").items()]
-    shown = [panel for panel in panels if panel.name != "truth" or record.labelled]
+    made = {*first.images, *["truth"] * bool(record.labelled)}
+    shown = [panel for panel in panels if panel.name in made]
     if record.gaps:
         shown[-1] = shown[-1]._replace(see=shown[-1].see + GAPS)
     whose = " The stories are about the package's own stages." if comparison else ""
@@ -211,7 +212,7 @@ def _times(record: Record) -> str:
         heads = ["the package's, ms", f"{_breakable(comparison.file)}, ms"]
     rows = [
         _time_row(symbols, f"{words}; replaced by <b>{stage}</b>" if stage in replaced else words, runs, stage)
-        for stage, (symbols, words) in STAGE_WORDS.items()
+        for stage, (symbols, words) in ((stage, STAGE_WORDS[stage]) for stage in record.stages)
     ]
     totals = [{"all": sum(run.values())} for run in runs]
     return _filled(
