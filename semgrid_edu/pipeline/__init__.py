@@ -1,7 +1,7 @@
 """One frame through every stage, from LIDAR scan and image to the refined semantic grid (paper, Fig. 2).
 
-`Stages` holds the paper's five stages, and a memory, as functions that can be exchanged, `run_pipeline` sends frames through them and checks
-what each hands to the next, and `load_stages` reads a student's own functions from a file.
+`Stages` holds the paper's five stages, and a memory, as functions that can be exchanged, `run_pipeline` sends frames
+through them and checks what each hands to the next, and `load_stages` reads a student's own functions from a file.
 """
 
 from semgrid_edu.pipeline.checks import StageError
