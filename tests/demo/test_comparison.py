@@ -224,7 +224,7 @@ def test_a_memory_of_ones_own_is_shown_beside_the_packages(drive, tmp_path):
     for frame in json.loads(page.text["frames"]):
         assert (np.array(decode(frame["images"]["your_remembered"])) == 0).all()
         assert frame["images"]["remembered"] != frame["images"]["grid"]
-    assert "Made with remember of my_stages.py" in " ".join(page.text["figcaption"].split())
+    assert "Made with <b>remember</b> of my_stages.py" in html
     assert re.search(r"<tr><th>all cells, grid with memory, my_<wbr>stages.py</th>", html)
     assert len(re.findall(r'<tr class="stage">', html)) == 6
 
