@@ -126,6 +126,7 @@ class GainCounts:
 
     def _scores(self, name: str) -> dict[str, object]:
         of = {method: counts for (group, method), counts in self._counts.items() if group == name}
+        of = of if name in GROUPS else {method: of[method] for method in (ONE, MEMORY)}
         stacked = {method: np.stack([one.confusion for one in counts])[None] for method, counts in of.items()}
         cells, metrics = int(stacked[ONE].sum()), ("pixel accuracy", "class accuracy")
         if not cells:
