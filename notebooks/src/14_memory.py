@@ -624,13 +624,13 @@ _ = interact(show_repeats, repeats=FloatSlider(value=0.6, min=0.0, max=0.95, ste
 #
 # **Far ahead.** The squares in which memory does most harm, three per drive:
 
-# %% jupyter={"source_hidden": true} alt="six squares of map in three rows, one frame, memory and truth, in which memory is worse: in the simulated ones, far ahead, a strip of sidewalk is wider than with one frame where the truth is road; in the real ones a few cells beside cars are called car"
+# %% jupyter={"source_hidden": true} alt="six squares of map in three rows, one frame, memory and truth, in which memory is worse: in the simulated ones, far ahead, a strip of sidewalk is wider than with one frame where the truth is road; in the real ones a few cells at the edges of cars differ"
 show_windows([(results, one) for results in (simulated, street) for one in windows(results, -1)])
 
 # %% [markdown]
 # In the simulated squares, 45 to 67 m ahead, earlier guesses of *sidewalk* and *vegetation* stay where the newest frame,
-# from nearer by, knows better: far views are bad witnesses, and the exponent trusts them too long. On the real street
-# it is a few cells at the edges of cars that move.
+# from nearer by, has fewer of them: far views are bad witnesses, and the exponent trusts them too long. On the real
+# street it is a few cells at the edges of cars.
 #
 # **A car that leaves.** And what of a car that stood, was seen, and drove away out of view?
 
