@@ -142,7 +142,7 @@ def combine(p, w):
             "another least probability",
             task="combine",
             loses=2,
-            says="on inputs you haven't seen",
+            says="take at least 0.0001",
             code=combined(least="1e-6"),
         ),
         mistake(
@@ -294,6 +294,13 @@ def moved(grid, ahead, left, fill):
             loses=2,
             says="expected",
             code=shifted().replace("else fill", "else fill[0]"),
+        ),
+        mistake(
+            "at most one cell to the side",
+            task="moved",
+            loses=2,
+            says="on inputs you haven't seen",
+            code=shifted(c="c - int(np.sign(left))"),
         ),
         # ---- task 4
         right("a loop over classes", task="listen", code=heard()),
