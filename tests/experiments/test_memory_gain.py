@@ -18,9 +18,15 @@ from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.scoring.statistics import MIN_DRIVES
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.studies.filter import memory_gain
-from semgrid_edu.workshop.studies.filter.first_memories import LAST, mean_in_place, mean_moved, product_moved
 from semgrid_edu.workshop.studies.filter.memory_counts import GROUPS, GainCounts, count_cells, frames_since_seen
-from semgrid_edu.workshop.studies.filter.memory_gain import memory_tables, real_blocks
+from semgrid_edu.workshop.studies.filter.memory_gain import (
+    LAST,
+    mean_in_place,
+    mean_moved,
+    memory_tables,
+    product_moved,
+    real_blocks,
+)
 from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
 
 SPEC = GridSpec(0, 71, -15.5, 15.5, 1.0)

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Exercise 14: memory for classes
 #
-# Weigh frames, measure how long errors last, move a map, let the laser correct the memory, and write a memory of your own; one question to answer in words. About
-# 90 minutes. The lecture is [14: the edge that the paper cut](../14_memory.ipynb).
+# Weigh frames, measure how long errors last, move a map, let the laser correct the memory, and write a memory of your own; one question to answer in words.
+# About 90 minutes. The lecture is [14: the edge that the paper cut](../14_memory.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
