@@ -146,9 +146,9 @@ def test_the_house_stays_small():
         modules[storey] += not module.endswith("__init__.py")
         lines[storey] += code_lines(module)
     assert modules["book"] <= 174
-    assert modules["workshop"] <= 127
-    assert lines["book"] <= 12_520
-    assert lines["workshop"] <= 10_890
+    assert modules["workshop"] <= 129
+    assert lines["book"] <= 12_540
+    assert lines["workshop"] <= 11_140
 
 
 def test_no_folder_has_more_than_18_modules():
