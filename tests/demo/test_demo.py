@@ -203,7 +203,7 @@ class TestMemory:
 
     def test_is_scored_and_timed(self, remembering, html):
         with_memory = (remembering / "index.html").read_text(encoding="utf-8")
-        for words in ("all cells, network + memory", "semantic cells, network + memory", "memory of classes"):
+        for words in ("all cells, network + memory", "compare the semantic cells", "memory of classes"):
             assert words in with_memory
             assert words not in html
 

@@ -23,6 +23,12 @@ SCAN_MILLISECONDS = 1000 * LIDAR_PERIOD
 COMPARED = " The package's occupancy grid names the unknown cells of the truth, so that both runs have the same truth."
 
 
+REMEMBERED = (
+    " This truth calls unknown what the camera doesn't see now, so among all cells a memory counts as wrong wherever "
+    "it still knows the class: compare the semantic cells."
+)
+"""Added to the table of metrics when a map with memory is scored."""
+
 GAPS = " White cells are left out: they are in view, but nobody labelled what is there."
 """Added to what the truth shows, when its labels have gaps."""
 
@@ -199,7 +205,7 @@ def _metrics(record: Record) -> str:
     head = "".join(f"<th>{escape(column)}</th>" for column in metrics)
     cells = {row: [f"<td>{100 * values[row]:.1f}</td>" for values in metrics.values()] for row in metrics["FmIoU"]}
     rows = "".join(f"<tr><th>{_breakable(row)}</th>{''.join(values)}</tr>" for row, values in cells.items())
-    compared = COMPARED if record.comparison else ""
+    compared = (COMPARED if record.comparison else "") + (REMEMBERED if "remember" in record.stages else "")
     return _filled("metrics.html", labelled=record.labelled, compared=compared, head=head, rows=rows)
 
 
