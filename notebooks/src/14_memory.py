@@ -204,8 +204,8 @@ print(f"exact:        {exact_classes(world, *seen)[-1].round(2)}")
 
 # %% [markdown]
 # The exact answer prefers *road*: since the third frame disagrees, the first two probably shared an error, which is now
-# over. No exponent can say that. One sequence proves nothing, but the toy is small enough for the mean over *every* sequence of readings. We measure in
-# nats: the mean of −log P(true class) after three frames; less is better.
+# over. An exponent can't say that. One sequence proves nothing, but the toy is small enough for the mean over *every*
+# sequence of readings. We measure in nats: the mean of −log P(true class) after three frames; less is better.
 #
 # **Predict before you run.** Order these four by their loss, with $r = 0.6$: forget all images but the last one (the
 # paper); the product of the frames; the frames with the best exponent; the exact answer.
@@ -293,9 +293,10 @@ assert rates[10] > 5 * rates[1] ** 10  # far more than if it fell like r^k
 
 # %% [markdown]
 # So a network that errs once errs again. (The filter draws particles, so on another processor the last digit may
-# differ, here and below; assertions hold what the text says.) Note also how slowly the correlation falls from one frame apart to ten. The
-# formula assumes that it falls like $r^k$; here it falls more slowly, because much of what makes a network wrong
-# doesn't pass: a kind of hedge that it never saw stays that kind of hedge. So even the formula is too hopeful.
+# differ, here and below; assertions hold what the text says.) Note also how slowly the correlation falls from one frame
+# apart to ten. The formula assumes that it falls like $r^k$; here it falls more slowly. One cause may be that much of
+# what makes a network wrong doesn't pass: a kind of hedge that it never saw stays that kind of hedge. So the formula is
+# too hopeful.
 #
 # ## The exponent, measured
 #
@@ -463,8 +464,8 @@ Markdown("In per cent:\n\n" + "\n".join(rows))
 # Read the rows *in view* first. On streets that are new to it, the memory gains 4.5 points, and the interval is far
 # from zero. The two memories that one writes first, mean and product of the last five maps, *lose* points there. The
 # gain isn't one of the simulator: the network from simulated streets gains 3.5 points on the real scene, whose labels
-# people made. The last rows are for a network that learned from these very frames. It errs little, so there is nothing to
-# gain in view, and nothing is lost: 0.0, with an interval from −0.2 to 0.2.
+# people made. The last rows are for a network that learned from these very frames. It errs little, so there is nothing
+# to gain in view, and nothing is lost: 0.0, with an interval from −0.2 to 0.2.
 #
 # Is this knowledge, or does the memory only say *unknown* less frequently? Ask both maps for the most probable
 # *semantic* class, also where an unknown one is more probable:
@@ -521,8 +522,8 @@ print(f"sample drive, cells seen before: right when last in view {last:.0f} %, r
 assert kept > last + 15
 
 # %% [markdown]
-# So the memory knows more than the last look. Cells that leave the view leave it at its edge, where the network errs
-# or calls them unknown, and the memory still holds the better looks from before.
+# So the memory knows more than the last look. It holds all looks together, and the last one before a cell leaves the
+# view is right in fewer than half of them.
 #
 # Where does it help most, and where does it harm? We let the program choose, so that nobody picks the pretty places: of
 # all squares of 8 x 8 m in all frames of both drives, those in which the number of right cells rises most. Three per
@@ -618,10 +619,10 @@ assert gains[0] > predicted["seen before"]
 
 # %% [markdown]
 # The toy gets the order right: most of what memory gives lies where the camera doesn't look any more. On the simulated
-# drive the gain there is even larger than predicted. On the real street both are *negative*. This network learned from
-# these frames, so it is seldom wrong and guesses well what stands behind a car; and the vehicle waits, so what is
-# hidden now is hidden by traffic, and the street has changed meanwhile. The toy knew nothing of either. A prediction
-# that fails tells where the model is too simple.
+# drive the gain there is even larger than predicted. On the real street both are *negative*. Two things
+# are different there, of which the toy knew nothing. This network learned from these frames, so one frame is right in
+# 92 of 100 cells in view. And the vehicle waits, so what is hidden now is hidden by traffic, and the street has changed
+# meanwhile. A prediction that fails tells where the model is too simple.
 #
 # This is the price that stays, the errors that no exponent follows:
 
@@ -667,9 +668,9 @@ _ = interact(show_repeats, repeats=FloatSlider(value=0.6, min=0.0, max=0.95, ste
 show_windows([(results, one) for results in (simulated, street) for one in windows(results, -1)])
 
 # %% [markdown]
-# In the simulated squares, 45 to 67 m ahead, earlier guesses of *sidewalk* and *vegetation* stay where the newest frame,
-# from nearer by, has fewer of them: far views are bad witnesses, and the exponent trusts them too long. On the real
-# street it is a few cells at the edges of cars.
+# In the simulated squares, 45 to 67 m ahead, earlier guesses of *sidewalk* and *vegetation* stay where the newest
+# frame, from nearer by, has fewer of them. The exponent falls with the distance, but perhaps not fast enough there. On
+# the real street it is a few cells at the edges of cars.
 #
 # **A car that leaves.** And what of a car that stood, was seen, and drove away out of view?
 
