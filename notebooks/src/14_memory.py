@@ -402,8 +402,8 @@ for p in ([0.8, 0.2], [0.5, 0.5], [0.3, 0.7]):
 #
 # <details><summary>Answer</summary>
 #
-# The rest is lost each time, 0.2 m rounds to 0 cells, so the class never leaves cells 0 to 2. It should be 2 m or four
-# cells farther on. So the memory also keeps where in its cell a thing is.
+# The rest is lost each time, since 0.2 m rounds to 0 cells. So the class never leaves cells 0 to 2, and is forgotten as
+# the car leaves them. It should be 2 m or four cells farther on. So the memory also keeps where in its cell a thing is.
 #
 # </details>
 
