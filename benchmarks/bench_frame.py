@@ -26,22 +26,22 @@ PASSES = 3
 """Along the drive, after one to warm up."""
 
 ROWS = ("image scaled", "evidence", "filter", "image network", "planes", "fusion")
-"""What a frame's time is made of; the CRF comes after."""
+"""What a frame's time is made of; the CRF and the memory of classes come after."""
 
 EVIDENCE = ("ground", "evidence")
 """The parts of a step of the filter, as `bench_occupancy` names them, that come before its belief."""
 
 
 def frame_times(frames: list[Frame], net: SemanticGridNet) -> np.ndarray:
-    """Return the milliseconds of each frame's rows, their sum and the CRF, (frames, rows + 2), along the drive."""
+    """Return the milliseconds of each frame's rows, their sum, CRF and memory, (frames, rows + 3), along the drive."""
     table, spent = [], defaultdict(float)
     with stopwatches(spent, time.perf_counter):
-        for result in run_pipeline(frames, net):
+        for result in run_pipeline(frames, net, memory=True):
             took = result.seconds
             evidence = sum(spent[part] for part in EVIDENCE)
             row = [scaling_time(result.frame, net), evidence, took["track"] - evidence]
             row += [took[stage] for stage in ("segment", "sample", "fuse")]
-            table.append([*row, sum(row), took["refine"]])
+            table.append([*row, sum(row), took["refine"], took["remember"]])
             spent.clear()
     return 1e3 * np.array(table)
 
@@ -62,7 +62,7 @@ def main() -> None:
     points = np.median([len(frame.points) for frame in frames])
     print(f"{len(frames)} frames of about {points:,.0f} points, {PASSES} times; {torch.get_num_threads()} threads")
     print(f"{'ms a frame':16}{'median':>8}{'90 %':>8}   of the LIDAR's period")
-    for name, column in zip((*ROWS, "sum", "CRF, after it"), times.T, strict=True):
+    for name, column in zip((*ROWS, "sum", "CRF, after it", "memory"), times.T, strict=True):
         share = np.median(column) / 1e3 / LIDAR_PERIOD
         print(f"{name:16}{np.median(column):8.1f}{np.quantile(column, 0.9):8.1f}{share:8.0%}")
 

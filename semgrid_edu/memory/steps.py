@@ -1,12 +1,14 @@
 """The steps of the memory: carry what moves, recall what is known of a cell, learn from a frame (section 3)."""
 
+from functools import lru_cache
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.memory.state import MOVES, ClassMemory, Look, MemoryParams
+from semgrid_edu.memory.state import MOVES, STAYS, ClassMemory, Look, MemoryParams
 from semgrid_edu.occupancy import N_STATES, State
 
 FAINT = 1e-3
@@ -32,11 +34,17 @@ def look_at(grid: NDArray, occupancy: NDArray, spec: GridSpec, params: MemoryPar
         wanted = f"shape (C, {spec.shape[0]}, {spec.shape[1]}), the last {N_STATES} classes unknown"
         raise ArgumentError("grid", wanted, f"shape {np.shape(grid)}")
     classes, log_class, sees = _seen_classes(np.ascontiguousarray(grid, np.float32), len(grid) - N_STATES)
-    e, movable = params.exponent(np.hypot(*np.moveaxis(spec.centers(), -1, 0))), list(params.movable)
+    e, movable = _exponents(spec, params), list(params.movable)
     if movable and not 0 <= min(movable) <= max(movable) < len(classes):
         raise ArgumentError("movable", f"numbers of semantic classes, 0 to {len(classes) - 1}", params.movable)
-    exponent = (e + (1 - e) * classes[movable].sum(axis=0)).astype(np.float32)
+    exponent = e + (1 - e) * classes[movable].sum(axis=0)
     return Look(classes, log_class, sees, exponent, np.clip(occupancy[State.DYNAMIC], 0, 1))
+
+
+@lru_cache(maxsize=8)
+def _exponents(spec: GridSpec, params: MemoryParams) -> NDArray[np.float32]:
+    """Return what one more frame is worth in each cell, (H, W)."""
+    return params.exponent(np.hypot(*np.moveaxis(spec.centers(), -1, 0))).astype(np.float32)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -85,11 +93,9 @@ def carry_classes(
     """
     check_shape("moving", moving, memory.weight.shape[1:])
     check_shape("velocity", velocity, (2, *moving.shape))
-    check_shape("moving", moving, memory.weight.shape[1:])
-    check_shape("velocity", velocity, (2, *moving.shape))
-    carried = ClassMemory(memory.planes.copy())
-    for part in (carried.evidence[MOVES], carried.weight[MOVES], carried.seen[MOVES], carried.offset):
-        part[:] = 0
+    carried = ClassMemory(np.zeros_like(memory.planes))
+    for name in ("evidence", "weight", "seen"):
+        getattr(carried, name)[STAYS] = getattr(memory, name)[STAYS]
     way = (np.nan_to_num(velocity) * dt).astype(np.float32)
     _carry(
         _moving_planes(memory), moving, way, np.float32(cell), np.float32(params.least_moving), _moving_planes(carried)
@@ -170,7 +176,7 @@ def recall_classes(
 def _recall(evidence, weight, seen, places, occupancy, classes, log_class, sees, exponent, most, recalled):
     """Row by row, with a class in the inner loops, so that memory is read in order."""
     n, height, width = log_class.shape
-    scores = np.empty((n, width), np.float32)
+    scores = np.zeros((n, width), np.float32)
     for r in range(height):
         for layer in range(2):
             mass = np.zeros(width, np.float32)
@@ -189,6 +195,8 @@ def _recall(evidence, weight, seen, places, occupancy, classes, log_class, sees,
                     for k in range(n):
                         recalled[k, r, c] += mass[c] * classes[k, r, c]
                     mass[c] = 0
+            if not mass.any():
+                continue
             for k in range(n):
                 for c in range(width):
                     if mass[c] > 0:
@@ -202,14 +210,20 @@ def _recall(evidence, weight, seen, places, occupancy, classes, log_class, sees,
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_softmax(scores, mass, row):
     """Share the mass of each cell of a row among its classes in proportion to the exponentials."""
-    for c in range(len(mass)):
-        if mass[c] > 0:
-            top, total = scores[:, c].max(), np.float32(0)
-            for k in range(len(scores)):
-                scores[k, c] = np.exp(scores[k, c] - top)
-                total += scores[k, c]
-            for k in range(len(scores)):
-                row[k, c] += mass[c] / total * scores[k, c]
+    n, width = scores.shape
+    top, total = np.full(width, -np.inf, np.float32), np.zeros(width, np.float32)
+    for k in range(n):
+        for c in range(width):
+            top[c] = max(top[c], scores[k, c])
+    for k in range(n):
+        for c in range(width):
+            if mass[c] > 0:
+                scores[k, c] = np.exp(scores[k, c] - top[c])
+                total[c] += scores[k, c]
+    for k in range(n):
+        for c in range(width):
+            if mass[c] > 0:
+                row[k, c] += mass[c] / total[c] * scores[k, c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -246,18 +260,24 @@ def learn_classes(memory: ClassMemory, places: NDArray, look: Look, params: Memo
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _learn(evidence, weight, seen, places, log_class, sees, exponent, moving, most):
-    """Change the arrays in place, only where the camera sees something."""
+    """Change the arrays in place where the camera sees something, with a class in the inner loops."""
     height, width = places.shape
+    old, new = np.zeros(width, np.float32), np.zeros(width, np.float32)
     for r in range(height):
         for layer in range(2):
             for c in range(width):
                 p = places[r, c]
                 part = (moving[p] if layer == 1 else 1 - moving[p]) * sees[p] if p >= 0 else np.float32(0)
+                old[c], new[c] = np.float32(0), np.float32(0)
                 if part > 0:
-                    old, new = _parts(weight[layer, r, c], part, exponent[p], most)
+                    old[c], new[c] = _parts(weight[layer, r, c], part, exponent[p], most)
                     seen[layer, r, c] = 1 - (1 - seen[layer, r, c]) * (1 - part)
-                    if new > 0:
-                        weight[layer, r, c] = old + new
-                        for k in range(len(log_class)):
-                            mean = old * evidence[layer, k, r, c] + new * log_class[k, p]
-                            evidence[layer, k, r, c] = mean / (old + new)
+                    if new[c] > 0:
+                        weight[layer, r, c] = old[c] + new[c]
+            if not new.any():
+                continue
+            for k in range(len(log_class)):
+                for c in range(width):
+                    if new[c] > 0:
+                        mean = old[c] * evidence[layer, k, r, c] + new[c] * log_class[k, places[r, c]]
+                        evidence[layer, k, r, c] = mean / (old[c] + new[c])

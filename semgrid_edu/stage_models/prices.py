@@ -22,6 +22,7 @@ from semgrid_edu.stage_models.bof import (
     expected_things,
 )
 from semgrid_edu.stage_models.cells_in_a_row import DT, Cell, CellsInARow
+from semgrid_edu.stage_models.class_memory import memory_price
 from semgrid_edu.stage_models.cmcdot import LEFT_OR_RIGHT, sampling_error
 from semgrid_edu.stage_models.cmcdot_graph import cmcdot_stage
 from semgrid_edu.stage_models.crf import UNDECIDED, all_free, two_classes
@@ -179,3 +180,9 @@ def forgotten_class() -> Price:
     """Lecture 00: how well the class of the far cell is known, with and without the earlier image."""
     gain = system_gain()
     return Price(gain.joint.log_loss[1], gain.scans.log_loss[1], "nats: class of the far cell")
+
+
+def errors_by_themselves() -> Price:
+    """Lecture 14: how well a cell's class is known after three frames that err together."""
+    price = memory_price()
+    return Price(price.exact, price.weighted, "nats: class of a cell, three frames")

@@ -189,6 +189,10 @@ class TestComparison:
     def test_only_what_can_differ_is_shown_twice(self, stages, changed):
         assert Comparison("my_stages.py", stages).changed == changed
 
+    def test_with_memory_its_map_can_differ_too(self):
+        assert Comparison("my_stages.py", ("fuse",), memory=True).changed == ("grid", "refined", "remembered")
+        assert Comparison("my_stages.py", ("remember",), memory=True).changed == ("remembered",)
+
     def test_every_picture_is_made_by_some_stage(self):
         assert all(MADE_BY.values())
 
@@ -208,6 +212,21 @@ def test_an_image_network_of_ones_own_is_shown_too_and_its_classes_are_in_the_le
     assert "your_scores" in json.loads(elements.text["frames"])[0]["images"]
     assert [a["data-image"] for a in elements.all("img")].count("your_scores") == 1
     assert re.search(r'<b>Classes</b>.*?">signage</span>', html)
+
+
+def test_a_memory_of_ones_own_is_shown_beside_the_packages(drive, tmp_path):
+    stages = write(
+        tmp_path, "def remember(views, spec):\n    for view in views: yield np.full_like(view.grid, 1 / 14)\n"
+    )
+    html = write_demo(drive, sample_weights(), tmp_path, stages).read_text(encoding="utf-8")
+    page = Page(html)
+    assert [a.get("class") for a in page.all("div")].count("pair") == 1
+    for frame in json.loads(page.text["frames"]):
+        assert (np.array(decode(frame["images"]["your_remembered"])) == 0).all()
+        assert frame["images"]["remembered"] != frame["images"]["grid"]
+    assert "Made with <b>remember</b> of my_stages.py" in html
+    assert re.search(r"<tr><th>all cells, grid with memory, my_<wbr>stages.py</th>", html)
+    assert len(re.findall(r'<tr class="stage">', html)) == 6
 
 
 def test_without_truth_both_are_shown_and_neither_is_scored(tmp_path):

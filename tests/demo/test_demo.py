@@ -22,7 +22,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14, LabelSet
-from semgrid_edu.networks import Architecture, build_net, save_net
+from semgrid_edu.networks import Architecture, build_net, load_net, save_net
 from semgrid_edu.pipeline import STAGES, run_pipeline
 from semgrid_edu.plotting import depth_colours
 from semgrid_edu.workshop.commands.main import app
@@ -80,8 +80,6 @@ def frames(page):
 
 @pytest.fixture(scope="module")
 def results(drive, weights):
-    from semgrid_edu.networks import load_net
-
     return list(run_pipeline(drive, load_net(weights, drive.camera)))
 
 
@@ -179,6 +177,40 @@ class TestMetrics:
         record = Record(GridSpec.compact(), KITTI_14)
         record._seconds[""] = [[5.0] * 5, [0.01] * 5, [0.03, 0.01, 0.01, 0.01, 0.01]]
         assert record.milliseconds() == pytest.approx(dict(zip(STAGES, [30, 10, 10, 10, 10], strict=True)))
+
+
+class TestMemory:
+    """`--memory`: a panel, a row of the tables and a part of the picture more."""
+
+    @pytest.fixture(scope="class")
+    @staticmethod
+    def remembering(drive, weights, tmp_path_factory):
+        folder = tmp_path_factory.mktemp("memory")
+        root = str(drive.folder.parents[1])
+        arguments = ["--kitti", root, "--date", DATE, "--drive", "0001", "--weights", str(weights), "--memory"]
+        result = CliRunner().invoke(app, ["demo", *arguments, "--out", str(folder)])
+        assert result.exit_code == 0, result.exception
+        return folder
+
+    def test_shows_what_the_pipeline_remembers_beside_all_else(self, remembering, drive, weights, frames):
+        own = run_pipeline(drive, load_net(weights, drive.camera), memory=True)
+        shown = json.loads(Page((remembering / "index.html").read_text(encoding="utf-8")).text["frames"])
+        for frame, without, result in zip(shown, frames, own, strict=True):
+            picture = np.array(decode(frame["images"].pop("remembered")))
+            np.testing.assert_array_equal(picture, result.remembered.argmax(axis=0))
+            assert frame["images"] == without["images"]
+            assert frame["texts"].pop("remembered").startswith("Map of classes seen from above")
+
+    def test_is_scored_and_timed(self, remembering, html):
+        with_memory = (remembering / "index.html").read_text(encoding="utf-8")
+        for words in ("all cells, network + memory", "compare the semantic cells", "memory of classes"):
+            assert words in with_memory
+            assert words not in html
+
+    def test_is_in_the_picture(self, remembering, out):
+        with Image.open(remembering / "overview.png") as more, Image.open(out / "overview.png") as fewer:
+            assert more.size == fewer.size
+            assert more.tobytes() != fewer.tobytes()
 
 
 class TestWithoutTruth:

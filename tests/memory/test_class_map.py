@@ -75,3 +75,20 @@ def test_another_number_of_classes_is_refused():
     class_map = ClassMap(SPEC, S + 1)
     with pytest.raises(ArgumentError, match="grid: expected 4 semantic classes and 4 unknown ones, found 7 classes"):
         class_map.step(street(PlanarMotion())[0], all_free(), PlanarMotion(), 0.1)
+
+
+def test_ten_thousand_steps_keep_sums_and_limits():
+    """Along a road without end, with a turn now and then and things that move: nothing drifts, nothing grows."""
+    spec, rng = GridSpec(0, 6, -2, 2, 0.5), np.random.default_rng(0)
+    class_map, nothing = ClassMap(spec, S, MemoryParams(movable=(1,))), np.full((2, 2, *spec.shape), np.nan, np.float32)
+    o = np.moveaxis(rng.dirichlet(np.full(4, 0.3), spec.shape), -1, 0).astype(np.float32)
+    belief = Belief(o, rng.normal(0, 5, (2, *spec.shape)).astype(np.float32), nothing)
+    g = np.moveaxis(rng.dirichlet(np.full(S + 4, 0.3), spec.shape), -1, 0).astype(np.float32)
+    for k in range(10_000):
+        motion = PlanarMotion(0.8, 0.0, 0.01 if k % 100 < 50 else -0.01)
+        remembered = class_map.step(np.roll(g, k, axis=1), belief, motion, 0.1)
+        if k % 1000 == 999:
+            np.testing.assert_allclose(remembered.sum(axis=0), 1, atol=1e-4)
+            assert np.isfinite(class_map.memory.planes).all()
+            assert class_map.memory.weight.max() <= class_map.params.most + 1e-5
+            assert class_map.memory.seen.max() <= 1 + 1e-6

@@ -174,6 +174,20 @@ def real_drive(
 
 
 @reproduce.command()
+def memory(
+    pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
+    scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")] = "002",
+    seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives.")] = 0,
+    drives: Annotated[int, typer.Option(min=1, max=1000, help="Number of simulated drives, of two seconds each.")] = 20,
+    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("memory.json"),
+) -> None:
+    """Score the memory of classes on fresh simulated streets and on a real scene (lecture 14)."""
+    from semgrid_edu.workshop.studies.filter.memory_gain import measure_memory, memory_tables
+
+    keep_result(out, lambda: measure_memory(pandaset, scene, seed, drives), memory_tables)
+
+
+@reproduce.command()
 def check(
     folder: Annotated[Path, typer.Argument(help="Results of the paper's experiments, such as docs/results/reduced.")],
 ) -> None:

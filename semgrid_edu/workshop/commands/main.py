@@ -62,6 +62,9 @@ def demo(
     weights: Annotated[Path | None, typer.Option(help="A trained network; else a shipped SegNet.")] = None,
     frames: Annotated[str | None, typer.Option(help="FIRST:LAST[:STEP], LAST excluded, such as 40:120:2.")] = None,
     stages: Annotated[Path | None, typer.Option(help="A Python file with stages of your own, to compare.")] = None,
+    memory: Annotated[
+        bool, typer.Option("--memory", help="Remember classes over frames, and show that map too.")
+    ] = False,
     out: Annotated[Path, typer.Option(help="The folder for the page.")] = Path("out/demo"),
     force: Force = False,
     show: Annotated[bool, typer.Option("--open", help="Show the page in a browser.")] = False,
@@ -69,7 +72,7 @@ def demo(
     """Run every stage over a drive, and write a page that shows it; without a drive, over the two shipped ones.
 
     These are a real street, and in the folder simulated/ a simulated one. Without --frames all frames are run. A file
-    for --stages defines some of track, segment, sample, fuse and refine.
+    for --stages defines some of track, segment, sample, fuse, refine and remember.
     """
     from semgrid_edu.datasets.samples import real_weights
     from semgrid_edu.networks.weights import weights_doubts
@@ -79,9 +82,9 @@ def demo(
     chosen = chosen_drive(kitti_named, {"--pandaset": pandaset, "--scene": scene}, camera)
     tell([*(chosen.doubts() if chosen else ()), *(weights_doubts(weights) if weights else ())])
     if chosen is None:
-        page = write_both_streets(out, weights, stages=stages, frames=frames, force=force)
+        page = write_both_streets(out, weights, stages=stages, frames=frames, force=force, memory=memory)
     else:
-        page = write_demo(chosen, weights or real_weights(), out, stages, frames, force=force)
+        page = write_demo(chosen, weights or real_weights(), out, stages, frames, force=force, memory=memory)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
     if show:
         typer.launch(page.resolve().as_uri())

@@ -23,15 +23,18 @@ class Comparison:
         Name of the student's file, without its folder.
     stages : tuple of str
         Names of the stages that the file holds, such as ("track", "refine").
+    memory : bool
+        Whether both runs remember classes over frames.
     """
 
     file: str
     stages: tuple[str, ...]
+    memory: bool = False
 
     @property
     def changed(self) -> tuple[str, ...]:
         """The pictures that these stages can change. The page shows each of them twice."""
-        return tuple(name for name, stages in MADE_BY.items() if set(stages) & set(self.stages))
+        return tuple(name for name in pictures_of(self.memory) if set(MADE_BY[name]) & set(self.stages))
 
     def lead(self) -> str:
         """Return the sentences that open the page, as HTML."""
@@ -57,6 +60,17 @@ class Comparison:
         """
         stages = [f"<b>{name}</b>" for name in self.stages if name in MADE_BY[picture]]
         return f"Made with {_listed(stages)} of {escape(self.file)}. Where does it differ from the package's picture?"
+
+
+def pictures_of(memory: bool) -> tuple[str, ...]:
+    """Return the names of the pictures that a run makes.
+
+    Parameters
+    ----------
+    memory : bool
+        Whether it remembers classes over frames.
+    """
+    return tuple(name for name in MADE_BY if memory or name != "remembered")
 
 
 def _listed(words: list[str]) -> str:

@@ -50,6 +50,8 @@ def _draw(record: Record, lines: list[str]) -> Figure:
     """Draw (l, i), s, o, g, refined g and, where it is known, the truth; below it some lines of text."""
     package, yours = record.liveliest
     maps = {"semantic grid g": package.grid.argmax(axis=0), "g refined by the CRF": package.refined.argmax(axis=0)}
+    if package.remembered is not None:
+        maps["g with memory"] = package.remembered.argmax(axis=0)
     if package.frame.labels is not None:
         maps["truth"] = grid_truth(package.frame.labels, package.belief.probability, record.spec)
     rows = 1 if yours is None else 2
@@ -103,8 +105,10 @@ def _draw_grids(axes: Sequence[Axes], result: FrameResult, maps: dict[str, NDArr
 def _draw_yours(axes: Sequence[Axes], yours: FrameResult, record: Record) -> list[NDArray]:
     """Draw a student's grids, except those that can't differ from the package's, and return the maps of classes."""
     maps = {"semantic grid g": yours.grid.argmax(axis=0), "refined g": yours.refined.argmax(axis=0)}
+    if yours.remembered is not None:
+        maps["g with memory"] = yours.remembered.argmax(axis=0)
     _draw_grids(axes, yours, maps, record)
-    for ax, picture in zip(axes, ("occupancy", "grid", "refined", "truth"), strict=False):
+    for ax, picture in zip(axes, ("occupancy", "grid", "refined", "remembered", "truth"), strict=False):
         ax.set_visible(picture in record.comparison.changed)
         ax.set_title(f"{ax.get_title(loc='left')}\n{record.comparison.file}")
     leftmost = next(ax for ax in axes if ax.get_visible())

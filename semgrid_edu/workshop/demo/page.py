@@ -23,6 +23,12 @@ SCAN_MILLISECONDS = 1000 * LIDAR_PERIOD
 COMPARED = " The package's occupancy grid names the unknown cells of the truth, so that both runs have the same truth."
 
 
+REMEMBERED = (
+    " This truth calls unknown what the camera doesn't see now, so among all cells a memory counts as wrong wherever "
+    "it still knows the class: compare the semantic cells."
+)
+"""Added to the table of metrics when a map with memory is scored."""
+
 GAPS = " White cells are left out: they are in view, but nobody labelled what is there."
 """Added to what the truth shows, when its labels have gaps."""
 
@@ -90,7 +96,8 @@ def page_html(
     """
     first, (near, far), comparison = record.views[0], DEPTH_RANGE, record.comparison
     panels = [Panel(name, **words) for name, words in table_beside(__file__, "captions").items()]
-    shown = [panel for panel in panels if panel.name != "truth" or record.labelled]
+    made = {*first.images, *["truth"] * bool(record.labelled)}
+    shown = [panel for panel in panels if panel.name in made]
     if record.gaps:
         shown[-1] = shown[-1]._replace(see=shown[-1].see + GAPS)
     whose = " The stories are about the package's own stages." if comparison else ""
@@ -198,7 +205,7 @@ def _metrics(record: Record) -> str:
     head = "".join(f"<th>{escape(column)}</th>" for column in metrics)
     cells = {row: [f"<td>{100 * values[row]:.1f}</td>" for values in metrics.values()] for row in metrics["FmIoU"]}
     rows = "".join(f"<tr><th>{_breakable(row)}</th>{''.join(values)}</tr>" for row, values in cells.items())
-    compared = COMPARED if record.comparison else ""
+    compared = (COMPARED if record.comparison else "") + (REMEMBERED if "remember" in record.stages else "")
     return _filled("metrics.html", labelled=record.labelled, compared=compared, head=head, rows=rows)
 
 
@@ -211,7 +218,7 @@ def _times(record: Record) -> str:
         heads = ["the package's, ms", f"{_breakable(comparison.file)}, ms"]
     rows = [
         _time_row(symbols, f"{words}; replaced by <b>{stage}</b>" if stage in replaced else words, runs, stage)
-        for stage, (symbols, words) in STAGE_WORDS.items()
+        for stage, (symbols, words) in ((stage, STAGE_WORDS[stage]) for stage in record.stages)
     ]
     totals = [{"all": sum(run.values())} for run in runs]
     return _filled(

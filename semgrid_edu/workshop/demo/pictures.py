@@ -147,7 +147,7 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, 
     left, top = -spec.y_max, -spec.x_max
     box = f'x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}"'
     href = f'href="{raster}"' if raster else ""
-    compared = name.endswith(("grid", "refined"))
+    compared = name.endswith(("grid", "refined", "remembered"))
     errors = f'<image data-errors="{name}" {box} preserveAspectRatio="none"/>' if compared else ""
     paths = f'<path class="arrows" data-arrows="{name}" d=""/>' if arrows else ""
     return (

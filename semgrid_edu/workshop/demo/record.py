@@ -11,18 +11,18 @@ from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import PlanarMotion, State
-from semgrid_edu.pipeline import STAGES, FrameResult
+from semgrid_edu.pipeline import REMEMBER, STAGES, FrameResult
 from semgrid_edu.plotting import occupancy_colours
 from semgrid_edu.plotting.images import visible_points
 from semgrid_edu.workshop.demo import pictures
-from semgrid_edu.workshop.demo.comparison import MADE_BY, Comparison
+from semgrid_edu.workshop.demo.comparison import Comparison, pictures_of
 from semgrid_edu.workshop.demo.details import frame_details
 
 YOURS = "your_"
 """Prefix of the names of pictures that are made with a student's stages."""
 
-ESTIMATES = ("grid", "refined")
-"""The grids of a result that are compared with the truth."""
+ESTIMATES = {"grid": "semantic grid", "refined": "refined grid", "remembered": "grid with memory"}
+"""The grids of a result that are compared with the truth, and what they are called; the last one only with memory."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class FrameView:
     clock : str
         Number and time of the frame, such as "frame 3, 0.3 s".
     images : dict of str to str
-        Data URIs of photo, points, scores, occupancy, grid, refined and, where it is known, truth. The names of those
-        made with a student's stages begin with `YOURS`.
+        Data URIs of photo, points, scores, occupancy, grid, refined, with memory remembered and, where it is known,
+        truth. The names of those made with a student's stages begin with `YOURS`.
     texts : dict of str to str
         Alternative texts of the images, by the same names; the photo has none.
     arrows : dict of str to str
@@ -78,6 +78,8 @@ class Record:
         The network of the package's results; without it, the page tells no stories of cells.
     stories : int
         One shown frame in this many has the stories of its cells.
+    memory : bool
+        Whether the results carry `remembered`.
 
     Attributes
     ----------
@@ -89,6 +91,8 @@ class Record:
         The results of the shown frame with the most moving cells.
     layout : dict of str to list of int
         `StoryMaps.layout` of the views' details.
+    stages : tuple of str
+        The stages whose times are recorded, in their order.
     """
 
     def __init__(
@@ -99,16 +103,18 @@ class Record:
         comparison: Comparison | None = None,
         net: SemanticGridNet | None = None,
         stories: int = 1,
+        memory: bool = False,
     ) -> None:
         self.net, self.stories, self.layout = net, stories, {}
+        self.stages = tuple(STAGES | REMEMBER if memory else STAGES)
         self.spec, self.label_set, self.shown, self.comparison = spec, label_set, shown, comparison
         self.views: list[FrameView] = []
         self.labelled = 0
         self.liveliest: tuple[FrameResult, FrameResult | None] | None = None
         self._number = shown[0] if shown else 0
         self._first_pose: NDArray | None = None
-        self._pictures = {"": tuple(MADE_BY), YOURS: comparison.changed if comparison else ()}
-        self._rows = _rows(comparison)
+        self._pictures = {"": pictures_of(memory), YOURS: comparison.changed if comparison else ()}
+        self._rows = _rows(comparison, self._pictures[""])
         self._confusion = {name: np.zeros((len(label_set),) * 2, np.int64) for name in self._rows.values()}
         self._occurs = np.zeros(256, bool)
         self._seconds: dict[str, list[list[float]]] = {"": [], YOURS: []}
@@ -127,7 +133,7 @@ class Record:
         runs = {"": package} if yours is None else {"": package, YOURS: yours}
         maps = {}
         for prefix, result in runs.items():
-            self._seconds[prefix].append([result.seconds[stage] for stage in STAGES])
+            self._seconds[prefix].append([result.seconds[stage] for stage in self.stages])
             names = [name for name in ESTIMATES if name in self._pictures[prefix]]
             maps |= {prefix + name: _best(getattr(result, name)) for name in names}
         labels = package.frame.labels
@@ -151,7 +157,7 @@ class Record:
         if not self._seconds[prefix]:
             return {}
         medians = 1000 * np.median(self._seconds[prefix], axis=0)
-        return dict(zip(STAGES, medians.tolist(), strict=True))
+        return dict(zip(self.stages, medians.tolist(), strict=True))
 
     def metrics(self) -> dict[str, dict[str, float]]:
         """Return each of `METRICS`, 0..1, by cells and estimate."""
@@ -221,14 +227,15 @@ class Record:
         return f"{self.comparison.file}: " if name.startswith(YOURS) else ""
 
 
-def _rows(comparison: Comparison | None) -> dict[str, str]:
+def _rows(comparison: Comparison | None, pictures: tuple[str, ...]) -> dict[str, str]:
     """Return, for each row of the table of metrics, the name of the map that is compared with the truth."""
+    made = [name for name in ESTIMATES if name in pictures]
     if comparison is None:
-        return {"network": "grid", "network + CRF": "refined"}
-    words = {"grid": "semantic grid", "refined": "refined grid"}
-    yours = [name for name in ESTIMATES if name in comparison.changed]
-    rows = {f"{words[name]}, the package's": name for name in ESTIMATES}
-    return rows | {f"{words[name]}, {comparison.file}": YOURS + name for name in yours}
+        words = {"grid": "network", "refined": "network + CRF", "remembered": "network + memory"}
+        return {words[name]: name for name in made}
+    yours = [name for name in made if name in comparison.changed]
+    rows = {f"{ESTIMATES[name]}, the package's": name for name in made}
+    return rows | {f"{ESTIMATES[name]}, {comparison.file}": YOURS + name for name in yours}
 
 
 def _best(values: NDArray) -> NDArray[np.uint8]:

@@ -136,6 +136,7 @@ def write_demo(
     frames: str | None = None,
     switch: str = "",
     force: bool | None = None,
+    memory: bool = False,
 ) -> Path:
     """Run every stage over a drive and write a page that shows it.
 
@@ -156,6 +157,9 @@ def write_demo(
         The link from the page to another one, as HTML.
     force : bool, optional
         Whether to replace an index.html that isn't a demo's, see `check_ours`.
+    memory : bool
+        Whether classes are remembered over frames, and that map is shown too. A `remember` among the stages shows it in
+        any case.
 
     Returns
     -------
@@ -176,15 +180,14 @@ def write_demo(
     page, picture = _check_page(out, force)
     if drive[chosen.run[0]].image is None:
         raise DataError(drive.folder, f"images of {getattr(drive, 'view', 'its camera')}", "none")
-    own, yours, comparison = Stages.of(net, keep_steps=True), (), None
+    mine = load_stages(stages) if stages is not None else Stages()
+    memory = memory or mine.remember is not None
+    own, yours, comparison = Stages.of(net, keep_steps=True, memory=memory), (), None
     if stages is not None:
-        mine = load_stages(stages)
-        if "remember" in mine.given:
-            raise ArgumentError("--stages", "a file without `remember`, whose map the page doesn't show", str(stages))
-        yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given)
+        yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given, memory)
     label_set = LABEL_SETS[net.architecture.label_set]
     stories = _stories_every(len(chosen.shown), net.architecture.grid)
-    record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories)
+    record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories, memory)
     results = run_side_by_side((drive[k] for k in chosen.run), own, *yours)
     with install_listener("numba:compile", CompileBar()):
         broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
@@ -213,7 +216,7 @@ def write_both_streets(out: str | Path, weights: str | Path | None = None, **opt
     weights : path-like, optional
         The network for both; when left out, each street has one that has learned from such streets.
     **options
-        `stages`, `frames` and `force` of `write_demo`.
+        `stages`, `frames`, `force` and `memory` of `write_demo`.
 
     Returns
     -------

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.frame import Frame, blocks
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels, blocks
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.occupancy import PlanarMotion, SensorModel, State, scan_evidence
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, look_up, map_around
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.street.traffic import MOVING_SPEED
-from semgrid_edu.workshop.simulation.things.materials import Kind
+from semgrid_edu.workshop.simulation.things.materials import Kind, class_of_kind
 
 FLAT = (Kind.ROAD, Kind.LANE, Kind.SIDEWALK, Kind.GRASS)
 """The kinds of bare ground."""
@@ -244,3 +245,22 @@ class SceneHistory:
                 self._first_hit[number] = now
             self._last_hit[number] = now
         return {number: now - self._first_hit[number] for number, last in self._last_hit.items() if last == now}
+
+
+def labelled_frame(drive: SimulatedDrive, k: int, birdseye: bool = True) -> Frame:
+    """Take a frame with its image and with labels in KITTI-14, as a data set on disk would hold it.
+
+    Parameters
+    ----------
+    drive : SimulatedDrive
+        The drive.
+    k : int
+        Number of the frame.
+    birdseye : bool
+        Whether the cells have labels as well as the pixels. Without, those of the cells are 255.
+    """
+    taken, classes = drive.frame(k, labelled=birdseye), class_of_kind(KITTI_14)
+    kinds = taken.truth.kinds if birdseye else np.full(LABEL_GRID.shape, IGNORE, np.uint8)
+    visible = taken.truth.visible if birdseye else np.zeros(LABEL_GRID.shape, bool)
+    labels = FrameLabels(KITTI_14, classes[taken.picture.kind], taken.picture.depth, classes[kinds], visible)
+    return Frame(taken.picture.image, taken.points, drive.rig.camera, taken.T_world_from_lidar, k * PERIOD, labels)

@@ -17,17 +17,17 @@ from tqdm.auto import tqdm
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.ground_truth import NO_FLAWS, Moment, TruthFlaws, TruthPolicy, drive_truth, flawed_drive
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.storage.files import table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
-from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
-from semgrid_edu.workshop.simulation.things.materials import class_of_kind
 from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, LIDARS, check_request
+from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
 from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, COUNTED, TruthCounts
 
 HELD_OUT = 700
@@ -154,16 +154,7 @@ def simulated_drive(number: int, lidar: str = "coarse", n_frames: int = 2 * REAC
         Number of frames, ten a second.
     """
     drive = SimulatedDrive(number, n_frames, rig=Rig(lidar=LIDARS[lidar]))
-    return [_labelled_frame(drive, k, birdseye=k == n_frames // 2) for k in range(n_frames)]
-
-
-def _labelled_frame(drive: SimulatedDrive, k: int, birdseye: bool) -> Frame:
-    """Take a frame with labels in KITTI-14, as a data set on disk would hold it, but without the image."""
-    taken, classes = drive.frame(k, labelled=birdseye), class_of_kind(KITTI_14)
-    kinds = taken.truth.kinds if birdseye else np.full(LABEL_GRID.shape, IGNORE, np.uint8)
-    visible = taken.truth.visible if birdseye else np.zeros(LABEL_GRID.shape, bool)
-    labels = FrameLabels(KITTI_14, classes[taken.picture.kind], taken.picture.depth, classes[kinds], visible)
-    return Frame(None, taken.points, drive.rig.camera, taken.T_world_from_lidar, k * PERIOD, labels)
+    return [replace(labelled_frame(drive, k, birdseye=k == n_frames // 2), image=None) for k in range(n_frames)]
 
 
 def score_frame(

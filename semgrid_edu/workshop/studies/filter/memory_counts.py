@@ -1,0 +1,149 @@
+"""Counts of semantic grids by when the camera last saw a cell: now, before, or never (section 3)."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.crf import expected_calibration_error
+from semgrid_edu.crf.temperature import reliability
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.metrics import METRICS, confusion_matrix
+from semgrid_edu.occupancy import PlanarMotion
+from semgrid_edu.occupancy.planar_motion import look_up
+from semgrid_edu.workshop.scoring.confusions import BANDS, band_names
+from semgrid_edu.workshop.scoring.counting import distance_bands, reliability_of_sums
+from semgrid_edu.workshop.scoring.score_with_interval import compared, score_with_interval
+
+GROUPS = ("in view", "seen before", "never seen")
+"""The cells that the camera sees now, those that it saw before, and the others."""
+ONE, MEMORY = "one frame", "memory"
+"""What memory is compared with, and its own name."""
+
+
+def frames_since_seen(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int64]:
+    """Return how many frames ago the camera last saw each cell, (F, H, W): 0 for now, -1 for never.
+
+    Parameters
+    ----------
+    frames : sequence of F Frame
+        Labelled frames, in the order of time.
+    spec : GridSpec
+        The grid, (H, W) cells.
+    """
+    visible = [frame.labels.visible_on(spec)[None].astype(np.float32) for frame in frames]
+    since = np.full((len(frames), *spec.shape), -1)
+    for now, frame in enumerate(frames):
+        for then in range(now + 1):
+            motion = PlanarMotion.from_poses(frames[then].T_world_from_lidar, frame.T_world_from_lidar)
+            seen = look_up(visible[then], np.zeros(1, np.float32), spec, spec, motion)[0] > 0
+            since[now, seen] = now - then
+    return since
+
+
+class CellCounts(NamedTuple):
+    """What is counted of some cells and one method.
+
+    Parameters
+    ----------
+    confusion : (C, C) int64
+        One row per true class.
+    by_confidence : (3, B) float64
+        As `GridCounts.reliability`.
+    brier : float
+        Sum over the cells of the squared distance between the distribution and the true class.
+    """
+
+    confusion: NDArray[np.int64]
+    by_confidence: NDArray[np.float64]
+    brier: float
+
+
+def count_cells(probability: NDArray, truth: NDArray) -> CellCounts:
+    """Count how a distribution over the classes does in labelled cells.
+
+    Parameters
+    ----------
+    probability : (C, N) float
+        In each cell.
+    truth : (N,) uint8
+        Their classes.
+    """
+    n = len(probability)
+    confusion = confusion_matrix(truth, probability.argmax(axis=0), n)
+    if not len(truth):
+        return CellCounts(confusion, np.zeros((3, 15)), 0.0)
+    diagram = reliability(probability, truth)
+    sums = np.stack([diagram.cells, diagram.confidence * diagram.cells, diagram.accuracy * diagram.cells])
+    return CellCounts(confusion, sums, float(np.square(probability - np.eye(n)[:, truth]).sum()))
+
+
+class GainCounts:
+    """Counts of several drives: by group of cells, band of distance or time since the last view, and method.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid of all drives.
+    """
+
+    def __init__(self, spec: GridSpec) -> None:
+        self.spec, self._bands = spec, distance_bands(spec, BANDS)
+        self._counts: dict[tuple[str, str], list[CellCounts]] = {}
+
+    def add(self, frames: Sequence[Frame], grids: Sequence[dict[str, NDArray]]) -> None:
+        """Count a drive.
+
+        Parameters
+        ----------
+        frames : sequence of F Frame
+            Its labelled frames.
+        grids : sequence of F dict of str to (C, H, W) float
+            What the methods make of each, by name.
+        """
+        since, truth = frames_since_seen(frames, self.spec), [one.labels.birdseye_on(self.spec) for one in frames]
+        truth = np.stack(truth)
+        for method in grids[0]:
+            said = np.stack([grid[method] for grid in grids], axis=1)
+            for name, cells in self._groups(since, truth != IGNORE).items():
+                counted = count_cells(said[:, cells], truth[cells])
+                self._counts.setdefault((name, method), []).append(counted)
+
+    def _groups(self, since: NDArray, labelled: NDArray) -> dict[str, NDArray[np.bool_]]:
+        """Return the cells of each group, and of the parts of the first two by distance and by time."""
+        seen = dict(zip(GROUPS, (since == 0, since > 0, since < 0), strict=True))
+        bands = {f"in view, {name}": seen["in view"] & (self._bands == k) for k, name in enumerate(band_names(BANDS))}
+        times = {f"seen {k} to {k + 4} frames ago": (since >= k) & (since < k + 5) for k in (1, 6, 11)}
+        return {name: cells & labelled for name, cells in (seen | bands | times).items()}
+
+    def summary(self) -> dict[str, object]:
+        """Return the scores of each group, and what memory gains over one frame, with intervals over the drives."""
+        names = dict.fromkeys(name for name, _ in self._counts)
+        return {name: self._scores(name) for name in names}
+
+    def _scores(self, name: str) -> dict[str, object]:
+        of = {method: counts for (group, method), counts in self._counts.items() if group == name}
+        of = of if name in GROUPS else {method: of[method] for method in (ONE, MEMORY)}
+        stacked = {method: np.stack([one.confusion for one in counts])[None] for method, counts in of.items()}
+        cells, metrics = int(stacked[ONE].sum()), ("pixel accuracy", "class accuracy")
+        if not cells:
+            return {"cells": 0}
+        scores = {"cells": cells, "methods": {method: _method(of[method], stacked[method]) for method in of}}
+        gain = {key: compared(stacked[MEMORY], stacked[ONE], METRICS[key]) for key in metrics}
+        return scores | {"gain": gain} if name in GROUPS else scores
+
+
+def _method(counts: Sequence[CellCounts], confusions: NDArray) -> dict[str, object]:
+    """Return the scores of one method in one group of cells."""
+    total, cells = confusions.sum(axis=(0, 1)), confusions.sum()
+    of_class, sums = np.maximum(total.sum(axis=1), 1), sum(one.by_confidence for one in counts)
+    return {
+        **{key: score_with_interval(confusions, METRICS[key]) for key in ("pixel accuracy", "class accuracy")},
+        "recall": {name: float(total[c, c] / of_class[c]) for c, name in enumerate(KITTI_14.names) if total[c].any()},
+        "called unknown": float(total[:, KITTI_14.n_semantic :].sum() / cells),
+        "ECE": expected_calibration_error(reliability_of_sums(sums)),
+        "Brier": sum(one.brier for one in counts) / float(cells),
+    }

@@ -1,0 +1,221 @@
+"""What the memory of classes gains, in cells that are in view, were seen before, or were never seen (section 3).
+
+Simulated streets have true labels in every cell; the labelled returns of a real scene are scored beside them.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import softmax
+from tqdm.auto import tqdm
+
+from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
+from semgrid_edu.datasets.samples import real_weights, sample_drive, sample_weights
+from semgrid_edu.errors import check_whole
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.memory import View
+from semgrid_edu.networks import load_net
+from semgrid_edu.occupancy import PlanarMotion
+from semgrid_edu.occupancy.planar_motion import look_up
+from semgrid_edu.pipeline import Stages, run_side_by_side
+from semgrid_edu.storage.provenance import made_by
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent, shown
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD
+from semgrid_edu.workshop.studies.filter.memory_counts import GROUPS, MEMORY, ONE, GainCounts
+from semgrid_edu.workshop.studies.filter.memory_worth import EDGES, WORTHS, worth_by_distance
+from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
+
+HELD_OUT = 1400
+"""Seed of the first drive for seed 0; each further seed adds 1000. The memory's parameters are from other drives."""
+FRAMES = 20
+"""Number of frames of a simulated drive, 2 s."""
+BLOCK = 2.0
+"""Seconds of one camera of the real scene that count as one drive: neighbouring frames look alike."""
+
+LAST = 5
+"""Number of maps that are joined: half a second."""
+
+FAINTEST = 1e-4
+"""Probability that a product takes in place of a smaller one, so that one frame alone can't forbid a class for ever."""
+
+
+def mean_in_place(views: Iterable[View], spec: GridSpec) -> Iterator[NDArray]:
+    """Average the last maps, cell number by cell number, as if the vehicle stood still.
+
+    Parameters
+    ----------
+    views : iterable of View
+        As `Stages.remember` takes them.
+    spec : GridSpec
+        The grid, (H, W) cells.
+    """
+    return _joined(views, spec, _mean, moved=False)
+
+
+def mean_moved(views: Iterable[View], spec: GridSpec) -> Iterator[NDArray]:
+    """Average the last maps, each looked up where the vehicle was then. Parameters are those of `mean_in_place`."""
+    return _joined(views, spec, _mean)
+
+
+def product_moved(views: Iterable[View], spec: GridSpec) -> Iterator[NDArray]:
+    """Multiply the last maps, each looked up where the vehicle was then. Parameters are those of `mean_in_place`."""
+    return _joined(views, spec, _product)
+
+
+def _joined(
+    views: Iterable[View], spec: GridSpec, join: Callable[[NDArray], NDArray], moved: bool = True
+) -> Iterator[NDArray]:
+    """Yield what `join` makes of the last maps, (K, C, H, W), in the cells of now; NaN where a map didn't reach."""
+    last: deque[View] = deque(maxlen=LAST)
+    for view in views:
+        last.append(view)
+        yield join(np.stack([_seen_from(view, earlier, spec) if moved else earlier.grid for earlier in last]))
+
+
+def _seen_from(now: View, earlier: View, spec: GridSpec) -> NDArray:
+    motion = PlanarMotion.from_poses(earlier.frame.T_world_from_lidar, now.frame.T_world_from_lidar)
+    return look_up(earlier.grid, np.full(len(earlier.grid), np.nan, np.float32), spec, spec, motion)
+
+
+def _mean(maps: NDArray) -> NDArray:
+    return np.nanmean(maps, axis=0)
+
+
+def _product(maps: NDArray) -> NDArray:
+    return softmax(np.nansum(np.log(np.maximum(maps, FAINTEST)), axis=0), axis=0)
+
+
+FIRST = {
+    "mean of five maps, not moved": mean_in_place,
+    "mean of five maps": mean_moved,
+    "product of five maps": product_moved,
+}
+"""What one would try first, by name."""
+
+
+def grids_of(frames: Sequence[Frame], weights: Path) -> tuple[list[View], list[dict[str, NDArray]]]:
+    """Send a drive through the stages, and return its views, and what each method makes of its frames, by name.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        The frames in the order of time.
+    weights : Path
+        Those of the network.
+    """
+    own = Stages.of(load_net(weights, frames[0].camera), memory=True)
+    results = [result for (result,) in run_side_by_side(frames, own)]
+    views = [View(result.frame, result.belief, result.grid) for result in results]
+    others = {name: list(remember(views, own.architecture.grid)) for name, remember in FIRST.items()}
+    return views, [
+        {ONE: result.grid, MEMORY: result.remembered, f"{ONE} + CRF": result.refined}
+        | {f"{MEMORY} + CRF": own.refine(np.log(np.maximum(result.remembered, 1e-6)), result.belief.probability)}
+        | {name: maps[k] for name, maps in others.items()}
+        for k, result in enumerate(results)
+    ]
+
+
+def measure_memory(pandaset: str | Path, scene: str = "002", seed: int = 0, drives: int = 20) -> dict[str, object]:
+    """Score the memory of classes beside one frame and beside what one would try first.
+
+    Parameters
+    ----------
+    pandaset, scene : path-like, str
+        As `PandasetScene` takes them.
+    seed : int
+        Seed for the simulated drives.
+    drives : int
+        Number of simulated drives, at least one.
+
+    Returns
+    -------
+    dict
+        "scores": for fresh simulated streets, for the sample drive, and for the real scene with two networks, by group
+        of cells; "worth": what one more frame is worth on the fresh streets; and all that made them. JSON can hold it.
+    """
+    check_whole(seed=seed)
+    check_whole(1, drives=drives)
+    began, spec = perf_counter(), GridSpec.compact()
+    blocks = [block for camera in CAMERAS for block in real_blocks(PandasetScene(pandaset, scene, camera))]
+    simulated = (_simulated(number) for number in range(HELD_OUT + 1000 * seed, HELD_OUT + 1000 * seed + drives))
+    fresh, views = _scored(simulated, sample_weights(), spec)
+    scores = {
+        "fresh simulated streets": fresh,
+        "sample drive": _scored([list(sample_drive())], sample_weights(), spec)[0],
+        "real street, network from simulated streets": _scored(blocks, sample_weights(), spec)[0],
+        "real street, network that learned from its frames": _scored(blocks, real_weights(), spec)[0],
+    }
+    worth = _worth(views, spec)
+    command = f"semgrid-edu reproduce memory --scene {scene} --seed {seed} --drives {drives}"
+    minutes = round((perf_counter() - began) / 60, 1)
+    made = made_by(command, "numpy", "torch", "numba", "embreex", "trimesh")
+    return {"scores": scores, "worth": worth, "drives": drives, "minutes": minutes, **made}
+
+
+def _simulated(number: int) -> list[Frame]:
+    drive = SimulatedDrive(number, FRAMES, rig=KITTI_AHEAD)
+    return [labelled_frame(drive, k) for k in range(FRAMES)]
+
+
+def real_blocks(frames: Iterable[Frame]) -> list[list[Frame]]:
+    """Cut the frames of a camera into blocks of `BLOCK` seconds, each of which is filtered by itself.
+
+    Parameters
+    ----------
+    frames : iterable of Frame
+        The frames in the order of time.
+    """
+    blocks: list[list[Frame]] = []
+    for frame in frames:
+        if not blocks or frame.time - blocks[-1][0].time >= BLOCK:
+            blocks.append([])
+        blocks[-1].append(frame)
+    return blocks
+
+
+def _scored(drives: Iterable[list[Frame]], weights: Path, spec: GridSpec) -> tuple[dict, list[list[View]]]:
+    """Return the scores of some drives, and their views without images and returns."""
+    counts, kept = GainCounts(spec), []
+    for frames in tqdm(drives, desc="memory", unit="drive"):
+        views, grids = grids_of(frames, weights)
+        counts.add(frames, grids)
+        kept.append([one._replace(frame=replace(one.frame, image=None, points=one.frame.points[:0])) for one in views])
+    return counts.summary(), kept
+
+
+def _worth(drives: Sequence[Sequence[View]], spec: GridSpec) -> dict[str, object]:
+    """Return what one more frame is worth by distance, as JSON can hold it."""
+    found = worth_by_distance(drives, spec)
+    loss = {str(worth): row.tolist() for worth, row in zip(WORTHS, found.log_loss, strict=True)}
+    return {"edges": list(EDGES), "log loss": loss, "cells": found.cells.tolist(), "best": found.best.tolist()}
+
+
+def memory_tables(result: dict) -> str:
+    """Return a table for each street: the methods by group of cells, per cent, and what memory gains.
+
+    Parameters
+    ----------
+    result : dict
+        From `measure_memory`, or from the JSON file that it was written to.
+    """
+    return "\n\n".join(f"{street}\n\n{markdown_table(_rows(groups))}" for street, groups in result["scores"].items())
+
+
+def _rows(groups: dict[str, dict]) -> list[list[str]]:
+    rows = [["cells", "method", "pixel accuracy", "class accuracy", "called unknown", "ECE", "Brier"]]
+    for name in GROUPS:
+        one = groups[name]
+        for method, scores in one.get("methods", {}).items():
+            metrics = [shown(scores[key]) for key in ("pixel accuracy", "class accuracy")]
+            others = [per_cent(scores["called unknown"]), per_cent(scores["ECE"]), f"{scores['Brier']:.3f}"]
+            rows.append([f"{name} ({one['cells']})", method, *metrics, *others])
+        if gain := one.get("gain"):
+            rows.append([name, "gain of memory", *(shown(gain[key]) for key in gain), "", "", ""])
+    return rows

@@ -1,0 +1,127 @@
+"""The study of what memory gains: cells told apart by when they were seen, counts by hand, and the committed result."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import semgrid_edu
+from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.memory import View
+from semgrid_edu.occupancy import Belief
+from semgrid_edu.workshop.commands.main import app
+from semgrid_edu.workshop.scoring.statistics import MIN_DRIVES
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.studies.filter import memory_gain
+from semgrid_edu.workshop.studies.filter.memory_counts import GROUPS, GainCounts, count_cells, frames_since_seen
+from semgrid_edu.workshop.studies.filter.memory_gain import (
+    LAST,
+    mean_in_place,
+    mean_moved,
+    memory_tables,
+    product_moved,
+    real_blocks,
+)
+from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
+
+SPEC = GridSpec(0, 71, -15.5, 15.5, 1.0)
+COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "memory.json"
+
+
+def frame(ahead: float, visible_from: float, time: float = 0.0) -> Frame:
+    """A vehicle `ahead` metres along a road of which the camera sees what is farther than some metres."""
+    pose = np.eye(4)
+    pose[0, 3] = ahead
+    visible = LABEL_GRID.centers()[..., 0] > visible_from
+    labels = FrameLabels(
+        KITTI_14, np.zeros((1, 1), np.uint8), np.zeros((1, 1)), np.zeros(LABEL_GRID.shape, np.uint8), visible
+    )
+    return Frame(None, np.empty((0, 4), np.float32), sample_drive().camera, pose, time, labels)
+
+
+def views(*called: int) -> list[View]:
+    """Frames a metre apart, each of which calls everything a class of its own."""
+    nothing, o = np.full((2, 2, *SPEC.shape), np.nan, np.float32), np.zeros((4, *SPEC.shape), np.float32)
+    o[0] = 1
+    grids = [np.eye(14, dtype=np.float32)[c][:, None, None] * np.ones(SPEC.shape, np.float32) for c in called]
+    return [View(frame(k, 0), Belief(o, nothing[0], nothing), g) for k, g in enumerate(grids)]
+
+
+def test_cells_know_how_many_frames_ago_they_were_seen():
+    """The camera sees what is farther than 10 m, and the vehicle drives 2 m in each frame."""
+    now = frames_since_seen([frame(2.0 * k, 10) for k in range(4)], SPEC)[-1]
+    x = SPEC.centers()[:, 0, 0]
+    expected = np.select([x > 10, x > 8, x > 6, x > 4], [0, 1, 2, 3], -1)
+    np.testing.assert_array_equal(now, np.broadcast_to(expected[:, None], SPEC.shape))
+
+
+def test_counts_are_those_by_hand():
+    p = np.array([[0.8, 0.5, 0.1], [0.2, 0.5, 0.9]])
+    counted = count_cells(p, np.array([0, 1, 0], np.uint8))
+    np.testing.assert_array_equal(counted.confusion, [[1, 1], [1, 0]])
+    assert counted.brier == pytest.approx(2 * (0.2**2 + 0.5**2 + 0.9**2))
+    cells, confidence, right = counted.by_confidence.sum(axis=1)
+    assert (cells, confidence, right) == (3, pytest.approx(0.8 + 0.5 + 0.9), pytest.approx(1))
+
+
+def test_each_group_counts_its_own_cells_and_unlabelled_ones_nowhere():
+    counts, frames = GainCounts(SPEC), [frame(0.0, 10), frame(2.0, 10)]
+    frames[1].labels.birdseye[:, :155] = IGNORE
+    road, car = (np.eye(14)[c][:, None, None] * np.ones(SPEC.shape) for c in (0, 3))
+    counts.add(frames, [{"one frame": car, "memory": road}, {"one frame": road, "memory": road}])
+    scores = counts.summary()
+    half = SPEC.shape[1] / 2
+    seen, before = (61 * 31, 61 * half), 2 * half
+    assert scores["in view"]["cells"] == pytest.approx(sum(seen), rel=0.05)
+    assert scores["seen before"]["cells"] == pytest.approx(before, rel=0.05)
+    one, memory = (scores["in view"]["methods"][name]["pixel accuracy"]["mean"] for name in ("one frame", "memory"))
+    assert (one, memory) == (pytest.approx(seen[1] / sum(seen), rel=0.05), 1)
+    assert scores["in view"]["gain"]["pixel accuracy"]["mean"] == pytest.approx(memory - one)
+    assert scores["in view"]["methods"]["memory"]["Brier"] == pytest.approx(0)
+
+
+def test_the_last_maps_are_averaged_and_multiplied():
+    called = (0, 0, 0, 1, 1, 1)
+    mean = list(mean_in_place(views(*called), SPEC))[-1]
+    np.testing.assert_allclose(mean[[0, 1], 5, 5], [2 / LAST, 3 / LAST])
+    moved = list(mean_moved(views(*called), SPEC))[-1]
+    np.testing.assert_allclose(moved[[0, 1], -3, 5], [2 / LAST, 3 / LAST])
+    np.testing.assert_allclose(moved[:2, 0, 5], [0, 1])  # what is farthest ahead lies in the newest map alone
+    product = list(product_moved(views(*called), SPEC))[-1]
+    np.testing.assert_allclose(product[0, -3, 5] / product[1, -3, 5], 1e-4, rtol=1e-3)  # three against two
+    np.testing.assert_allclose(product.sum(axis=0), 1, atol=1e-5)
+
+
+def test_a_camera_is_cut_into_blocks_of_two_seconds():
+    blocks = real_blocks(frame(0, 0, time) for time in (0.0, 0.8, 1.6, 2.4, 3.2, 4.8))
+    assert [[one.time for one in block] for block in blocks] == [[0.0, 0.8, 1.6], [2.4, 3.2], [4.8]]
+
+
+def test_a_simulated_frame_has_its_image():
+    taken = labelled_frame(SimulatedDrive(7, 1), 0)
+    assert taken.image.shape[2] == 3
+    assert taken.labels.visible.any()
+
+
+def test_the_command_keeps_the_result_and_prints_its_tables(monkeypatch, tmp_path):
+    result = json.loads(COMMITTED.read_text())
+    monkeypatch.setattr(memory_gain, "measure_memory", lambda *asked: result)
+    arguments = ["reproduce", "memory", "--pandaset", str(tmp_path), "--out", str(tmp_path / "memory.json")]
+    shown = CliRunner().invoke(app, arguments)
+    assert shown.exit_code == 0, shown.output
+    assert memory_tables(result) in shown.output
+    assert json.loads((tmp_path / "memory.json").read_text()) == result
+
+
+def test_the_committed_result_is_whole():
+    result = json.loads(COMMITTED.read_text())
+    assert result["drives"] >= MIN_DRIVES
+    for groups in result["scores"].values():
+        assert all(groups[name]["cells"] for name in GROUPS)
+    worth = result["worth"]
+    assert worth["best"] == [float(min(worth["log loss"], key=lambda w: worth["log loss"][w][k])) for k in range(5)]
