@@ -126,10 +126,10 @@ def test_the_register_finds_the_equation():
     assert f"`{defined_in.replace('.', '/')}.py`" in TEXT
 
 
-@pytest.mark.parametrize("folder", [".", "notebooks", "benchmarks", "data_samples"])
+@pytest.mark.parametrize("folder", [".", "docs", "notebooks", "benchmarks", "data_samples"])
 def test_what_the_documents_name_exists(folder):
     """Paths below the repository's folders, links, and dotted names of the package, but for patterns such as NAME."""
-    for document in (ROOT / folder).glob("[RC][EO]*.md"):  # README and CONTRIBUTING; the CHANGELOG tells of the past
+    for document in {*(ROOT / folder).glob("*.md")} - {ROOT / "CHANGELOG.md"}:  # which tells of the past
         text = document.read_text(encoding="utf-8")
         paths = {ROOT / path for path in re.findall(rf"(?<![\w/])(?:\.\./)?((?:{FOLDERS})/[\w./-]*\w)", text)}
         links = {document.parent / link for link in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", text)}

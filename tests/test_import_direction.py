@@ -1,4 +1,4 @@
-"""Imports run one way: down the README's map of the house, and never from the book to the workshop."""
+"""Imports run one way: down the map of the house in docs/house.md, and never from the book to the workshop."""
 
 import ast
 import re
@@ -9,7 +9,7 @@ from pathlib import Path
 import semgrid_edu
 
 PACKAGE = Path(semgrid_edu.__file__).parent
-README = PACKAGE.parent / "README.md"
+MAP = PACKAGE.parent / "docs" / "house.md"
 FILES = sorted(PACKAGE.rglob("*.py"))
 MODULES = [path for path in FILES if path.name not in ("__init__.py", "__main__.py")]
 WORKSHOP = "workshop"
@@ -23,7 +23,7 @@ def dotted(path: Path) -> str:
 
 def house() -> list[str]:
     """The rooms of the map, in its order: modules of the top, and folders."""
-    rows = re.findall(r"^\| (`.*?) \|", README.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    rows = re.findall(r"^\| (`.*?) \|", MAP.read_text(encoding="utf-8"), flags=re.MULTILINE)
     names = [name for row in rows for name in re.findall(r"`([\w/]+?)(?:\.py|/)`", row)]
     return [name.replace("/", ".") for name in names]
 

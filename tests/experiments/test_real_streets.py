@@ -1,4 +1,4 @@
-"""The study of real streets: what is kept apart stays apart, runs aren't mixed up, and the README quotes its result."""
+"""The study of real streets: what is kept apart stays apart, runs aren't mixed up, and docs/results.md quotes its result."""
 
 import json
 from pathlib import Path
@@ -135,9 +135,11 @@ NAMES = {
 }
 
 
-def test_the_readme_quotes_the_committed_result():
+def test_the_page_of_results_quotes_the_committed_result():
     by_side, in_time = json.loads((CLONE / "docs/results/real_streets.json").read_text())["scores"].values()
-    section = (CLONE / "README.md").read_text(encoding="utf-8").split("### On a real street")[1].split("\n###")[0]
+    section = (
+        (CLONE / "docs" / "results.md").read_text(encoding="utf-8").split("## On a real street")[1].split("\n##")[0]
+    )
     rows = [[cell.strip(" *") for cell in line.split("|")[1:-1]] for line in section.splitlines() if line[:1] == "|"][
         2:
     ]

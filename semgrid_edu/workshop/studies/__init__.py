@@ -1,1 +1,1 @@
-"""Measurements that lectures and README quote: filter, CRF, ground truth, training, and a new drive."""
+"""Measurements that lectures and docs/results.md quote: filter, CRF, ground truth, training, and a new drive."""
