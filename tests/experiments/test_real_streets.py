@@ -1,4 +1,4 @@
-"""The study of real streets: what is kept apart stays apart, runs aren't mixed up, and docs/results.md quotes its result."""
+"""The study of real streets: what is kept apart stays apart, runs aren't mixed up, and results.md quotes its result."""
 
 import json
 from pathlib import Path
