@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
@@ -68,7 +69,7 @@ def animate(frames: Iterable[Figure | NDArray[np.uint8]], period: float, alt: st
     >>> animate(frames, period=0.2, alt="a rectangle that turns from black to light grey")
     Animation(alt='a rectangle that turns from black to light grey')
     """
-    pictures = [_picture(frame) for frame in frames]
+    pictures = _pictures(frames)
     if not pictures or len(sizes := {picture.size for picture in pictures}) > 1:
         found = f"sizes {sorted(sizes)}" if pictures else "no frames"
         raise ArgumentError("frames", "at least one, all of one size", found)
@@ -83,14 +84,26 @@ def animate(frames: Iterable[Figure | NDArray[np.uint8]], period: float, alt: st
     return Animation(png, alt)
 
 
+def _pictures(frames: Iterable[Figure | NDArray[np.uint8]]) -> list[Image.Image]:
+    """Return the frames as they look when they come; a figure that comes again unchanged is not drawn again."""
+    pictures: list[Image.Image] = []
+    drawn = None
+    for frame in frames:
+        held = frame is drawn and isinstance(frame, Figure) and not frame.stale
+        pictures.append(pictures[-1] if held else _picture(frame))
+        drawn = frame
+    return pictures
+
+
 def _picture(frame: Figure | NDArray[np.uint8]) -> Image.Image:
     """Return a frame as it looks now."""
     if not isinstance(frame, Figure):
         return Image.fromarray(np.asarray(frame)).convert("RGB")
-    drawn = io.BytesIO()
-    frame.savefig(drawn, format="png", dpi="figure", bbox_inches=None)
+    # `savefig` would draw twice, and pack a PNG that is unpacked at once.
+    canvas = FigureCanvasAgg(frame)
+    canvas.draw()
     plt.close(frame)
-    return Image.open(drawn).convert("RGB")
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
 
 def _with_common_palette(pictures: list[Image.Image]) -> list[Image.Image]:
