@@ -3,6 +3,7 @@
 import io
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import chain, pairwise
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -69,7 +70,10 @@ def animate(frames: Iterable[Figure | NDArray[np.uint8]], period: float, alt: st
     >>> animate(frames, period=0.2, alt="a rectangle that turns from black to light grey")
     Animation(alt='a rectangle that turns from black to light grey')
     """
-    pictures = _pictures(frames)
+    pictures: list[Image.Image] = []
+    for before, frame in pairwise(chain([None], frames)):
+        held = frame is before and not getattr(frame, "stale", True)  # a figure in which nothing has changed
+        pictures.append(pictures[-1] if held else _picture(frame))
     if not pictures or len(sizes := {picture.size for picture in pictures}) > 1:
         found = f"sizes {sorted(sizes)}" if pictures else "no frames"
         raise ArgumentError("frames", "at least one, all of one size", found)
@@ -82,17 +86,6 @@ def animate(frames: Iterable[Figure | NDArray[np.uint8]], period: float, alt: st
         limit = f"at most {MAX_ANIMATION_BYTES // 1000} kB: show fewer frames, a smaller figure or less that changes"
         raise ArgumentError("frames", limit, found)
     return Animation(png, alt)
-
-
-def _pictures(frames: Iterable[Figure | NDArray[np.uint8]]) -> list[Image.Image]:
-    """Return the frames as they look when they come; a figure that comes again unchanged is not drawn again."""
-    pictures: list[Image.Image] = []
-    drawn = None
-    for frame in frames:
-        held = frame is drawn and isinstance(frame, Figure) and not frame.stale
-        pictures.append(pictures[-1] if held else _picture(frame))
-        drawn = frame
-    return pictures
 
 
 def _picture(frame: Figure | NDArray[np.uint8]) -> Image.Image:

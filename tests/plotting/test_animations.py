@@ -96,8 +96,12 @@ def held_and_changed(change):
 
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
-def test_each_frame_looks_as_it_would_be_saved(change):
-    pictures = [np.asarray(picture) for picture in animations._pictures(held_and_changed(change))]
+def test_each_frame_looks_as_it_would_be_saved(change, monkeypatch):
+    pictures, reduced = [], animations._with_common_palette
+    monkeypatch.setattr(
+        animations, "_with_common_palette", lambda drawn: pictures.extend(map(np.asarray, drawn)) or reduced(drawn)
+    )
+    plotting.animate(held_and_changed(change), 0.2, "a line changes")
     np.testing.assert_array_equal(pictures, [as_saved(fig) for fig in held_and_changed(change)])
     assert not np.array_equal(pictures[1], pictures[2])
 
@@ -105,8 +109,9 @@ def test_each_frame_looks_as_it_would_be_saved(change):
 def test_a_figure_that_is_held_is_drawn_once(monkeypatch):
     drawn, draw = [], animations._picture
     monkeypatch.setattr(animations, "_picture", lambda frame: drawn.append(frame) or draw(frame))
-    assert len(animations._pictures(frame for frame in drawings() for _ in range(3))) == 12
+    held = plotting.animate((frame for frame in drawings() for _ in range(3)), 0.2, "a point moves to the right")
     assert len(drawn) == 4
+    assert sum(decoded(held.png)[1]) == 12 * 200
 
 
 def test_the_same_frames_give_the_same_bytes():
