@@ -5,12 +5,15 @@ import shutil
 from functools import cache
 
 import pytest
+from class_of import NAME, SOURCE
 from filelock import FileLock
 from nbgrader_scores import alembic_asked_once  # noqa: F401 (a fixture for all tests here)
 from typer.testing import CliRunner
+from warm import warm_processes
 
 from semgrid_edu.workshop.commands.main import app
-from semgrid_edu.workshop.course.nbgrader import build
+from semgrid_edu.workshop.course.nbgrader import build, preprocessors
+from semgrid_edu.workshop.course.nbgrader.preprocessors import prepared_folder
 
 pytest.register_assert_rewrite("grader_checks")
 
@@ -41,6 +44,26 @@ def built(tmp_path_factory):
 def new_course(built, tmp_path_factory):
     """Return a function that lays out a course of its own at each call; built once, then copied."""
     return lambda: shutil.copytree(built[0], tmp_path_factory.mktemp("course"), dirs_exist_ok=True)
+
+
+@pytest.fixture(scope="module")
+def course(new_course):
+    """A course of the module's own."""
+    return new_course()
+
+
+@pytest.fixture(scope="module")
+def start(course):
+    """A function that forks a process for a student of exercise 01 from one that is ready."""
+    with warm_processes(SOURCE, prepared_folder(course, NAME)) as start:
+        yield start
+
+
+@pytest.fixture
+def forked(course, start, monkeypatch):
+    """The course while its students' processes are forked: for what doesn't depend on how a process is started."""
+    monkeypatch.setattr(preprocessors, "starter", lambda *_, **__: lambda _: start())
+    return course
 
 
 def pytest_generate_tests(metafunc):
