@@ -10,7 +10,7 @@ import pytest
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Iterator[None]:
-    """Keep the garbage collector from what is loaded for good: it would go through a million objects again and again."""
+    """Keep the garbage collector from what is loaded for good: it would go through a million objects at each turn."""
     gc.disable()
     try:
         return (yield)
