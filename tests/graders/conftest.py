@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from copy import deepcopy
 from functools import cache
 
 import pytest
@@ -11,6 +12,8 @@ from nbgrader_scores import alembic_asked_once  # noqa: F401 (a fixture for all 
 from typer.testing import CliRunner
 from warm import warm_processes
 
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.samples import samples_dir
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.course.nbgrader import build, preprocessors
 from semgrid_edu.workshop.course.nbgrader.preprocessors import prepared_folder
@@ -23,6 +26,24 @@ def exercises_read_once():
     """Let the hundreds of students here fill in copies of one student version, since no exercise changes meanwhile."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "student_version", cache(build.student_version))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shipped_frames_read_once():
+    """Give test cells copies of the shipped drives' frames: for each student they would decode the same pictures."""
+    read, frames = KittiRawDrive._frame, {}
+
+    def copied(drive, k):
+        if not drive.folder.is_relative_to(samples_dir()):
+            return read(drive, k)
+        key = drive.folder, *drive._sensors, k
+        if key not in frames:
+            frames[key] = read(drive, k)
+        return deepcopy(frames[key])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(KittiRawDrive, "_frame", copied)
         yield
 
 
