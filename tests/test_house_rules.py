@@ -7,6 +7,7 @@ import re
 import tokenize
 from collections import Counter, defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,6 @@ PACKAGE = Path(semgrid_edu.__file__).parent
 SOURCES = {
     path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in sorted(PACKAGE.rglob("*.py"))
 }
-TREES = {module: ast.parse(source) for module, source in SOURCES.items()}
 
 ENTRY = re.compile(r"(?P<names>\*{0,2}\w+(?:, \*{0,2}\w+)*)( : \S.*)?")
 """The first line of an entry in a numpydoc section, such as `low, high : float`."""
@@ -29,6 +29,12 @@ REFERENCE = re.compile(r"\bParameters[\w, ]* are those of `([\w.]+)`")
 
 SHARED_OPTIONS = ("Force", "Resume", "Runs")
 """Options of several commands, which declare their help text once."""
+
+
+@cache
+def tree(module: str) -> ast.Module:
+    """A module's syntax: asked for by tests alone, so that a process that only collects them doesn't parse."""
+    return ast.parse(SOURCES[module])
 
 
 def definitions(body: list[ast.stmt], *kinds: type) -> list:
@@ -43,7 +49,7 @@ def decorators(node: ast.FunctionDef | ast.ClassDef) -> str:
 
 def documented(module: str) -> Iterator[tuple[str, str, list[str]]]:
     """Every public function, class and method of a module: its name, its docstring and the parameters it takes."""
-    for node in definitions(TREES[module].body):
+    for node in definitions(tree(module).body):
         takes = arguments(node) if isinstance(node, ast.FunctionDef) else constructor_arguments(node)
         yield node.name, ast.get_docstring(node) or "", takes
         for method in definitions(node.body, ast.FunctionDef) if isinstance(node, ast.ClassDef) else ():
@@ -83,8 +89,10 @@ def described(docstring: str) -> set[str]:
     return names
 
 
-DESCRIBED = {name: described(docstring) for module in TREES for name, docstring, _ in documented(module)}
-"""What each public thing of the package describes itself, by "function", "Class" or "Class.method"."""
+@cache
+def described_by_themselves() -> dict[str, set[str]]:
+    """What each public thing of the package describes itself, by "function", "Class" or "Class.method"."""
+    return {name: described(docstring) for module in SOURCES for name, docstring, _ in documented(module)}
 
 
 def described_elsewhere(docstring: str, known: dict[str, set[str]]) -> set[str]:
@@ -95,9 +103,9 @@ def described_elsewhere(docstring: str, known: dict[str, set[str]]) -> set[str]:
 
 def undescribed(module: str) -> list[str]:
     """What the docstrings of a module leave out, one line per function, class or method."""
-    found = [] if ast.get_docstring(TREES[module]) else [f"{module} has no docstring"]
+    found = [] if ast.get_docstring(tree(module)) else [f"{module} has no docstring"]
     for name, docstring, takes in documented(module):
-        known = described(docstring) | described_elsewhere(docstring, DESCRIBED)
+        known = described(docstring) | described_elsewhere(docstring, described_by_themselves())
         missing = [argument for argument in takes if argument not in known]
         if missing or not docstring:
             found.append(f"{module}: {name} doesn't describe {', '.join(missing) or 'itself'}")
@@ -107,7 +115,7 @@ def undescribed(module: str) -> list[str]:
 def body_lengths(module: str) -> list[int]:
     """Lines of the body of each function of a module, without docstring and blank lines."""
     lengths, lines = [], SOURCES[module].splitlines()
-    for node in ast.walk(TREES[module]):
+    for node in ast.walk(tree(module)):
         if isinstance(node, ast.FunctionDef):
             body = node.body[bool(ast.get_docstring(node)) :]
             spanned = lines[body[0].lineno - 1 : body[-1].end_lineno] if body else []
@@ -115,16 +123,18 @@ def body_lengths(module: str) -> list[int]:
     return lengths
 
 
+@cache
 def doc_lines(module: str) -> set[int]:
     """The numbers of the lines of a module that belong to docstrings, those below constants included."""
     strings = [
         node
-        for node in ast.walk(TREES[module])
+        for node in ast.walk(tree(module))
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
     ]
     return {line for node in strings for line in range(node.lineno, node.end_lineno + 1)}
 
 
+@cache
 def code_lines(module: str) -> int:
     """Lines of a module that hold code: neither docstring nor comment nor blank."""
     form = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
@@ -178,9 +188,9 @@ def test_every_parameter_has_a_description():
 
 def test_no_two_public_things_share_a_name():
     places = defaultdict(set)
-    commands = {module for module in TREES if module.startswith("workshop/commands/")}
-    for module in TREES.keys() - commands:  # a command has the name of what it runs
-        for node in definitions(TREES[module].body):
+    commands = {module for module in SOURCES if module.startswith("workshop/commands/")}
+    for module in SOURCES.keys() - commands:  # a command has the name of what it runs
+        for node in definitions(tree(module).body):
             places[node.name].add(module)
     assert {name: modules for name, modules in places.items() if len(modules) > 1} == {}
 

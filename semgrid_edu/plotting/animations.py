@@ -3,9 +3,11 @@
 import io
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import chain, pairwise
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
@@ -68,7 +70,10 @@ def animate(frames: Iterable[Figure | NDArray[np.uint8]], period: float, alt: st
     >>> animate(frames, period=0.2, alt="a rectangle that turns from black to light grey")
     Animation(alt='a rectangle that turns from black to light grey')
     """
-    pictures = [_picture(frame) for frame in frames]
+    pictures: list[Image.Image] = []
+    for before, frame in pairwise(chain([None], frames)):
+        held = frame is before and not getattr(frame, "stale", True)  # a figure in which nothing has changed
+        pictures.append(pictures[-1] if held else _picture(frame))
     if not pictures or len(sizes := {picture.size for picture in pictures}) > 1:
         found = f"sizes {sorted(sizes)}" if pictures else "no frames"
         raise ArgumentError("frames", "at least one, all of one size", found)
@@ -87,10 +92,11 @@ def _picture(frame: Figure | NDArray[np.uint8]) -> Image.Image:
     """Return a frame as it looks now."""
     if not isinstance(frame, Figure):
         return Image.fromarray(np.asarray(frame)).convert("RGB")
-    drawn = io.BytesIO()
-    frame.savefig(drawn, format="png", dpi="figure", bbox_inches=None)
+    # `savefig` would draw twice, and pack a PNG that is unpacked at once.
+    canvas = FigureCanvasAgg(frame)
+    canvas.draw()
     plt.close(frame)
-    return Image.open(drawn).convert("RGB")
+    return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
 
 
 def _with_common_palette(pictures: list[Image.Image]) -> list[Image.Image]:

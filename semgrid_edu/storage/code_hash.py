@@ -2,7 +2,8 @@
 
 import ast
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -24,11 +25,10 @@ def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
     str
         SHA-256, hexadecimal. It differs under a version of Python that prints syntax trees differently.
     """
-    code = sorted(map(ast.dump, import_closure(modules, root).values()))
-    return hashlib.sha256("\n".join(code).encode()).hexdigest()
+    return hashlib.sha256("\n".join(sorted(import_closure(modules, root).values())).encode()).hexdigest()
 
 
-def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, ast.Module]:
+def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, str]:
     """Follow the import statements of modules, and of what they import, through the package.
 
     A name that a package passes on in its `__init__.py` leads to the module that defines it, so that one function of
@@ -43,28 +43,29 @@ def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, ast
 
     Returns
     -------
-    dict of Path to ast.Module
-        The syntax trees of these modules and of all that they lead to, without docstrings.
+    dict of Path to str
+        The syntax trees of these modules and of all that they lead to, printed without docstrings.
     """
-    trees: dict[Path, ast.Module] = {}
+    trees: dict[Path, str] = {}
     waiting = list(modules)
     while waiting:
         path = waiting.pop()
         if path not in trees:
-            trees[path] = _without_docstrings(ast.parse(path.read_text(encoding="utf-8")))
-            waiting += _imported(trees[path], root)
+            trees[path], imports = _tree_and_imports(path.read_text(encoding="utf-8"))
+            waiting += filter(None, (_origin(module, name, root) for module, name, _ in imports))
     return trees
 
 
-def _imported(tree: ast.Module, root: Path) -> Iterator[Path]:
-    """Yield the files of the package that import statements lead to."""
+@cache  # by the text: whatever changes in a file is seen, and what doesn't is parsed once
+def _tree_and_imports(text: str) -> tuple[str, list[tuple[str, str, str]]]:
+    """Return a module's syntax tree, printed, and from where it imports which names, and what it calls them."""
+    tree, imports = _without_docstrings(ast.parse(text)), []
     for node in ast.walk(tree):
-        names = []
         if isinstance(node, ast.Import):
-            names = [alias.name.rpartition(".")[::2] for alias in node.names]
+            imports += [(*alias.name.rpartition(".")[::2], "") for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and not node.level:
-            names = [(node.module, alias.name) for alias in node.names]
-        yield from filter(None, (_origin(module, name, root) for module, name in names))
+            imports += [(node.module, alias.name, alias.asname or alias.name) for alias in node.names]
+    return ast.dump(tree), imports
 
 
 def _origin(module: str, name: str, root: Path) -> Path | None:
@@ -76,10 +77,9 @@ def _origin(module: str, name: str, root: Path) -> Path | None:
             return path
     if not init.is_file():
         return None
-    for node in ast.walk(ast.parse(init.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and any((alias.asname or alias.name) == name for alias in node.names):
-            return _origin(node.module, name, root)
-    return init
+    imports = _tree_and_imports(init.read_text(encoding="utf-8"))[1]
+    passed_from = next((module for module, _, called in imports if called == name), None)
+    return _origin(passed_from, name, root) if passed_from else init
 
 
 def _without_docstrings(tree: ast.Module) -> ast.Module:

@@ -76,15 +76,15 @@ def test_the_command_writes_what_compare_returns_and_prints_it_as_a_table(tmp_pa
     monkeypatch.setattr(
         "semgrid_edu.workshop.studies.filter.occupancy.compare_filters", partial(compare_filters, frames=2)
     )
-    arguments = ["reproduce", "occupancy", "--seed", "1", "--drives", "2", "--grid", "compact", "--out", str(out)]
+    arguments = ["reproduce", "occupancy", "--seed", "1", "--drives", "1", "--grid", "compact", "--out", str(out)]
     monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments])
     with pytest.raises(SystemExit, match="0"):
         run()
     written = json.loads(out.read_text())
-    again = compare_filters(seed=1, drives=2, grids=("compact",), frames=2)
+    again = compare_filters(seed=1, drives=1, grids=("compact",), frames=2)
     assert written["scores"] == again["scores"]
     assert (
-        written["command"] == again["command"] == "semgrid-edu reproduce occupancy --seed 1 --drives 2 --grid compact"
+        written["command"] == again["command"] == "semgrid-edu reproduce occupancy --seed 1 --drives 1 --grid compact"
     )
     printed = capsys.readouterr().out
     assert occupancy_table(written, "HDL-64E", "compact") in printed

@@ -2,15 +2,21 @@
 
 import os
 import shutil
+from copy import deepcopy
 from functools import cache
 
 import pytest
+from class_of import NAME, SOURCE
 from filelock import FileLock
 from nbgrader_scores import alembic_asked_once  # noqa: F401 (a fixture for all tests here)
 from typer.testing import CliRunner
+from warm import warm_processes
 
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.samples import samples_dir
 from semgrid_edu.workshop.commands.main import app
-from semgrid_edu.workshop.course.nbgrader import build
+from semgrid_edu.workshop.course.nbgrader import build, preprocessors
+from semgrid_edu.workshop.course.nbgrader.preprocessors import prepared_folder
 
 pytest.register_assert_rewrite("grader_checks")
 
@@ -20,6 +26,24 @@ def exercises_read_once():
     """Let the hundreds of students here fill in copies of one student version, since no exercise changes meanwhile."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(build, "student_version", cache(build.student_version))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shipped_frames_read_once():
+    """Give test cells copies of the shipped drives' frames: for each student they would decode the same pictures."""
+    read, frames = KittiRawDrive._frame, {}
+
+    def copied(drive, k):
+        if not drive.folder.is_relative_to(samples_dir()):
+            return read(drive, k)
+        key = drive.folder, *drive._sensors, k
+        if key not in frames:
+            frames[key] = read(drive, k)
+        return deepcopy(frames[key])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(KittiRawDrive, "_frame", copied)
         yield
 
 
@@ -41,6 +65,26 @@ def built(tmp_path_factory):
 def new_course(built, tmp_path_factory):
     """Return a function that lays out a course of its own at each call; built once, then copied."""
     return lambda: shutil.copytree(built[0], tmp_path_factory.mktemp("course"), dirs_exist_ok=True)
+
+
+@pytest.fixture(scope="module")
+def course(new_course):
+    """A course of the module's own."""
+    return new_course()
+
+
+@pytest.fixture(scope="module")
+def start(course):
+    """A function that forks a process for a student of exercise 01 from one that is ready."""
+    with warm_processes(SOURCE, prepared_folder(course, NAME)) as start:
+        yield start
+
+
+@pytest.fixture
+def forked(course, start, monkeypatch):
+    """The course while its students' processes are forked: for what doesn't depend on how a process is started."""
+    monkeypatch.setattr(preprocessors, "starter", lambda *_, **__: lambda _: start())
+    return course
 
 
 def pytest_generate_tests(metafunc):

@@ -6,7 +6,6 @@ give these three the same points and messages.
 
 import re
 from dataclasses import dataclass
-from functools import partial
 from unittest import mock
 
 import pytest
@@ -16,8 +15,9 @@ from warm import grade_warm, warm_processes
 
 from semgrid_edu.workshop.course.nbgrader import preprocessors
 from semgrid_edu.workshop.course.nbgrader.autograde import reference_answers, submission
-from semgrid_edu.workshop.course.nbgrader.preprocessors import prepared_folder
+from semgrid_edu.workshop.course.nbgrader.preprocessors import prepare, prepared_folder
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
+from semgrid_edu.workshop.course.sandbox.limits import Limits
 
 TIMEOUT = {"answer": 30, "endless loop": 2}
 """Seconds for a cell: enough for any answer on a busy machine; what each call of an endless loop costs."""
@@ -120,17 +120,16 @@ class GraderChecks:
     @pytest.fixture(scope="class")
     @classmethod
     def graded_by_nbgrader(cls, source, students, course, start):
-        """The same of the reference, the stub and the first packed student, graded as a class is.
+        """The same of the first packed student, the reference and the stub, graded by nbgrader.
 
-        `start` comes first, because nbgrader then needn't compile again what the warm session has compiled. The packed
-        student has processes of her own, as in a class, and before her the reference has, by which nbgrader prepares an
-        exercise. What nbgrader itself makes of the reference and the stub is seen in warm processes, too.
+        `start` comes first, because nbgrader then needn't compile again what the warm session has compiled. The
+        reference passes once in processes of its own, as in a class (`prepare`). What nbgrader makes of answers is seen
+        in forked ones; `test_warm` compares the two.
         """
         notebooks = {name: submission(source, students[name]) for name in ("student-0", "reference", "stub")}
-        grade = partial(autograde, course, cls.exercise, timeout=TIMEOUT["answer"])
-        scores = grade(submissions={"student-0": notebooks.pop("student-0")})
+        prepare(course, cls.exercise, Limits().memory)
         with mock.patch.object(preprocessors, "starter", return_value=lambda _: start()):
-            scores |= grade(submissions=notebooks)
+            scores = autograde(course, cls.exercise, notebooks, TIMEOUT["answer"])
         return {student: cls.by_task(source, cells) for student, cells in scores.items()}
 
     @staticmethod

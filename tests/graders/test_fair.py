@@ -10,12 +10,6 @@ from nbgrader.api import Gradebook
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place
 from semgrid_edu.workshop.course.nbgrader.build import course_api
 
-
-@pytest.fixture(scope="module")
-def course(new_course):
-    return new_course()
-
-
 NOISE = {  # the strict one last, because it changes how the others would end
     "tqdm": "from tqdm import tqdm; list(tqdm(range(3)))",
     "logging": "import logging; logging.warning('far')",
@@ -32,8 +26,8 @@ NOISE = {  # the strict one last, because it changes how the others would end
 }
 
 
-def test_what_is_said_beside_costs_nothing(course):
-    assert graded(course, "noisy", handed_in(inside("locate", "\n    ".join(NOISE.values())))).score == 15
+def test_what_is_said_beside_costs_nothing(forked):
+    assert graded(forked, "noisy", handed_in(inside("locate", "\n    ".join(NOISE.values())))).score == 15
 
 
 def twin(cell):
@@ -94,21 +88,21 @@ def forget_everything_nbgrader_wrote(notebook):
         forget_everything_nbgrader_wrote,
     ],
 )
-def test_a_changed_notebook_keeps_its_points(course, change):
+def test_a_changed_notebook_keeps_its_points(forked, change):
     notebook = handed_in()
     change(notebook)
-    assert graded(course, change.__name__, notebook).score == 15
+    assert graded(forked, change.__name__, notebook).score == 15
 
 
-def test_helpers_may_have_any_name(course):
+def test_helpers_may_have_any_name(forked):
     names = ["weights", "read", "loss", "gradient", "field", "before", "got", "slips", "moved", "row", "before", "test"]
     helpers = "\n".join(f"def {name}(x): return x" for name in names)
     uses = "x = " + "(".join(names) + "(1" + ")" * len(names)
     answers = {name: f"{helpers}\n{code}\n{uses}" for name, code in inside("follow", uses).items()}
-    assert graded(course, "helpers", handed_in(answers)).score == 15
+    assert graded(forked, "helpers", handed_in(answers)).score == 15
 
 
-def test_lists_are_as_good_as_arrays(course):
+def test_lists_are_as_good_as_arrays(forked):
     as_lists = "\n\ndef as_lists(f):\n    return lambda *a, **k: np.asarray(f(*a, **k)).tolist()\n"
     functions = {
         "locate": "locate",
@@ -119,7 +113,7 @@ def test_lists_are_as_good_as_arrays(course):
         "build-map": "build_map",
     }
     answers = {n: f"{code}{as_lists}\n{functions[n]} = as_lists({functions[n]})" for n, code in REFERENCE.items()}
-    assert graded(course, "lists", handed_in(answers)).score == 15
+    assert graded(forked, "lists", handed_in(answers)).score == 15
 
 
 ENDS = {
@@ -149,11 +143,11 @@ def test_a_cell_that_ends_python_costs_its_own_points(course):
     assert "Python itself ended here" in result.note
 
 
-def test_a_deleted_task_costs_its_own_points(course):
+def test_a_deleted_task_costs_its_own_points(forked):
     notebook = handed_in()
     for name in ("predict", "predict-test", "predict-wall-test"):
         del notebook.cells[cell_of(notebook, name)]
-    assert graded(course, "deleted", notebook).score == 12
+    assert graded(forked, "deleted", notebook).score == 12
 
 
 def test_who_crashed_gets_feedback_and_the_written_answer_is_read(course):
@@ -171,8 +165,8 @@ def test_who_crashed_gets_feedback_and_the_written_answer_is_read(course):
 
 
 @pytest.mark.parametrize("content", ['{"cells": [', "", "[]", '{"cells": 3, "metadata": {}, "nbformat": 4}'])
-def test_a_file_that_is_no_notebook_says_so(course, content):
-    result = graded(course, f"broken-{len(content)}", content)
+def test_a_file_that_is_no_notebook_says_so(forked, content):
+    result = graded(forked, f"broken-{len(content)}", content)
     assert (result.score, result.points) == (0, 17)
     assert result.note.startswith("Crashed: the file can't be graded")
 

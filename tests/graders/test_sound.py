@@ -13,12 +13,6 @@ from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
 from semgrid_edu.workshop.course.sandbox import session
 
-
-@pytest.fixture(scope="module")
-def course(new_course):
-    return new_course()
-
-
 EASY = "\n".join(
     f"def {name}(*_, **__): return 0"
     for name in ("locate", "predict", "follow", "transition", "half_life", "fuse", "build_map")
@@ -137,8 +131,8 @@ locate = predict = follow = transition = half_life = fuse = build_map = f
 
 
 @pytest.mark.parametrize("kind", ATTACKS)
-def test_an_attack_earns_nothing(course, kind):
-    assert graded(course, kind, handed_in(EASIER, first=f"{EASY}\n{ATTACKS[kind]}")).score == 0
+def test_an_attack_earns_nothing(forked, kind):
+    assert graded(forked, kind, handed_in(EASIER, first=f"{EASY}\n{ATTACKS[kind]}")).score == 0
 
 
 EASIER = dict.fromkeys(REFERENCE, "pass")
@@ -207,10 +201,10 @@ def two_of_a_name(notebook):
         two_of_a_name,
     ],
 )
-def test_changed_tests_earn_nothing(course, change):
+def test_changed_tests_earn_nothing(forked, change):
     notebook = handed_in(EASIER, first=EASY)
     change(notebook)
-    result = graded(course, change.__name__, notebook)
+    result = graded(forked, change.__name__, notebook)
     assert (result.score, result.points) == (0, 17)
 
 
@@ -235,14 +229,14 @@ except sqlite3.Error: pass
     assert graded(course, "victim-again", handed_in()).score == 15
 
 
-def test_hidden_inputs_are_not_in_the_feedback(course):
+def test_hidden_inputs_are_not_in_the_feedback(forked):
     """The secret: hidden tests of `locate` draw thirty cells, visible ones have four."""
     spy = "seen.append(len(belief)); print('cells:', len(belief)); assert len(belief) < 5, f'cells: {len(belief)}'"
     notebook = handed_in(inside("locate", spy), first="seen = []", last="print('cells:', max(seen))")
-    assert graded(course, "spy", notebook).score == 13
-    with course_api(course) as api:
+    assert graded(forked, "spy", notebook).score == 13
+    with course_api(forked) as api:
         assert api.generate_feedback(NAME, "spy")["success"]
-    page = place(course, "feedback", "spy", NAME).with_suffix(".html").read_text()
+    page = place(forked, "feedback", "spy", NAME).with_suffix(".html").read_text()
     assert "cells: 4" in page
     assert "cells: 30" not in page
     assert "cells: 5" not in page
@@ -255,14 +249,14 @@ TELLS = {
 
 
 @pytest.mark.parametrize("kind", TELLS)
-def test_an_error_does_not_tell_hidden_inputs(course, kind):
+def test_an_error_does_not_tell_hidden_inputs(forked, kind):
     notebook = handed_in(inside("locate", TELLS[kind]), first="UNREADABLE = 'ascii', b'x', 0, 1, ''")
-    assert graded(course, f"tells-{kind}", notebook).score == 13
-    graded_notebook = place(course, "autograded", f"tells-{kind}", NAME).read_text()
+    assert graded(forked, f"tells-{kind}", notebook).score == 13
+    graded_notebook = place(forked, "autograded", f"tells-{kind}", NAME).read_text()
     assert "cells: 30" not in graded_notebook
 
 
-def test_feedback_runs_no_scripts(course):
+def test_feedback_runs_no_scripts(forked):
     show = """
 from IPython.display import HTML, Javascript, display
 display(HTML("<script>" + "alert(1)</script>"))
@@ -274,10 +268,10 @@ display({"image/svg+xml": "<svg onload=" + "'alert(3)'/>", "image/png": '"><scri
     notebook.cells.append(new_markdown_cell(text))
     notebook.metadata["title"] = "<script>alert(7)</script>"
     notebook.metadata["widgets"] = {"application/vnd.jupyter.widget-state+json": {"x": "<script>alert(8)</script>"}}
-    assert graded(course, "scripts", notebook).score == 15
-    with course_api(course) as api:
+    assert graded(forked, "scripts", notebook).score == 15
+    with course_api(forked) as api:
         assert api.generate_feedback(NAME, "scripts")["success"]
-    page = place(course, "feedback", "scripts", NAME).with_suffix(".html").read_text()
+    page = place(forked, "feedback", "scripts", NAME).with_suffix(".html").read_text()
     for number in range(1, 9):
         assert f"<script>alert({number})" not in page
     assert "onerror" not in page

@@ -14,6 +14,7 @@ from PIL import Image
 
 from semgrid_edu import plotting
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.plotting import animations
 
 
 def squares(n=5):
@@ -57,6 +58,60 @@ def test_a_figure_is_drawn_anew_for_each_frame_and_closed():
     blue = [np.argwhere((frame[..., 2] > 150) & (frame[..., 0] < 60))[:, 1].mean() for frame in frames]
     np.testing.assert_allclose(np.diff(blue), (0.9 - 0.125) * 330 / 5, atol=1)  # matplotlib's default margins
     assert plt.get_fignums() == before
+
+
+CHANGES = {
+    "data": lambda ax: ax.lines[0].set_data([0, 1], [1, 0]),
+    "picture": lambda ax: ax.images[0].set_data(1 - ax.images[0].get_array()),
+    "title": lambda ax: ax.set_title("after"),
+    "limits": lambda ax: ax.set_xlim(0, 9),
+    "text": lambda ax: ax.texts[0].set(position=(0.8, 0.8)),
+    "new": lambda ax: ax.scatter([0.2], [0.7], color="black"),
+    "gone": lambda ax: ax.lines[0].remove(),
+    "cleared": lambda ax: ax.clear(),
+    "legend": lambda ax: ax.legend(["line"]),
+    "figure": lambda ax: ax.figure.suptitle("above"),
+}
+"""What may happen to a figure between two frames."""
+
+
+def as_saved(fig):
+    """A figure's pixels as `savefig` writes them."""
+    file = io.BytesIO()
+    fig.savefig(file, dpi="figure")
+    return np.asarray(Image.open(file).convert("RGB"))
+
+
+def held_and_changed(change):
+    """A figure twice as it is, and once after a change."""
+    fig, ax = plt.subplots(figsize=(3, 2), layout="constrained")
+    ax.plot([0, 1], [0, 1])
+    ax.imshow([[0.0, 1.0]], extent=(0, 1, 0, 1), cmap="Greys")
+    ax.text(0.2, 0.2, "A")
+    yield fig
+    yield fig
+    change(ax)
+    yield fig
+    plt.close(fig)
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+def test_each_frame_looks_as_it_would_be_saved(change, monkeypatch):
+    pictures, reduced = [], animations._with_common_palette
+    monkeypatch.setattr(
+        animations, "_with_common_palette", lambda drawn: pictures.extend(map(np.asarray, drawn)) or reduced(drawn)
+    )
+    plotting.animate(held_and_changed(change), 0.2, "a line changes")
+    np.testing.assert_array_equal(pictures, [as_saved(fig) for fig in held_and_changed(change)])
+    assert not np.array_equal(pictures[1], pictures[2])
+
+
+def test_a_figure_that_is_held_is_drawn_once(monkeypatch):
+    drawn, draw = [], animations._picture
+    monkeypatch.setattr(animations, "_picture", lambda frame: drawn.append(frame) or draw(frame))
+    held = plotting.animate((frame for frame in drawings() for _ in range(3)), 0.2, "a point moves to the right")
+    assert len(drawn) == 4
+    assert sum(decoded(held.png)[1]) == 12 * 200
 
 
 def test_the_same_frames_give_the_same_bytes():
