@@ -248,8 +248,8 @@ plt.show()
 #
 # ## Repeat, and count the bits
 #
-# That was all. The rest is repetition. To see it work we need a vehicle that really errs as the model says, so `trip`
-# (folded here) draws one at random: that of the animation. The filter doesn't see the places, only the readings.
+# The rest is repetition. To see it work we need a vehicle that really errs as the model says, so `trip` (folded here)
+# draws one at random: that of the animation. The filter doesn't see the places, only the readings.
 
 
 # %% jupyter={"source_hidden": true}
@@ -688,7 +688,7 @@ print(M.round(3))
 # The rates are *assumptions* about the world, like the sensor's numbers. What do they say of a cell that nobody looks
 # at any more? Start with one that is surely STATIC, and one that is surely DYNAMIC:
 
-# %% jupyter={"source_hidden": true} alt="two panels of stacked bands over ten seconds: the STATIC cell is still mostly static after five seconds while UNKNOWN grows; of the DYNAMIC cell little is left after two seconds, FREE takes over at first and then UNKNOWN"
+# %% jupyter={"source_hidden": true} alt="two panels of stacked bands over ten seconds: after five seconds the STATIC cell is static by a half, and most of the rest is UNKNOWN; of the DYNAMIC cell little is left after two seconds, FREE takes over at first and then UNKNOWN"
 times = np.linspace(0, 10, 51)
 fig, axes = plt.subplots(1, 2, figsize=(9, 2.4), sharey=True, layout="constrained")
 for ax, state in zip(axes, (State.STATIC, State.DYNAMIC), strict=True):
@@ -805,23 +805,27 @@ car, hidden = list(SPOTS).index("a car drives through"), list(SPOTS).index("a pa
 hits = np.flatnonzero(occupied[:, car] > free[:, car])
 assert len(hits) == 4
 assert (history[hits, car, State.DYNAMIC] > history[hits, car, State.STATIC]).all()
+assert (np.diff(history[hits, car, State.STATIC]) > 0).all()
 assert (history[hits[-1] + 1 : hits[-1] + 3, car, State.FREE] < 0.5).any()
 assert (history[hits[-1] + 4 :, car, State.FREE] > 0.5).all()
 blind = np.flatnonzero(occupied[:, hidden] == free[:, hidden])
 assert (np.diff(history[blind, hidden, State.FREE]) < 0).all()
+assert history[blind[-1] + 1, hidden, State.UNKNOWN] < 1e-9
+assert history[blind[-1] + 1, hidden, State.DYNAMIC] > 0.03 > 0.02 > history[-1, hidden, State.DYNAMIC]
 
 # %% [markdown]
 # Each picture is one cell over two seconds, each band as high as its state is probable. At its first scan the road is
-# free and the house STATIC, both above 0.9. For the house that is the prior of first sight, not a prediction: the rates
-# have had no time to act. Below on the left the car is there within one scan and mostly DYNAMIC: the right
-# answer, for the reason that you have predicted. It isn't ten to one, though, for two reasons. A little STATIC was left
-# over from before. And the prediction forgets a little of the free cell at each step; what it forgets becomes UNKNOWN,
-# and is shared out anew by the rule of first sight, where standing things are more frequent than moving ones. When the
-# car has left, the cell needs a few scans to believe it; remember that for the next lecture. On the right the belief
-# fades while the car hides the cell: grey grows, because we forget, and orange, because something may have driven in
-# unseen. Both are gone when the cell is seen again.
+# free and the house STATIC, both above 0.9. For the house that is the prior of first sight, not a prediction: the
+# rates have had no time to act. Below on the left the car is there within one scan and mostly DYNAMIC: the right
+# answer, for the reason that you have predicted. It isn't ten to one, though, for two reasons. A little STATIC was
+# left over from before. And the prediction forgets a little of the free cell at each step; what it forgets becomes
+# UNKNOWN, and is shared out anew by the rule of first sight, where standing things are more frequent than moving ones.
+# From return to return the STATIC band grows, because by our rates a moving thing leaves a cell sooner than a standing
+# one. When the car has left, the cell needs a few scans to believe it; remember that for the next lecture. On the
+# right the belief fades while the car hides the cell: grey grows, because we forget, and orange, because something may
+# have driven in unseen. When the cell is seen again, grey is gone at once and orange within a few scans.
 #
-# `step` agrees with `filterpy` and with the package to six digits. The package does this in thousands of cells at once.
+# `step` agrees with `filterpy` and with the package to six digits.
 #
 # ### How much of this rests on one rate?
 #
@@ -870,9 +874,9 @@ assert whole_filter[State.DYNAMIC] > 0.9
 #
 # ## Play with it
 #
-# Back to the ring road. Two sliders: `hit`, how often the sensor says *pole* beside a pole, and `slip`, how probable it
-# is that the vehicle moves by less or more than one cell. When does the filter keep track? What is worse, a bad sensor
-# or bad odometry? (Without a running kernel there are no sliders; the figure below them shows four settings.)
+# Back to the ring road. Two sliders: `hit`, how often the sensor says *pole* beside a pole, and `slip`, how probable
+# it is that the vehicle moves by less or more than one cell. When does the filter keep track? (Without a running
+# kernel there are no sliders; the figure below them shows four settings.)
 
 
 # %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]

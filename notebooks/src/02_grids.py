@@ -536,7 +536,8 @@ plt.show()
 
 # %% [markdown]
 # In the middle the fence and the house are sharp. But D is the streak of oncoming cars, and E that of a car that
-# overtakes us. E is short and D is long. Why?
+# overtakes us. (The red patch at 50 m on the right is the streak of a car that drives ahead of us.) E is short and D
+# is long. Why?
 #
 # Take the two cars apart. You stand still and scan ten times a second. One car drives away from you at 10 m/s on the
 # right, one comes towards you on the left.
@@ -589,10 +590,12 @@ for k in (2, 8, 16, 24):
     print(f"{k / 10:.1f} s: tail of the car that drives away {away:.1f} m, of the one that comes {coming:.1f} m")
 
 # %% [markdown]
-# The clamp decides the first tail and can do nothing about the second. That is what the drive shows: E, the car that
-# overtakes us, drags a short tail, and D is a row of oncoming cars, each in the shadow of the one before. One remedy for
-# shadows is to let every cell **forget** a little before each scan: its log-odds shrink towards "don't know", with a
-# memory of $\tau$ seconds. Where beams look, the scan puts back what was lost; where none looks, the cell fades:
+# The clamp decides the first tail and can do nothing about the second. (Only the front of the oncoming car is hit, so
+# the first four metres of its tail lie under the car itself and aren't counted.) That is what the drive shows: E, the
+# car that overtakes us, drags a short tail, and D is a row of oncoming cars, each in the shadow of the one before. One
+# remedy for shadows is to let every cell **forget** a little before each scan: its log-odds shrink towards "don't
+# know", with a memory of $\tau$ seconds. Where beams look, the scan puts back what was lost; where none looks, the
+# cell fades:
 #
 # $$ L \leftarrow L\, e^{-\Delta t / \tau} $$
 #
@@ -763,18 +766,25 @@ for frame, cells in zip(frames, wrong, strict=True):
     rows, cols, _ = fine.cells(returns[:, :2])
     empty = np.isin(frame.labels.birdseye, (ROAD, SIDEWALK))
     away.append(0.1 * ndimage.distance_transform_edt(empty)[rows, cols])
-beside = np.mean([stands[k][max(r - 1, 0) : r + 2, max(c - 1, 0) : c + 2].any() for k, r, c in np.argwhere(wrong)])
-print(f"{100 * beside:.1f} % of these cells touch one in which something stands")
+around = np.ones((1, 3, 3))
+touches, but_plants = (ndimage.binary_dilation(cells, around) for cells in (stands, stands & known))
+beside, by_chance = touches[wrong].mean(), touches[known & ~stands].mean()
+print(
+    f"{100 * beside:.1f} % of these cells touch one in which something stands; {100 * by_chance:.0f} % of all empty cells do"
+)
+print(f"{100 * but_plants[wrong].mean():.0f} % touch something other than a plant")
 print(f"distance of their returns from it: {np.median(np.concatenate(away)):.1f} m (median)")
 assert beside > 0.98
 assert np.median(np.concatenate(away)) < 0.15
+assert but_plants[wrong].mean() > 0.6
+assert by_chance < 0.3
 
 # %% [markdown]
-# So hardly any return is an invention. Something stands there, but a tenth of a metre beside, in the next cell. Look
-# at the red strip in the map of a single scan above: along the whole side of a car, returns fall over the border of
-# their cells. It may be an error of the pose or of a range, or a label that is drawn a little too small. If the returns
-# of that side share it, they are wrong together. Take the third graph on a row of cells, with a pose error of one cell,
-# and let one, two, three returns of a scan come from the same cell:
+# So hardly any return is an invention. Something stands there, in a third of the cases only a plant, but a tenth of a
+# metre beside, in the next cell. Look at the red strip in the map of a single scan above: along the whole side of a
+# car, returns fall over the border of their cells. It may be an error of the pose or of a range, or a label that is
+# drawn a little too small. If the returns of that side share it, they are wrong together. Take the third graph on a
+# row of cells, with a pose error of one cell, and let one, two, three returns of a scan come from the same cell:
 
 # %%
 counted = count_rings()
@@ -803,7 +813,9 @@ pairs = seen[:, :, 1:] & seen[:, :, :-1] & hit[:, :, :-1]
 others = np.stack([seen.sum(axis=0) - one for one in seen])
 rate = np.where(others > 0, (hit.sum(axis=0) - hit) / np.maximum(others, 1), hit[seen].mean())
 shares = hit[seen].mean(), rate[:, :, 1:][pairs].mean(), hit[:, :, 1:][pairs].mean()
-print("hit: {:.0%} of all cells; beside a hit, {:.0%} if cells were independent, and {:.0%} in truth".format(*shares))
+print(
+    "hit: {:.0%} of the cells seen; beside a hit, {:.0%} if cells were independent, and {:.0%} in truth".format(*shares)
+)
 assert shares[2] > 2 * shares[1] > 3 * shares[0]
 
 # %% [markdown]
