@@ -375,21 +375,19 @@ for low, far in ((2, 8), (8, 12), (12, 18), (18, 30)):
 along = np.arange(2, 30.1, side.cell)
 stopped, gone_on = (np.histogram(x, along)[0] for x in (fence[:, 0], (scan[:, 0] * across)[through]))
 outvoted = (stopped < 0.23 * (stopped + gone_on))[stopped + gone_on > 0].mean()
-print(f"in {100 * outvoted:.0f} % of the cells along the fence fewer than 23 % come back")
+print(f"in one of {1 / outvoted:.0f} cells along the fence fewer than 23 % come back")
 assert 0.1 < outvoted < 0.25
 evidence, behind = scan_evidence(scan, side, sensor), side.centers()[..., 1] < np.median(fence[:, 1]) - 0.3
 behind &= ~(kinds[510:710, 145:285] == Kind.PLANT).reshape(100, 2, 70, 2).any(axis=(1, 3))
-unseen = (evidence.occupied == evidence.free)[behind].mean()
-print(f"behind the fence {100 * unseen:.0f} % of the cells without a plant stay unknown")
-assert unseen > 0.9
+assert (evidence.occupied == evidence.free)[behind].mean() > 0.9
 
 # %% [markdown]
 # The share grows along the fence, for two reasons, which this table doesn't separate. A beam is a cone: farther away
 # it is wider and meets more wires. And it grazes the fence more and more, so that the wires stand closer together as
 # the beam sees them. (The simulator is built so.) On this street the share is above 23 % in all four bands, but not in
 # each cell: votes would tear a hole into the fence at one cell in six. The rule of one return keeps such cells, too.
-# It has a price, which the right picture shows: the reach of a beam ends at its first obstacle, so nearly all of the
-# ground behind the fence, between the hedges, stays unknown, although many beams crossed it.
+# It has a price, which the right picture shows: the reach of a beam ends at its first obstacle, so more than nine
+# tenths of the ground behind the fence, between the hedges, stay unknown, although many beams crossed it.
 #
 # What does the log-odds grid make of it after eight scans? And how often is a cell of a hedge passed by one scan and
 # hit by the next, on five streets with a porous hedge and on the same streets with hedges made opaque?
