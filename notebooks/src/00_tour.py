@@ -163,6 +163,7 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # | [10](10_crf.ipynb), [11](11_fast_crf.ipynb) | $g \to g$ | the CRF by hand: equations (3) and (4); the fast CRF |
 # | [12](12_experiments.ipynb) | all | the paper's experiments, every claim put to the test |
 # | [13](13_real_drive.ipynb) | all | your own street |
+# | [14](14_memory.ipynb) | $g_{t-1} \to g_t$ | memory for classes: a cut edge is put back |
 #
 # ### One symbol, one meaning
 #
@@ -706,7 +707,7 @@ Markdown(ledger_table(ledger()))
 # %% [markdown]
 # Don't add the numbers up: they have different units, and each toy world was chosen to show its edge. Read the table as
 # a list of questions about *your* street. One edge you can pay back yourself: `g0 -> g1`, by carrying the classes along
-# from one semantic grid to the next.
+# from one semantic grid to the next (lecture [14](14_memory.ipynb)).
 #
 # ## The registers
 #
