@@ -644,7 +644,7 @@ plt.show()
 # Left: the *true* labels of the image, laid on the ground by equation (1); right: the true map. Hatched: the pixel
 # shows something nearer, which is drawn out to the edge of the grid. No camera model repairs that. The LIDAR knows
 # which cells are hidden, and the occupancy grid calls them UNKNOWN: this is why the paper needs both sensors. Far
-# ahead, the map is the road's own shape that is missing: there a plane *below* zero would be right.
+# ahead, what the map lacks is the road's own shape: there a plane *below* zero would be right.
 # [The companion](deeper/05_cells_and_slopes.ipynb) measures slopes, and how few pixels a far cell has.
 #
 # ## A real street
@@ -710,7 +710,7 @@ _ = interact(show, height=FloatSlider(value=0.0, min=-1.0, max=3.8, step=0.05, d
 # <details><summary>Answer</summary>
 #
 # To the side: 30 · tan 1° = 0.52 m, one cell. Nodding: rows 6.5 and 13.5 below the horizon are 300 / 6.5 = 46 m and 300
-# / 13.5 = 22 m: 16 m too far, or 8 m too near. The same degree, and up to thirty times the error, because the camera
+# / 13.5 = 22 m: 16 m too far, or 8 m too near. The same degree, and fifteen or thirty times the error, because the camera
 # looks at the road at a very flat angle.
 #
 # </details>
@@ -775,7 +775,7 @@ Markdown(ledger_table(ledger("pixel") + ledger("height")))
 #    it shifts.
 # 2. Transforms are read by names, right to left; the inverse undoes the shift first, then the turn.
 # 3. A point in view has one pixel, (1); a pixel has a whole ray of points. All planes meet at the horizon.
-# 4. The error of a wrong height grows like $1 / (z_\text{cam} - z)$: 17 cm of sidewalk are half a metre on the map.
+# 4. A wrong height moves a thing by $x\,(z - \delta) / (z_\text{cam} - z)$: 17 cm of sidewalk are half a metre on the map.
 # 5. In view is not yet seen: (1) cuts occlusion (0.83 instead of 0.23) and the height (1 instead of 0.03).
 #
 # ## Further reading

@@ -2,7 +2,7 @@
 # # The lattice of velocities: how it moves, what it costs, where it errs
 #
 # **In one sentence.** A filter on a lattice of velocities is exact for what the lattice can say; changes of speed and
-# ways of less than a cell have to be translated into its steps, and each finer step is paid for in every cell.
+# distances of less than a cell have to be translated into its steps, and each finer step is paid for in every cell.
 #
 # **You will be able to**
 # - show that BOF, in one cell and without motion, is the discrete Bayes filter of lecture 01;

@@ -165,7 +165,7 @@ plotting.animate(frames_of(before, range(8, 24)), 0.25, alt="a wall comes into v
 # When the fault was found on KITTI, five explanations were at hand. Each of them can be switched off on a simulated
 # street, where everything else stays as it is:
 #
-# | suspect | why it could be to blame | switched off by |
+# | suspect | why it could be the cause | switched off by |
 # |---|---|---|
 # | transparency | beams pass through wire mesh in one scan and hit it in the next | every mesh, hedge and pane stops all beams |
 # | pillars | the edge of a pillar's shadow runs along the fence behind it as we pass | taking all pillars and posts away |
@@ -214,13 +214,13 @@ Markdown(markdown_table(rows) + "\n\n" + source)
 # %% [markdown]
 # On this page only the filter is run again; what changes the street takes longer, so it stands on the right alone.
 #
-# Read each line against the first, *as it was*. A suspect that is to blame makes the number fall when it is switched
+# Read each line against the first, *as it was*. A suspect that is a cause makes the number fall when it is switched
 # off. Opaque mesh and exact poses hardly change anything on either street: these bets are lost. Without pillars almost
 # all phantoms on the street with mesh and hedge are gone, because there the pillars alone throw shadows on the fence.
-# On the street with walls fewer go, since the gaps throw shadows too. So the LIDAR isn't to blame: **the phantoms need
+# On the street with walls fewer go, since the gaps throw shadows too. So the LIDAR isn't the cause: **the phantoms need
 # the edge of a shadow that moves along something that stands.**
 #
-# Births at first sight are to blame on one of the two streets only. They are where many phantoms begin; but a phantom
+# Births at first sight are a cause on one of the two streets only. They are where many phantoms begin; but a phantom
 # that has begun, however small, needs no more births to grow.
 #
 # In the filter, the last line says what carries them: particles that arrive in UNKNOWN cells, that is, in cells just

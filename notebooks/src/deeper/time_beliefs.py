@@ -41,7 +41,7 @@ plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 # %% [markdown]
 # ## One thing, two places
 #
-# Lecture 03's smallest world: four cells in a row, and one thing in cell 1. It either stands, or drives one cell to the
+# A small world of lecture 03: four cells in a row, and one thing in cell 1. It either stands, or drives one cell to the
 # right in each step. Both are equally probable. Before any scan, where is it one step later?
 
 
@@ -115,7 +115,7 @@ print("given the slice before:   ", d_separated(stage.model, "c1,1", "c2,1", giv
 # %% [markdown]
 # This is the whole difficulty. Each *slice* is cheap, because given the slice before its cells are independent. But the
 # filter has to sum the slice before out, and what is summed out leaves its children coupled. After a few steps every
-# cell is coupled to every other one, however few arrows the graph has. (The field says that the belief becomes
+# cell is coupled to every other one that a chain of arrows connects with it. (The field says that the belief becomes
 # **entangled**.)
 #
 # ## Three questions about the same chain
@@ -149,7 +149,7 @@ ax.set(xlabel="step", ylabel="P(OCCUPIED)", ylim=(-0.05, 1.15), xticks=range(0, 
 fig.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False, fontsize=9)
 plt.show()
 assert story == [0] * 6 + [1] * 9 + [0] * 5
-assert smooth[2] < 0.35 < 0.4 < forward[2]
+assert (round(forward[2], 2), round(smooth[2], 1)) == (0.45, 0.3)
 assert min(smooth[6:15]) > 0.5 > max(*smooth[:6], *smooth[15:])
 assert forward[6] < 0.5 < 0.8 < smooth[6]
 assert forward[15] > 0.5 > 0.35 > smooth[15]
@@ -266,7 +266,9 @@ assert min(worst["head on"][2], worst["towards a fence"][2]) > 0.1
 # In these worlds, the moment of the projection matters more than the projection itself. After the whole step the largest
 # error of all five worlds is 0.011; after the prediction it is 0.274. In the first world, `twice` and BOF agree to six
 # digits, so the moment explains all of BOF's error there. In a real grid nobody can update jointly, because all cells
-# depend on each other. But the first three rows show what a scan is worth if it is used before the coupling is forgotten.
+# depend on each other. But the first and the third row show what a scan is worth if it is used before the
+# coupling is forgotten. ("At the edge" there is nothing to lose: the thing drives to the right or leaves the row, so two
+# cells never share it.)
 #
 # The surprise is in the last two rows. There, projecting costs nothing, and BOF errs all the same: it computes even the
 # marginals of the *prediction* in an approximate way. It adds what two cells send as if only one could ("head on"), and

@@ -361,7 +361,7 @@ _test()
 # ## Task 7: in your own words (2 points)
 #
 # Thirty metres ahead, the semantic grid says *road* in a cell that the occupancy grid calls STATIC with probability 0.9. Name two
-# stages of the pipeline that may be to blame, and say for each what you would look at to find out. Then name one dashed edge of the
+# stages of the pipeline that may be the cause, and say for each what you would look at to find out. Then name one dashed edge of the
 # lecture's graph that could have prevented the mistake, and say what would flow along it. Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "blame", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}

@@ -229,7 +229,7 @@ def _test():
     assert mean.shape == (2, 1, 3), f"the mean has a plane for x and one for y, shape (2, 1, 3), got {mean.shape}"
     slips = {
         (0.8, -0.2): "you weigh by P(occupied, v): given that something moves means divided by P(DYNAMIC)",
-        (8 / 7, -2 / 7): "what stands doesn't move: the zero velocity, the first bin, counts neither above nor below",
+        (8 / 7, -2 / 7): "what stands doesn't move: leave the zero velocity, the first bin, out of both sums",
         (-0.5, 2.0): "x and y are swapped: velocities[:, 0] is x, the first plane of the mean",
         (4 / 3, -4 / 3): "every velocity counts the same: weigh each by what the cell believes of it",
         (1.0, -1.0): "every velocity counts the same: weigh each by what the cell believes of it",

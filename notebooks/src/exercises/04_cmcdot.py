@@ -331,7 +331,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# When the test has passed, try `cuts(package_filter)`. Which edges does the package cut, and does the price fit the lecture's ledger?
+# When the test has passed, try `cuts(package_filter)`. Which edges does the package cut, and do the prices fit the ledgers of lectures 03 and 04?
 #
 # ## Task 5: your filter on two streets (2 points)
 #
