@@ -280,8 +280,8 @@ assert came_in[loop_alone].mean() > 0.8
 
 # %% [markdown]
 # The package's `Cmcdot` is this loop with a margin around its map, so that the map may turn. At 1.6 s the two agree in
-# more than nine cells of ten. Most others are UNKNOWN to the loop alone: they came in at its far end, and the package had
-# seen them in its margin. Watch the overtaking car A go through one round:
+# more than nine cells of ten. Most others came in at the far end, UNKNOWN to the loop, seen before in the package's margin.
+# Watch the overtaking car A go through one round:
 
 
 # %% jupyter={"source_hidden": true} alt="seven small pictures of the overtaking car: the old belief, the car orange; after move all has slid down by a cell; after predict the orange has flown ahead and is paler; the scan, with hit cells black and passed cells pink; after update the orange is sharp again; its particles before step 4, mostly pale, and after it, all alike"
@@ -818,9 +818,9 @@ print("error to exact ", *(f"{e:6.3f}" for e in error.to_exact), f"{error.bias:6
 both = np.hypot(error.bias, error.to_bof)
 assert np.abs(error.to_exact / both - 1).max() < 0.08  # the squares add, nearly
 assert -0.6 < error.slope < -0.4
-assert abs(error.to_bof[1] / error.to_bof[3] - 4.5) < 0.1
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="errors against the number of particles on logarithmic axes: the sampling error falls along a line of slope minus one half, from 0.018 to 0.001; the error to the exact answer stays on the dashed line of the bias at 0.051"
+assert abs(error.to_bof[1] / error.to_bof[3] - 4.5) < 0.1
 fig, ax = plt.subplots(figsize=(6.5, 2.8), layout="constrained")
 ax.loglog(error.numbers, error.to_exact, "s", color="#d95f02", label="CMCDOT against exact")
 ax.loglog(error.numbers, error.to_bof, "o", color="#6a1b9a", label="CMCDOT against BOF")
