@@ -352,7 +352,7 @@ def mean_error(n, resample, seeds=10):
 errors = {resample: [mean_error(n, resample) for n in NUMBERS] for resample in (False, True)}
 at_work = {resample: particle_filter(1000, np.random.default_rng(0), resample)[1] for resample in (False, True)}
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, effective sample size of 1000 particles over 25 steps on a logarithmic axis: with resampling it stays between 400 and 1000, without it falls to about 2; right, error against number of particles on logarithmic axes: with resampling along a line of slope minus one half, without it several times larger"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, effective sample size of 1000 particles over 25 steps on a logarithmic axis: with resampling it stays between 400 and 1000, without it falls to about 2; right, error against number of particles on logarithmic axes: with resampling along a line of slope minus one half, without it hardly larger for 10 particles and more than three times for 10,000"
 fig, axes = plt.subplots(1, 2, figsize=(9, 3), layout="constrained")
 for resample, style, label in ((True, "o-", "with resampling"), (False, "s--", "without")):
     axes[0].plot(at_work[resample], style, markersize=4, label=label)
