@@ -3,88 +3,91 @@
 from grader_checks import GraderChecks, mistake, right
 
 
-def depth(
-    start="np.full(size, np.nan)",
-    skip="Z <= 0",
-    ray="(X / Z, Y / Z, 1)",
-    inside="0 <= u <= size[1] - 1 and 0 <= v <= size[0] - 1",
-    pixel="round(float(v)), round(float(u))",
-    keep="np.fmin(depth[pixel], Z)",
-    result="depth",
-    before="",
+def opened(
+    near="(np.abs(uv - uv[n]) <= reach).all(axis=1)", hides="(Z[n] - Z[near] > gap).any()", result="~hidden", before=""
 ):
     """Return an answer to task 1 with these parts."""
     return f"""
-def depth_picture(points, K, size):
-    depth = {start}
-    for X, Y, Z in points:
-        if {skip}:
-            continue
-        u, v, _ = K @ {ray}
-        {before}
-        if {inside}:
-            pixel = {pixel}
-            depth[pixel] = {keep}
+def open_to_view(uv, Z, reach, gap):
+    hidden = np.zeros(len(Z), bool)
+    {before}
+    for n in range(len(Z)):
+        near = {near}
+        hidden[n] = {hides}
     return {result}"""
 
 
-def votes(
-    kept="label != 255 and label != SKY",
-    ground="[ROAD, SIDEWALK, VEGETATION]",
-    best="np.where(standing.any(axis=1), standing.argmax(axis=1), votes.argmax(axis=1))",
-    result="np.where(votes.any(axis=1), best, 255)",
-    add="votes[cell, label] += 1",
-    size="10",
+def shares(
+    cases="((outline, 1 - calibration), (1 - outline, calibration))",
+    counted="range(n // 2 + 1, n + 1)",
+    ways="comb(n, m)",
+    road="1 - (1 - wrong) ** n",
+    car="wrong**n",
+    weights="(1 - p_car, p_car)",
+    result="majority, standing",
 ):
     """Return an answer to task 2 with these parts."""
     return f"""
-def count_votes(cells, classes, n_cells):
-    votes = np.zeros((n_cells, {size}), int)
-    for cell, label in zip(cells, classes):
-        if {kept}:
-            {add}
-    standing = votes.copy()
-    standing[:, {ground}] = 0
-    best = {best}
+def wrong_shares(n, outline, calibration, p_car):
+    majority = standing = 0.0
+    for wrong, chance in {cases}:
+        majority += chance * sum({ways} * wrong**m * (1 - wrong) ** (n - m) for m in {counted})
+        of_road, of_car = {weights}
+        standing += chance * (of_road * ({road}) + of_car * ({car}))
     return {result}"""
 
 
-def closing(body, pad="2 * reach", cut="[2 * reach : -2 * reach, 2 * reach : -2 * reach]"):
-    """Return an answer to task 3 that does this to the padded mask."""
+def audited(
+    first="(votes != 255) & (made != votes)",
+    second="given & unseen",
+    given="(votes == 255) & (made < 10)",
+    third="given & (made == c) & ~around",
+    around="ndimage.binary_dilation(votes == c, square)",
+    square="np.ones((2 * reach + 1, 2 * reach + 1), bool)",
+    classes="range(10)",
+):
+    """Return an answer to task 3 with these parts."""
     return f"""
-def close_mask(mask, reach):
-    square = np.ones((2 * reach + 1, 2 * reach + 1), bool)
-    padded = np.pad(mask, {pad})
-    return ({body}){cut}"""
+def audit(votes, unseen, made, reach):
+    given, square, far = {given}, {square}, 0
+    for c in {classes}:
+        around = {around}
+        far += ({third}).sum()
+    return ({first}).sum(), ({second}).sum(), far"""
 
 
-def unknown(
-    state="o.argmax(axis=0)", near="(near != 255) & (state != UNKNOWN)", number="10 + state", votes="votes != 255"
+def middle(
+    start="np.asarray(table) @ o",
+    skip="vote is not None",
+    factor="np.where(np.arange(2) == vote, same, 1 - same)",
+    result="weight[0] / weight.sum()",
 ):
     """Return an answer to task 4 with these parts."""
     return f"""
-def fill_unknown(votes, o, near):
-    state = {state}
-    filled = np.where({near}, near, {number})
-    return np.where({votes}, votes, filled)"""
+def between(left, right, o, same, table):
+    weight = {start}
+    for vote in (left, right):
+        if {skip}:
+            weight = weight * {factor}
+    return {result}"""
 
 
-def carry(
-    known="np.isfinite(velocity).all(axis=1)",
-    who="moves & known",
-    way="velocity[moves & known] * seconds",
-    kept="carried[~moves | known]",
-    result="carried @ T_now_from_then[:3, :3].T + T_now_from_then[:3, 3]",
-    start="points.copy()",
-    sign="+=",
+def measured(
+    asked="rule(uv, Z, reach, gap)",
+    points="frame.points[kept]",
+    policy='TruthPolicy(cleanup="none")',
+    labelled="made < 10",
+    result="labelled.sum(), (labelled & (made != frame.labels.birdseye_on(spec))).sum()",
+    kept="numbers[is_open]",
 ):
     """Return an answer to task 5 with these parts."""
     return f"""
-def carry_window(points, moves, velocity, seconds, T_now_from_then):
-    known = {known}
-    carried = {start}
-    carried[{who}, :2] {sign} {way}
-    carried = {kept}
+def labels_and_wrong(frame, o, spec, reach, gap, rule=open_to_view):
+    numbers, uv, Z = in_view(frame)
+    is_open = {asked}
+    kept = {kept}
+    made = lidar_truth(replace(frame, points={points}), o, spec, {policy})
+    labelled = {labelled}
     return {result}"""
 
 
@@ -93,585 +96,599 @@ class TestTruth(GraderChecks):
     entries = (
         # ---- task 1
         right(
-            "the farthest first, so that closer ones overwrite",
-            task="depth-picture",
+            "a matrix of all pairs",
+            task="open-to-view",
             code="""
-def depth_picture(points, K, size):
-    picture = np.full(size, np.nan)
-    points = points[points[:, 2] > 0]
-    points = points[np.argsort(-points[:, 2])]
-    u, v = (K[:2, :2] @ points[:, :2].T) / points[:, 2] + K[:2, 2:]
-    seen = (u >= 0) & (u <= size[1] - 1) & (v >= 0) & (v <= size[0] - 1)
-    for row, col, Z in zip(np.rint(v[seen]).astype(int), np.rint(u[seen]).astype(int), points[seen, 2]):
-        picture[row, col] = Z
-    return picture""",
+def open_to_view(uv, Z, reach, gap):
+    du, dv = (np.abs(np.subtract.outer(a, a)) for a in uv.T)
+    return ~((du <= reach) & (dv <= reach) & (np.subtract.outer(Z, Z) > gap)).any(axis=1)""",
         ),
         right(
-            "np.minimum.at",
-            task="depth-picture",
+            "a picture of smallest depths",
+            task="open-to-view",
             code="""
-def depth_picture(points, K, size):
-    ahead = points[points[:, 2] > 0]
-    pixels = ahead @ K.T
-    u, v = pixels[:, 0] / ahead[:, 2], pixels[:, 1] / ahead[:, 2]
-    seen = (0 <= u) & (u <= size[1] - 1) & (0 <= v) & (v <= size[0] - 1)
-    picture = np.full(size, np.inf)
-    np.minimum.at(picture, (np.rint(v[seen]).astype(int), np.rint(u[seen]).astype(int)), ahead[seen, 2])
-    picture[np.isinf(picture)] = np.nan
-    return picture""",
+def open_to_view(uv, Z, reach, gap):
+    if not len(Z):
+        return np.ones(0, bool)
+    u, v = (uv - uv.min(axis=0)).T
+    picture = np.full((v.max() + 1, u.max() + 1), np.inf)
+    np.minimum.at(picture, (v, u), Z)
+    nearest = ndimage.minimum_filter(picture, 2 * reach + 1, mode="constant", cval=np.inf)
+    return Z - nearest[v, u] <= gap""",
+        ),
+        right(
+            "a list of truth values",
+            task="open-to-view",
+            code="""
+def open_to_view(uv, Z, reach, gap):
+    closest = [Z[np.abs(uv - at).max(axis=1) <= reach].min() for at in uv]
+    return [bool(z - c <= gap) for z, c in zip(Z, closest)]""",
         ),
         mistake(
-            "the last one wins",
-            task="depth-picture",
+            "the same pixel only, the lecture's rule",
+            task="open-to-view",
             loses=2,
-            says="that is the last return in the list",
-            code=depth(keep="Z"),
+            says="return 4 lies two columns and two rows",
+            code=opened(near="(uv == uv[n]).all(axis=1)"),
         ),
         mistake(
-            "the farthest",
-            task="depth-picture",
+            "a disc in place of a square",
+            task="open-to-view",
             loses=2,
-            says="or the farthest: of several the closest counts",
-            code=depth(keep="np.fmax(depth[pixel], Z)"),
+            says="return 4 lies two columns and two rows",
+            code=opened(near="np.linalg.norm(uv - uv[n], axis=1) <= reach"),
         ),
         mistake(
-            "the first one wins",
-            task="depth-picture",
+            "rows ignored",
+            task="open-to-view",
             loses=2,
-            says="that is the first return in the list",
-            code=depth(keep="Z if np.isnan(depth[pixel]) else depth[pixel]"),
+            says="the closer one is three rows away",
+            code=opened(near="np.abs(uv - uv[n])[:, 0] <= reach"),
         ),
         mistake(
-            "the distance in place of the depth",
-            task="depth-picture",
+            "the reach excluded",
+            task="open-to-view",
             loses=2,
-            says="holds the distance of the return",
-            code=depth(keep="np.fmin(depth[pixel], np.sqrt(X * X + Y * Y + Z * Z))"),
+            says="return 4 lies two columns and two rows",
+            code=opened(near="(np.abs(uv - uv[n]) < reach).all(axis=1)"),
         ),
         mistake(
-            "behind the camera", task="depth-picture", loses=2, says="look at the sign of Z", code=depth(skip="Z == 0")
-        ),
-        mistake(
-            "cut off instead of rounded",
-            task="depth-picture",
+            "a reach too large by one",
+            task="open-to-view",
             loses=2,
-            says="round to the nearest pixel, don't cut off",
-            code=depth(pixel="int(v), int(u)"),
+            says="the closer one is three columns away",
+            code=opened(near="(np.abs(uv - uv[n]) <= reach + 1).all(axis=1)"),
         ),
         mistake(
-            "rounded before the test",
-            task="depth-picture",
+            "columns or rows",
+            task="open-to-view",
             loses=2,
-            says="test the pixel against the image before you round it",
-            code=depth(before="u, v = round(float(u)), round(float(v))"),
+            says="the closer one is three columns away",
+            code=opened(near="(np.abs(uv - uv[n]) <= reach).any(axis=1)"),
         ),
         mistake(
-            "rows and columns swapped",
-            task="depth-picture",
+            "no gap",
+            task="open-to-view",
             loses=2,
-            says="the picture is turned",
-            code=depth(start="np.full(size[::-1], np.nan)", pixel="round(float(u)), round(float(v))"),
+            says="closer by 0.4 m only",
+            code=opened(hides="(Z[n] > Z[near]).any()"),
         ),
         mistake(
-            "infinite where nothing is",
-            task="depth-picture",
+            "the gap included",
+            task="open-to-view",
             loses=2,
-            says="a pixel without a return is np.nan, not infinite",
-            code=depth(start="np.full(size, np.inf)"),
+            says="which is not more than the gap",
+            code=opened(hides="(Z[n] - Z[near] >= gap).any()"),
         ),
         mistake(
-            "zero where nothing is",
-            task="depth-picture",
+            "whatever lies at another depth",
+            task="open-to-view",
             loses=2,
-            says="a pixel without a return is np.nan",
-            code=depth(result="np.nan_to_num(depth)"),
+            says="only a closer return hides",
+            code=opened(hides="(np.abs(Z[n] - Z[near]) > gap).any()"),
         ),
         mistake(
-            "one focal length for both",
-            task="depth-picture",
+            "hidden in place of open",
+            task="open-to-view",
             loses=2,
-            says="on inputs you haven't seen: other pixels have a depth, with other focal lengths",
-            code=depth(before="v = K[0, 0] * Y / Z + K[1, 2]"),
+            says="True means that a return is NOT hidden",
+            code=opened(result="hidden"),
+        ),
+        mistake(
+            "what is hidden hides nothing",
+            task="open-to-view",
+            loses=2,
+            says="return 7 is hidden by return 8",
+            code="""
+def open_to_view(uv, Z, reach, gap):
+    is_open = np.ones(len(Z), bool)
+    for n in np.argsort(Z):
+        near = (np.abs(uv - uv[n]) <= reach).all(axis=1) & is_open
+        is_open[n] = not (Z[n] - Z[near] > gap).any()
+    return is_open""",
+        ),
+        mistake(
+            "the nearest pixel alone is asked",
+            task="open-to-view",
+            loses=2,
+            says="return 8 is hidden by return 9",
+            code=opened(
+                before="others = np.arange(len(Z))",
+                near="[min((others != n).nonzero()[0], key=lambda m: np.abs(uv[m] - uv[n]).max())]",
+                hides="(np.abs(uv[near] - uv[n]) <= reach).all() and (Z[n] - Z[near] > gap).any()",
+            ),
+        ),
+        mistake(
+            "a gap of half a metre written in",
+            task="open-to-view",
+            loses=2,
+            says="on inputs you haven't seen",
+            code=opened(hides="(Z[n] - Z[near] > 0.5).any()"),
         ),
         # ---- task 2
         right(
-            "a loop over cells",
-            task="count-votes",
+            "all outcomes",
+            task="wrong-shares",
             code="""
-def count_votes(cells, classes, n_cells):
-    made = np.full(n_cells, 255)
-    for cell in range(n_cells):
-        mine = [c for c in classes[cells == cell] if c not in (255, SKY)]
-        stands = [c for c in mine if c not in (ROAD, SIDEWALK, VEGETATION)]
-        voters = stands or mine
-        if voters:
-            made[cell] = max(sorted(set(voters)), key=voters.count)
-    return made""",
+from itertools import product
+
+def wrong_shares(n, outline, calibration, p_car):
+    total = np.zeros(2)
+    for car in (0, 1):
+        for off in (0, 1):
+            for swaps in product((0, 1), repeat=n):
+                k = sum(swaps)
+                p = (p_car if car else 1 - p_car) * (calibration if off else 1 - calibration)
+                p *= outline**k * (1 - outline) ** (n - k)
+                cars = sum(car ^ off ^ s for s in swaps)
+                total += p * np.array([(2 * cars > n) != car, (cars > 0) != car])
+    return total""",
         ),
         right(
-            "ground last by a large bonus",
-            task="count-votes",
+            "scipy's binomial distribution",
+            task="wrong-shares",
             code="""
-def count_votes(cells, classes, n_cells):
-    votes = np.zeros((n_cells, 256))
-    np.add.at(votes, (cells, classes), 1)
-    votes[:, [SKY, 255]] = 0
-    bonus = np.full(256, 1e6)
-    bonus[[ROAD, SIDEWALK, VEGETATION]] = 0
-    score = np.where(votes > 0, votes + bonus, 0)
-    return np.where(score.any(axis=1), score.argmax(axis=1), 255)""",
+from scipy.stats import binom
+
+def wrong_shares(n, outline, calibration, p_car):
+    chance = np.array([1 - calibration, calibration])
+    wrong = binom(n, np.array([outline, 1 - outline]))
+    standing = (1 - p_car) * (1 - wrong.pmf(0)) + p_car * wrong.pmf(n)
+    return [float(chance @ wrong.sf(n // 2)), float(chance @ standing)]""",
         ),
         mistake(
-            "majority",
-            task="count-votes",
+            "no calibration",
+            task="wrong-shares",
             loses=2,
-            says="What stands wins, be it one vote",
-            code=votes(best="votes.argmax(axis=1)"),
-        ),
-        mistake("sky votes", task="count-votes", loses=2, says="cell 2 became sky", code=votes(kept="label != 255")),
-        mistake(
-            "a cell without a vote is road",
-            task="count-votes",
-            loses=2,
-            says="a cell without a vote is 255",
-            code=votes(result="best"),
+            says="majority: 0.0280: the calibration is ignored",
+            code=shares(cases="((outline, 1.0),)"),
         ),
         mistake(
-            "255 votes",
-            task="count-votes",
+            "a camera that is off makes all returns wrong",
+            task="wrong-shares",
             loses=2,
-            says="255 isn't a class that wins votes",
-            code=votes(kept="label != SKY", size="256"),
+            says="outlines err too: then a return is right with probability",
+            code=shares(cases="((outline, 1 - calibration), (1.0, calibration))"),
         ),
         mistake(
-            "vegetation stands",
-            task="count-votes",
+            "errors added",
+            task="wrong-shares",
             loses=2,
-            says="vegetation counts as standing",
-            code=votes(ground="[ROAD, SIDEWALK]"),
+            says="both errors can't be added",
+            code=shares(cases="((outline, 1.0), (1.0, calibration))"),
         ),
         mistake(
-            "the largest number wins",
-            task="count-votes",
+            "a camera for each return",
+            task="wrong-shares",
             loses=2,
-            says="not the one with the largest number",
-            code="""
-def count_votes(cells, classes, n_cells):
-    made = np.full(n_cells, 255)
-    for cell in range(n_cells):
-        mine = classes[(cells == cell) & (classes != 255) & (classes != SKY)]
-        stands = mine[~np.isin(mine, [ROAD, SIDEWALK, VEGETATION])]
-        voters = stands if len(stands) else mine
-        if len(voters):
-            made[cell] = voters.max()
-    return made""",
+            says="it is off for all of them together",
+            code=shares(cases="((outline * (1 - calibration) + (1 - outline) * calibration, 1.0),)"),
         ),
         mistake(
-            "ties to the last class",
-            task="count-votes",
+            "how often it is right",
+            task="wrong-shares",
             loses=2,
-            says="of equally frequent classes the one with the smallest number wins",
-            code=votes(
-                best="np.where(standing.any(axis=1), 9 - standing[:, ::-1].argmax(axis=1), votes.argmax(axis=1))"
-            ),
+            says="that is how often the label is right",
+            code=shares(result="1 - majority, 1 - standing"),
         ),
         mistake(
-            "a vote counted once, however often",
-            task="count-votes",
+            "all wrong but one",
+            task="wrong-shares",
             loses=2,
-            says="cell 1: sidewalk has two votes, road one",
-            code=votes(add="votes[cell, label] = 1"),
+            says="go up to m = n",
+            code=shares(counted="range(n // 2 + 1, n)"),
         ),
         mistake(
-            "a single class that stands, by name",
-            task="count-votes",
+            "no outlines",
+            task="wrong-shares",
             loses=2,
-            says="on inputs you haven't seen: another class wins in a cell with several",
-            code=votes(ground="[ROAD, SIDEWALK, VEGETATION, 8]"),
+            says="that holds without errors of outlines",
+            code=shares(cases="((0.0, 1 - calibration), (1.0, calibration))"),
+        ),
+        mistake(
+            "all must be wrong",
+            task="wrong-shares",
+            loses=2,
+            says="more than half is enough",
+            code=shares(counted="[n]"),
+        ),
+        mistake(
+            "swapped",
+            task="wrong-shares",
+            loses=2,
+            says="the two numbers are swapped",
+            code=shares(result="standing, majority"),
+        ),
+        mistake(
+            "one number",
+            task="wrong-shares",
+            loses=2,
+            says="expected two numbers",
+            code=shares(result="majority"),
+        ),
+        mistake(
+            "road and car swapped",
+            task="wrong-shares",
+            loses=2,
+            says="the probabilities of road and car are swapped",
+            code=shares(weights="(p_car, 1 - p_car)"),
+        ),
+        mistake(
+            "road alone",
+            task="wrong-shares",
+            loses=2,
+            says="that is a cell of road",
+            code=shares(weights="(1, 0)"),
+        ),
+        mistake(
+            "cars alone",
+            task="wrong-shares",
+            loses=2,
+            says="that is a cell of a car",
+            code=shares(weights="(0, 1)"),
+        ),
+        mistake(
+            "three returns written in",
+            task="wrong-shares",
+            loses=2,
+            says="on inputs you haven't seen",
+            code=shares(road="1 - (1 - wrong) ** 3", car="wrong**3"),
+        ),
+        mistake(
+            "ways not counted",
+            task="wrong-shares",
+            loses=2,
+            says="majority",
+            code=shares(ways="1"),
         ),
         # ---- task 3
         right(
-            "shifted copies",
-            task="close-mask",
+            "a loop over cells",
+            task="audit",
             code="""
-def close_mask(mask, reach):
-    height, width = mask.shape
-    padded = np.pad(mask.astype(bool), 2 * reach)
-    steps = [(i, j) for i in range(2 * reach + 1) for j in range(2 * reach + 1)]
-    dilated = np.zeros((height + 2 * reach, width + 2 * reach), bool)
-    for i, j in steps:
-        dilated |= padded[i : i + height + 2 * reach, j : j + width + 2 * reach]
-    closed = np.ones((height, width), bool)
-    for i, j in steps:
-        closed &= dilated[i : i + height, j : j + width]
-    return closed""",
+def audit(votes, unseen, made, reach):
+    counts = [0, 0, 0]
+    for r, c in np.ndindex(votes.shape):
+        if votes[r, c] != 255:
+            counts[0] += int(made[r, c] != votes[r, c])
+        elif made[r, c] <= 9:
+            counts[1] += int(unseen[r, c])
+            part = votes[max(0, r - reach) : r + reach + 1, max(0, c - reach) : c + reach + 1]
+            counts[2] += int(made[r, c] not in part)
+    return counts""",
         ),
         right(
-            "growing what is there, then what is not",
-            task="close-mask",
+            "distances to each class",
+            task="audit",
             code="""
-def close_mask(mask, reach):
-    def grow(m):
-        rows, cols = np.nonzero(m)
-        out = np.zeros_like(m)
-        for r, c in zip(rows, cols):
-            out[max(r - reach, 0) : r + reach + 1, max(c - reach, 0) : c + reach + 1] = True
-        return out
-    wide = np.pad(mask.astype(bool), 2 * reach)
-    closed = ~grow(~grow(wide))
-    return closed[2 * reach : -2 * reach, 2 * reach : -2 * reach]""",
+def audit(votes, unseen, made, reach):
+    free = votes == 255
+    far = np.zeros(votes.shape, bool)
+    for c in np.unique(made[made < 10]):
+        mine = np.argwhere(votes == c)
+        for r, k in np.argwhere(free & (made == c)):
+            far[r, k] = not len(mine) or np.abs(mine - [r, k]).max(axis=1).min() > reach
+    return np.array([(~free & (made != votes)).sum(), (free & unseen & (made < 10)).sum(), far.sum()])""",
         ),
         mistake(
-            "opened instead of closed",
-            task="close-mask",
+            "every changed cell",
+            task="audit",
             loses=2,
-            says="Dilate first, then erode",
-            code=closing("ndimage.binary_dilation(ndimage.binary_erosion(padded, square), square)"),
+            says="leave 255 out",
+            code=audited(first="made != votes"),
         ),
         mistake(
-            "dilated alone",
-            task="close-mask",
+            "votes lost only when they become unknown",
+            task="audit",
             loses=2,
-            says="that is the dilated mask",
-            code=closing("ndimage.binary_dilation(padded, square)"),
+            says="has become ROAD",
+            code=audited(first="(votes != 255) & (made >= 10)"),
         ),
         mistake(
-            "nothing around the map",
-            task="close-mask",
+            "unseen cells with a vote",
+            task="audit",
             loses=2,
-            says="surround the map with False cells before you dilate",
-            code=closing("ndimage.binary_closing(padded, square)", pad="0", cut=""),
+            says="neither breaks the rule",
+            code=audited(second="unseen & (made < 10)"),
         ),
         mistake(
-            "not cut off",
-            task="close-mask",
+            "unseen cells that stay unknown",
+            task="audit",
             loses=2,
-            says="cut the surrounding cells off",
-            code=closing("ndimage.binary_closing(padded, square)", cut=""),
+            says="neither breaks the rule",
+            code=audited(second="unseen & (votes == 255)"),
         ),
         mistake(
-            "a cross, scipy's default",
-            task="close-mask",
+            "seen in place of unseen",
+            task="audit",
             loses=2,
-            says="the gap of two cells is still open",
-            code=closing("ndimage.binary_closing(padded, iterations=reach)"),
+            says="cells that break rules 1, 2 and 3",
+            code=audited(second="given & ~unseen"),
         ),
         mistake(
-            "twice the reach",
-            task="close-mask",
+            "labels of the finished map vouch",
+            task="audit",
             loses=2,
-            says="the gap of five cells is closed",
-            code=closing("ndimage.binary_closing(padded, square, iterations=3)", pad="6", cut="[6:-6, 6:-6]"),
+            says="doesn't vouch for itself",
+            code=audited(around="ndimage.binary_dilation(made == c, square)"),
         ),
         mistake(
-            "rows alone",
-            task="close-mask",
+            "any vote vouches",
+            task="audit",
             loses=2,
-            says="turned upright",
-            code=closing("ndimage.binary_closing(padded, square[:1])"),
+            says="a vote of the same class is needed",
+            code=audited(around="ndimage.binary_dilation(votes != 255, square)"),
         ),
         mistake(
-            "columns are joined, too far in the corners",
-            task="close-mask",
+            "cells with a vote in rule 3",
+            task="audit",
             loses=2,
-            says="on inputs you haven't seen",
-            code=closing("ndimage.binary_closing(padded, square[:1]) | ndimage.binary_closing(padded, square[:, :1])"),
+            says="rule 3 is about cells without one",
+            code=audited(third="(made == c) & ~around"),
+        ),
+        mistake(
+            "a cross in place of a square",
+            task="audit",
+            loses=2,
+            says="that is within the reach",
+            code=audited(around="ndimage.binary_dilation(votes == c, iterations=max(reach, 1))"),
+        ),
+        mistake(
+            "a cell that breaks two rules counted once",
+            task="audit",
+            loses=2,
+            says="Or did you leave out cell (2, 5)",
+            code=audited(third="given & (made == c) & ~around & ~unseen"),
+        ),
+        mistake(
+            "the reach written in",
+            task="audit",
+            loses=2,
+            says="on inputs you haven't seen: rule 3",
+            code=audited(square="np.ones((3, 3), bool)"),
+        ),
+        mistake(
+            "classes of the example only",
+            task="audit",
+            loses=2,
+            says="on inputs you haven't seen: rule 3",
+            code=audited(classes="(ROAD, SIDEWALK, VEGETATION, CAR)"),
         ),
         # ---- task 4
         right(
-            "a loop",
-            task="fill-unknown",
+            "all eight worlds",
+            task="between",
             code="""
-def fill_unknown(votes, o, near):
-    filled = votes.copy()
-    for r in range(votes.shape[0]):
-        for c in range(votes.shape[1]):
-            if votes[r, c] == 255:
-                state = int(np.argmax(o[:, r, c]))
-                filled[r, c] = near[r, c] if near[r, c] != 255 and state != UNKNOWN else 10 + state
-    return filled""",
+def between(left, right, o, same, table):
+    total = [0.0, 0.0]
+    for a in (0, 1):
+        for b in (0, 1):
+            for c in (0, 1):
+                if left in (None, a) and right in (None, c):
+                    p = (same if a == b else 1 - same) * (same if b == c else 1 - same)
+                    total[b] += p * sum(o[s] * table[b][s] for s in range(4))
+    return total[0] / sum(total)""",
         ),
         right(
-            "a table of the unknown classes",
-            task="fill-unknown",
+            "log-odds",
+            task="between",
             code="""
-def fill_unknown(votes, o, near):
-    state = np.argmax(o, axis=0)
-    filled = np.array([10, 11, 12, 13])[state]
-    spread = (state != UNKNOWN) & (near < 255)
-    filled[spread] = near[spread]
-    labelled = votes < 255
-    filled[labelled] = votes[labelled]
-    return filled""",
-        ),
-        right(
-            "nested lists, and helpers with everyday names",
-            task="fill-unknown",
-            code="""
-weights, read, gradient, field, before, mask, points = "these were names of the test cells".split()
-
-
-def got(vote, states, around):
-    state = int(np.argmax(states))
-    return int(vote if vote != 255 else around if around != 255 and state != UNKNOWN else 10 + state)
-
-
-def fill_unknown(votes, o, near):
-    return [[got(votes[r, c], o[:, r, c], near[r, c]) for c in range(votes.shape[1])] for r in range(len(votes))]""",
+def between(left, right, o, same, table):
+    odds = np.log((table[0] @ o) / (table[1] @ o))
+    for vote in (left, right):
+        odds += 0 if vote is None else (1 - 2 * vote) * np.log(same / (1 - same))
+    return np.array([1 / (1 + np.exp(-odds))])""",
         ),
         mistake(
-            "names of classes",
-            task="fill-unknown",
+            "no occupancy",
+            task="between",
             loses=2,
-            says="fill_unknown returned no array of numbers but a list",
-            code="def fill_unknown(votes, o, near):\n    return [['road'] * 4, ['car'] * 4]",
+            says="one vote for road",
+            code=middle(start="np.ones(2)"),
         ),
         mistake(
-            "what nobody observed is filled",
-            task="fill-unknown",
+            "the most probable state taken for certain",
+            task="between",
             loses=2,
-            says="the filter has not observed it",
-            code=unknown(near="near != 255"),
+            says="you take the most probable state for certain",
+            code=middle(start="np.asarray(table)[:, np.argmax(o)]"),
         ),
         mistake(
-            "nothing is filled",
-            task="fill-unknown",
+            "P(car)",
+            task="between",
             loses=2,
-            says="it takes that",
-            code=unknown(near="(near != 255) & False"),
+            says="one vote for road, the middle cell STATIC",
+            code=middle(result="weight[1] / weight.sum()"),
         ),
         mistake(
-            "255 stays", task="fill-unknown", loses=2, says="cells are still 255", code=unknown(near="state != UNKNOWN")
-        ),
-        mistake(
-            "the filter overrules votes",
-            task="fill-unknown",
+            "no vote counts as road",
+            task="between",
             loses=2,
-            says="a vote stays, whatever the filter says",
-            code=unknown(votes="(votes != 255) & (state != UNKNOWN)"),
+            says="it says nothing, not road",
+            code=middle(skip="True", factor="np.where(np.arange(2) == (vote or 0), same, 1 - same)"),
         ),
         mistake(
-            "the number of the state",
-            task="fill-unknown",
+            "no vote counts as car",
+            task="between",
             loses=2,
-            says="the unknown classes begin at 10",
-            code=unknown(number="state"),
-        ),
-        mistake(
-            "counted from UNKNOWN",
-            task="fill-unknown",
-            loses=2,
-            says="FREE and UNKNOWN are swapped",
-            code=unknown(number="13 - state"),
-        ),
-        mistake(
-            "the maximum over rows",
-            task="fill-unknown",
-            loses=2,
-            says="a maximum over axis 0",
-            code="""
-def fill_unknown(votes, o, near):
-    return 10 + o.argmax(axis=1)""",
-        ),
-        mistake(
-            "dynamic counts as static",
-            task="fill-unknown",
-            loses=2,
-            says="rather DYNAMIC (0.6) than STATIC",
-            code=unknown(number="10 + np.array([0, 1, 1, 3])[state]"),
-        ),
-        mistake(
-            "only what is free is filled",
-            task="fill-unknown",
-            loses=2,
-            says="on inputs you haven't seen: a cell with vote 255 and state",
-            code=unknown(near="(near != 255) & (state == FREE)"),
-        ),
-        # ---- task 5
-        right(
-            "point by point",
-            task="carry-window",
-            code="""
-def carry_window(points, moves, velocity, seconds, T_now_from_then):
-    rows = []
-    for p, m, v in zip(points, moves, velocity):
-        p = np.append(p, 1.0)
-        if m:
-            if np.isnan(v).any():
-                continue
-            p[:2] += v * seconds
-        rows.append((T_now_from_then @ p)[:3])
-    return np.array(rows).reshape(-1, 3)""",
-        ),
-        right(
-            "homogeneous coordinates, velocities without NaN",
-            task="carry-window",
-            code="""
-def carry_window(points, moves, velocity, seconds, T_now_from_then):
-    gone = moves & np.isnan(velocity).any(axis=1)
-    step = np.where(moves[:, None], velocity, 0.0) * seconds
-    moved = np.column_stack([points[:, :2] + step, points[:, 2], np.ones(len(points))])[~gone]
-    return (moved @ T_now_from_then.T)[:, :3]""",
-        ),
-        mistake(
-            "not carried",
-            task="carry-window",
-            loses=3,
-            says="the car was left where it was",
-            code=carry(way="0 * velocity[moves & known]"),
-        ),
-        mistake("backward", task="carry-window", loses=3, says="the car went backward", code=carry(sign="-=")),
-        mistake(
-            "without time",
-            task="carry-window",
-            loses=3,
-            says="that is its velocity",
-            code=carry(way="velocity[moves & known]"),
-        ),
-        mistake(
-            "carried after the transform",
-            task="carry-window",
-            loses=3,
-            says="you added the motion after the transform",
-            code=carry(start="points @ T_now_from_then[:3, :3].T + T_now_from_then[:3, 3]", result="carried"),
-        ),
-        mistake(
-            "not transformed",
-            task="carry-window",
-            loses=3,
-            says="nothing was transformed",
-            code=carry(result="carried"),
-        ),
-        mistake(
-            "the inverse transform",
-            task="carry-window",
-            loses=3,
-            says="you used the inverse transform",
-            code=carry(result="(carried - T_now_from_then[:3, 3]) @ T_now_from_then[:3, :3]"),
-        ),
-        mistake(
-            "turned, not shifted",
-            task="carry-window",
-            loses=3,
-            says="its 4 m are missing",
-            code=carry(result="carried @ T_now_from_then[:3, :3].T"),
-        ),
-        mistake(
-            "what stands is carried too",
-            task="carry-window",
-            loses=3,
-            says="only what `moves` is",
-            code=carry(who="known", way="velocity[known] * seconds"),
-        ),
-        mistake(
-            "unknown velocities kept",
-            task="carry-window",
-            loses=3,
-            says="what moves with an unknown velocity is left out",
-            code=carry(kept="carried"),
-        ),
-        mistake(
-            "one known part is enough",
-            task="carry-window",
-            loses=3,
-            says="a return has NaN",
-            code=carry(known="np.isfinite(velocity).any(axis=1)"),
-        ),
-        mistake(
-            "what stands needs a velocity",
-            task="carry-window",
-            loses=3,
-            says="3 returns came back",
-            code=carry(kept="carried[known]"),
-        ),
-        mistake(
-            "moving ones alone",
-            task="carry-window",
-            loses=3,
-            says="these are the moving ones, or the standing ones, alone",
-            code=carry(kept="carried[moves & known]"),
-        ),
-        mistake(
-            "carved",
-            task="carry-window",
-            loses=3,
-            says="these are the moving ones, or the standing ones, alone",
-            code=carry(kept="carried[~moves]"),
-        ),
-        mistake(
-            "its own argument",
-            task="carry-window",
-            loses=3,
-            says="changed its argument `points`",
-            code=carry(start="points"),
-        ),
-        mistake(
-            "only in the plane",
-            task="carry-window",
-            loses=3,
-            says="on inputs you haven't seen: an earlier scan",
-            code=carry(
-                result="np.column_stack([carried[:, :2] @ T_now_from_then[:2, :2].T + T_now_from_then[:2, 3], "
-                "carried[:, 2]])"
+            says="it says nothing, not car",
+            code=middle(
+                skip="True", factor="(np.array([same, 1 - same]) if vote == 0 else np.array([1 - same, same]))"
             ),
         ),
         mistake(
+            "a vote of road taken for none",
+            task="between",
+            loses=2,
+            says="one vote for road",
+            code=middle(skip="vote"),
+        ),
+        mistake(
+            "neighbours averaged",
+            task="between",
+            loses=2,
+            says="both votes count, multiply",
+            code="""
+def between(left, right, o, same, table):
+    weight, seen = np.asarray(table) @ o, [v for v in (left, right) if v is not None]
+    if seen:
+        weight = weight * np.mean([np.where(np.arange(2) == v, same, 1 - same) for v in seen], axis=0)
+    return weight[0] / weight.sum()""",
+        ),
+        mistake(
+            "only the left one",
+            task="between",
+            loses=2,
+            says="only one neighbour counts",
+            code=middle().replace("(left, right)", "(left,)"),
+        ),
+        mistake(
+            "the votes taken over",
+            task="between",
+            loses=2,
+            says="one vote for road",
+            code="def between(left, right, o, same, table):\n    return 1.0 if left == 0 else 0.0",
+        ),
+        mistake(
+            "against the vote",
+            task="between",
+            loses=2,
+            says="one vote for road, the middle cell STATIC",
+            code=middle(factor="np.where(np.arange(2) != vote, same, 1 - same)"),
+        ),
+        mistake(
+            "not normalised",
+            task="between",
+            loses=2,
+            says="one vote for road, the middle cell STATIC",
+            code=middle(result="weight[0]"),
+        ),
+        mistake(
+            "the lecture's numbers written in",
+            task="between",
+            loses=2,
+            says="on inputs you haven't seen",
+            code=middle(factor="np.where(np.arange(2) == vote, 0.9, 0.1)"),
+        ),
+        mistake(
+            "votes always for road",
+            task="between",
+            loses=2,
+            says="on inputs you haven't seen",
+            code=middle(factor="np.array([same, 1 - same])"),
+        ),
+        # ---- task 5
+        right(
+            "hidden returns deleted, those out of view kept",
+            task="labels-and-wrong",
+            code="""
+def labels_and_wrong(frame, o, spec, reach, gap, rule=open_to_view):
+    numbers, uv, Z = in_view(frame)
+    gone = numbers[~np.asarray(rule(uv, Z, reach, gap))]
+    other = replace(frame, points=np.delete(frame.points, gone, axis=0))
+    made = lidar_truth(other, o, spec, TruthPolicy(cleanup="none"))
+    stands = frame.labels.birdseye_on(spec)
+    cells = [(m, s) for m, s in zip(made.ravel(), stands.ravel()) if m < 10]
+    return [len(cells), sum(m != s for m, s in cells)]""",
+        ),
+        mistake(
+            "cleaned up",
+            task="labels-and-wrong",
+            loses=3,
+            says="the clean-up is in your map",
+            code=measured(policy="TruthPolicy()"),
+        ),
+        mistake(
+            "the rule isn't asked",
+            task="labels-and-wrong",
+            loses=3,
+            says="do you use `rule`?",
+            code=measured(asked="np.ones(len(Z), bool)"),
+        ),
+        mistake(
+            "one's own rule in place of the one handed over",
+            task="labels-and-wrong",
+            loses=3,
+            says="a rule that hides nothing must leave the number of labels",
+            code=measured(asked="open_to_view(uv, Z, reach, gap)"),
+        ),
+        mistake(
+            "hidden ones kept",
+            task="labels-and-wrong",
+            loses=3,
+            says="a rule that hides nothing must leave the number of labels",
+            code=measured(asked="~rule(uv, Z, reach, gap)"),
+        ),
+        mistake(
+            "all cells are labelled",
+            task="labels-and-wrong",
+            loses=3,
+            says="10 to 13 are no labels",
+            code=measured(labelled="made < 14"),
+        ),
+        mistake(
+            "right labels counted",
+            task="labels-and-wrong",
+            loses=3,
+            says="that is the number of right labels",
+            code=measured(result="labelled.sum(), (labelled & (made == frame.labels.birdseye_on(spec))).sum()"),
+        ),
+        mistake(
+            "all cells compared",
+            task="labels-and-wrong",
+            loses=3,
+            says="leave the number of wrong labels as it is",
+            code=measured(result="labelled.sum(), (made != frame.labels.birdseye_on(spec)).sum()"),
+        ),
+        mistake(
+            "numbers among those in view taken for numbers of the scan",
+            task="labels-and-wrong",
+            loses=3,
+            says="a rule that hides nothing must leave the number of labels",
+            code=measured(kept="np.flatnonzero(is_open)"),
+        ),
+        mistake(
+            "reach and gap written in",
+            task="labels-and-wrong",
+            loses=3,
+            says="another reach changes nothing",
+            code=measured(asked="rule(uv, Z, 2, 0.5)"),
+        ),
+        mistake(
+            "reach and gap swapped",
+            task="labels-and-wrong",
+            loses=3,
+            says="on inputs you haven't seen",
+            code=measured(asked="rule(uv, Z, gap, reach)"),
+        ),
+        mistake(
             "a loop without an end",
-            task="carry-window",
+            task="labels-and-wrong",
             loses=3,
             says="before timeout",
             code="""
-def carry_window(points, moves, velocity, seconds, T_now_from_then):
-    while seconds > 0:
-        points = points + 0
-    return points""",
-        ),
-        # ---- passed, or lost, when somebody tried who had not written the tests
-        mistake(
-            "nothing nearer than three metres",
-            task="depth-picture",
-            loses=2,
-            says="on inputs you haven't seen",
-            code=depth(skip="Z < 3"),
-        ),
-        mistake(
-            "nothing beyond 31 m",
-            task="depth-picture",
-            loses=2,
-            says="on inputs you haven't seen: a return is missing or wrong",
-            code=depth(skip="Z <= 0 or Z > 31"),
-        ),
-        mistake(
-            "borders left out",
-            task="depth-picture",
-            loses=2,
-            says="on inputs you haven't seen: a return is missing or wrong",
-            code=depth(inside="0 < u < size[1] - 1 and 0 < v < size[0] - 1"),
-        ),
-        mistake(
-            "a skew ignored",
-            task="depth-picture",
-            loses=2,
-            says="on inputs you haven't seen: other pixels have a depth",
-            code=depth(before="K = np.array([[K[0, 0], 0, K[0, 2]], [0, K[1, 1], K[1, 2]], [0, 0, 1]])"),
-        ),
-        right(
-            "halves rounded up",
-            task="depth-picture",
-            code=depth(pixel="int(np.floor(v + 0.5)), int(np.floor(u + 0.5))"),
-        ),
-        right(
-            "a deque of rows",
-            task="count-votes",
-            code="""
-from collections import deque
-
-def count_votes(cells, classes, n_cells):
-    ground, found = (ROAD, SIDEWALK, VEGETATION), deque()
-    for cell in range(n_cells):
-        votes = [c for c in classes[cells == cell].tolist() if c not in (255, SKY)]
-        votes = [c for c in votes if c not in ground] or votes
-        found.append(max(sorted(set(votes)), key=votes.count) if votes else 255)
-    return found""",
+def labels_and_wrong(frame, o, spec, reach, gap, rule=open_to_view):
+    while True:
+        reach = reach + 0""",
         ),
     )

@@ -1,113 +1,108 @@
-"""Hidden tests of exercise 09, where truth comes from: the package, scipy and definitions are the reference."""
+"""Hidden tests of exercise 09, where truth comes from: loops, sums over all outcomes and a graph are the reference."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_closing
-from scipy.spatial.transform import Rotation
 
-from semgrid_edu.answers import answer_array
-from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
-from semgrid_edu.labels import KITTI_14
+from semgrid_edu.answers import answer_array, answer_number
+from semgrid_edu.camera import project, transform_points
+from semgrid_edu.datasets.ground_truth import TruthPolicy, lidar_truth
+from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.graphical import Factor, GraphicalModel, eliminate
+from semgrid_edu.grid import GridSpec
 from semgrid_instructor import close, generator, hidden
 
 
+def _open(uv: NDArray, Z: NDArray, reach: int, gap: float) -> NDArray:
+    """Return which returns aren't hidden, pair by pair."""
+    apart = np.maximum(np.abs(np.subtract.outer(uv[:, 0], uv[:, 0])), np.abs(np.subtract.outer(uv[:, 1], uv[:, 1])))
+    return ~((apart <= reach) & (np.subtract.outer(Z, Z) > gap)).any(axis=1)
+
+
 @hidden
-def check_depth_picture(depth_picture: Callable) -> None:
-    """Other cameras with unequal focal lengths and a skew, crowded pixels, no point at all; near, far, on a border."""
-    for seed, (size, n) in enumerate((((9, 5), 400), ((3, 20), 60), ((4, 4), 0))):
+def check_open_to_view(open_to_view: Callable) -> None:
+    """Crowded images, other reaches and gaps, a single return, and none."""
+    for seed, (n, reach, gap) in enumerate(((400, 3, 0.5), (300, 0, 0.0), (500, 6, 4.0), (1, 2, 0.5), (0, 1, 1.0))):
         rng = generator(90 + seed)
-        K = np.array([[11.0 + seed, rng.uniform(2, 4), size[1] / 2], [0, 7.0, size[0] / 3], [0, 0, 1]])
-        points = rng.uniform((-9, -5, -3), (9, 5, 25), (n, 3))
-        got = answer_array(depth_picture(points.copy(), K.copy(), size))
-        assert got.shape == size, f"shape {got.shape} instead of {size}"
-        pixels, seen = project(points, Camera(K, np.eye(4), size))
-        wanted = np.full(size, np.inf)
-        u, v = np.rint(pixels[seen]).astype(int).T
-        np.minimum.at(wanted, (v, u), points[seen, 2])
-        wanted[np.isinf(wanted)] = np.nan
-        assert np.array_equal(np.isnan(got), np.isnan(wanted)), "other pixels have a depth, with other focal lengths"
-        assert close(got, wanted, equal_nan=True), "other depths, where many returns share a pixel"
-    K, depths = np.array([[4.0, 0, 4], [0, 4, 2], [0, 0, 1]]), np.array([0.25, 2.0, 64.0, 512.0])
-    pixels = np.array([[0, 0], [8, 4], [0, 4], [8, 0]])  # u, v: the corners of an image of 5 x 9 pixels
-    points = np.column_stack([(pixels - [4, 2]) / 4 * depths[:, None], depths])  # powers of two: nothing is rounded
-    got = answer_array(depth_picture(points, K, (5, 9)))
-    wanted = np.full((5, 9), np.nan)
-    wanted[pixels[:, 1], pixels[:, 0]] = depths
-    where = "on a border (limits included), a quarter of a metre or hundreds of metres away"
-    assert close(got, wanted, equal_nan=True), f"a return is missing or wrong {where}"
+        uv, Z = rng.integers(0, (90, 30), (n, 2)), rng.uniform(2, 40, n)
+        got = answer_array(open_to_view(uv.copy(), Z.copy(), reach, gap), dtype=bool)
+        assert got.shape == (n,), f"shape {got.shape} instead of {(n,)}"
+        wrong = (got != _open(uv, Z, reach, gap)).sum()
+        assert not wrong, f"{wrong} of {n} returns wrong, with a reach of {reach} and a gap of {gap}"
 
 
 @hidden
-def check_count_votes(count_votes: Callable) -> None:
-    """Many cells, all classes, ties, no return at all."""
-    for seed, (n, n_cells) in enumerate(((900, 150), (40, 60), (0, 5))):
+def check_wrong_shares(wrong_shares: Callable) -> None:
+    """Sum over all outcomes of every return: one to seven returns, other errors, none of either."""
+    cases = ((1, 0.2, 0.1, 0.3), (3, 0.05, 0.3, 0.5), (5, 0.3, 0.0, 0.1), (7, 0.0, 0.2, 0.6), (5, 0.15, 0.05, 0.9))
+    for n, outline, calibration, p_car in cases:
+        wanted = np.zeros(2)
+        for car, off, *swapped in product((False, True), repeat=2 + n):
+            chance = np.prod([outline if one else 1 - outline for one in swapped])
+            chance *= (p_car if car else 1 - p_car) * (calibration if off else 1 - calibration)
+            brings_car = [car ^ off ^ one for one in swapped]
+            wanted += chance * np.array([(sum(brings_car) > n / 2) != car, any(brings_car) != car])
+        got = answer_array(wrong_shares(n, outline, calibration, p_car))
+        assert got.shape == (2,), f"shape {got.shape} instead of (2,)"
+        for name, a, b in zip(("a majority", "what stands wins"), got, wanted, strict=True):
+            assert close(a, b), f"{name} with {n} returns: wrong with {a:.4f} instead of {b:.4f}"
+
+
+@hidden
+def check_audit(audit: Callable) -> None:
+    """Random maps, larger reaches, things at every edge; a map that breaks nothing."""
+    for seed, (shape, reach) in enumerate((((9, 13), 2), ((12, 5), 1), ((6, 7), 0), ((8, 8), 3))):
         rng = generator(95 + seed)
-        cells, classes = rng.integers(0, n_cells, n), rng.choice([*range(10), 0, 1, 2, 0, 255], n)
-        got = answer_array(count_votes(cells.copy(), classes.copy(), n_cells))
-        assert got.shape == (n_cells,), f"shape {got.shape} instead of {(n_cells,)}"
-        kept = (classes != 255) & (classes != KITTI_14.index("sky"))
-        votes = np.zeros((len(KITTI_14), n_cells), int)
-        np.add.at(votes, (classes[kept], cells[kept]), 1)
-        wanted = KITTI_14.most_voted(votes, otherwise=255)
-        assert np.array_equal(got == 255, wanted == 255), "other cells have a label"
-        assert np.array_equal(got, wanted), "another class wins in a cell with several"
+        votes = np.where(rng.random(shape) < 0.25, rng.integers(0, 10, shape), 255)
+        unseen = rng.random(shape) < 0.3
+        made = np.where((votes == 255) | (rng.random(shape) < 0.2), rng.integers(0, 14, shape), votes)
+        wanted = [0, 0, 0]
+        for r, c in np.ndindex(shape):
+            if votes[r, c] != 255:
+                wanted[0] += made[r, c] != votes[r, c]
+            elif made[r, c] < 10:
+                around = votes[max(r - reach, 0) : r + reach + 1, max(c - reach, 0) : c + reach + 1]
+                wanted[1] += unseen[r, c]
+                wanted[2] += made[r, c] not in around
+        got = answer_array(audit(votes.copy(), unseen.copy(), made.copy(), reach))
+        assert got.shape == (3,), f"shape {got.shape} instead of (3,)"
+        for rule, (a, b) in enumerate(zip(got, wanted, strict=True), 1):
+            assert a == b, f"rule {rule} is broken by {b} cells with a reach of {reach}, not by {a:g}"
+    kept = np.where(votes == 255, 13, votes)
+    assert not np.any(answer_array(audit(votes.copy(), unseen.copy(), kept, 1))), "a map of votes alone breaks nothing"
 
 
 @hidden
-def check_close_mask(close_mask: Callable) -> None:
-    """Other reaches, things at every edge, an empty and a full mask."""
-    for seed, (shape, reach, density) in enumerate(
-        (((12, 9), 2, 0.2), ((7, 15), 3, 0.05), ((5, 6), 1, 0.0), ((4, 7), 2, 1.0), ((6, 6), 1, 0.5))
-    ):
-        mask = generator(100 + seed).random(shape) < density
-        got = answer_array(close_mask(mask.copy(), reach), dtype=bool)
-        assert got.shape == shape, f"shape {got.shape} instead of {shape}"
-        side = np.ones((2 * reach + 1,) * 2, bool)
-        wanted = binary_closing(np.pad(mask, 2 * reach), side)[2 * reach : -2 * reach, 2 * reach : -2 * reach]
-        assert not (mask & ~got).any(), f"closing with a reach of {reach} lost cells of the mask"
-        assert np.array_equal(got, wanted), f"another mask with a reach of {reach}"
-
-
-@hidden
-def check_fill_unknown(fill_unknown: Callable) -> None:
-    """Larger maps with all classes and states in all combinations."""
-    for seed, shape in enumerate(((11, 7), (1, 30), (20, 20))):
+def check_between(between: Callable) -> None:
+    """Every combination of votes, by elimination in the graph; other tables and filters."""
+    for seed, (left, right) in enumerate(product((0, 1, None), repeat=2)):
         rng = generator(105 + seed)
-        votes, near = (rng.choice([*range(9), 255, 255, 255, 255], shape) for _ in range(2))
-        o = rng.dirichlet(np.ones(4), shape).transpose(2, 0, 1)
-        got = answer_array(fill_unknown(votes.copy(), o.copy(), near.copy()))
-        assert got.shape == shape, f"shape {got.shape} instead of {shape}"
-        for place in np.ndindex(shape):
-            state = int(np.argmax(o[(slice(None), *place)]))
-            wanted = 10 + state if near[place] == 255 or state == 3 else near[place]
-            wanted = wanted if votes[place] == 255 else votes[place]
-            assert got[place] == wanted, f"a cell with vote {votes[place]} and state {state} got {got[place]:g}"
+        same, table, o = rng.uniform(0.55, 0.95), rng.dirichlet(np.ones(4), 2), rng.dirichlet(np.ones(4))
+        alike = [[same, 1 - same], [1 - same, same]]
+        factors = [Factor("m1", [0.5, 0.5]), Factor(("m1", "m2"), alike), Factor(("m2", "m3"), alike)]
+        row = GraphicalModel([*factors, Factor(("m2", "s"), table), Factor("s", o)])
+        votes = {name: vote for name, vote in (("m1", left), ("m3", right)) if vote is not None}
+        wanted = eliminate(row, ("m2",), votes).normalised().table[0]
+        got = answer_number(between(left, right, o.copy(), same, table.copy()))
+        assert close(got, wanted), f"with the votes {left} and {right}: {got:.4f} instead of {wanted:.4f}"
 
 
 @hidden
-def check_carry_window(carry_window: Callable) -> None:
-    """Other turns, also up and down hill, other times, also scans that come later."""
-    for seed, (n, seconds) in enumerate(((60, 0.9), (25, -0.4), (1, 0.1), (0, 0.3))):
-        rng = generator(110 + seed)
-        T = rigid_transform(Rotation.from_rotvec(rng.normal(0, 0.3, 3)).as_matrix(), rng.normal(0, 5, 3))
-        points, moves, velocity = rng.normal(0, 10, (n, 3)), rng.random(n) < 0.5, rng.normal(0, 8, (n, 2))
-        velocity[rng.random((n, 2)) < 0.2] = np.nan
-        got = answer_array(carry_window(points.copy(), moves.copy(), velocity.copy(), seconds, T))
-        got = got.reshape(-1, 3) if got.size == 0 else got
-        wanted = _carried(points, moves, velocity, seconds, T)
-        when = "a later scan" if seconds < 0 else "an earlier scan"
-        assert got.shape == wanted.shape, f"{when}: shape {got.shape} instead of {wanted.shape}"
-        assert n == 0 or close(got, wanted), f"{when}: other places, where the road climbs or time runs backward"
-
-
-def _carried(points: NDArray, moves: NDArray, velocity: NDArray, seconds: float, T: NDArray) -> NDArray:
-    """Return what is left of the points, one by one."""
-    rows = []
-    for point, mover, v in zip(points, moves, velocity, strict=True):
-        if not mover:
-            rows.append(point)
-        elif not np.isnan(v).any():
-            rows.append(point + np.array([v[0] * seconds, v[1] * seconds, 0]))
-    return transform_points(T, np.reshape(rows, (-1, 3)))
+def check_labels_and_wrong(labels_and_wrong: Callable) -> None:
+    """Other frames of the sample drive, other reaches and gaps, and a rule that must be asked."""
+    drive, spec = sample_drive(), GridSpec.compact()
+    for k, reach, gap in ((4, 5, 0.5), (15, 2, 2.0)):
+        frame = drive[k]
+        o = np.moveaxis(np.tile([0.1, 0.2, 0.1, 0.6], (*spec.shape, 1)), -1, 0)
+        in_camera = transform_points(frame.camera.T_camera_from_lidar, frame.points[:, :3])
+        pixels, visible = project(in_camera, frame.camera)
+        kept = np.flatnonzero(visible)[_open(np.rint(pixels[visible]).astype(int), in_camera[visible, 2], reach, gap)]
+        made = lidar_truth(replace(frame, points=frame.points[kept]), o, spec, TruthPolicy(cleanup="none"))
+        wrong = ((made < 10) & (made != frame.labels.birdseye_on(spec))).sum()
+        got = answer_array(labels_and_wrong(frame, o, spec, reach, gap, _open))
+        assert got.shape == (2,), f"shape {got.shape} instead of (2,)"
+        assert got[0] == (made < 10).sum(), f"another number of labels with a reach of {reach} and a gap of {gap}"
+        assert got[1] == wrong, f"another number of wrong labels with a reach of {reach} and a gap of {gap}"

@@ -1,16 +1,16 @@
 # %% [markdown]
 # # Exercise 09: where truth comes from
 #
-# Five functions that together make a ground truth from image labels and LIDAR, and one question to answer in words. About 90 minutes.
+# Five functions that ask more of a made truth than the lecture did, and one question to answer in words. About 90 minutes.
 # The lecture is [09: where truth comes from, and how wrong it is](../09_truth.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | the closest of several depths | 2 |
-# | 2 | votes in a cell | 2 |
-# | 3 | closing a gap | 2 |
-# | 4 | what has no label | 2 |
-# | 5 | a moving car, carried by its velocity | 3 |
+# | 1 | a stricter rule for hidden returns | 2 |
+# | 2 | which rule of voting to choose | 2 |
+# | 3 | an audit of clean-ups | 2 |
+# | 4 | a cell between two votes | 2 |
+# | 5 | what your rule changes in a map | 3 |
 # | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
@@ -19,392 +19,100 @@
 # %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
 # Names that begin with _ belong to the tests.
 import warnings
+from dataclasses import replace
+from math import comb
 
 import numpy as np
 from scipy import ndimage  # task 3 may use it
 
 from semgrid_edu.answers import answer_array
+from semgrid_edu.camera import project, transform_points
+from semgrid_edu.datasets.ground_truth import TruthPolicy, lidar_truth
+from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
-ROAD, SIDEWALK, VEGETATION, CAR, SKY = (KITTI_14.index(n) for n in ("road", "sidewalk", "vegetation", "car", "sky"))
+ROAD, SIDEWALK, VEGETATION, CAR = (KITTI_14.index(n) for n in ("road", "sidewalk", "vegetation", "car"))
 FREE, STATIC, DYNAMIC, UNKNOWN = range(4)  # the occupancy states
 
+
+def in_view(frame):
+    """Return the number of each return that falls into the image, (N,), its whole pixel (u, v), (N, 2), and depth, (N,)."""
+    in_camera = transform_points(frame.camera.T_camera_from_lidar, frame.points[:, :3])
+    uv, visible = project(in_camera, frame.camera)
+    return np.flatnonzero(visible), np.rint(uv[visible]).astype(int), in_camera[visible, 2]
+
+
 # %% [markdown]
-# ## Task 1: the closest of several depths (2 points)
+# ## Task 1: a stricter rule for hidden returns (2 points)
 #
-# `points` holds returns in the camera frame, `(N, 3)`: X to the right, Y down, Z ahead, metres. `K` is the intrinsic matrix, `(3, 3)`, and `size` is the height and the
-# width of the image, in pixels. The pixel of a return is $(u, v, 1)^T = K\,(X/Z, Y/Z, 1)^T$, with every entry of `K`. A return is in view, near or far, when it lies
-# in front of the camera and its pixel, **before** rounding, lies in $0 \le u \le \text{width} - 1$ and $0 \le v \le \text{height} - 1$. Then its pixel is rounded to
-# the nearest whole numbers.
+# The lecture's rule drops a return when a closer one shares its *pixel*. That catches next to nothing, because two returns seldom meet on one pixel. Here is a
+# stricter one. `uv` holds the whole pixel (u, v) of each return, `(N, 2)`, and `Z` its depth in metres, `(N,)`. A return is **hidden** when any other return, at most `reach` columns
+# *and* at most `reach` rows away, is closer by **more than** `gap` metres. Returns that are hidden themselves hide others too: something is there.
 #
-# Complete `depth_picture`: it returns an array `(height, width)` with the depth Z of the **closest** return on each pixel, and `np.nan` on pixels without a return.
+# Complete `open_to_view`: it returns an array `(N,)`, True for each return that is *not* hidden. There are thousands of returns in a scan, so don't loop over all pairs in Python.
 
 
-# %% nbgrader={"grade": false, "grade_id": "depth-picture", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def depth_picture(points, K, size):
-    """Return the smallest depth on each pixel, (height, width); NaN where there is none."""
+# %% nbgrader={"grade": false, "grade_id": "open-to-view", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def open_to_view(uv, Z, reach, gap):
+    """Return which returns aren't hidden by a closer one in the pixels around, (N,)."""
     ### BEGIN SOLUTION
-    depth = np.full(size, np.nan)
-    for X, Y, Z in points:
-        if Z <= 0:
-            continue
-        u, v, _ = K @ (X / Z, Y / Z, 1)
-        if 0 <= u <= size[1] - 1 and 0 <= v <= size[0] - 1:
-            pixel = round(float(v)), round(float(u))
-            depth[pixel] = np.fmin(depth[pixel], Z)
-    return depth
+    is_open = np.ones(len(Z), bool)
+    for n in range(len(Z)):
+        near = (np.abs(uv - uv[n]) <= reach).all(axis=1)
+        is_open[n] = not (Z[n] - Z[near] > gap).any()
+    return is_open
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "depth-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _picture():
-    """Return points (9, 3), K of a camera whose row 1 looks level and column 2 straight ahead, and the picture, (4, 6), by hand."""
-    K = np.array([[10.0, 0, 2], [0, 10.0, 1], [0, 0, 1]])  # by hand: u = 2 + 10 X / Z, v = 1 + 10 Y / Z
-    points = [
-        [0.0, 1.0, 10.0],  # u = 2, v = 2
-        [0.0, 2.0, 20.0],  # the same pixel, farther away
-        [0.0, 0.5, 5.0],  # the same pixel, closer
-        [0.0, 3.0, 30.0],  # the same pixel, the farthest, and the last in the list
-        [4.2, -1.2, 20.0],  # u = 4.1, v = 0.4
-        [1.9, 1.0, 10.0],  # u = 3.9, v = 2
-        [-0.4, -0.2, -2.0],  # behind the camera: u = 4, v = 2 if you forget to look at Z
-        [3.2, 0.0, 10.0],  # u = 5.2: beyond the centre of the last pixel, which is 5
-        [0.0, -1.04, 10.0],  # v = -0.04: above the centre of the first row
+# %% nbgrader={"grade": false, "grade_id": "returns-of-task-1", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_RETURNS = np.array(  # u, v, Z; by hand with a reach of 2 pixels and a gap of 0.5 m
+    [
+        [10, 5, 20.0],  # 0: hidden by 1, two columns away
+        [12, 5, 8.0],  # 1
+        [15, 5, 20.0],  # 2: three columns from 1
+        [12, 8, 20.0],  # 3: three rows from 1
+        [14, 7, 20.0],  # 4: hidden by 1, two columns and two rows away
+        [30, 5, 10.4],  # 5: 6 is closer, but only by 0.4 m
+        [31, 5, 10.0],  # 6
+        [40, 5, 30.0],  # 7: hidden by 8, which is hidden too
+        [42, 5, 20.0],  # 8: hidden by 9
+        [44, 5, 10.0],  # 9
+        [50, 5, 12.0],  # 10: hidden by 11, on the same pixel
+        [50, 5, 9.0],  # 11
+        [60, 5, 10.5],  # 12: 13 is closer by 0.5 m, not by more
+        [60, 6, 10.0],  # 13
     ]
-    wanted = np.full((4, 6), np.nan)
-    wanted[2, 2], wanted[0, 4], wanted[2, 4] = 5.0, 20.0, 10.0
-    return np.array(points), K, wanted
-
-
-# %% nbgrader={"grade": false, "grade_id": "depth-other-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _depth_hint(got):
-    """Return what is wrong with a picture whose pixel (2, 2) may be right, or nothing."""
-    if np.isclose(got[2, 2], np.sqrt(25.25), atol=1e-3):
-        return "row 2, column 2 holds the distance of the return: the depth is Z, along the optical axis"
-    if got[2, 4] == -2:
-        return "row 2, column 4: a return behind the camera got into the picture: look at the sign of Z"
-    if np.isnan(got[2, 4]) and not np.isnan(got[2, 3]):
-        return "the return at u = 3.9 landed in column 3: round to the nearest pixel, don't cut off"
-    if not np.isnan(got[:2, 5]).all():
-        return "the return at u = 5.2 is in the picture: test the pixel against the image before you round it"
-    if not np.isnan(got[0, 2]):
-        return "the return at v = -0.04 is in the picture: test the pixel against the image before you round it"
-
-
-# %% nbgrader={"grade": true, "grade_id": "depth-picture-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    points, K, wanted = _picture()
-    got = answer_array(depth_picture(points, K, (4, 6)), "depth_picture")
-    assert got.shape != (6, 4), "the picture is turned: rows (v) come first, then columns (u)"
-    assert got.shape == (4, 6), f"expected a picture of height 4 and width 6, got shape {got.shape}"
-    assert not np.isinf(got).any(), "a pixel without a return is np.nan, not infinite"
-    assert not (got == 0).any(), "a pixel without a return is np.nan, not 0"
-    slips = {
-        30.0: "that is the last return in the list, or the farthest: of several the closest counts",
-        10.0: "that is the first return in the list: of several the closest counts",
-        16.25: "that is the mean of all four: between the car in front and the wall behind there is nothing. Take the closest",
-        0.5: "that is Y: the depth is Z, along the optical axis",
-        0.2: "that is 1 / Z",
-    }
-    for slip, hint in slips.items():
-        assert not np.isclose(got[2, 2], slip), f"row 2, column 2: {got[2, 2]:.2f}: {hint}"
-    hint = _depth_hint(got)
-    assert not hint, hint
-    np.testing.assert_allclose(got, wanted, err_msg="the whole picture, by hand")
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import truth
-
-    complaint = truth.check_depth_picture(depth_picture)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 2: votes in a cell (2 points)
-#
-# `cells` and `classes` hold the cell and the class of each labelled return, `(N,)`, as whole numbers. Classes are those of `KITTI_14`: ten that have a meaning (0 to 9), of which
-# `SKY` never gets a vote, and 255 for "no label".
-#
-# Complete `count_votes`: it returns an array `(n_cells,)` with the class that each cell takes, 255 where it gets none. **What stands wins**: if any return of a cell
-# has a class that stands, the most frequent of *those* wins; otherwise the most frequent of the ground's, which are `ROAD`, `SIDEWALK` and `VEGETATION`. Of equally frequent
-# classes the one with the smallest number wins.
-
-
-# %% nbgrader={"grade": false, "grade_id": "count-votes", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def count_votes(cells, classes, n_cells):
-    """Return the class of each cell, (n_cells,); 255 where it has no vote."""
-    ### BEGIN SOLUTION
-    votes = np.zeros((n_cells, 10), int)
-    for cell, label in zip(cells, classes, strict=True):
-        if label != 255 and label != SKY:
-            votes[cell, label] += 1
-    standing = votes.copy()
-    standing[:, [ROAD, SIDEWALK, VEGETATION]] = 0
-    best = np.where(standing.any(axis=1), standing.argmax(axis=1), votes.argmax(axis=1))
-    return np.where(votes.any(axis=1), best, 255)
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": false, "grade_id": "votes-cells", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_PEDESTRIAN, _SIGNAGE = KITTI_14.index("pedestrian"), KITTI_14.index("signage")
-
-
-def _returns():
-    """Return cells and classes, (23,) each, in no order; `in_cell` holds the classes of each of the eight cells."""
-    in_cell = [
-        [ROAD, ROAD, ROAD, CAR],  # one return from a car, three from the road
-        [SIDEWALK, ROAD, SIDEWALK],  # ground alone: the most frequent
-        [SKY, SKY, ROAD],  # sky gets no vote
-        [],  # no return
-        [255, 255, SIDEWALK],  # 255 is no label
-        [_SIGNAGE, _PEDESTRIAN, ROAD, ROAD, ROAD],  # two that stand, equally frequent
-        [SKY, 255],  # nothing that counts
-        [ROAD, CAR, CAR, _PEDESTRIAN, VEGETATION, VEGETATION, VEGETATION],  # the most frequent of those that stand
-    ]
-    cells = np.repeat(np.arange(8), [len(one) for one in in_cell])
-    classes = np.array([label for one in in_cell for label in one])
-    order = np.random.default_rng(9).permutation(len(cells))
-    return cells[order], classes[order]
-
-
-# %% nbgrader={"grade": true, "grade_id": "count-votes-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    got = answer_array(count_votes(*_returns(), 8), "count_votes")
-    assert got.shape == (8,), f"expected one class for each of 8 cells, got shape {got.shape}"
-    assert got[3] == 255, f"cell 3 has no return and got class {got[3]:g}: a cell without a vote is 255"
-    assert got[2] != SKY, "cell 2 became sky: such a label lies at an outline, and gets no vote"
-    assert got[4] != 255, "cell 4: 255 isn't a class that wins votes; SIDEWALK has one"
-    assert got[6] != SKY, "cell 6 became sky: such a label gets no vote"
-    assert got[6] == 255, f"cell 6 has neither a class with a meaning nor a vote, and got {got[6]:g}: it is 255"
-    assert got[0] != ROAD, "cell 0: three returns from the road outvoted the car. What stands wins, be it one vote"
-    ground = "cell 7: the ground outvoted what stands, or vegetation counts as standing: it is ground"
-    assert got[7] != VEGETATION, ground
-    most = "cell 7: of those that stand the most frequent wins, not the one with the largest number"
-    assert got[7] != _PEDESTRIAN, most
-    assert got[5] != _SIGNAGE, "cell 5: of equally frequent classes the one with the smallest number wins"
-    assert got[1] == SIDEWALK, "cell 1: sidewalk has two votes, road one"
-    by_hand = [CAR, SIDEWALK, ROAD, 255, SIDEWALK, _PEDESTRIAN, 255, CAR]
-    np.testing.assert_array_equal(got, by_hand, err_msg="all, by hand")
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import truth
-
-    complaint = truth.check_count_votes(count_votes)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 3: closing a gap (2 points)
-#
-# `mask` is a map of True and False, `(H, W)`. To **dilate** it by a reach of `r` cells is to set each cell True that has a True cell at most `r` rows *and* at most `r` columns
-# away (a square of 2r + 1 cells). To **erode** it is to keep only cells whose whole square is True. To **close** it is to dilate, then erode.
-#
-# Beyond the map there is nothing, but a thing at the edge of the map must not lose its edge by being closed: so surround the map with enough False
-# cells first, and cut them off in the end.
-#
-# Complete `close_mask`: it returns the closed mask, `(H, W)`. You may write loops, or use `ndimage`.
-
-
-# %% nbgrader={"grade": false, "grade_id": "close-mask", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def close_mask(mask, reach):
-    """Return the mask, dilated and then eroded, (H, W)."""
-    ### BEGIN SOLUTION
-    margin = 2 * reach
-    closed = ndimage.binary_closing(np.pad(mask, margin), np.ones((2 * reach + 1, 2 * reach + 1)))
-    return closed[margin:-margin, margin:-margin]
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": false, "grade_id": "masks", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _mask(*rows):
-    """Turn rows of # and . into a mask."""
-    return np.array([[c == "#" for c in row] for row in rows])
-
-
-_DOTS = _mask("...........", "#..#.....#.", "...........")
-
-
-# %% nbgrader={"grade": true, "grade_id": "close-mask-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    mask = _DOTS.copy()
-    got = answer_array(
-        close_mask(mask, 1), "close_mask", dtype=bool
-    )  # by hand: the gap of two cells is closed, no more
-    assert np.array_equal(mask, _DOTS), "close_mask changed its argument `mask`: work on a copy"
-    size = f"expected the shape of the mask, (3, 11), got {got.shape}: cut the surrounding cells off"
-    assert got.shape == (3, 11), size
-    early = "nothing is left: you eroded first, and no square fits into single cells. Dilate first, then erode"
-    assert got.any(), early
-    wide = "the rows beside have True cells: that is the dilated mask. Erode it too, by the same reach"
-    assert not got[[0, 2]].any(), wide
-    assert got[1, 0], "the cell at the edge of the map is lost: surround the map with False cells before you dilate"
-    assert got[_DOTS].all(), "a cell of the mask is lost: closing only adds. Did you erode before you dilated?"
-    assert got[1, 1:3].all(), "the gap of two cells is still open: with a reach of 1 gaps up to two cells close"
-    five = "the gap of five cells is closed in part: with a reach of 1 only gaps up to two cells close"
-    assert not got[1, 4:9].any(), five
-    upright = answer_array(close_mask(_DOTS.T.copy(), 1), "close_mask", dtype=bool)
-    turned = _mask("...........", "####.....#.", "...........").T
-    assert np.array_equal(upright, turned), "turned upright: gaps between rows aren't closed like gaps between columns"
-    one_less = answer_array(close_mask(_mask(".....", ".#...", "....."), 1), "close_mask", dtype=bool)
-    assert one_less.sum() == 1, f"a single cell became {one_less.sum()} cells: closing moves no outline"
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import truth
-
-    complaint = truth.check_close_mask(close_mask)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 4: what has no label (2 points)
-#
-# `votes` is a map of classes, `(H, W)`, with 255 where no return has brought a label, as from task 2. `o` is the occupancy grid, `(4, H, W)`: the probabilities of FREE,
-# STATIC, DYNAMIC and UNKNOWN. `near` is another map of classes, `(H, W)`: the class of the nearest labelled cell, 255 where that is too far away.
-#
-# Complete `fill_unknown`: it returns a map of classes, `(H, W)`, without any 255.
-#
-# - A cell with a vote keeps it.
-# - A cell without a vote that the filter has **observed** (its most probable state isn't UNKNOWN) takes the class of `near`, if there is one.
-# - All others are unknown by their most probable state: class 10 (unknown-free), 11 (-static), 12 (-dynamic) or 13 (-unobserved).
-
-
-# %% nbgrader={"grade": false, "grade_id": "fill-unknown", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def fill_unknown(votes, o, near):
-    """Return a class for every cell, (H, W)."""
-    ### BEGIN SOLUTION
-    state = o.argmax(axis=0)
-    filled = np.where((near != 255) & (state != UNKNOWN), near, 10 + state)
-    return np.where(votes != 255, votes, filled)
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": false, "grade_id": "small-map", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _small_map():
-    """Return votes (2, 4), the occupancy o (4, 2, 4) and near (2, 4)."""
-    free = [[0.7, 0.6, 0.4, 0.1], [0.2, 0.2, 0.1, 0.1]]
-    static = [[0.1, 0.2, 0.3, 0.5], [0.1, 0.2, 0.1, 0.1]]
-    dynamic = [[0.1, 0.1, 0.2, 0.2], [0.6, 0.1, 0.2, 0.1]]
-    unknown = [[0.1, 0.1, 0.1, 0.2], [0.1, 0.5, 0.6, 0.7]]
-    votes = np.array([[ROAD, 255, 255, 255], [255, 255, 255, CAR]])
-    return (
-        votes,
-        np.array([free, static, dynamic, unknown]),
-        np.array([[ROAD, ROAD, 255, 255], [255, SIDEWALK, 255, CAR]]),
-    )
-
-
-# %% nbgrader={"grade": true, "grade_id": "fill-unknown-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    votes, o, near = _small_map()
-    got = answer_array(fill_unknown(votes, o, near), "fill_unknown")
-    assert np.array_equal(votes, _small_map()[0]), "fill_unknown changed its argument `votes`: work on a copy"
-    axis = "the most probable state of a cell is a maximum over axis 0"
-    assert got.shape == (2, 4), f"expected the shape of the votes, (2, 4), got {got.shape}: {axis}"
-    left = (got == 255).sum()
-    assert not left, f"{left} cells are still 255: each cell without a label is one of the four unknowns"
-    vote = f"cell (1, 3) has a vote, CAR, and became {got[1, 3]:g}: a vote stays, whatever the filter says"
-    assert got[1, 3] == CAR, vote
-    blind = "cell (1, 1) became sidewalk, but the filter has not observed it (UNKNOWN 0.5): clean-up leaves it alone"
-    assert got[1, 1] != SIDEWALK, blind
-    seen = f"cell (0, 1) is observed, and the nearest label is ROAD: it takes that, not {got[0, 1]:g}"
-    assert got[0, 1] == ROAD, seen
-    swapped = "FREE and UNKNOWN are swapped: class 10 is unknown-free, 13 unknown-unobserved"
-    assert got[0, 2] != 13 or got[1, 2] != 10, swapped
-    assert got[0, 2] != FREE, f"cell (0, 2) got {got[0, 2]:g}, the number of its state: the unknown classes begin at 10"
-    assert got[1, 0] != 11, "cell (1, 0) is rather DYNAMIC (0.6) than STATIC (0.1): class 12"
-    np.testing.assert_array_equal(got, [[ROAD, ROAD, 10, 11], [12, 13, 13, CAR]], err_msg="all cells, by hand")
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import truth
-
-    complaint = truth.check_fill_unknown(fill_unknown)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 5: a moving car, carried by its velocity (3 points)
-#
-# A window of scans. `points` holds the returns of an **earlier** scan, `(N, 3)`: x, y, z in the LIDAR frame as it stood *then*. `moves` says which of them lie in a cell that moves, `(N,)`, and
-# `velocity` is the velocity of that cell over ground along x and y of the frame of *then*, `(N, 2)` in m/s; it may be NaN where the filter doesn't know it. `seconds` is the time from then to now. `T_now_from_then` is the 4 x 4
-# transform from the LIDAR frame of then to that of now.
-#
-# Complete `carry_window`: it returns the returns in the LIDAR frame of **now**, `(M, 3)`, in their order, such that
-#
-# - what stands is only transformed, because the vehicle has moved;
-# - what moves is first moved on by velocity times time, in the frame of then, and then transformed;
-# - what moves with an unknown velocity (NaN in either part) is left out: nobody knows where it is.
-
-
-# %% nbgrader={"grade": false, "grade_id": "carry-window", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def carry_window(points, moves, velocity, seconds, T_now_from_then):
-    """Return earlier returns where they are now, (M, 3)."""
-    ### BEGIN SOLUTION
-    known = np.isfinite(velocity).all(axis=1)
-    carried = points.copy()
-    carried[moves & known, :2] += velocity[moves & known] * seconds
-    carried = carried[~moves | known]
-    return carried @ T_now_from_then[:3, :3].T + T_now_from_then[:3, 3]
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": false, "grade_id": "carry-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _window():
-    """Return points, moves and velocity. The vehicle has driven 4 m ahead in 0.5 s since, and turned left by 90 degrees."""
-    points = [
-        [10.0, 0.0, -1.0],  # a post: stands, although its cell has a velocity
-        [20.0, 3.0, -0.5],  # a car at 10 m/s along x: 5 m farther on now, at (25, 3)
-        [20.0, -3.0, -0.5],  # moves, velocity unknown
-        [8.0, 2.0, 0.5],  # stands, velocity unknown, as usual for what stands
-        [6.0, -1.0, 0.0],  # moves to the left at 2 m/s: at (6, 0) now
-        [9.0, 4.0, 0.0],  # moves; only one part of its velocity is known
-    ]
-    velocity = [[3.0, 3.0], [10.0, 0.0], [np.nan, np.nan], [np.nan, np.nan], [0.0, 2.0], [1.0, np.nan]]
-    return np.array(points), np.array([False, True, True, False, True, True]), np.array(velocity)
-
-
-_CAR_SLIPS = {
-    (3.0, -16.0): "the car was left where it was: add velocity times time before the transform",
-    (3.0, -11.0): "the car went backward: it is 0.5 s later now, so it is farther along its velocity",
-    (3.0, -26.0): "the car went 10 m: that is its velocity; in 0.5 s it covers half of that",
-    (8.0, -16.0): "you added the motion after the transform: the velocity is along the axes of then",
-    (25.0, 3.0): "nothing was transformed: the vehicle has moved and turned",
-    (1.0, 25.0): "you used the inverse transform: T_now_from_then takes points from then to now",
-    (3.0, -25.0): "the vehicle's turn is there, its 4 m are missing: a transform rotates, then shifts",
+)
+_OPEN_SLIPS = {  # number of the return: what is wrong when its answer is
+    1: "return 1 is dropped, but what is near it is farther away: only a closer return hides",
+    10: "return 10 shares its pixel with a closer one: such a return is hidden, as in the lecture",
+    2: "return 2 is dropped: the closer one is three columns away",
+    3: "return 3 is dropped: the closer one is three rows away",
+    5: "return 5 is dropped: the one beside it is closer by 0.4 m only, less than the gap",
+    12: "return 12 is dropped: the one below it is closer by 0.5 m, which is not more than the gap",
+    4: "return 4 lies two columns and two rows from a closer one: `reach` counts columns and rows, each by itself",
+    7: "return 7 is hidden by return 8, although 8 is hidden itself: something is there",
+    8: "return 8 is hidden by return 9, two columns away",
+    0: "return 0 is hidden: the closer one is two columns away, which is within the reach",
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "carry-window-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "open-to-view-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    points, moves, velocity = _window()
-    T_now_from_then = np.array([[0.0, 1, 0, 0], [-1, 0, 0, 4], [0, 0, 1, 0], [0, 0, 0, 1]])
-    got = answer_array(carry_window(points, moves, velocity, 0.5, T_now_from_then), "carry_window")
-    assert np.array_equal(points, _window()[0]), "carry_window changed its argument `points`: work on a copy"
-    assert got.shape[1:] == (3,), f"expected x, y, z of each return, (M, 3), got shape {got.shape}"
-    nan = "a return has NaN: what moves with an unknown velocity is left out, and what stands has no velocity to add"
-    assert np.isfinite(got).all(), nan
-    assert len(got) != 6, "6 returns came back: what moves with an unknown velocity is left out"
-    assert len(got) != 5, "5 returns came back: a velocity is unknown when either of its parts is NaN"
-    alone = "these are the moving ones, or the standing ones, alone. Both belong to the map"
-    assert len(got) != 2, f"2 returns came back: {alone}"
-    assert len(got) == 4, f"{len(got)} returns came back, 4 by hand: what stands stays, known velocity or not"
-    for (x, y), hint in _CAR_SLIPS.items():
-        assert not np.allclose(got[1, :2], (x, y), atol=1e-6), f"the car is put at ({x}, {y}): {hint}"
-    assert not np.allclose(got[0, :2], (1.5, -7.5), atol=1e-6), "the post was carried: only what `moves` is"
-    by_hand = [[0.0, -6, -1.0], [3.0, -21, -0.5], [2.0, -4, 0.5], [0.0, -2, 0.0]]
-    np.testing.assert_allclose(got, by_hand, atol=1e-9, err_msg="all four returns, by hand")
+    uv, Z = _RETURNS[:, :2].astype(int), _RETURNS[:, 2]
+    got = answer_array(open_to_view(uv.copy(), Z.copy(), 2, 0.5), "open_to_view", dtype=bool)
+    assert got.shape == (14,), f"expected True or False for each of 14 returns, got shape {got.shape}"
+    by_hand = ~np.isin(np.arange(14), [0, 4, 7, 8, 10])
+    assert not np.array_equal(got, ~by_hand), "True means that a return is NOT hidden: the other way round"
+    for number, hint in _OPEN_SLIPS.items():
+        assert got[number] == by_hand[number], hint
+    np.testing.assert_array_equal(got, by_hand, err_msg="all returns, by hand")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import truth
 
-    complaint = truth.check_carry_window(carry_window)
+    complaint = truth.check_open_to_view(open_to_view)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -412,10 +120,293 @@ def _test():
 _test()
 
 # %% [markdown]
-# ### See it on the drive
+# ## Task 2: which rule of voting to choose (2 points)
 #
-# Your functions are the steps of `semgrid_edu.datasets.ground_truth.lidar_truth`. `TruthPolicy(past=9, labels="own", movers="carried")` does with nine scans what your `carry_window` does with one. The widget of the
-# lecture shows what each choice does to the map.
+# A cell holds `n` returns, an odd number. It is a car with probability `p_car`, otherwise road, and each return brings one of these two classes. Two kinds of error are in the data:
+#
+# - with probability `calibration` the camera is off, and then **all** returns of the cell fall on pixels of the other class;
+# - whether it is or not, each return **by itself** brings the class that its pixel doesn't show, with probability `outline`.
+#
+# The cell takes its label by *majority*, or by *what stands wins* (car, as soon as one return brings car). Which rule should one choose?
+#
+# Complete `wrong_shares`: it returns two numbers, the probability that a majority gives the wrong label, and that *what stands wins* does. `comb(n, m)` is the number of ways to choose
+# m of n.
+
+
+# %% nbgrader={"grade": false, "grade_id": "wrong-shares", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def wrong_shares(n, outline, calibration, p_car):
+    """Return how often a majority is wrong, and how often what stands wins is."""
+    ### BEGIN SOLUTION
+    majority = standing = 0.0
+    for wrong, chance in ((outline, 1 - calibration), (1 - outline, calibration)):
+        most = sum(comb(n, m) * wrong**m * (1 - wrong) ** (n - m) for m in range(n // 2 + 1, n + 1))
+        majority += chance * most
+        standing += chance * ((1 - p_car) * (1 - (1 - wrong) ** n) + p_car * wrong**n)
+    return majority, standing
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "wrong-shares-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_MAJORITY_SLIPS = {
+    0.0280: "the calibration is ignored",
+    0.1252: "when the camera is off, outlines err too: then a return is right with probability `outline`",
+    0.1280: "when the camera is off, outlines err too, and both errors can't be added: go through both cases",
+    0.0855: "you let the camera be off for each return by itself: it is off for all of them together",
+    0.8776: "that is how often the label is right",
+    0.0486: "three wrong returns of three are a wrong majority, too: go up to m = n",
+    0.1000: "that holds without errors of outlines",
+    0.0738: "that is the probability that all are wrong: more than half is enough",
+}
+_STANDING_SLIPS = {
+    0.2170: "the calibration is ignored",
+    0.7102: "that is how often the label is right",
+    0.1278: "the probabilities of road and car are swapped",
+    0.3438: "that is a cell of road: weight it with 1 - p_car, and a car cell with p_car",
+    0.0738: "that is a cell of a car: weight it with p_car, and a road cell with 1 - p_car",
+    0.1224: "that is the majority's",
+}
+
+
+def _explain(what, got, slips):
+    """Stop with a hint when the number `got` is what a common slip gives."""
+    for slip, hint in slips.items():
+        assert not np.isclose(got, slip, atol=1e-4), f"{what} {got:.4f}: {hint}"
+
+
+# %% nbgrader={"grade": true, "grade_id": "wrong-shares-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # By hand: three returns. Wrong with 0.1 each: a majority with 0.028, a road cell 0.271, a car cell 0.001. Wrong with 0.9 each: 0.972, 0.999, 0.729.
+    got = answer_array(wrong_shares(3, 0.1, 0.1, 0.2), "wrong_shares")
+    assert got.shape == (2,), f"expected two numbers, majority and what stands wins, got shape {got.shape}"
+    assert not np.allclose(got, [0.2898, 0.1224], atol=1e-4), "the two numbers are swapped: the majority comes first"
+    _explain("majority:", got[0], _MAJORITY_SLIPS)
+    np.testing.assert_allclose(got[0], 0.9 * 0.028 + 0.1 * 0.972, atol=1e-6, err_msg="majority")
+    _explain("what stands wins:", got[1], _STANDING_SLIPS)
+    wanted = 0.9 * (0.8 * 0.271 + 0.2 * 0.001) + 0.1 * (0.8 * 0.999 + 0.2 * 0.729)
+    np.testing.assert_allclose(got[1], wanted, atol=1e-6, err_msg="what stands wins")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import truth
+
+    complaint = truth.check_wrong_shares(wrong_shares)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# When the test has passed: how large must `p_car` be for *what stands wins* to be the better rule, with three returns and both errors 0.1? And with nine returns? Is there any number of returns with which it is
+# better for a street on which one cell in ten is a car?
+#
+# ## Task 3: an audit of clean-ups (2 points)
+#
+# In the lecture most wrong labels came from the clean-up. You are given finished maps, and want to know which of them break the rules of their own recipe. `votes` is a map of classes, `(H, W)`, with 255 where no
+# return has brought a label. `unseen`, `(H, W)`, is True in cells that the filter has not observed. `made` is the finished map, `(H, W)`: classes 0 to 9 have a meaning, 10 to 13 are the unknown ones.
+#
+# Complete `audit`: it returns three numbers, how many cells break each of these rules.
+#
+# 1. A cell with a vote keeps it.
+# 2. A cell without a vote that is unseen gets no class with a meaning.
+# 3. A cell without a vote gets a class with a meaning only from a **vote** of that class at most `reach` rows *and* at most `reach` columns away.
+#
+# A cell can break rules 2 and 3.
+
+
+# %% nbgrader={"grade": false, "grade_id": "audit", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def audit(votes, unseen, made, reach):
+    """Return how many cells break each of three rules."""
+    ### BEGIN SOLUTION
+    given = (votes == 255) & (made < 10)
+    square = np.ones((2 * reach + 1, 2 * reach + 1), bool)
+    far = 0
+    for c in range(10):
+        around = ndimage.binary_dilation(votes == c, square)
+        far += (given & (made == c) & ~around).sum()
+    return ((votes != 255) & (made != votes)).sum(), (given & unseen).sum(), far
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "audit-map", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _finished():
+    """Return votes, what is unseen, and a finished map, (3, 6) each; the reach is 1."""
+    votes, unseen = np.full((3, 6), 255), np.zeros((3, 6), bool)
+    votes[0, 0], votes[0, 5], votes[2, 0] = ROAD, CAR, SIDEWALK
+    unseen[0, 0] = unseen[1, 3] = unseen[1, 5] = unseen[2, 5] = True
+    made = [
+        [ROAD, ROAD, ROAD, 10, SIDEWALK, ROAD],  # (0, 2): too far; (0, 4): beside a car's vote; (0, 5): overruled
+        [ROAD, SIDEWALK, 10, 13, CAR, CAR],  # (1, 5): unseen
+        [SIDEWALK, SIDEWALK, 10, 10, VEGETATION, VEGETATION],  # no vote of vegetation anywhere; (2, 5): unseen too
+    ]
+    return votes, unseen, np.array(made)
+
+
+_AUDIT_SLIPS = (  # rule, count: hint
+    {0: "the vote of cell (0, 5), CAR, has become ROAD", 16: "a cell without a vote can't break it: leave 255 out"},
+    {
+        3: "unseen are also a cell that has a vote and one that is unknown in the finished map: neither breaks the rule",
+        4: "unseen are also a cell that has a vote and one that is unknown in the finished map: neither breaks the rule",
+        0: "cells (1, 5) and (2, 5) are unseen and got a class",
+    },
+    {
+        0: "a label doesn't vouch for itself: look for votes, not for labels of the finished map",
+        1: "labels of the finished map don't vouch for others: look for votes",
+        2: "labels of the finished map don't vouch for others: look for votes",
+        3: "cell (0, 4) became SIDEWALK beside a vote of CAR: a vote of the same class is needed. Or did you leave out cell (2, 5), which breaks two rules?",
+        5: "cell (0, 5) has a vote: rule 3 is about cells without one",
+        6: "cells (1, 1) and (1, 4) have a vote one row and one column away: that is within the reach",
+        7: "cells (1, 1) and (1, 4) have a vote one row and one column away, and (0, 5) has its own vote",
+    },
+)
+
+
+# %% nbgrader={"grade": true, "grade_id": "audit-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    votes, unseen, made = _finished()
+    got = answer_array(audit(votes, unseen, made, 1), "audit")
+    assert np.array_equal(votes, _finished()[0]), "audit changed its argument `votes`: work on a copy"
+    assert np.array_equal(made, _finished()[2]), "audit changed its argument `made`: work on a copy"
+    assert got.shape == (3,), f"expected three numbers, one for each rule, got shape {got.shape}"
+    for n, slips in enumerate(_AUDIT_SLIPS):
+        hint = slips.get(int(got[n]))
+        assert not hint, f"rule {n + 1}, {got[n]:g} cells: {hint}"
+    np.testing.assert_array_equal(got, [1, 2, 4], err_msg="cells that break rules 1, 2 and 3, by hand")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import truth
+
+    complaint = truth.check_audit(audit)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 4: a cell between two votes (2 points)
+#
+# The lecture's clean-up gives a cell the class of its neighbour and doesn't ask the occupancy grid which state the cell is in: that edge is cut. Here you put it back. Three cells lie in a row, and each is ROAD (0) or CAR (1).
+#
+# - `left` and `right` are the votes of the outer cells, 0 or 1; they are right for sure. `None` means that there is no vote.
+# - Two neighbours show the same class with probability `same`; each class is as probable as the other for an outer cell.
+# - `table`, `(2, 4)`, holds the probability of the states FREE, STATIC, DYNAMIC, UNKNOWN in a cell of road (row 0) and of car (row 1).
+# - `o`, `(4,)`, is what the filter says of the middle cell. It may be unsure: each state counts with its probability, so a class has the weight $\sum_s o_s\, \text{table}_{c,s}$.
+#
+# Complete `between`: it returns the probability of road in the middle cell.
+
+
+# %% nbgrader={"grade": false, "grade_id": "between", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def between(left, right, o, same, table):
+    """Return the probability that the middle cell is road."""
+    ### BEGIN SOLUTION
+    weight = np.asarray(table) @ o
+    for vote in (left, right):
+        if vote is not None:
+            weight = weight * np.where(np.arange(2) == vote, same, 1 - same)
+    return weight[0] / weight.sum()
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "between-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_TABLE = np.array([[0.85, 0.05, 0.05, 0.05], [0.05, 0.6, 0.25, 0.1]])
+_BETWEEN_SLIPS = {
+    0.9878: "the occupancy is ignored",
+    0.8710: "you take the most probable state for certain: each state counts with its probability",
+    0.7178: "only one neighbour counts, or they are averaged: both votes count, multiply",
+    0.2203: "both neighbours are ignored, or they cancel: multiply by `same` for the class of a vote, 1 - `same` for the other",
+}
+
+
+# %% nbgrader={"grade": true, "grade_id": "between-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # By hand, as in the lecture: one vote for road, STATIC for sure: 0.9 * 0.05 = 0.045 against 0.1 * 0.6 = 0.06.
+    static = np.array([0.0, 1.0, 0.0, 0.0])
+    got = answer_array(between(ROAD, None, static, 0.9, _TABLE.copy()), "between")
+    assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
+    none = "the cell on the right has no vote: it says nothing"
+    assert not np.isclose(got, 0.0405 / 0.0465), f"one vote for road, {got:.3f}: {none}, not road"
+    assert not np.isclose(got, 0.05 / 0.65), f"one vote for road, {got:.3f}: {none}, not car"
+    np.testing.assert_allclose(got, 0.045 / 0.105, atol=1e-6, err_msg="one vote for road, the middle cell STATIC")
+    unsure = np.array(
+        [0.1, 0.7, 0.1, 0.1]
+    )  # road 0.13, car 0.46; with two votes 0.81 * 0.13 = 0.1053 against 0.01 * 0.46
+    got = answer_array(between(ROAD, ROAD, unsure, 0.9, _TABLE.copy()), "between")
+    for slip, hint in _BETWEEN_SLIPS.items():
+        assert not np.isclose(got, slip, atol=1e-3), f"two votes for road, an unsure filter, {got:.4f}: {hint}"
+    np.testing.assert_allclose(got, 0.1053 / 0.1099, atol=1e-6, err_msg="two votes for road, an unsure filter")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import truth
+
+    complaint = truth.check_between(between)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 5: what your rule changes in a map (3 points)
+#
+# Does the rule of task 1 make a better truth? Complete `labels_and_wrong`: it makes a map from one frame without the returns that `open_to_view(uv, Z, reach, gap)` calls hidden, and returns two numbers:
+#
+# - how many cells have a label (a class from 0 to 9);
+# - in how many of these another class stands. `frame.labels.birdseye_on(spec)`, `(H, W)`, knows what stands in each cell.
+#
+# `in_view(frame)`, in the first cell, gives the returns in view, their pixels and depths. `replace(frame, points=...)` makes a frame with other points (its rows keep all four columns). The map is
+# `lidar_truth(frame, o, spec, TruthPolicy(cleanup="none"))`, so that you see votes alone.
+#
+# The tests hand over a rule of their own as `rule`; unless they do, it is yours.
+
+
+# %% nbgrader={"grade": false, "grade_id": "labels-and-wrong", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def labels_and_wrong(frame, o, spec, reach, gap, rule=open_to_view):
+    """Return the number of labelled cells, and in how many of them something else stands."""
+    ### BEGIN SOLUTION
+    numbers, uv, Z = in_view(frame)
+    kept = numbers[rule(uv, Z, reach, gap)]
+    made = lidar_truth(replace(frame, points=frame.points[kept]), o, spec, TruthPolicy(cleanup="none"))
+    labelled = made < 10
+    return labelled.sum(), (labelled & (made != frame.labels.birdseye_on(spec))).sum()
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": true, "grade_id": "labels-and-wrong-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    frame, spec = sample_drive()[10], GridSpec.compact()
+    o = np.zeros((4, *spec.shape))
+    o[FREE] = 1
+
+    def all_open(uv, Z, reach, gap):
+        return np.ones(len(Z), bool)
+
+    def half(uv, Z, reach, gap):  # says of a return what depends on all that it is given
+        return (uv[:, 0] + 2 * uv[:, 1] + np.floor(Z).astype(int)) % 5 < reach + gap
+
+    usual = lidar_truth(frame, o, spec, TruthPolicy(cleanup="none"))
+    wrong = ((usual < 10) & (usual != frame.labels.birdseye_on(spec))).sum()
+    got = answer_array(labels_and_wrong(frame, o, spec, 4, 0.5, all_open), "labels_and_wrong")
+    assert got.shape == (2,), f"expected two numbers, labelled cells and wrong ones, got shape {got.shape}"
+    right = "that is the number of right labels: count those in whose cell another class stands"
+    assert got[1] != (usual < 10).sum() - wrong or got[1] == wrong, right
+    cleaned = lidar_truth(frame, o, spec)
+    assert got[0] != (cleaned < 10).sum(), 'the clean-up is in your map: hand over TruthPolicy(cleanup="none")'
+    assert got[0] != usual.size, "every cell counts as labelled: 10 to 13 are no labels"
+    assert got[0] == (usual < 10).sum(), "a rule that hides nothing must leave the number of labels as it is"
+    assert got[1] == wrong, "a rule that hides nothing must leave the number of wrong labels as it is"
+    fewer = answer_array(labels_and_wrong(frame, o, spec, 2, 0.5, half), "labels_and_wrong")
+    assert fewer[0] < got[0], "a rule that hides many returns must leave fewer labels: do you use `rule`?"
+    other = answer_array(labels_and_wrong(frame, o, spec, 4, 0.5, half), "labels_and_wrong")
+    assert not np.array_equal(other, fewer), "another reach changes nothing: hand `reach` and `gap` over to the rule"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import truth
+
+    complaint = truth.check_labels_and_wrong(labels_and_wrong)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# When the tests have passed, ask your rule: how do labels and wrong labels change on `sample_drive()[10]` with a reach of 0, 2, 4 and 8 pixels and a gap of 0.5 m? How many right labels does each wrong one cost that you get rid of?
 #
 # ## Task 6: in your own words (2 points)
 #
