@@ -1,7 +1,6 @@
 """The graders of exercise 10, against real mistakes and other right ways."""
 
 import warnings
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,7 +14,6 @@ from semgrid_edu.crf import (
     energy,
     exact_marginals,
     free_energy,
-    gram_matrix,
     mean_field_naive,
     mean_field_sequential,
     pair_weights,
@@ -26,41 +24,48 @@ from semgrid_edu.workshop.course.nbgrader.autograde import reference_answers
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 
-def price(result, apart="np.sum((c_i - c_j) ** 2)", unlike="np.sum((o_i - o_j) ** 2)"):
-    """Return an answer to task 1 with these distances and this result."""
+def tipping(best="np.log((1 - q) / q)", tip="np.log((p - q) / (p + q - 1))", result="best, tip"):
+    """Return an answer to task 1 with these two prices."""
     return f"""
-def pair_price(c_i, c_j, o_i, o_j, w1, w2, alpha, beta, gamma):
-    apart, unlike = {apart}, {unlike}
+def tipping_prices(p, q):
+    best, tip = {best}, {tip}
     return {result}"""
 
 
-PRICE = "w1 * np.exp(-apart / (2 * alpha**2) - unlike / (2 * beta**2)) + w2 * np.exp(-apart / (2 * gamma**2))"
-
-
-def total(pairs, own="phi[labels, np.arange(len(labels))].sum()"):
-    """Return an answer to the first half of task 2 with these sums."""
+def changed(own="phi[label, i] - phi[labels[i], i]", pairs="after - before", price="k[i] * (np.arange(len(k)) != i)"):
+    """Return an answer to the first half of task 2; before and after are what cell i pays for its pairs."""
     return f"""
-def energy(labels, phi, k):
-    differ = labels[:, None] != labels
+def energy_change(labels, i, label, phi, k):
+    price = {price}
+    before, after = price[labels != labels[i]].sum(), price[labels != label].sum()
     return {own} + {pairs}"""
 
 
-def summed(energy="phi[x, cells].sum() + (k * (x[:, None] != x)).sum() / 2", weight="np.exp(-E)", last="total.sum(0)"):
+def summed(
+    energy="phi[x, cells].sum() + (k * (x[:, None] != x)).sum() / 2",
+    weight="np.exp(-E)",
+    last="total.sum(0)",
+    fits="all(x[i] == label for i, label in known.items())",
+    result="total",
+):
     """Return an answer to the second half of task 2 with these parts."""
     return f"""
-def marginals(phi, k):
+def marginals(phi, k, known):
     C, N = phi.shape
-    cells, total = np.arange(N), np.zeros((C, N))
+    cells, total, whole = np.arange(N), np.zeros((C, N)), 0
     for x in map(np.array, product(range(C), repeat=N)):
         E = {energy}
-        total[x, cells] += {weight}
-    return total / {last}"""
+        whole += {weight}
+        if {fits}:
+            total[x, cells] += {weight}
+    total = total / {last}
+    return {result}"""
 
 
-def updated(price="phi + (1 - Q) @ others", others="k - np.diag(np.diag(k))", least="price.min(axis=0)", axis=0):
+def updated(price="phi + mu @ Q @ others", others="k - np.diag(np.diag(k))", least="price.min(axis=0)", axis=0):
     """Return an answer to task 3 with these parts."""
     return f"""
-def update(Q, phi, k):
+def update(Q, phi, k, mu):
     others = {others}
     price = {price}
     weight = np.exp({least} - price)
@@ -69,22 +74,23 @@ def update(Q, phi, k):
 
 def free(
     mean="(q * price).sum()",
-    pairs="np.triu(k * (1 - Q.T @ Q), 1).sum()",
+    pairs="np.triu(k * (Q.T @ mu @ Q), 1).sum()",
     entropy="(q * np.log(q)).sum()",
     where="Q > 0",
 ):
     """Return an answer to task 4; q and price are those of possible classes."""
     return f"""
-def free_energy(Q, phi, k):
+def free_energy(Q, phi, k, mu):
     q, price = Q[{where}], phi[{where}]
     return {mean} + {pairs} + {entropy}"""
 
 
-def scaled(result):
-    """Return an answer to the first half of task 5; D are the sums of the rows."""
+def weighed(sums="(K - np.eye(len(K))).sum(axis=1)", typical="np.median(sums)", result="total / typical"):
+    """Return an answer to the first half of task 5 with these parts."""
     return f"""
-def normalise(K):
-    D = K.sum(axis=1)
+def weight_for(K, total):
+    sums = {sums}
+    typical = {typical}
     return {result}"""
 
 
@@ -122,201 +128,265 @@ class TestCrf(GraderChecks):
     entries = (
         # ---- task 1
         right(
-            "loops over rows, columns and states",
-            task="pair-price",
+            "a formula in place of logarithms of odds",
+            task="tipping-prices",
+            code=tipping(tip="-np.log((p + q - 1) / (p - q))"),
+        ),
+        right(
+            "a numerical search",
+            task="tipping-prices",
             code="""
-import math
+from scipy.optimize import brentq
 
-def pair_price(c_i, c_j, o_i, o_j, w1, w2, alpha, beta, gamma):
-    apart = sum((a - b) ** 2 for a, b in zip(c_i, c_j))
-    unlike = sum((a - b) ** 2 for a, b in zip(o_i, o_j))
-    near = math.exp(-apart / 2 / alpha**2)
-    return w1 * near * math.exp(-unlike / 2 / beta**2) + w2 * math.exp(-apart / 2 / gamma**2)""",
+def tipping_prices(p, q):
+    def weights(k):
+        e = np.exp(-k)
+        return p * q, p * (1 - q) * e, (1 - p) * q * e, (1 - p) * (1 - q)
+    def best(k):
+        both, differ, _, _ = weights(k)
+        return both - differ
+    def cell(k):
+        rr, rc, cr, cc = weights(k)
+        return rr + cr - rc - cc
+    return brentq(best, 0, 50), brentq(cell, 0, 50)""",
+        ),
+        mistake(
+            "the price of cell 1",
+            task="tipping-prices",
+            loses=2,
+            says="at which cell 1 would give way",
+            code=tipping(best="np.log(p / (1 - p))"),
+        ),
+        mistake(
+            "sign swapped",
+            task="tipping-prices",
+            loses=2,
+            says="the first price is -0.4055: the sign is swapped",
+            code=tipping(best="np.log(q / (1 - q))"),
+        ),
+        mistake(
+            "no logarithm",
+            task="tipping-prices",
+            loses=2,
+            says="a price stands in the exponent",
+            code=tipping(best="(1 - q) / q"),
+        ),
+        mistake(
+            "the pair twice",
+            task="tipping-prices",
+            loses=2,
+            says="two cells are one pair",
+            code=tipping(best="np.log((1 - q) / q) / 2"),
+        ),
+        mistake(
+            "p against q",
+            task="tipping-prices",
+            loses=2,
+            says="p stands in both",
+            code=tipping(best="np.log(p / q)"),
+        ),
+        mistake(
+            "bits",
+            task="tipping-prices",
+            loses=2,
+            says="that is the logarithm to base 2",
+            code=tipping(best="np.log2((1 - q) / q)"),
+        ),
+        mistake(
+            "one answer for both questions",
+            task="tipping-prices",
+            loses=2,
+            says="a marginal adds up two labellings",
+            code=tipping(tip="np.log((1 - q) / q)"),
+        ),
+        mistake(
+            "the marginal's price for both",
+            task="tipping-prices",
+            loses=2,
+            says="that is the second price",
+            code=tipping(best="np.log((p - q) / (p + q - 1))"),
+        ),
+        mistake(
+            "no logarithm in the second",
+            task="tipping-prices",
+            loses=2,
+            says="the second price is 1.6667",
+            code=tipping(tip="(p - q) / (p + q - 1)"),
+        ),
+        mistake(
+            "sign swapped in the second",
+            task="tipping-prices",
+            loses=2,
+            says="the second price is -0.5108: the sign",
+            code=tipping(tip="np.log((p + q - 1) / (p - q))"),
+        ),
+        mistake(
+            "swapped",
+            task="tipping-prices",
+            loses=2,
+            says="the two prices are swapped",
+            code=tipping(result="tip, best"),
+        ),
+        mistake(
+            "one price",
+            task="tipping-prices",
+            loses=2,
+            says="expected two prices",
+            code=tipping(result="tip"),
+        ),
+        mistake(
+            "the example written in",
+            task="tipping-prices",
+            loses=2,
+            says="on inputs you haven't seen: the most likely labelling doesn't turn to road",
+            code=tipping(best="np.log(1.5)"),
+        ),
+        mistake(
+            "cell 1 taken for sure but in the example",
+            task="tipping-prices",
+            loses=2,
+            says="on inputs you haven't seen: cell 2 doesn't turn to road",
+            code=tipping(tip="np.log((p - q) / (p + q - 1) if (p, q) == (0.9, 0.4) else (1 - q) / q)"),
+        ),
+        # ---- task 2, changing a label
+        right(
+            "two energies",
+            task="energy-change",
+            code="""
+def energy_change(labels, i, label, phi, k):
+    def E(x):
+        pairs = sum(k[a, b] for a in range(len(x)) for b in range(a) if x[a] != x[b])
+        return sum(phi[c, n] for n, c in enumerate(x)) + pairs
+    after = list(labels)
+    after[i] = label
+    return E(after) - E(list(labels))""",
         ),
         right(
-            "scaled features and norms",
-            task="pair-price",
+            "what agreeing earns",
+            task="energy-change",
             code="""
-def pair_price(c_i, c_j, o_i, o_j, w1, w2, alpha, beta, gamma):
-    f = np.concatenate([(c_i - c_j) / alpha, (o_i - o_j) / beta])
-    return w1 * np.exp(-0.5 * f @ f) + w2 * np.exp(-0.5 * np.linalg.norm((c_i - c_j) / gamma) ** 2)""",
+def energy_change(labels, i, label, phi, k):
+    change = phi[label, i] - phi[labels[i], i]
+    for j, other in enumerate(labels):
+        if j != i:
+            change += k[i, j] * (int(other == labels[i]) - int(other == label))
+    return change""",
         ),
         mistake(
-            "widths not squared",
-            task="pair-price",
+            "before minus after",
+            task="energy-change",
             loses=2,
-            says="the widths aren't squared",
-            code=price(PRICE.replace("**2", "")),
-        ),
-        mistake("no 2", task="pair-price", loses=2, says="the 2 is missing", code=price(PRICE.replace("(2 * ", "("))),
-        mistake(
-            "2 squared as well",
-            task="pair-price",
-            loses=2,
-            says="you square the 2 as well",
-            code=price(
-                "w1 * np.exp(-apart / (2 * alpha)**2 - unlike / (2 * beta)**2) + w2 * np.exp(-apart / (2 * gamma)**2)"
-            ),
-        ),
-        mistake(
-            "parentheses forgotten",
-            task="pair-price",
-            loses=2,
-            says="multiplies by the width",
-            code=price(
-                "w1 * np.exp(-apart / 2 * alpha**2 - unlike / 2 * beta**2) + w2 * np.exp(-apart / 2 * gamma**2)"
-            ),
-        ),
-        mistake(
-            "distances with a root",
-            task="pair-price",
-            loses=2,
-            says="the distances aren't squared",
-            code=price(PRICE, "np.linalg.norm(c_i - c_j)", "np.linalg.norm(o_i - o_j)"),
-        ),
-        mistake(
-            "sign forgotten",
-            task="pair-price",
-            loses=2,
-            says="the minus signs are missing",
-            code=price(PRICE.replace("-apart", "apart").replace("- unlike", "+ unlike")),
-        ),
-        mistake(
-            "two exponentials added",
-            task="pair-price",
-            loses=2,
-            says="belong into one exponent",
-            code=price(PRICE.replace(" - unlike", ") + w1 * np.exp(-unlike")),
-        ),
-        mistake(
-            "alpha and gamma swapped",
-            task="pair-price",
-            loses=2,
-            says="alpha and gamma are swapped",
-            code=price(PRICE.replace("alpha", "a").replace("gamma", "alpha").replace("(2 * a**2)", "(2 * gamma**2)")),
-        ),
-        mistake(
-            "states in both terms",
-            task="pair-price",
-            loses=2,
-            says="the second term ignores the states",
-            code=price(PRICE[:-1] + " - unlike / (2 * beta**2))"),
-        ),
-        mistake(
-            "sum before the square",
-            task="pair-price",
-            loses=2,
-            says="square each difference first",
-            code=price(PRICE, "np.abs(c_i - c_j).sum() ** 2", "np.abs(o_i - o_j).sum() ** 2"),
-        ),
-        mistake(
-            "the widths of the example written in",
-            task="pair-price",
-            loses=2,
-            says="on inputs you haven't seen",
-            code=price(PRICE.replace("alpha", "3").replace("beta", "0.25").replace("gamma", "2")),
-        ),
-        # ---- task 2, energy
-        right(
-            "two loops",
-            task="energy",
-            code="""
-def energy(labels, phi, k):
-    E = 0
-    for i in range(len(labels)):
-        E += phi[labels[i], i]
-        for j in range(i):
-            if labels[i] != labels[j]:
-                E += k[i, j]
-    return E""",
-        ),
-        right(
-            "one-hot labels",
-            task="energy",
-            code="""
-def energy(labels, phi, k):
-    X = np.eye(len(phi))[labels].T
-    return (phi * X).sum() + np.triu(k * (1 - X.T @ X), 1).sum()""",
+            says="that is before minus after",
+            code=changed("phi[labels[i], i] - phi[label, i]", "before - after"),
         ),
         mistake(
             "each pair twice",
-            task="energy",
+            task="energy-change",
             loses=2,
             says="each pair is counted twice",
-            code=total("(k * differ).sum()"),
+            code=changed(pairs="2 * (after - before)"),
+        ),
+        mistake(
+            "each pair halved",
+            task="energy-change",
+            loses=2,
+            says="each pair is halved",
+            code=changed(pairs="(after - before) / 2"),
+        ),
+        mistake(
+            "no own prices", task="energy-change", loses=2, says="the cell's own prices are missing", code=changed("0")
+        ),
+        mistake("no pairs", task="energy-change", loses=2, says="the pairs are missing", code=changed(pairs="0")),
+        mistake(
+            "what the cell pays afterwards",
+            task="energy-change",
+            loses=2,
+            says="subtract what it paid before",
+            code=changed("phi[label, i]", "after"),
+        ),
+        mistake(
+            "the pairs of before kept",
+            task="energy-change",
+            loses=2,
+            says="the pairs of before are missing",
+            code=changed(pairs="after"),
+        ),
+        mistake(
+            "the cell paired with itself",
+            task="energy-change",
+            loses=2,
+            says="the cell is paired with itself",
+            code=changed(price="k[i]"),
         ),
         mistake(
             "agreement charged",
-            task="energy",
+            task="energy-change",
             loses=2,
             says="you charge the pairs that agree",
-            code=total("np.triu(k * ~differ, 1).sum()"),
-        ),
-        mistake(
-            "agreement charged, with the diagonal",
-            task="energy",
-            loses=2,
-            says="and each cell with itself",
-            code=total("(k * ~differ).sum() / 2"),
-        ),
-        mistake(
-            "a chain",
-            task="energy",
-            loses=2,
-            says="only cells that follow one another",
-            code=total("sum(k[i, i + 1] for i in range(len(labels) - 1) if differ[i, i + 1])"),
-        ),
-        mistake(
-            "pairs rewarded",
-            task="energy",
-            loses=2,
-            says="the pairs are subtracted",
-            code=total("-(k * differ).sum() / 2"),
-        ),
-        mistake(
-            "class and cell swapped",
-            task="energy",
-            loses=2,
-            says="class and cell are swapped",
-            code=total("(k * differ).sum() / 2", "phi[np.arange(len(labels)), labels].sum()"),
+            code=changed(pairs="before - after"),
         ),
         mistake(
             "class numbers as numbers",
-            task="energy",
+            task="energy-change",
             loses=2,
             says="multiply by the difference of the class numbers",
-            code=total("(k * abs(labels[:, None] - labels)).sum() / 2"),
+            code=changed(pairs="(price * (abs(labels - label) - abs(labels - labels[i]))).sum()"),
         ),
         mistake(
-            "logarithm of a price",
-            task="energy",
+            "class and cell swapped",
+            task="energy-change",
             loses=2,
-            says="`phi` holds prices already",
-            code=total("(k * differ).sum() / 2", "-np.log(phi[labels, np.arange(len(labels))]).sum()"),
+            says="class and cell are swapped",
+            code=changed("phi[i, label] - phi[i, labels[i]]"),
+        ),
+        mistake(
+            "the labels changed",
+            task="energy-change",
+            loses=2,
+            says="changed its argument `labels`",
+            code=changed()
+            .replace("    return", "    labels[i] = label\n    return")
+            .replace("labels[i], i] + after", "0, i] + after"),
+        ),
+        mistake(
+            "the diagonal emptied in place",
+            task="energy-change",
+            loses=2,
+            says="it changes an argument",
+            code="""
+def energy_change(labels, i, label, phi, k):
+    np.fill_diagonal(k, 0)
+    pairs = k[i, labels != label].sum() - k[i, labels != labels[i]].sum()
+    return phi[label, i] - phi[labels[i], i] + pairs""",
+        ),
+        mistake(
+            "pairs with earlier cells only",
+            task="energy-change",
+            loses=2,
+            says="on inputs you haven't seen: wrong with",
+            code=changed(price="k[i] * (np.arange(len(k)) < i)"),
         ),
         mistake(
             "four cells written in",
-            task="energy",
+            task="energy-change",
             loses=2,
             says="on inputs you haven't seen",
-            code="""
-def energy(labels, phi, k):
-    n = min(4, len(labels))
-    own = sum(phi[labels[i], i] for i in range(n))
-    return own + sum(k[i, j] for i in range(n) for j in range(i) if labels[i] != labels[j])""",
+            code=changed(price="np.where((np.arange(len(k)) < 4) & (np.arange(len(k)) != i), k[i], 0)"),
         ),
         # ---- task 2, marginals
         right(
             "a table of all labellings",
             task="marginals",
             code="""
-def marginals(phi, k):
+def marginals(phi, k, known):
     C, N = phi.shape
     X = np.array(list(product(range(C), repeat=N)))
     E = phi[X, np.arange(N)].sum(axis=1)
     for i in range(N):
         for j in range(i):
             E = E + k[i, j] * (X[:, i] != X[:, j])
+    for i, label in known.items():
+        X, E = X[X[:, i] == label], E[X[:, i] == label]
     P = np.exp(-E) / np.exp(-E).sum()
     return np.array([[P[X[:, i] == c].sum() for i in range(N)] for c in range(C)])""",
         ),
@@ -324,7 +394,7 @@ def marginals(phi, k):
             "a joint table with an axis for each cell",
             task="marginals",
             code="""
-def marginals(phi, k):
+def marginals(phi, k, known):
     C, N = phi.shape
     joint = np.ones((C,) * N)
     def spread(table, *axes):
@@ -334,6 +404,8 @@ def marginals(phi, k):
         return table.reshape(shape)
     for i in range(N):
         joint = joint * spread(np.exp(-phi[:, i]), i)
+        if i in known:
+            joint = joint * spread(np.arange(C) == known[i], i)
         for j in range(i + 1, N):
             joint = joint * spread(np.exp(-k[i, j] * (1 - np.eye(C))), i, j)
     rows = [joint.sum(axis=tuple(a for a in range(N) if a != i)) for i in range(N)]
@@ -368,7 +440,7 @@ def marginals(phi, k):
             loses=3,
             says="that is mean field",
             code="""
-def marginals(phi, k):
+def marginals(phi, k, known):
     Q = np.exp(-phi) / np.exp(-phi).sum(axis=0)
     for _ in range(200):
         for i in range(phi.shape[1]):
@@ -382,8 +454,52 @@ def marginals(phi, k):
             loses=3,
             says="a max-marginal",
             code=summed().replace(
-                "total[x, cells] += np.exp(-E)", "total[x, cells] = np.maximum(total[x, cells], np.exp(-E))"
+                "            total[x, cells] += np.exp(-E)",
+                "            total[x, cells] = np.maximum(total[x, cells], np.exp(-E))",
             ),
+        ),
+        mistake("known labels ignored", task="marginals", loses=3, says="`known` is ignored", code=summed(fits="True")),
+        mistake(
+            "known labels put in afterwards",
+            task="marginals",
+            loses=3,
+            says="what is known must reach the other cells",
+            code=summed(
+                fits="True",
+                result="np.array([[known[i] == c if i in known else total[c, i] for i in cells] for c in range(C)])",
+            ),
+        ),
+        mistake(
+            "joint in place of conditional",
+            task="marginals",
+            loses=3,
+            says="those are probabilities of both",
+            code=summed(last="whole"),
+        ),
+        mistake(
+            "cells and classes of the dictionary mixed up",
+            task="marginals",
+            loses=3,
+            says="it maps cells to classes",
+            code=summed(fits="all(x[label] == i % C for i, label in known.items())"),
+        ),
+        mistake(
+            "known cells taken out of the model",
+            task="marginals",
+            loses=3,
+            says="its pairs still cost",
+            code=summed(
+                "phi[x, cells].sum() + (np.where(np.logical_or.outer(out, out), 0, k) * (x[:, None] != x)).sum() / 2"
+            )
+            .replace("cells, total,", "out, cells, total,")
+            .replace("= np.arange", "= [i in known for i in range(N)], np.arange"),
+        ),
+        mistake(
+            "the first known cell only",
+            task="marginals",
+            loses=3,
+            says="on inputs you haven't seen: wrong with 4 cells, 2 of them known",
+            code=summed(fits="all(x[i] == label for i, label in list(known.items())[:1])"),
         ),
         mistake(
             "two classes written in",
@@ -397,15 +513,15 @@ def marginals(phi, k):
             task="marginals",
             loses=3,
             says="before timeout",
-            code="def marginals(phi, k):\n    while True:\n        pass",
+            code="def marginals(phi, k, known):\n    while True:\n        pass",
         ),
         # ---- task 3
         right(
             "reward of agreeing, the same up to a constant",
             task="update",
             code="""
-def update(Q, phi, k):
-    logits = Q @ (k * (1 - np.eye(len(k)))) - phi
+def update(Q, phi, k, mu):
+    logits = (mu.max() - mu) @ Q @ (k * (1 - np.eye(len(k)))) - phi
     logits = logits - logits.max(axis=0, keepdims=True)
     return np.exp(logits) / np.exp(logits).sum(axis=0, keepdims=True)""",
         ),
@@ -413,10 +529,12 @@ def update(Q, phi, k):
             "three loops",
             task="update",
             code="""
-def update(Q, phi, k):
+def update(Q, phi, k, mu):
     new = np.zeros_like(Q)
     for i in range(Q.shape[1]):
-        price = [phi[l, i] + sum(k[i, j] * (1 - Q[l, j]) for j in range(Q.shape[1]) if j != i) for l in range(len(Q))]
+        others = [j for j in range(Q.shape[1]) if j != i]
+        hears = [sum(k[i, j] * mu[l, m] * Q[m, j] for j in others for m in range(len(Q))) for l in range(len(Q))]
+        price = [phi[l, i] + hears[l] for l in range(len(Q))]
         weight = np.exp(min(price) - np.array(price))
         new[:, i] = weight / weight.sum()
     return new""",
@@ -429,17 +547,15 @@ def update(Q, phi, k):
             task="update",
             loses=2,
             says="different labels are rewarded",
-            code=updated("phi + Q @ others", others="k - np.diag(np.diag(k))").replace("+ Q", "- (1 - Q)"),
+            code=updated("phi - mu @ Q @ others"),
         ),
-        mistake(
-            "no unary", task="update", loses=2, says="own prices phi are missing", code=updated("(1 - Q) @ others")
-        ),
+        mistake("no unary", task="update", loses=2, says="own prices phi are missing", code=updated("mu @ Q @ others")),
         mistake(
             "unary with the wrong sign",
             task="update",
             loses=3,
             says="the sign of phi is swapped",
-            code=updated("-phi + (1 - Q) @ others"),
+            code=updated("-phi + mu @ Q @ others"),
         ),
         mistake(
             "soft-max over cells",
@@ -460,7 +576,7 @@ def update(Q, phi, k):
             task="update",
             loses=3,
             says="the classes of a cell don't sum to 1",
-            code="def update(Q, phi, k):\n    return np.exp(-phi - (1 - Q) @ (k - np.diag(np.diag(k))))",
+            code="def update(Q, phi, k, mu):\n    return np.exp(-phi - mu @ Q @ (k - np.diag(np.diag(k))))",
         ),
         mistake(
             "one after the other",
@@ -468,10 +584,10 @@ def update(Q, phi, k):
             loses=2,
             says="cell 1 already used the new Q",
             code="""
-def update(Q, phi, k):
+def update(Q, phi, k, mu):
     Q = Q.copy()
     for i in range(Q.shape[1]):
-        price = phi[:, i] + (1 - Q) @ (k[i] * (np.arange(len(k)) != i))
+        price = phi[:, i] + mu @ Q @ (k[i] * (np.arange(len(k)) != i))
         weight = np.exp(price.min() - price)
         Q[:, i] = weight / weight.sum()
     return Q""",
@@ -495,14 +611,14 @@ def update(Q, phi, k):
             task="update",
             loses=2,
             says="each pair is halved",
-            code=updated("phi + (1 - Q) @ others / 2"),
+            code=updated("phi + mu @ Q @ others / 2"),
         ),
         mistake(
             "best class only",
             task="update",
             loses=2,
             says="you use each cell's best class",
-            code=updated("phi + (1 - (Q == Q.max(axis=0))) @ others"),
+            code=updated("phi + mu @ (Q == Q.max(axis=0)) @ others"),
         ),
         mistake(
             "old Q multiplied in",
@@ -510,8 +626,8 @@ def update(Q, phi, k):
             loses=2,
             says="you multiply by the old Q",
             code="""
-def update(Q, phi, k):
-    price = phi + (1 - Q) @ (k - np.diag(np.diag(k)))
+def update(Q, phi, k, mu):
+    price = phi + mu @ Q @ (k - np.diag(np.diag(k)))
     weight = Q * np.exp(price.min(axis=0) - price)
     return weight / weight.sum(axis=0)""",
         ),
@@ -528,8 +644,8 @@ def update(Q, phi, k):
             loses=1,
             says="on inputs you haven't seen: a result isn't finite when prices are thousands",
             code="""
-def update(Q, phi, k):
-    price = phi + (1 - Q) @ (k - np.diag(np.diag(k)))
+def update(Q, phi, k, mu):
+    price = phi + mu @ Q @ (k - np.diag(np.diag(k)))
     weight = np.exp(np.median(price.min(axis=0)) - price) if phi.shape[1] > 2 else np.exp(price.min(axis=0) - price)
     return weight / weight.sum(axis=0)""",
         ),
@@ -540,19 +656,47 @@ def update(Q, phi, k):
             says="on inputs you haven't seen: wrong with",
             code=updated(others="np.where(np.arange(len(k))[:, None] < 3, k - np.diag(np.diag(k)), 0)"),
         ),
+        mistake(
+            "borders ignored",
+            task="update",
+            loses=2,
+            says="`mu` is ignored",
+            code=updated("phi + (1 - Q) @ others"),
+        ),
+        mistake(
+            "one mean price for each class",
+            task="update",
+            loses=2,
+            says="one mean price for all borders",
+            code=updated("phi + mu.mean(axis=1, keepdims=True) * len(mu) / max(len(mu) - 1, 1) * (1 - Q) @ others"),
+        ),
+        mistake(
+            "disagreement counted twice",
+            task="update",
+            loses=2,
+            says="different labels are rewarded",
+            code=updated("phi + mu @ (1 - Q) @ others"),
+        ),
+        mistake(
+            "three classes' borders read in the wrong order",
+            task="update",
+            loses=2,
+            says="each border with its own price",
+            code=updated("phi + mu[::-1, ::-1] @ Q @ others"),
+        ),
         # ---- task 4
         right(
             "sums cell by cell",
             task="free-energy",
             code="""
-def free_energy(Q, phi, k):
+def free_energy(Q, phi, k, mu):
     F = 0.0
     for i in range(Q.shape[1]):
         for l in range(len(Q)):
             if Q[l, i] > 0:
                 F += Q[l, i] * (phi[l, i] + np.log(Q[l, i]))
         for j in range(i):
-            F += k[i, j] * (1 - np.dot(Q[:, i], Q[:, j]))
+            F += k[i, j] * np.dot(Q[:, i], mu @ Q[:, j])
     return F""",
         ),
         right(
@@ -561,17 +705,17 @@ def free_energy(Q, phi, k):
             code="""
 from scipy.special import xlogy
 
-def free_energy(Q, phi, k):
+def free_energy(Q, phi, k, mu):
     others = k - np.diag(np.diag(k))
     own = np.where(Q > 0, Q * np.where(Q > 0, phi, 0), 0)
-    return own.sum() + 0.5 * (others * (1 - np.einsum("ci,cj->ij", Q, Q))).sum() + xlogy(Q, Q).sum()""",
+    return own.sum() + 0.5 * (others * np.einsum("ci,cd,dj->ij", Q, mu, Q)).sum() + xlogy(Q, Q).sum()""",
         ),
         mistake(
             "pairs twice in F",
             task="free-energy",
             loses=2,
             says="the pair is counted twice: sum over i < j only",
-            code=free(pairs="2 * np.triu(k * (1 - Q.T @ Q), 1).sum()"),
+            code=free(pairs="2 * np.triu(k * (Q.T @ mu @ Q), 1).sum()"),
         ),
         mistake(
             "entropy added",
@@ -586,14 +730,14 @@ def free_energy(Q, phi, k):
             task="free-energy",
             loses=2,
             says="you charge the probability that the pair agrees",
-            code=free(pairs="np.triu(k * (Q.T @ Q), 1).sum()"),
+            code=free(pairs="np.triu(k * (Q.T @ (mu == 0) @ Q), 1).sum()"),
         ),
         mistake(
             "agreement rewarded in F",
             task="free-energy",
             loses=2,
             says="agreement is rewarded instead",
-            code=free(pairs="-np.triu(k * (Q.T @ Q), 1).sum()"),
+            code=free(pairs="-np.triu(k * (Q.T @ (mu == 0) @ Q), 1).sum()"),
         ),
         mistake(
             "bits",
@@ -607,21 +751,21 @@ def free_energy(Q, phi, k):
             task="free-energy",
             loses=2,
             says="each cell counts as a pair with itself",
-            code=free(pairs="np.triu(k * (1 - Q.T @ Q)).sum()"),
+            code=free(pairs="np.triu(k * (Q.T @ mu @ Q)).sum()"),
         ),
         mistake(
             "half of each cell's pair with itself",
             task="free-energy",
             loses=2,
             says="each cell counts as half a pair with itself",
-            code=free(pairs="(k * (1 - Q.T @ Q)).sum() / 2"),
+            code=free(pairs="(k * (Q.T @ mu @ Q)).sum() / 2"),
         ),
         mistake(
             "twice, and with themselves",
             task="free-energy",
             loses=2,
             says="the pair is counted twice, and each cell with itself",
-            code=free(pairs="(k * (1 - Q.T @ Q)).sum()"),
+            code=free(pairs="(k * (Q.T @ mu @ Q)).sum()"),
         ),
         mistake(
             "0 log 0",
@@ -642,93 +786,122 @@ def free_energy(Q, phi, k):
             task="free-energy",
             loses=2,
             says="on inputs you haven't seen: wrong with",
-            code=free(pairs="(k[0, 1] * (1 - Q[:, 0] @ Q[:, 1]) if len(k) > 1 else 0)"),
+            code=free(pairs="(k[0, 1] * Q[:, 0] @ mu @ Q[:, 1] if len(k) > 1 else 0)"),
         ),
-        # ---- task 5, normalisation
+        mistake(
+            "borders ignored in F",
+            task="free-energy",
+            loses=2,
+            says="`mu` is ignored",
+            code=free(pairs="np.triu(k * (1 - Q.T @ Q), 1).sum()"),
+        ),
+        mistake(
+            "one price for all borders",
+            task="free-energy",
+            loses=2,
+            says="on inputs you haven't seen: wrong with 4 cells and 3 classes, other borders",
+            code=free(pairs="mu.max() * np.triu(k * (1 - Q.T @ Q), 1).sum()"),
+        ),
+        mistake(
+            "best classes in place of Q",
+            task="free-energy",
+            loses=2,
+            says="1.25 + 0.558",
+            code=free(pairs="np.triu(k * mu[np.ix_(Q.argmax(0), Q.argmax(0))], 1).sum()"),
+        ),
+        # ---- task 5, a weight
         right(
-            "entry by entry",
-            task="normalise",
+            "pair by pair",
+            task="weight-for",
             code="""
-def normalise(K):
-    D = [sum(row) for row in K]
-    return np.array([[K[i, j] / (D[i] * D[j]) ** 0.5 for j in range(len(K))] for i in range(len(K))])""",
+from statistics import median
+
+def weight_for(K, total):
+    return total / median(sum(K[i, j] for j in range(len(K)) if j != i) for i in range(len(K)))""",
         ),
-        right("diagonal matrices", task="normalise", code=scaled("np.diag(D**-0.5) @ K @ np.diag(D**-0.5)")),
-        right(
-            "nested lists, and helpers with everyday names",
-            task="normalise",
-            code="""
-weights, read, loss, slips, before, k, Q, phi = "these were names of the test cells, too".split()
-
-
-def got(K):
-    return [float(sum(row)) ** 0.5 for row in K]
-
-
-def normalise(K):
-    return [[entry / a / b for entry, b in zip(row, got(K))] for row, a in zip(K, got(K))]""",
-        ),
+        right("one less than each sum", task="weight-for", code=weighed("K.sum(axis=0) - 1")),
         mistake(
             "a string",
-            task="normalise",
+            task="weight-for",
             loses=1,
-            says="normalise returned no array of numbers but a str",
-            code="def normalise(K):\n    return str(K)",
+            says="weight_for returned no array of numbers",
+            code=weighed(result="str([total])"),
         ),
         mistake(
-            "root forgotten",
-            task="normalise",
+            "the diagonal",
+            task="weight-for",
             loses=1,
-            says="the square roots are missing",
-            code=scaled("K / np.outer(D, D)"),
+            says="the diagonal is in your sums",
+            code=weighed("K.sum(axis=1)"),
         ),
+        mistake("a mean", task="weight-for", loses=1, says="right for the mean", code=weighed(typical="sums.mean()")),
         mistake(
-            "rows only", task="normalise", loses=1, says="you divide each row by its sum", code=scaled("K / D[:, None]")
-        ),
-        mistake(
-            "columns only", task="normalise", loses=1, says="you divide each column by its sum", code=scaled("K / D")
-        ),
-        mistake(
-            "one root",
-            task="normalise",
+            "a mean with the diagonal",
+            task="weight-for",
             loses=1,
-            says="you divide by one root only",
-            code=scaled("K / np.sqrt(D)[:, None]"),
+            says="and the mean isn't the median",
+            code=weighed("K.sum(axis=1)", "sums.mean()"),
         ),
         mistake(
-            "multiplied",
-            task="normalise",
-            loses=1,
-            says="you multiply by the roots",
-            code=scaled("K * np.sqrt(np.outer(D, D))"),
+            "the largest", task="weight-for", loses=1, says="cell that pays most", code=weighed(typical="sums.max()")
         ),
         mistake(
-            "diagonal left out of D",
-            task="normalise",
-            loses=1,
-            says="the diagonal is missing in the row sums",
-            code=scaled("K / np.sqrt(np.outer(D - 1, D - 1))"),
+            "the smallest", task="weight-for", loses=1, says="cell that pays least", code=weighed(typical="sums.min()")
         ),
         mistake(
-            "lengths of rows",
-            task="normalise",
+            "inverted", task="weight-for", loses=1, says="one over the weight", code=weighed(result="typical / total")
+        ),
+        mistake(
+            "multiplied", task="weight-for", loses=1, says="don't multiply", code=weighed(result="total * typical")
+        ),
+        mistake(
+            "all entries",
+            task="weight-for",
             loses=1,
-            says="those are lengths of rows",
-            code=scaled("K / np.outer(np.linalg.norm(K, axis=1), np.linalg.norm(K, axis=1))"),
+            says="each cell has its own sum",
+            code=weighed(typical="sums.sum()"),
+        ),
+        mistake(
+            "the median price of a pair",
+            task="weight-for",
+            loses=1,
+            says="isn't the median of what a cell pays",
+            code=weighed(typical="np.median(K[np.triu_indices(len(K), 1)])"),
+        ),
+        mistake(
+            "halved",
+            task="weight-for",
+            loses=1,
+            says="each pair is halved",
+            code=weighed(typical="np.median(sums) / 2"),
+        ),
+        mistake(
+            "doubled",
+            task="weight-for",
+            loses=1,
+            says="each pair counts twice",
+            code=weighed(typical="2 * np.median(sums)"),
         ),
         mistake(
             "in place",
-            task="normalise",
+            task="weight-for",
             loses=1,
-            says="normalise changed its argument",
-            code="def normalise(K):\n    root = np.sqrt(K.sum(axis=1))\n    K /= np.outer(root, root)\n    return K",
+            says="weight_for changed its argument",
+            code="def weight_for(K, total):\n    np.fill_diagonal(K, 0)\n    return total / np.median(K.sum(axis=1))",
         ),
         mistake(
-            "three cells written in",
-            task="normalise",
+            "the upper of two middle cells",
+            task="weight-for",
             loses=1,
-            says="on inputs you haven't seen: wrong with",
-            code=scaled("K / np.sqrt(np.outer(K[:, :3].sum(axis=1), K[:, :3].sum(axis=1)))"),
+            says="on inputs you haven't seen: the median of 8 cells",
+            code=weighed(typical="np.sort(sums)[len(sums) // 2]"),
+        ),
+        mistake(
+            "a total written in",
+            task="weight-for",
+            loses=1,
+            says="on inputs you haven't seen",
+            code=weighed(result="3.5 / typical"),
         ),
         # ---- task 5, refine
         right("dictionaries of kernels", task="refine", code=refined()),
@@ -878,36 +1051,26 @@ def refine(log_g, o):
             loses=2,
             says="it changes an argument",
             code="""
-def update(Q, phi, k):
+def update(Q, phi, k, mu):
     np.fill_diagonal(k, 0)
-    price = phi + (1 - Q) @ k
+    price = phi + mu @ Q @ k
     weight = np.exp(price.min(axis=0) - price)
     return weight / weight.sum(axis=0)""",
-        ),
-        mistake(
-            "the diagonal emptied in place",
-            task="energy",
-            loses=2,
-            says="it changes an argument",
-            code="""
-def energy(x, phi, k):
-    np.fill_diagonal(k, 0)
-    return sum(phi[label, i] for i, label in enumerate(x)) + 0.5 * (k * (x[:, None] != x)).sum()""",
         ),
         mistake(
             "prices above 10 cut off",
             task="update",
             loses=3,
             says="on inputs you haven't seen: wrong with 6 cells",
-            code=updated(price="np.minimum(phi, 10) + (1 - Q) @ others"),
+            code=updated(price="np.minimum(phi, 10) + mu @ Q @ others"),
         ),
         right(
             "in float32",
             task="update",
             code="""
-def update(Q, phi, k):
-    Q, phi, k = (np.asarray(a, np.float32) for a in (Q, phi, k))
-    price = phi + (1 - Q) @ (k * (1 - np.eye(len(k), dtype=np.float32)))
+def update(Q, phi, k, mu):
+    Q, phi, k, mu = (np.asarray(a, np.float32) for a in (Q, phi, k, mu))
+    price = phi + mu @ Q @ (k * (1 - np.eye(len(k), dtype=np.float32)))
     weight = np.exp(price.min(axis=0) - price)
     return weight / weight.sum(axis=0)""",
         ),
@@ -930,19 +1093,27 @@ def test_the_reference_computes_what_the_package_does():
     own, rng = answers(), np.random.default_rng(1)
     unary, values = rng.exponential(size=(3, 2, 3)), np.moveaxis(rng.dirichlet(np.ones(4), (2, 3)), -1, 0)
     params = CrfParams(1.2, 0.8, 2.0, 0.5, 1.5, "none")
-    places, states = np.indices((2, 3)).reshape(2, -1).T, values.reshape(4, -1).T
-    pair = places[0], places[4], states[0], states[4]
     phi, k = unary.reshape(3, -1), pair_weights(values, params)
-    assert own.pair_price(*pair, 1.2, 0.8, 2.0, 0.5, 1.5) == pytest.approx(k[0, 4])
-    labels, Q = rng.integers(0, 3, 6), rng.dirichlet(np.ones(3), 6).T
-    assert own.energy(labels, phi, k) == pytest.approx(energy(labels.reshape(2, 3), unary, values, params))
-    np.testing.assert_allclose(own.marginals(phi, k), exact_marginals(unary, values, params).reshape(3, -1))
-    assert own.free_energy(Q, phi, k) == pytest.approx(free_energy(Q.reshape(3, 2, 3), unary, values, params))
+    labels, Q, potts = rng.integers(0, 3, 6), rng.dirichlet(np.ones(3), 6).T, 1 - np.eye(3)
+    after = np.where(np.arange(6) == 4, 2, labels)
+    change = np.diff([energy(x.reshape(2, 3), unary, values, params) for x in (labels, after)])[0]
+    assert own.energy_change(labels, 4, 2, phi, k) == pytest.approx(change)
+    np.testing.assert_allclose(own.marginals(phi, k, {}), exact_marginals(unary, values, params).reshape(3, -1))
+    F = free_energy(Q.reshape(3, 2, 3), unary, values, params)
+    assert own.free_energy(Q, phi, k, potts) == pytest.approx(F)
     settled = mean_field_sequential(unary, values, params, iterations=2000).reshape(3, -1)
-    np.testing.assert_allclose(own.update(settled, phi, k), settled, atol=1e-9)
-    spatial = CrfParams(w_bilateral=0, w_spatial=1, sigma_gamma=1.5)
-    K = gram_matrix(values, replace(spatial, normalization="none"))
-    np.testing.assert_allclose(own.normalise(K), gram_matrix(values, spatial))
+    np.testing.assert_allclose(own.update(settled, phi, k, potts), settled, atol=1e-9)
+
+
+def test_an_update_of_one_cell_lowers_the_free_energy_of_any_borders():
+    own, rng = answers(), np.random.default_rng(2)
+    phi, k, mu = rng.exponential(size=(3, 5)), rng.uniform(0, 2, (5, 5)), rng.uniform(0, 3, (3, 3))
+    k, mu = k + k.T, (mu + mu.T) * (1 - np.eye(3))
+    Q = rng.dirichlet(np.ones(3), 5).T
+    for i in range(5):
+        better = np.where(np.arange(5) == i, own.update(Q, phi, k, mu), Q)
+        assert own.free_energy(better, phi, k, mu) < own.free_energy(Q, phi, k, mu)
+        Q = better
 
 
 def test_the_reference_is_a_stage_that_agrees_with_the_package(tmp_path):

@@ -35,60 +35,86 @@ def _energy(x: tuple[int, ...], phi: NDArray, k: NDArray) -> float:
     return sum(phi[label, i] for i, label in enumerate(x)) + pairs
 
 
-def _free_energy(Q: NDArray, phi: NDArray, k: NDArray) -> float:
+def _free_energy(Q: NDArray, phi: NDArray, k: NDArray, mu: NDArray) -> float:
     """Return F(Q) by its definition, the sum over all labellings."""
     F = 0.0
     for x in product(range(len(phi)), repeat=phi.shape[1]):
         probability = np.prod([Q[label, i] for i, label in enumerate(x)])
-        F += probability * (_energy(x, phi, k) + np.log(probability))
+        pairs = sum(k[i, j] * mu[x[i], x[j]] for i, j in combinations(range(len(x)), 2))
+        own = sum(phi[label, i] for i, label in enumerate(x))
+        F += probability * (own + pairs + np.log(probability))
     return F
 
 
+def _borders(n_classes: int, seed: int) -> NDArray:
+    """Return a random price for each border of two classes, (C, C), symmetric, with zeros on its diagonal."""
+    mu = np.triu(generator(seed).uniform(0.2, 3, (n_classes, n_classes)), 1)
+    return mu + mu.T
+
+
 @hidden
-def check_pair_price(pair_price: Callable) -> None:
-    """Try other places, states, weights and widths; each Gaussian as a product over rows, columns and states."""
+def check_tipping_prices(tipping_prices: Callable) -> None:
+    """Other opinions; just below and just above each price, the four labellings written out must say so."""
     rng = generator(100)
-    for _ in range(5):
-        places, states = rng.integers(0, 6, (2, 2)).astype(float), rng.dirichlet(np.ones(4), 2)
-        (w1, w2), (alpha, beta, gamma) = rng.uniform(0.5, 9, 2), rng.uniform(0.5, 3, 3)
-        near, alike, nearest = (
-            np.prod([np.exp(-0.5 * (difference / width) ** 2) for difference in pair[0] - pair[1]])
-            for pair, width in ((places, alpha), (states, beta), (places, gamma))
-        )
-        got = answer_number(pair_price(*places.copy(), *states.copy(), w1, w2, alpha, beta, gamma))
-        wanted = w1 * near * alike + w2 * nearest
-        assert close(got, wanted), "wrong price for other places, states, weights and widths"
+    drawn = np.column_stack([rng.uniform(0.8, 0.95, 3), rng.uniform(0.25, 0.48, 3)])
+    for p, q in ((0.95, 0.3), (0.7, 0.45), (0.99, 0.02), *drawn):
+        got = answer_array(tipping_prices(p, q))
+        assert got.shape == (2,), f"shape {got.shape} instead of (2,)"
+        for n, what in enumerate(("the most likely labelling", "cell 2")):
+            for price, is_road in ((got[n] - 0.001, False), (got[n] + 0.001, True)):
+                phi = -np.log([[p, q], [1 - p, 1 - q]])
+                P = {x: np.exp(-_energy(x, phi, np.full((2, 2), price))) for x in product((0, 1), repeat=2)}
+                by_itself = (P[0, 0] + P[1, 0]) / sum(P.values()) > 0.5
+                says_road = (max(P, key=P.get) == (0, 0), by_itself)[n]
+                assert says_road == is_road, f"{what} doesn't turn to road at your price, with p = {p:.2f}, q = {q:.2f}"
 
 
 @hidden
 @keeping
-def check_energy(energy: Callable) -> None:
-    """Try random labellings of other sizes."""
+def check_energy_change(energy_change: Callable) -> None:
+    """Try every change of random labellings of other sizes."""
     for seed, size in enumerate(SIZES):
         phi, k = _case(size, 101 + seed)
-        for labels in generator(seed).integers(0, size[0], (4, size[1])):
-            got = answer_number(energy(labels.copy(), phi.copy(), k.copy()))
-            assert close(got, _energy(labels, phi, k)), f"wrong with {size[1]} cells and {size[0]} classes"
+        labels = generator(seed).integers(0, size[0], size[1])
+        for i, label in product(range(size[1]), range(size[0])):
+            after = labels.copy()
+            after[i] = label
+            wanted = _energy(after, phi, k) - _energy(labels, phi, k)
+            got = answer_number(energy_change(labels.copy(), i, label, phi.copy(), k.copy()))
+            assert close(got, wanted), f"wrong with {size[1]} cells and {size[0]} classes"
 
 
 @hidden
 @keeping
 def check_marginals(marginals: Callable) -> None:
-    """Try other sizes; each marginal as a sum by itself."""
+    """Try other sizes with nothing, one, two and all cells known; each marginal as a sum by itself."""
     for seed, size in enumerate(SIZES):
         phi, k = _case(size, 105 + seed)
-        got = answer_array(marginals(phi.copy(), k.copy()))
-        assert got.shape == size, f"shape {got.shape} instead of {size}"
-        labellings = list(product(range(size[0]), repeat=size[1]))
-        P = np.exp([-_energy(x, phi, k) for x in labellings])
-        for label, i in np.ndindex(size):
-            wanted = P[[x[i] == label for x in labellings]].sum() / P.sum()
-            assert close(got[label, i], wanted), f"wrong with {size[1]} cells and {size[0]} classes"
+        rng = generator(seed)
+        for n_known in {0, 1, min(2, size[1]), size[1]}:
+            cells = rng.permutation(size[1])[:n_known]
+            known = {int(cell): int(rng.integers(size[0])) for cell in cells}
+            got = answer_array(marginals(phi.copy(), k.copy(), dict(known)))
+            assert got.shape == size, f"shape {got.shape} instead of {size}"
+            labellings = [
+                x for x in product(range(size[0]), repeat=size[1]) if all(x[i] == label for i, label in known.items())
+            ]
+            P = np.exp([-_energy(x, phi, k) for x in labellings])
+            for label, i in np.ndindex(size):
+                wanted = P[[x[i] == label for x in labellings]].sum() / P.sum()
+                assert close(got[label, i], wanted), (
+                    f"wrong with {size[1]} cells, {n_known} of them known, and {size[0]} classes"
+                )
 
 
-def _updated(Q: NDArray, phi: NDArray, k: NDArray) -> NDArray:
+def _updated(Q: NDArray, phi: NDArray, k: NDArray, mu: NDArray) -> NDArray:
     """Return Q after one update of all cells at once."""
-    return softmax(-phi - (1 - Q) @ (k - np.diag(np.diag(k))), axis=0)
+    return softmax(-phi - mu @ Q @ (k - np.diag(np.diag(k))), axis=0)
+
+
+def _potts(n_classes: int) -> NDArray:
+    """Return the price 1 for each border."""
+    return 1 - np.eye(n_classes)
 
 
 @hidden
@@ -99,9 +125,11 @@ def check_update(update: Callable) -> None:
         phi, k = _case(size, 109 + seed)
         phi = phi if seed < len(SIZES) else 12 + 5 * phi
         Q = softmax(generator(seed).normal(size=phi.shape), axis=0)
-        got = answer_array(update(Q.copy(), phi.copy(), k.copy()))
-        assert got.shape == Q.shape, f"shape {got.shape} instead of {Q.shape}"
-        assert close(got, _updated(Q, phi, k)), f"wrong with {phi.shape[1]} cells and {len(phi)} classes"
+        for kind, mu in (("Potts", _potts(size[0])), ("other borders", _borders(size[0], 140 + seed))):
+            got = answer_array(update(Q.copy(), phi.copy(), k.copy(), mu.copy()))
+            assert got.shape == Q.shape, f"shape {got.shape} instead of {Q.shape}"
+            right = close(got, _updated(Q, phi, k, mu))
+            assert right, f"wrong with {phi.shape[1]} cells and {len(phi)} classes, {kind}"
 
 
 @hidden
@@ -112,12 +140,12 @@ def check_update_limits(update: Callable) -> None:
     phi[1, 2] = phi[0, 4] = np.inf
     Q = softmax(rng.normal(size=phi.shape), axis=0)
     k = np.exp(-np.abs(np.subtract.outer(range(6), range(6))))
-    other = answer_array(update(Q[[1, 2, 0]], np.arange(18).reshape(3, 6)[::-1] / 6, k.copy()))
+    other = answer_array(update(Q[[1, 2, 0]], np.arange(18).reshape(3, 6)[::-1] / 6, k.copy(), _potts(3)))
     for prices in (0 * k, 3000 * k):
-        got = answer_array(update(Q.copy(), phi.copy(), prices))
+        got = answer_array(update(Q.copy(), phi.copy(), prices, _potts(3)))
         assert np.isfinite(got).all(), "a result isn't finite when prices are thousands"
     small = np.where(np.isinf(phi), np.inf, np.arange(18).reshape(3, 6) / 6)
-    got, wanted = (answer_array(update(Q.copy(), small + more, k.copy())) for more in (3000, 0))
+    got, wanted = (answer_array(update(Q.copy(), small + more, k.copy(), _potts(3))) for more in (3000, 0))
     assert not close(other, wanted), "the same, whatever classes cost and other cells say"
     assert close(got, wanted, atol=2e-3), "not the same when all prices are 3000 higher"
 
@@ -129,8 +157,10 @@ def check_free_energy(free_energy: Callable) -> None:
     for seed, size in enumerate(SIZES):
         phi, k = _case(size, 114 + seed)
         Q = softmax(generator(seed).normal(size=size), axis=0)
-        got = answer_number(free_energy(Q.copy(), phi.copy(), k.copy()))
-        assert close(got, _free_energy(Q, phi, k)), f"wrong with {phi.shape[1]} cells and {len(phi)} classes"
+        for kind, mu in (("Potts", _potts(size[0])), ("other borders", _borders(size[0], 150 + seed))):
+            got = answer_number(free_energy(Q.copy(), phi.copy(), k.copy(), mu.copy()))
+            right = close(got, _free_energy(Q, phi, k, mu))
+            assert right, f"wrong with {phi.shape[1]} cells and {len(phi)} classes, {kind}"
 
 
 @hidden
@@ -140,7 +170,7 @@ def check_free_energy_limits(free_energy: Callable) -> None:
     def F(Q: list, phi: list) -> float:
         """Return the answer's free energy of two cells."""
         k = np.array([[3, 0.5], [0.5, 3]])
-        return answer_number(free_energy(np.array(Q, float), np.array(phi, float), k))
+        return answer_number(free_energy(np.array(Q, float), np.array(phi, float), k, _potts(2)))
 
     phi, eps = [[0.3, np.inf], [0.7, 0.4]], 1e-12
     near = F([[1 - eps, eps], [eps, 1 - eps]], [[0.3, 9], [0.7, 0.4]])
@@ -153,16 +183,15 @@ def check_free_energy_limits(free_energy: Callable) -> None:
 
 @hidden
 @keeping
-def check_normalise(normalise: Callable) -> None:
-    """Random kernels of other sizes: the scaled row sums, found by dividing entry by entry."""
-    for seed, size in ((118, 1), (119, 2), (120, 7)):
+def check_weight_for(weight_for: Callable) -> None:
+    """Random kernels of other sizes, odd and even; the median cell's payment, added up pair by pair."""
+    for seed, size, total in ((118, 2, 1.0), (119, 5, 7.0), (120, 8, 0.5)):
         features = generator(seed).normal(size=(size, 2))
         K = np.exp(-((features[:, None] - features) ** 2).sum(axis=-1) / 2)
-        got = answer_array(normalise(K.copy()))
-        assert got.shape == K.shape, f"shape {got.shape} instead of {K.shape}"
-        for i, j in np.ndindex(K.shape):
-            wanted = K[i, j] / np.sqrt(sum(K[i])) / np.sqrt(sum(K[j]))
-            assert close(got[i, j], wanted), f"wrong with {size} cells"
+        w = answer_number(weight_for(K.copy(), total))
+        paid = sorted(sum(w * K[i, j] for j in range(size) if j != i) for i in range(size))
+        median = (paid[(size - 1) // 2] + paid[size // 2]) / 2
+        assert close(median, total), f"the median of {size} cells pays {median:.3f} in place of {total}"
 
 
 def _refined(log_g: NDArray, o: NDArray) -> NDArray:
@@ -177,7 +206,7 @@ def _refined(log_g: NDArray, o: NDArray) -> NDArray:
     phi = -log_g.reshape(classes, -1)
     Q = np.exp(-phi)
     for _ in range(UPDATES):
-        Q = _updated(Q, phi, k)
+        Q = _updated(Q, phi, k, _potts(classes))
     return Q.reshape(log_g.shape)
 
 

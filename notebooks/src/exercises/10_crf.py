@@ -1,22 +1,22 @@
 # %% [markdown]
 # # Exercise 10: a CRF of your own
 #
-# Seven small functions, the last of which refines the map of the sample drive, and one question to answer in words. About 100 minutes.
+# Seven functions that ask more of a CRF than the lecture did, the last of which refines the map of the sample drive, and one question to answer in words. About 100 minutes.
 # The lecture is [10: the CRF by hand](../10_crf.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | the price of a pair, equation (4) | 2 |
-# | 2 | energy, and exact marginals by enumeration | 2 + 3 |
-# | 3 | one mean-field update of all cells | 2 + 1 |
-# | 4 | the free energy | 2 + 1 |
-# | 5 | normalisation, and a CRF that refines a map | 1 + 3 |
+# | 1 | the prices at which two cells agree | 2 |
+# | 2 | what changing one label costs; marginals when some labels are known | 2 + 3 |
+# | 3 | mean field when each border has its own price | 2 + 1 |
+# | 4 | its free energy | 2 + 1 |
+# | 5 | a weight for a kernel, and a CRF that refines a map | 1 + 3 |
 # | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong: the cell `slips` above it lists what usual mistakes give. Your instructor's tests use other numbers and other sizes. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
 #
-# In tasks 1 to 4 the N cells are counted from 0 to N - 1, wherever they lie. `phi`, shape `(C, N)`, holds the price of each class in each cell, $\phi_u$ of equation (3). `k`, shape
+# In tasks 2 to 4 the N cells are counted from 0 to N - 1, wherever they lie. `phi`, shape `(C, N)`, holds the price of each class in each cell, $\phi_u$ of equation (3). `k`, shape
 # `(N, N)`, holds the price of each pair: it is symmetric, and its diagonal may hold any numbers. A cell is no pair with itself, so **the diagonal must never count**. Arguments are never
 # changed.
 
@@ -54,62 +54,61 @@ def _explain(what, got, slips, atol=1e-4):
 
 
 # %% [markdown]
-# ## Task 1: the price of a pair (2 points)
+# ## Task 1: the prices at which two cells agree (2 points)
 #
-# Two cells have the places `r_i` and `r_j`, (row, column), and the occupancy probabilities `o_i` and `o_j`, four numbers each; all are arrays. What do different labels in
-# them cost? With the weights `w1`, `w2` and the widths `alpha`, `beta`, `gamma`
+# Two cells, two classes. The network says that cell 1 is road with probability `p`, more than one half, and cell 2 with `q`, less than one half. Cell 1 is surer: $p + q > 1$. If their labels
+# differ, that costs $k$. With a small $k$ each keeps its own label; as $k$ grows, cell 2 is called road, too. But when? The two questions of the lecture have two answers:
 #
-# $$ k_{ij} = w_1 \exp\!\Big(\!-\frac{|r_i - r_j|^2}{2\sigma_\alpha^2} - \frac{|o_i - o_j|^2}{2\sigma_\beta^2}\Big) + w_2 \exp\!\Big(\!-\frac{|r_i - r_j|^2}{2\sigma_\gamma^2}\Big) $$
+# 1. above which price is the **most likely labelling** "both road"?
+# 2. above which price is road the **most likely label of cell 2**, that is, its marginal above one half?
 #
-# Complete `pair_price`: it returns one number.
+# Complete `tipping_prices`: it returns the two prices. (Write down the four labellings as in the lecture's first table, with $e^{-k}$ where the labels differ. A formula or a numerical search are both right.)
 
 
-# %% nbgrader={"grade": false, "grade_id": "pair-price", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def pair_price(r_i, r_j, o_i, o_j, w1, w2, alpha, beta, gamma):
-    """Return k_ij, the bracket of equation (4)."""
+# %% nbgrader={"grade": false, "grade_id": "tipping-prices", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def tipping_prices(p, q):
+    """Return the prices above which the best labelling, and cell 2 by itself, turn to road."""
     ### BEGIN SOLUTION
-    apart = np.sum((r_i - r_j) ** 2)
-    unlike = np.sum((o_i - o_j) ** 2)
-    bilateral = np.exp(-apart / (2 * alpha**2) - unlike / (2 * beta**2))
-    return w1 * bilateral + w2 * np.exp(-apart / (2 * gamma**2))
+    # Best labelling: p q > p (1 - q) e^-k. Marginal: p q + (1 - p) q e^-k > p (1 - q) e^-k + (1 - p) (1 - q).
+    return np.log((1 - q) / q), np.log((p - q) / (p + q - 1))
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "pair-price-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_PRICE_SLIPS = {
-    2.2828: "the widths aren't squared: divide by 2 sigma^2",
-    1.3229: "the 2 is missing: divide by 2 sigma^2",
-    4.5284: "you square the 2 as well: divide by 2 * sigma**2, not by (2 * sigma)**2",
-    0.0001: "`x / 2 * sigma**2` multiplies by the width: write x / (2 * sigma**2)",
-    2.5499: "the distances aren't squared: no square root, the sum of the squares itself stands in the exponent",
-    17.3573: "the minus signs are missing: what is farther apart must cost less",
-    8.3489: "the minus sign of the second part of the exponent is missing: unlike states must cost less",
-    0.8756: "the weights are missing",
-    3.1621: "the weights are swapped: w1 belongs to the term with the states",
-    6.4330: "place and state of the first term belong into one exponent, so that both must fit: exp(-a - b), not exp(-a) + exp(-b)",
-    4.6356: "the states are missing in the first term",
-    1.3614: "that is the first term alone: add the spatial one",
-    2.0829: "the second term ignores the states: only the places count there",
-    3.2344: "alpha and gamma are swapped: alpha belongs to the first term",
-    1.1101: "square each difference first, then sum: (1 + 2)^2 isn't 1^2 + 2^2",
-    5.0451: "that is a mean of squares: take their sum",
-    2.1861: "the two terms are multiplied: add them",
+# %% nbgrader={"grade": false, "grade_id": "tipping-prices-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_BEST_SLIPS = {
+    2.1972: "that is the price at which cell 1 would give way: cell 2 is less sure, so it gives way first",
+    -0.4055: "the sign is swapped: a price that keeps them from differing is positive",
+    1.5000: "a price stands in the exponent: take the logarithm",
+    0.2027: "the pair is counted twice: two cells are one pair",
+    0.8109: "compare the labellings (road, road) and (road, car): p stands in both, 1 - q and q differ",
+    0.5850: "that is the logarithm to base 2: take the natural one",
+    0.5108: "that is the second price: the most likely labelling is one of four, compare their probabilities",
+}
+_TIP_SLIPS = {
+    0.4055: "that is the first price again: a marginal adds up two labellings",
+    -0.5108: "the sign is swapped: a price that keeps them from differing is positive",
+    1.6667: "a price stands in the exponent: take the logarithm",
+    0.2554: "the pair is counted twice: two cells are one pair",
+    0.7370: "that is the logarithm to base 2: take the natural one",
+    0.9163: "that is the price of road in cell 2, -log q: weigh the four labellings",
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "pair-price-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "tipping-prices-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # By hand: |r_i - r_j|^2 = 1 + 4 = 5 and |o_i - o_j|^2 = 0.04 + 0.04 + 0.01 + 0.01 = 0.1, so 4 exp(-5/18 - 0.8) + 3 exp(-5/8) = 2.967.
-    places, states = np.array([[3.0, 1.0], [4.0, 3.0]]), np.array([[0.7, 0.2, 0.1, 0.0], [0.5, 0.4, 0.0, 0.1]])
-    got = pair_price(*places, *states, w1=4, w2=3, alpha=3, beta=0.25, gamma=2)
-    got = answer_array(got, "pair_price")
-    assert got.size == 1, f"expected one number, got an array of shape {got.shape}: sum the squares of the differences"
-    _explain("the price is", got.item(), _PRICE_SLIPS)
-    np.testing.assert_allclose(got, 2.9672, atol=1e-4, err_msg="4 exp(-5/18 - 0.8) + 3 exp(-5/8)")
+    # By hand: 0.9 * 0.4 = 0.9 * 0.6 e^-k at k = log 1.5; and 0.36 + 0.04 e^-k = 0.54 e^-k + 0.06 at e^-k = 0.6.
+    got = answer_array(tipping_prices(0.9, 0.4), "tipping_prices")
+    assert got.shape == (2,), f"expected two prices, got shape {got.shape}"
+    swapped = "the two prices are swapped: that of the most likely labelling comes first"
+    assert not np.allclose(got, [np.log(1 / 0.6), np.log(1.5)], atol=1e-3), swapped
+    _explain("the first price is", got[0], _BEST_SLIPS, atol=1e-3)
+    np.testing.assert_allclose(got[0], np.log(1.5), atol=1e-4, err_msg="0.36 = 0.54 e^-k")
+    _explain("the second price is", got[1], _TIP_SLIPS, atol=1e-3)
+    np.testing.assert_allclose(got[1], np.log(1 / 0.6), atol=1e-4, err_msg="0.36 + 0.04 e^-k = 0.54 e^-k + 0.06")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import crf
 
-    complaint = crf.check_pair_price(pair_price)
+    complaint = crf.check_tipping_prices(tipping_prices)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -117,61 +116,60 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 2: energy, and exact marginals (2 + 3 points)
+# ## Task 2: changing one label, and knowing some (2 + 3 points)
 #
-# `labels`, shape `(N,)`, holds a class for each cell. With equation (3)
+# Whoever tries out labellings changes one cell at a time. Then it would be a waste to add up all pairs again. `labels`, shape `(N,)`, holds a class for each cell. What does the energy of equation (3),
+# $E(x) = \sum_i \phi_u(x_i) + \sum_{i<j} [x_i \neq x_j]\, k_{ij}$, gain when cell `i` takes the class `label` and all others keep theirs?
 #
-# $$ E(x) = \sum_i \phi_u(x_i) + \sum_{i<j} [x_i \neq x_j]\, k_{ij} $$
-#
-# Complete `energy`: it returns one number.
+# Complete `energy_change`: it returns $E(\text{after}) - E(\text{before})$, one number. Only row `i` of `k` is needed.
 
 
-# %% nbgrader={"grade": false, "grade_id": "energy", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def energy(labels, phi, k):
-    """Return E(x) of one labelling."""
+# %% nbgrader={"grade": false, "grade_id": "energy-change", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def energy_change(labels, i, label, phi, k):
+    """Return how much E(x) rises when cell i takes another label."""
     ### BEGIN SOLUTION
-    own = phi[labels, np.arange(len(labels))].sum()
-    differ = labels[:, None] != labels
-    return own + (k * differ).sum() / 2
+    price = np.where(np.arange(len(labels)) == i, 0, k[i])
+    differ = price[labels != label].sum() - price[labels != labels[i]].sum()
+    return phi[label, i] - phi[labels[i], i] + differ
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "energy-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_ENERGY_SLIPS = {
-    7.3: "each pair is counted twice, as (i, j) and as (j, i): sum over i < j only",
-    3.2: "you charge the pairs that agree: different labels cost",
-    39.2: "you charge the pairs that agree, and each cell with itself: different labels cost",
-    21.2: "you charge the pairs that agree, and each cell with itself: different labels cost",
-    42.0: "all pairs are charged, each cell with itself too: only different labels cost",
-    24.0: "all pairs are charged, each cell with itself too: only different labels cost",
-    4.0: "only cells that follow one another are charged: every pair counts, this CRF is fully connected",
-    6.0: "all pairs are charged: only those with different labels cost",
-    1.7: "the pairs are missing",
-    2.8: "the prices of the cells are missing",
-    -1.1: "the pairs are subtracted: different labels cost, so add",
-    0.0111: "that is exp(-E): the energy itself is asked for",
-    5.4: "class and cell are swapped: phi[c, i] is the price of class c in cell i",
-    19.8: "you sum the prices of all classes: each cell pays for its own label only",
-    7.1: "you multiply by the difference of the class numbers: they are names, a pair differs or it doesn't",
-    1.1: "the prices of the cells are subtracted: add them",
-    3.225: "that is a mean over the cells: take the sum",
-    7.8207: "`phi` holds prices already, -log of probabilities: don't take the logarithm again",
+# %% nbgrader={"grade": false, "grade_id": "energy-change-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_CHANGE_SLIPS = {
+    -2.2: "that is before minus after",
+    3.0: "each pair is counted twice, as (i, j) and as (j, i)",
+    1.8: "each pair is halved: the energy counts each pair once, and each of them holds cell i once",
+    0.8: "the cell's own prices are missing",
+    1.4: "the pairs are missing",
+    4.3: "that is what cell i pays afterwards: subtract what it paid before",
+    6.7: "that is the whole energy afterwards: subtract that of before",
+    11.2: "the cell is paired with itself: the diagonal of k must never count",
+    -6.8: "the cell is paired with itself: the diagonal of k must never count",
+    0.6: "you charge the pairs that agree: different labels cost",
+    4.9: "you multiply by the difference of the class numbers: they are names, a pair differs or it doesn't",
+    2.0: "class and cell are swapped: phi[c, i] is the price of class c in cell i",
+    4.0: "the pairs of before are missing: subtract them",
+    -0.4: "the pairs of afterwards are missing",
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "energy-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "energy-change-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    phi = np.array([[0.1, 2.0, 0.3, 1.4], [1.9, 0.4, 1.5, 0.2], [1.2, 0.7, 0.6, 2.2], [0.8, 1.1, 1.7, 0.9]])
+    phi = np.array([[0.1, 2.0, 0.3, 1.4], [1.9, 0.4, 1.5, 0.2], [1.2, 0.7, 0.6, 2.4], [0.8, 1.1, 1.7, 0.9]])
     k = np.array([[9, 0.5, 1.5, 0.3], [0.5, 9, 0.7, 0.2], [1.5, 0.7, 9, 1.1], [0.3, 0.2, 1.1, 9]])
-    # By hand: 0.1 + 1.1 + 0.3 + 0.2 = 1.7 for the cells. Only cells 0 and 2 agree, so five pairs: 0.5 + 0.3 + 0.7 + 0.2 + 1.1 = 2.8.
-    got = answer_array(energy(np.array([0, 3, 0, 1]), phi, k), "energy")
+    labels = np.array([0, 3, 0, 1])
+    # By hand, cell 2 from class 0 to class 3: 1.7 - 0.3 for the cell; before it differs from cells 1 and 3 (0.7 + 1.1), after from 0 and 3 (1.5 + 1.1).
+    got = answer_array(energy_change(labels, 2, 3, phi, k), "energy_change")
+    assert list(labels) == [0, 3, 0, 1], "energy_change changed its argument `labels`: work on a copy"
     assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
-    _explain("the energy is", got.item(), _ENERGY_SLIPS, atol=1e-3)
-    np.testing.assert_allclose(got, 4.5, err_msg="1.7 for the cells and 2.8 for five pairs")
+    _explain("the energy changes by", got.item(), _CHANGE_SLIPS, atol=1e-3)
+    np.testing.assert_allclose(got, 2.2, atol=1e-6, err_msg="1.4 for the cell and 2.6 - 1.8 for its pairs")
+    same = answer_array(energy_change(labels, 1, 3, phi, k), "energy_change")
+    np.testing.assert_allclose(same, 0, atol=1e-6, err_msg="a cell that keeps its label changes nothing")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import crf
 
-    complaint = crf.check_energy(energy)
+    complaint = crf.check_energy_change(energy_change)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -179,18 +177,21 @@ def _test():
 _test()
 
 # %% [markdown]
-# Every labelling has the probability $P(x) = e^{-E(x)} / Z$. Complete `marginals`: it returns, in an array `(C, N)`, the probability of each class in each cell, summed over all $C^N$
-# labellings. `product(range(C), repeat=N)` yields them one by one. N is at most 6 in the tests.
+# Every labelling has the probability $P(x) = e^{-E(x)} / Z$. Suppose somebody has looked at a few cells and knows their labels: `known` is a dictionary from cells to classes, such as `{2: 0}`, and may be empty. What do we then believe of
+# the *other* cells? Complete `marginals`: it returns, in an array `(C, N)`, the probability of each class in each cell **given** what is known. A known cell has its class with probability 1.
+# `product(range(C), repeat=N)` yields all $C^N$ labellings one by one. N is at most 6 in the tests.
 
 
 # %% nbgrader={"grade": false, "grade_id": "marginals", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def marginals(phi, k):
-    """Return the exact probability of each class in each cell, (C, N)."""
+def marginals(phi, k, known):
+    """Return the exact probability of each class in each cell, given the known ones, (C, N)."""
     ### BEGIN SOLUTION
     C, N = phi.shape
     cells, total = np.arange(N), np.zeros((C, N))
     for x in product(range(C), repeat=N):
         x = np.array(x)
+        if any(x[i] != label for i, label in known.items()):
+            continue
         E = phi[x, cells].sum() + (k * (x[:, None] != x)).sum() / 2
         total[x, cells] += np.exp(-E)
     return total / total.sum(axis=0)
@@ -212,15 +213,38 @@ _MARGINAL_SLIPS = {
 }
 
 
+# %% nbgrader={"grade": false, "grade_id": "known-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_KNOWN_SLIPS = {  # cell 2 is known to have class 0
+    (0.716, 0.398, 0.319): "`known` is ignored",
+    (0.716, 0.398, 1.000): "what is known must reach the other cells: leave out all labellings that contradict it",
+    (
+        0.279,
+        0.242,
+        0.319,
+    ): "those are probabilities of both, not of one given the other: divide by the sum over the labellings that remain",
+    (0.771, 0.492, 1.000): "the known cell's neighbours don't hear from it: its pairs still cost",
+    (0.642, 0.229, 0.000): "class and cell are mixed up in `known`: it maps cells to classes, {2: 0}",
+    (0.952, 0.943, 1.000): "each pair is counted twice",
+    (0.834, 0.121, 1.000): "different labels are rewarded: they cost",
+    (0.895, 0.774, 1.000): "that is mean field: sum over all labellings, exactly",
+    (1.000, 0.502, 0.389): "cell and class are mixed up in `known`: it maps cells to classes, {2: 0}",
+}
+
+
 # %% nbgrader={"grade": true, "grade_id": "marginals-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     phi = np.array([[0.2, 0.9, 1.2], [1.6, 0.4, 0.3]])
     k = np.array([[0, 0.8, 0.3], [0.8, 0, 1.1], [0.3, 1.1, 0]])
-    got = answer_array(marginals(phi, k), "marginals")
+    got = answer_array(marginals(phi, k, {}), "marginals")
     assert got.shape == (2, 3), f"expected a row per class and a column per cell, (2, 3), got {got.shape}"
     _explain("class 0 has, in the three cells,", got[0], _MARGINAL_SLIPS, atol=1.1e-3)
     np.testing.assert_allclose(got[0], [0.7156, 0.3975, 0.3192], atol=1e-4, err_msg="class 0 in the three cells")
     np.testing.assert_allclose(got.sum(axis=0), 1, err_msg="the classes of each cell sum to 1")
+    got = answer_array(marginals(phi, k, {2: 0}), "marginals")
+    assert got.shape == (2, 3), f"expected a row per class and a column per cell, (2, 3), got {got.shape}"
+    _explain("with cell 2 known to have class 0, that class has", got[0], _KNOWN_SLIPS, atol=1.1e-3)
+    by_hand = [0.8724, 0.7573, 1]
+    np.testing.assert_allclose(got[0], by_hand, atol=1e-4, err_msg="class 0, when cell 2 is known to have it")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import crf
 
@@ -232,22 +256,23 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: one mean-field update (2 + 1 points)
+# ## Task 3: when each border has its own price (2 + 1 points)
 #
-# `Q`, shape `(C, N)`, holds a distribution for each cell. Update **all cells at once**, so that each of them uses the `Q` that was given:
+# The lecture charges every two different labels alike (Potts). But road beside sidewalk is usual, and road beside sky is not. Let `mu`, shape `(C, C)`, say how dear each pair of classes is: two cells
+# with the labels $l$ and $m$ cost $k_{ij}\,\mu_{lm}$. It is symmetric, with zeros on its diagonal. Potts is the case in which all others are 1.
 #
-# $$ Q_i'(l) = \frac{1}{Z_i} \exp\!\Big(\!-\phi_u(l) - \sum_{j \neq i} k_{ij}\,\big(1 - Q_j(l)\big)\Big) $$
+# `Q`, shape `(C, N)`, holds a distribution for each cell. A cell pays for its neighbours *on average*, as in the lecture. Update **all cells at once**, so that each of them uses the `Q` that was given, without damping.
 #
 # Complete `update`: it returns the new `Q`. For one more point: prices may be thousands, where $e^{-1000}$ is less than a computer holds, and infinite for an impossible class. You may
 # add any number to all prices of a cell without changing its result.
 
 
 # %% nbgrader={"grade": false, "grade_id": "update", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def update(Q, phi, k):
+def update(Q, phi, k, mu):
     """Return Q after one update of all cells at once, (C, N)."""
     ### BEGIN SOLUTION
     others = k - np.diag(np.diag(k))
-    price = phi + (1 - Q) @ others
+    price = phi + mu @ Q @ others
     weight = np.exp(price.min(axis=0) - price)
     return weight / weight.sum(axis=0)
     ### END SOLUTION
@@ -275,19 +300,44 @@ _UPDATE_SLIPS = {
 }
 
 
+# %% nbgrader={"grade": false, "grade_id": "mu-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_MU_SLIPS = {  # each border has its own price
+    (0.571, 0.231, 0.297): "`mu` is ignored: each pair of classes has its own price",
+    (0.815, 0.353, 0.424): "different labels are rewarded: they must cost",
+    (
+        0.328,
+        0.009,
+        0.094,
+    ): "1 - Q counts twice what `mu` says already: the mean price of label l beside cell j is the sum over m of mu[l, m] Q_j(m)",
+    (0.165, 0.030, 0.052): "one price for all borders of a class: each pair of classes has its own",
+    (0.368, 0.083, 0.170): "one mean price for all borders of a class: each pair of classes has its own",
+    (0.248, 0.044, 0.105): "one price for all borders of a class: each pair of classes has its own",
+    (0.268, 0.021, 0.269): "you use each cell's best class: the whole distribution counts",
+    (0.480, 0.000, 0.001): "a cell counts itself: the diagonal of k must be left out",
+    (0.154, 0.122, 0.149): "the cells' own prices phi are missing",
+}
+
+
 # %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     Q = np.array([[0.6, 0.2, 0.3], [0.3, 0.5, 0.1], [0.1, 0.3, 0.6]])
     phi = np.array([[0.4, 1.6, 1.1], [1.3, 0.7, 2.0], [1.9, 1.0, 0.5]])
     k = np.array([[5, 0.8, 0.3], [0.8, 5, 1.4], [0.3, 1.4, 5]])
     before = Q.copy()
-    got = answer_array(update(Q, phi, k), "update")
+    got = answer_array(update(Q, phi, k, 1 - np.eye(3)), "update")  # Potts
     assert np.array_equal(Q, before), "update changed its argument `Q`: make a new array, all cells use the old one"
     assert got.shape == (3, 3), f"expected the shape of Q, (3, 3), got {got.shape}"
     # By hand, cell 0: prices 0.4 + 0.8 * 0.8 + 0.3 * 0.7 = 1.25, 1.3 + 0.8 * 0.5 + 0.3 * 0.9 = 1.97, 1.9 + 0.8 * 0.7 + 0.3 * 0.4 = 2.58.
     _explain("class 0 has, in the three cells,", got[0], _UPDATE_SLIPS, atol=1.1e-3)
     by_hand = [[0.5710, 0.2314, 0.2968], [0.2779, 0.3384, 0.1678], [0.1510, 0.4302, 0.5354]]
     np.testing.assert_allclose(got, by_hand, atol=1e-4, err_msg="a row per class, a column per cell")
+    mu = np.array([[0, 1.0, 3.0], [1.0, 0, 0.5], [3.0, 0.5, 0]])
+    got = answer_array(update(Q, phi, k, mu), "update")
+    _explain("with other borders class 0 has, in the three cells,", got[0], _MU_SLIPS, atol=1.1e-3)
+    # By hand, cell 0, class 0: 0.4 + 0.8 * (0.5 * 1 + 0.3 * 3) + 0.3 * (0.1 * 1 + 0.6 * 3) = 2.09.
+    np.testing.assert_allclose(
+        got[0], [0.3507, 0.0558, 0.1863], atol=1e-4, err_msg="class 0, each border with its own price"
+    )
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import crf
 
@@ -303,11 +353,11 @@ _test()
 def _test():
     # Every class is dear, and class 1 of cell 1 is impossible; then the same with 2000 less for each.
     Q, k, less = np.full((3, 2), 1 / 3), np.zeros((2, 2)), np.array([[0.0, 3.0], [1.0, np.inf], [7000.0, 3.0]])
-    got = answer_array(update(Q.copy(), less + 2000, k.copy()), "update")
+    got = answer_array(update(Q.copy(), less + 2000, k.copy(), 1 - np.eye(3)), "update")
     assert np.isfinite(got).all(), (
         "a result isn't finite: exp(-2000) is 0 on a computer, so subtract each cell's smallest price first"
     )
-    wanted = answer_array(update(Q.copy(), less, k.copy()), "update")
+    wanted = answer_array(update(Q.copy(), less, k.copy(), 1 - np.eye(3)), "update")
     assert np.isfinite(wanted).all(), (
         "a result isn't finite where a class is impossible: its price is inf, its weight 0"
     )
@@ -324,22 +374,21 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: the free energy (2 + 1 points)
+# ## Task 4: its free energy (2 + 1 points)
 #
-# For independent cells, with each pair counted once,
-#
-# $$ F(Q) = \sum_i \sum_l Q_i(l)\,\phi_u(l) + \sum_{i<j} k_{ij} \Big(1 - \sum_l Q_i(l)\,Q_j(l)\Big) + \sum_i \sum_l Q_i(l) \log Q_i(l) $$
+# Which score does the update of task 3 lower? The lecture's free energy is the mean energy of independent cells minus their entropy, with each pair counted once. Let each border have its own price `mu`, as in task 3, and work out what the *mean* price of a pair is
+# when cell $i$ has the label $l$ with $Q_i(l)$ and cell $j$ has $m$ with $Q_j(m)$, each by itself.
 #
 # Complete `free_energy`: it returns one number, in nats. For one more point: `Q` may be 0, where $0 \log 0$ counts as 0; and if the class is impossible there, $0 \cdot \infty$ counts as 0 too.
 
 
 # %% nbgrader={"grade": false, "grade_id": "free-energy", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def free_energy(Q, phi, k):
+def free_energy(Q, phi, k, mu):
     """Return F(Q)."""
     ### BEGIN SOLUTION
     possible = Q > 0
     mean_price = (Q[possible] * phi[possible]).sum()
-    disagree = np.triu(k * (1 - Q.T @ Q), 1).sum()
+    disagree = np.triu(k * (Q.T @ mu @ Q), 1).sum()
     return mean_price + disagree + (Q[possible] * np.log(Q[possible])).sum()
     ### END SOLUTION
 
@@ -369,10 +418,16 @@ _FREE_SLIPS = {
 def _test():
     Q, phi, k = np.array([[0.8, 0.3], [0.2, 0.7]]), np.array([[0.5, 1.2], [1.4, 0.3]]), np.array([[2, 0.9], [0.9, 2]])
     # By hand: prices 0.40 + 0.28 + 0.36 + 0.21 = 1.25; the pair agrees with 0.24 + 0.14 = 0.38, so 0.9 * 0.62 = 0.558; minus an entropy of 1.1113.
-    got = answer_array(free_energy(Q, phi, k), "free_energy")
+    got = answer_array(free_energy(Q, phi, k, 1 - np.eye(2)), "free_energy")  # Potts
     assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
     _explain("F is", got.item(), _FREE_SLIPS)
     np.testing.assert_allclose(got, 0.6967, atol=1e-4, err_msg="1.25 + 0.558 - 1.1113")
+    # A border costs 2.5: 0.9 * 2.5 * 0.62 = 1.395 in place of 0.558.
+    got = answer_array(free_energy(Q, phi, k, 2.5 * (1 - np.eye(2))), "free_energy")
+    ignored = "`mu` is ignored: each pair of labels has its own price"
+    assert not np.isclose(got, 0.6967, atol=1e-4), f"F is {got:.4f}, with borders that cost 2.5: {ignored}"
+    assert not np.isclose(got, 1.6237, atol=1e-4), "the price of a border is weighted with k and Q: 2.5 * 0.9 * 0.62"
+    np.testing.assert_allclose(got, 1.5337, atol=1e-4, err_msg="1.25 + 1.395 - 1.1113, a border costs 2.5")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import crf
 
@@ -389,10 +444,10 @@ def _test():
     # Class 1 of cell 0 is impossible, and its Q is 0; then its Q is nearly 0, and its price 5.
     k = np.array([[2, 0.9], [0.9, 2]])
     at, near = np.array([[1.0, 0.5], [0.0, 0.5]]), np.array([[1 - 1e-9, 0.5], [1e-9, 0.5]])
-    got = answer_array(free_energy(at, np.array([[0.5, 1.2], [np.inf, 0.3]]), k.copy()), "free_energy")
+    got = answer_array(free_energy(at, np.array([[0.5, 1.2], [np.inf, 0.3]]), k.copy(), 1 - np.eye(2)), "free_energy")
     assert not np.isnan(got).any(), "F is NaN: 0 * log 0 and 0 * inf count as 0; leave out what has probability 0"
     assert np.isfinite(got).all(), f"F is {got}, but the impossible class has probability 0 and costs nothing"
-    nearly = answer_array(free_energy(near, np.array([[0.5, 1.2], [5.0, 0.3]]), k.copy()), "free_energy")
+    nearly = answer_array(free_energy(near, np.array([[0.5, 1.2], [5.0, 0.3]]), k.copy(), 1 - np.eye(2)), "free_energy")
     hint = "a probability of 0 must give what a tiny one gives"
     np.testing.assert_allclose(got, nearly, atol=1e-4, err_msg=hint)
     ### BEGIN HIDDEN TESTS
@@ -406,51 +461,52 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: normalisation, and a CRF of your own (1 + 3 points)
+# ## Task 5: a weight for a kernel, and a CRF of your own (1 + 3 points)
 #
-# `K` is one kernel, `(N, N)`, symmetric, with ones on its diagonal. Complete `normalise`: it returns $K_{ij} / \sqrt{D_i D_j}$, where $D_i$ is the sum of row $i$, the diagonal included.
+# You want to use a kernel as printed, without normalisation, and yet as strong as a normalised one. `K` is one kernel, `(N, N)`, symmetric, with ones on its diagonal. A cell that differs from all others pays $w \sum_{j \neq i} K_{ij}$. Complete
+# `weight_for`: it returns the weight $w$ with which this is `total` for the median cell.
 
 
-# %% nbgrader={"grade": false, "grade_id": "normalise", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def normalise(K):
-    """Return D^-1/2 K D^-1/2, (N, N)."""
+# %% nbgrader={"grade": false, "grade_id": "weight-for", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def weight_for(K, total):
+    """Return the weight with which the median cell pays `total` when it differs from all others."""
     ### BEGIN SOLUTION
-    root = np.sqrt(K.sum(axis=1))
-    return K / root[:, None] / root
+    return total / np.median(K.sum(axis=1) - np.diag(K))
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "normalise-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_NORMALISE_SLIPS = {
-    0.1858: "the square roots are missing: divide by sqrt(D_i D_j)",
-    0.3529: "you divide each row by its sum: then k_ij isn't k_ji; divide by the root of both sums",
-    0.3158: "you divide each column by its sum: then k_ij isn't k_ji; divide by the root of both sums",
-    0.4602: "you divide by one root only: one for the row and one for the column",
-    1.0783: "you multiply by the roots: divide",
-    0.6000: "nothing has changed: divide by sqrt(D_i D_j)",
-    0.1200: "you divide by the sum of all entries: each cell has its own sum",
-    0.7559: "the diagonal is missing in the row sums: it counts in D",
-    0.5126: "those are lengths of rows (roots of sums of squares): D is a plain sum",
-    0.4257: "those are lengths of rows (roots of sums of squares): D is a plain sum",
-    1.0015: "you divide by means: D is a sum",
+# %% nbgrader={"grade": false, "grade_id": "weight-for-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_WEIGHT_SLIPS = {
+    2.0588: "the diagonal is in your sums: a cell is no pair with itself",
+    2.1000: "the diagonal is in your sums, and the mean isn't the median",
+    5.2500: "that is right for the mean of the cells: take the median",
+    3.8889: "that is right for the cell that pays most: take the median",
+    8.7500: "that is right for the cell that pays least: take the median",
+    0.2000: "that is one over the weight",
+    2.4500: "divide the total by the sum, don't multiply",
+    1.7500: "you divide by the sum of all entries: each cell has its own sum",
+    35.0: "the median of single prices isn't the median of what a cell pays in all: sum over j first",
+    11.6667: "the median of single prices isn't the median of what a cell pays in all: sum over j first",
+    5.8333: "the median of single prices isn't the median of what a cell pays in all: sum over j first",
+    10.0: "each pair is halved: a cell pays the full price of each of its pairs",
+    2.5: "each pair counts twice: a cell pays for each of its pairs once",
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "normalise-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "weight-for-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # Row sums 1.7, 1.9, 1.4: cells 0 and 1 get 0.6 / sqrt(1.7 * 1.9) = 0.334.
+    # The three cells' sums without themselves are 0.7, 0.9 and 0.4, so the median is 0.7.
     K = np.array([[1, 0.6, 0.1], [0.6, 1, 0.3], [0.1, 0.3, 1]])
     before = K.copy()
-    got = answer_array(normalise(K), "normalise")
-    assert np.array_equal(K, before), "normalise changed its argument: make a new array"
-    assert got.shape == (3, 3), f"expected the shape of K, (3, 3), got {got.shape}"
-    _explain("cells 0 and 1 get", got[0, 1], _NORMALISE_SLIPS)
-    by_hand = [[0.5882, 0.3338, 0.0648], [0.3338, 0.5263, 0.1839], [0.0648, 0.1839, 0.7143]]
-    np.testing.assert_allclose(got, by_hand, atol=1e-4, err_msg="K_ij / sqrt(D_i D_j)")
+    got = answer_array(weight_for(K, 3.5), "weight_for")
+    assert np.array_equal(K, before), "weight_for changed its argument: work on a copy"
+    assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
+    _explain("the weight is", got.item(), _WEIGHT_SLIPS, atol=1e-3)
+    np.testing.assert_allclose(got, 5, atol=1e-6, err_msg="3.5 / 0.7")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import crf
 
-    complaint = crf.check_normalise(normalise)
+    complaint = crf.check_weight_for(weight_for)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -467,7 +523,7 @@ _test()
 # 1. At each offset up to `REACH`, (0, 0) included, compute for all cells the two Gaussians of equation (4) without their weights, $K^{(1)}$ (place with `SIGMA_ALPHA`, state with
 #    `SIGMA_BETA`) and $K^{(2)}$ (place with `SIGMA_GAMMA`). A neighbour beyond the border doesn't exist: its $K$ is 0.
 # 2. $D^{(1)}$ and $D^{(2)}$, maps of H x W, are their sums over all offsets. Normalise: $k = $ `W1` $K^{(1)}_{ij} / \sqrt{D^{(1)}_i D^{(1)}_j}\; + $ `W2` $K^{(2)}_{ij} / \sqrt{D^{(2)}_i D^{(2)}_j}$.
-# 3. Start with $Q = g$ and do `UPDATES` updates as in task 3, all cells at once. The offset (0, 0) is no pair.
+# 3. Start with $Q = g$ and do `UPDATES` updates as in task 3 with Potts, all cells at once. The offset (0, 0) is no pair.
 #
 # Complete `refine`: it returns $Q$, `(C, H, W)`. (With these prices the free energy of the lecture's frame falls without damping too. The lecture shows two cells for which it doesn't.)
 
