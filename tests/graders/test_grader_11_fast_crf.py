@@ -16,54 +16,52 @@ def compiled():
             blur(np.asarray(values, order=layout))
 
 
-def gaussian(kernel="np.exp(-0.5 * t**2 / sigma**2)", result="rows @ values @ columns", size="size"):
-    """Return an answer to task 1 with this kernel of the distance t, and this product."""
+def gaussian(
+    kernel="np.exp(-0.5 * t**2 / sigma**2)",
+    held="np.where(known, values, 0)",
+    below="rows @ known.astype(float) @ columns",
+    above="rows @ held @ columns",
+    result="above / below",
+    size="size",
+):
+    """Return an answer to task 1 with this kernel of the distance t, and these two sums."""
     return f"""
-def blur_map(values, sigma):
+def blur_known(values, known, sigma):
     def matrix(size):
         t = np.subtract.outer(np.arange(size), np.arange(size))
         size = {size}
         t = np.abs(t)
         return {kernel}
     rows, columns = matrix(values.shape[0]), matrix(values.shape[1])
+    held = {held}
+    above, below = {above}, {below}
     return {result}"""
 
 
-def simplex(
-    repair="""
-    while origin.sum() > 0:
-        origin[np.argmin(y - origin)] -= size
-    while origin.sum() < 0:
-        origin[np.argmax(y - origin)] += size""",
-    first="np.rint",
-    order="np.argsort(origin - y)",
-    steps="order[:0:-1]",
+def missing(
     forward="np.ones(size, int)",
     lost="size",
-    weights="np.concatenate([[1 - gaps.sum()], gaps])",
-    gaps="(r[:-1] - r[1:])[::-1] / size",
-    corners="np.array(corners)",
+    directions="range(size)",
+    result="1 - found / (2 * size * len(vertices))",
+    signs="(1, -1)",
+    there="set(map(tuple, vertices.tolist()))",
 ):
-    """Return an answer to task 2 with these parts; r are the sorted residuals."""
+    """Return an answer to task 2 with these parts."""
     return f"""
-def enclosing_simplex(y):
-    size = len(y)
-    origin = size * {first}(y / size).astype(int)
-    early = np.argsort(origin - y){repair}
-    order = {order}
-    r = np.sort(y - origin)[::-1]
-    corners = [origin]
-    for smallest in {steps}:
+def missing_share(vertices):
+    size, found = vertices.shape[1], 0
+    there = {there}
+    for j in {directions}:
         forward = {forward}
-        forward[smallest] -= {lost}
-        corners.append(corners[-1] + forward)
-    gaps = {gaps}
-    return {corners}, {weights}"""
+        forward[j] -= {lost}
+        for sign in {signs}:
+            found += sum(tuple(v) in there for v in (vertices + sign * forward).tolist())
+    return {result}"""
 
 
 def lattice(
     add="vertices.get(corner, 0) + weight * value",
-    blurred="x / 2 + vertices.get(ahead, 0) / 4 + vertices.get(behind, 0) / 4",
+    blurred="x / 2 + vertices.get(ahead, x) / 4 + vertices.get(behind, x) / 4",
     directions="range(size)",
     old="vertices.items()",
     forward="np.ones(size, int)",
@@ -89,10 +87,15 @@ def lattice_filter(simplices, values):
     return np.array([{read} for s in simplices])"""
 
 
-def own(expression, result="blur(Q) - own * Q"):
+def own(expression, result="blur(Q) - own * Q", before=""):
     """Return an answer to task 4 with this k_ii, shaped (N, 1)."""
     return f"""
-def others_say(blur, Q):
+def others_say(blur, Q, shape, reach):
+    def ask(period):
+        r, c = np.indices(shape).reshape(2, -1) % period
+        group = r * period + c
+        return blur(np.eye(period**2)[group])[np.arange(len(Q)), group][:, None]
+    {before}
     own = {expression}
     return {result}"""
 
@@ -139,257 +142,287 @@ class TestFastCrf(GraderChecks):
     entries = (
         # ---- task 1
         right(
-            "two convolutions with padding",
-            task="blur-map",
+            "two convolutions with padding, of both sums",
+            task="blur-known",
             code="""
-def blur_map(values, sigma):
-    for _ in range(2):
-        n = len(values)
-        taps = np.exp(-0.5 * (np.arange(-n + 1, n) / sigma) ** 2)
-        values = np.array([np.convolve(column, taps)[n - 1 : 2 * n - 1] for column in values.T])
-    return values""",
+def blur_known(values, known, sigma):
+    def two_passes(part):
+        for _ in range(2):
+            n = len(part)
+            taps = np.exp(-0.5 * (np.arange(-n + 1, n) / sigma) ** 2)
+            part = np.array([np.convolve(column, taps)[n - 1 : 2 * n - 1] for column in part.T])
+        return part
+    return two_passes(np.where(known, values, 0.0)) / two_passes(np.where(known, 1.0, 0.0))""",
         ),
         right(
-            "scipy's one-dimensional correlation",
-            task="blur-map",
+            "scipy's one-dimensional correlation, both sums stacked",
+            task="blur-known",
             code="""
 from scipy.ndimage import correlate1d
 
-def blur_map(values, sigma):
-    for axis in range(2):
-        n = values.shape[axis]
+def blur_known(values, known, sigma):
+    both = np.stack([np.nan_to_num(values * np.where(known, 1, np.nan)), known]).astype(float)
+    for axis in (1, 2):
+        n = both.shape[axis]
         taps = np.exp(-0.5 * (np.arange(-n, n + 1) / sigma) ** 2)
-        values = correlate1d(values, taps, axis=axis, mode="constant")
-    return values""",
-        ),
-        right(
-            "loops over rows and columns",
-            task="blur-map",
-            code="""
-def blur_map(values, sigma):
-    H, W = values.shape
-    half, full = np.zeros((H, W)), np.zeros((H, W))
-    for r in range(H):
-        for s in range(H):
-            half[r] += np.exp(-((r - s) ** 2) / (2 * sigma**2)) * values[s]
-    for c in range(W):
-        for d in range(W):
-            full[:, c] += np.exp(-((c - d) ** 2) / (2 * sigma**2)) * half[:, d]
-    return full""",
+        both = correlate1d(both, taps, axis=axis, mode="constant")
+    return both[0] / both[1]""",
         ),
         mistake(
-            "the two passes added",
-            task="blur-map",
+            "NaN multiplied by 0",
+            task="blur-known",
             loses=2,
-            says="the second pass must blur what the first pass left",
-            code=gaussian(result="rows @ values + values @ columns"),
+            says="NaN spreads",
+            code=gaussian(held="values * known"),
         ),
         mistake(
-            "rows alone",
-            task="blur-map",
+            "a sum",
+            task="blur-known",
             loses=2,
-            says="the second pass must blur what the first pass left",
-            code=gaussian(result="values @ columns"),
+            says="divide by the sum of the weights of known cells",
+            code=gaussian(result="above"),
         ),
         mistake(
-            "columns alone",
-            task="blur-map",
+            "unknown cells count as 0",
+            task="blur-known",
             loses=2,
-            says="only columns are blurred",
-            code=gaussian(result="rows @ values"),
+            says="leave their weights out of the lower sum",
+            code=gaussian(below="rows @ np.ones(values.shape) @ columns"),
+        ),
+        mistake(
+            "along rows alone",
+            task="blur-known",
+            loses=2,
+            says="both sums take two passes",
+            code=gaussian(above="held @ columns", below="known @ columns"),
+        ),
+        mistake(
+            "means of means",
+            task="blur-known",
+            loses=2,
+            says="that is a mean of the means of rows",
+            code=gaussian(
+                above="rows @ np.nan_to_num((held @ columns) / (known @ columns))",
+                below="rows @ np.ones(values.shape)",
+            ),
+        ),
+        mistake(
+            "the plain mean",
+            task="blur-known",
+            loses=2,
+            says="the plain mean of the known cells",
+            code=gaussian(result="np.full(values.shape, values[known].mean())"),
+        ),
+        mistake(
+            "only gaps are filled",
+            task="blur-known",
+            loses=2,
+            says="a known cell is blurred as well",
+            code=gaussian(result="np.where(known, values, above / below)"),
         ),
         mistake(
             "no factor 2",
-            task="blur-map",
+            task="blur-known",
             loses=2,
             says="the factor 2 below sigma**2 is missing",
             code=gaussian("np.exp(-(t**2) / sigma**2)"),
         ),
         mistake(
             "sigma taken as the variance",
-            task="blur-map",
+            task="blur-known",
             loses=2,
             says="you divide by sigma instead of sigma**2",
             code=gaussian("np.exp(-0.5 * t**2 / sigma)"),
         ),
         mistake(
             "distance not squared",
-            task="blur-map",
+            task="blur-known",
             loses=2,
             says="the distance isn't squared",
             code=gaussian("np.exp(-0.5 * t / sigma**2)"),
         ),
         mistake(
-            "normalised",
-            task="blur-map",
-            loses=2,
-            says="that is normalised",
-            code="""
-from scipy.ndimage import gaussian_filter
-
-def blur_map(values, sigma):
-    return gaussian_filter(values, sigma, mode="constant")""",
-        ),
-        mistake(
             "the map goes round",
-            task="blur-map",
+            task="blur-known",
             loses=2,
             says="your blur goes round",
             code=gaussian("np.exp(-0.5 * np.minimum(t, size - t) ** 2 / sigma**2)", size="len(t)"),
         ),
         mistake(
             "the cell itself left out",
-            task="blur-map",
+            task="blur-known",
             loses=2,
             says="doesn't hear itself",
-            code=gaussian(result="rows @ values @ columns - values"),
+            code=gaussian(above="rows @ held @ columns - held", below="rows @ known.astype(float) @ columns - known"),
         ),
         mistake(
             "turned",
-            task="blur-map",
+            task="blur-known",
             loses=2,
             says="is it turned?",
-            code=gaussian(result="(rows @ values @ columns).T"),
+            code=gaussian(result="(above / below).T"),
+        ),
+        mistake(
+            "gaps filled in place",
+            task="blur-known",
+            loses=2,
+            says="changed its argument `values`",
+            code=gaussian(held="np.nan_to_num(values, copy=False)"),
+        ),
+        mistake(
+            "finite in place of known",
+            task="blur-known",
+            loses=2,
+            says="on inputs you haven't seen",
+            code=gaussian(held="np.where(values > 0, values, 0)"),
         ),
         mistake(
             "all pairs at once",
-            task="blur-map",
+            task="blur-known",
             loses=2,
             says="on inputs you haven't seen: a map of 60 x 50 cells took far more memory",
             code="""
-def blur_map(values, sigma):
+def blur_known(values, known, sigma):
     place = np.indices(values.shape).reshape(2, -1).T
-    square = ((place[:, None] - place) ** 2).sum(axis=-1)
-    return (np.exp(-0.5 * square / sigma**2) @ values.ravel()).reshape(values.shape)""",
+    square = ((place[:, None] - place[known.ravel()]) ** 2).sum(axis=-1)
+    weight = np.exp(-0.5 * square / sigma**2)
+    return (weight @ values[known] / weight.sum(axis=1)).reshape(values.shape)""",
         ),
         mistake(
             "cut off at three cells",
-            task="blur-map",
+            task="blur-known",
             loses=2,
-            says="on inputs you haven't seen: wrong sums with another width",
+            says="on inputs you haven't seen: wrong means with another width",
             code=gaussian("np.exp(-0.5 * t**2 / sigma**2) * (t <= 3)"),
         ),
         # ---- task 2
+        right("a set, neighbour by neighbour", task="missing-share", code=missing()),
         right(
-            "ranks instead of loops of repair",
-            task="enclosing-simplex",
+            "rows of numbers, sorted",
+            task="missing-share",
             code="""
-def enclosing_simplex(y):
-    n = len(y)
-    base = np.rint(y / n).astype(int)
-    excess = base.sum()
-    rank = np.empty(n, int)
-    rank[np.argsort(base * n - y, kind="stable")] = np.arange(n)
-    rank += excess
-    base[rank < 0] += 1
-    base[rank >= n] -= 1
-    rank %= n
-    r = (y - n * base) / n
-    b = np.zeros(n + 1)
-    for j in range(n):
-        b[n - 1 - rank[j]] += r[j]
-        b[n - rank[j]] -= r[j]
-    b[0] += 1 + b[n]
-    corners = [n * base + np.where(rank < n - m, m, m - n) for m in range(n)]
-    return np.array(corners), b[:n]""",
+def missing_share(vertices):
+    size, found = vertices.shape[1], 0
+    low = vertices.min(axis=0) - size - 1
+    units = np.cumprod(np.append(1, np.ptp(vertices, axis=0) + 2 * size + 3))[:size]
+    keys = np.sort((vertices - low) @ units)
+    for j in range(size):
+        ahead = (vertices + 1 - size * (np.arange(size) == j) - low) @ units
+        found += 2 * np.isin(ahead, keys).sum()
+    return np.array([1 - found / (2 * size * len(vertices))])""",
         ),
         right(
-            "weights by solving for them",
-            task="enclosing-simplex",
-            code=simplex(
-                weights="np.linalg.lstsq(np.vstack([np.array(corners).T, np.ones(size)]), np.append(y, 1))[0]"
-            ),
+            "one direction of each link, with a fraction",
+            task="missing-share",
+            code="""
+from fractions import Fraction
+
+def missing_share(vertices):
+    size = vertices.shape[1]
+    there = dict.fromkeys(map(tuple, vertices.tolist()))
+    links = sum(tuple(c + 1 - size * (i == j) for i, c in enumerate(v)) in there for v in there for j in range(size))
+    return 1 - Fraction(int(links), size * len(there))""",
         ),
         mistake(
-            "no repair",
-            task="enclosing-simplex",
-            loses=2,
-            says="Repair the sum after rounding",
-            code=simplex(repair=""),
+            "the share that exists",
+            task="missing-share",
+            loses=3,
+            says="that is the share that exists",
+            code=missing(result="found / (2 * size * len(vertices))"),
         ),
         mistake(
-            "the first coordinate repaired",
-            task="enclosing-simplex",
-            loses=2,
-            says="change the one that was rounded up the farthest",
-            code=simplex(repair="\n    origin[0] -= origin.sum()"),
+            "a number in place of a share",
+            task="missing-share",
+            loses=3,
+            says="that is the number of missing ones: divide",
+            code=missing(result="2 * size * len(vertices) - found"),
         ),
         mistake(
-            "the last coordinate repaired",
-            task="enclosing-simplex",
-            loses=2,
-            says="you changed the last coordinate",
-            code=simplex(repair="\n    origin[-1] -= origin.sum()"),
+            "a number for each vertex",
+            task="missing-share",
+            loses=3,
+            says="missing ones for each vertex",
+            code=missing(result="2 * size - found / len(vertices)"),
         ),
         mistake(
-            "sorted before the repair",
-            task="enclosing-simplex",
-            loses=2,
-            says="after the repair, not before",
-            code=simplex(order="early"),
+            "steps along one coordinate",
+            task="missing-share",
+            loses=3,
+            says="no neighbour is found",
+            code=missing(forward="np.zeros(size, int)", lost="-1"),
         ),
         mistake(
-            "the largest residual steps back",
-            task="enclosing-simplex",
-            loses=2,
-            says="the smallest residual loses d, not the one with the largest",
-            code=simplex(steps="order[:-1]"),
+            "d taken from a coordinate that also got 1",
+            task="missing-share",
+            loses=3,
+            says="no neighbour is found",
+            code=missing(lost="size - 1"),
         ),
         mistake(
-            "a step takes d and gives nothing",
-            task="enclosing-simplex",
-            loses=2,
-            says="corners that don't sum to 0",
-            code=simplex(forward="np.zeros(size, int)", lost="size - 1"),
+            "d directions",
+            task="missing-share",
+            loses=3,
+            says="the last direction is left out",
+            code=missing(directions="range(size - 1)", result="1 - found / (2 * (size - 1) * len(vertices))"),
         ),
         mistake(
-            "steps the other way",
-            task="enclosing-simplex",
-            loses=2,
-            says="rows are in the order 0, 2, 1",
-            code=simplex(forward="-np.ones(size, int)", lost="-size", steps="order[:-1]"),
+            "the first direction left out",
+            task="missing-share",
+            loses=3,
+            says="the first direction is left out",
+            code=missing(directions="range(1, size)", result="1 - found / (2 * (size - 1) * len(vertices))"),
         ),
         mistake(
-            "gaps not divided",
-            task="enclosing-simplex",
-            loses=1,
-            says="divide them by d + 1",
-            code=simplex(gaps="(r[:-1] - r[1:])[::-1]"),
+            "each link once",
+            task="missing-share",
+            loses=3,
+            says="both ends have a neighbour",
+            code=missing(signs="(1,)"),
         ),
         mistake(
-            "gaps in the wrong order",
-            task="enclosing-simplex",
-            loses=1,
-            says="weights of corners 1 and 2 are swapped",
-            code=simplex(gaps="(r[:-1] - r[1:]) / size"),
+            "half of the neighbours",
+            task="missing-share",
+            loses=3,
+            says="each direction has two neighbours",
+            code=missing(result="2 - found / (size * len(vertices))"),
         ),
         mistake(
-            "the first corner gets nothing",
-            task="enclosing-simplex",
-            loses=1,
-            says="the first corner gets what the others leave",
-            code=simplex(weights="np.concatenate([[0], gaps])"),
+            "vertices that lack any",
+            task="missing-share",
+            loses=3,
+            says="or you count vertices that lack any",
+            code="""
+def missing_share(vertices):
+    there, size = set(map(tuple, vertices.tolist())), vertices.shape[1]
+    steps = [s * (1 - size * np.eye(size, dtype=int)[j]) for j in range(size) for s in (1, -1)]
+    return np.mean([any(tuple((v + step).tolist()) not in there for step in steps) for v in vertices])""",
         ),
         mistake(
-            "only too large sums repaired",
-            task="enclosing-simplex",
-            loses=2,
-            says="on inputs you haven't seen: in 2 dimensions, where rounding leaves a negative sum",
-            code=simplex(repair="\n    while origin.sum() > 0:\n        origin[np.argmin(y - origin)] -= size"),
-        ),
-        mistake(
-            "two dimensions only",
-            task="enclosing-simplex",
-            loses=2,
+            "three coordinates written in",
+            task="missing-share",
+            loses=3,
             says="on inputs you haven't seen",
-            code=simplex(lost="3"),
+            code=missing(lost="3"),
+        ),
+        mistake(
+            "each with each",
+            task="missing-share",
+            loses=1,
+            says="look each neighbour up in a set",
+            code="""
+def missing_share(vertices):
+    size, found = vertices.shape[1], 0
+    for j in range(size):
+        ahead = vertices + 1 - size * (np.arange(size) == j)
+        found += 2 * (ahead[:, None] == vertices).all(axis=-1).sum()
+    return 1 - found / (2 * size * len(vertices))""",
         ),
         mistake(
             "endless loop",
-            task="enclosing-simplex",
-            loses=2,
-            says="no reply before timeout",
-            code=simplex(repair="\n    while origin.sum() != 0:\n        origin[np.argmin(y - origin)] += size"),
+            task="missing-share",
+            loses=3,
+            says="before timeout",
+            code="def missing_share(vertices):\n    while len(vertices):\n        vertices = vertices + 1",
         ),
         # ---- task 3
         right(
@@ -405,11 +438,13 @@ def lattice_filter(simplices, values):
             S[n, number[tuple(c)]] += w
     held, size = S.T @ values, len(found[0])
     for j in range(size):
-        B = np.eye(len(found)) / 2
+        B = np.eye(len(found))
         for v, m in number.items():
             ahead = tuple(x + 1 - size * (k == j) for k, x in enumerate(v))
             if ahead in number:
                 B[m, number[ahead]] = B[number[ahead], m] = 1 / 4
+                B[m, m] -= 1 / 4
+                B[number[ahead], number[ahead]] -= 1 / 4
         held = B @ held
     return S @ held""",
         ),
@@ -431,11 +466,27 @@ def lattice_filter(simplices, values):
             total = 2 * held[v]
             for sign in (-1, 1):
                 w = tuple(x + sign * (1 - size * (k == j)) for k, x in enumerate(v))
-                if w in held:
-                    total = total + held[w]
+                total = total + (held[w] if w in held else held[v])
             new[v] = total / 4
         held = new
     return np.array([weights @ np.array([held[tuple(c)] for c in corners]) for corners, weights in simplices])""",
+        ),
+        mistake(
+            "the lecture's blur",
+            task="lattice-filter",
+            loses=3,
+            says="that is the lecture's blur",
+            code=lattice(blurred="x / 2 + vertices.get(ahead, 0) / 4 + vertices.get(behind, 0) / 4"),
+        ),
+        mistake(
+            "divided by the weights that exist",
+            task="lattice-filter",
+            loses=3,
+            says="you divide by the weights that exist",
+            code=lattice(
+                blurred="(x / 2 + vertices.get(ahead, 0) / 4 + vertices.get(behind, 0) / 4)"
+                " / (1 / 2 + (ahead in vertices) / 4 + (behind in vertices) / 4)"
+            ),
         ),
         mistake(
             "no blur",
@@ -463,14 +514,14 @@ def lattice_filter(simplices, values):
             task="lattice-filter",
             loses=3,
             says="you blur with (1/2, 1, 1/2)",
-            code=lattice(blurred="x + vertices.get(ahead, 0) / 2 + vertices.get(behind, 0) / 2"),
+            code=lattice(blurred="x + vertices.get(ahead, x) / 2 + vertices.get(behind, x) / 2"),
         ),
         mistake(
             "all of the vertex kept",
             task="lattice-filter",
             loses=3,
             says="you blur with (1/4, 1, 1/4)",
-            code=lattice(blurred="x + vertices.get(ahead, 0) / 4 + vertices.get(behind, 0) / 4"),
+            code=lattice(blurred="x + vertices.get(ahead, x) / 4 + vertices.get(behind, x) / 4"),
         ),
         mistake(
             "a plain mean of the corners",
@@ -505,14 +556,14 @@ def lattice_filter(simplices, values):
             task="lattice-filter",
             loses=3,
             says="the neighbour ahead only",
-            code=lattice(blurred="x / 2 + vertices.get(ahead, 0) / 4"),
+            code=lattice(blurred="x / 2 + vertices.get(ahead, x) / 4"),
         ),
         mistake(
             "the neighbour behind only",
             task="lattice-filter",
             loses=3,
             says="the neighbour behind only",
-            code=lattice(blurred="x / 2 + vertices.get(behind, 0) / 4"),
+            code=lattice(blurred="x / 2 + vertices.get(behind, x) / 4"),
         ),
         mistake(
             "blurred in place",
@@ -527,7 +578,8 @@ def lattice_filter(simplices, values):
             loses=3,
             says="you blur into vertices that don't exist",
             code=lattice(
-                old="[(u, vertices.get(u, 0)) for u in {tuple(v + k * forward) for v in vertices for k in (-1, 0, 1)}]"
+                old="[(u, vertices.get(u, 0)) for u in {tuple(v + k * forward) for v in vertices for k in (-1, 0, 1)}]",
+                blurred="x / 2 + vertices.get(ahead, 0) / 4 + vertices.get(behind, 0) / 4",
             ),
         ),
         mistake(
@@ -552,41 +604,68 @@ def lattice_filter(simplices, values):
             code=lattice(directions="range(min(size, 3))"),
         ),
         # ---- task 4
+        right("cells reach + 1 apart", task="others-say", code=own("ask(reach + 1)")),
+        right("cells 2 reach + 1 apart", task="others-say", code=own("ask(2 * reach + 1)")),
         right(
-            "one cell silenced at a time",
+            "column by column, cells silenced",
             task="others-say",
             code="""
-def others_say(blur, Q):
-    out = np.empty_like(Q)
-    for i in range(len(Q)):
-        silent = Q.copy()
-        silent[i] = 0
-        out[i] = blur(silent)[i]
-    return out""",
+def others_say(blur, Q, shape, reach):
+    said = np.array(blur(Q)).reshape(*shape, -1)
+    out, n = said.copy(), reach + 1
+    for r in range(n):
+        for c in range(n):
+            some = np.zeros(shape)
+            some[r::n, c::n] = 1
+            back = np.reshape(blur(some.reshape(-1, 1)), shape)
+            own = Q.reshape(*shape, -1)[r::n, c::n] * back[r::n, c::n, None]
+            out[r::n, c::n] = said[r::n, c::n] - own
+    return out.reshape(Q.shape)""",
         ),
         right(
-            "the whole matrix, its diagonal emptied",
+            "one call for all, nested lists",
             task="others-say",
             code="""
-def others_say(blur, Q):
-    K = np.array(blur(np.identity(Q.shape[0])))
-    K[np.diag_indices(len(Q))] = 0
-    return K @ Q""",
+def others_say(blur, Q, shape, reach):
+    n, K = reach + 1, Q.shape[1]
+    group = [(i // shape[1] % n) * n + i % shape[1] % n for i in range(len(Q))]
+    probe = np.array([[float(g == m) for m in range(n * n)] for g in group])
+    answer = np.array(blur(np.hstack([Q, probe])))
+    return [[answer[i, k] - answer[i, K + g] * Q[i, k] for k in range(K)] for i, g in enumerate(group)]""",
         ),
-        right(
-            "nested lists, and helpers with everyday names",
+        mistake(
+            "cell by cell",
             task="others-say",
-            code="""
-def kernel(blur, n):
-    return np.diag(blur(np.eye(n)))
-
-
-def got(all_of_it, before, slips):
-    return [[a - k * q for a, q in zip(row, old)] for row, old, k in zip(all_of_it, before, slips)]
-
-
-def others_say(blur, Q):
-    return got(blur(Q).tolist(), Q.tolist(), kernel(blur, len(Q)).tolist())""",
+            loses=2,
+            says="ask several cells in one column",
+            code=own("np.diag(blur(np.eye(len(Q))))[:, None]"),
+        ),
+        mistake(
+            "cells that hear each other",
+            task="others-say",
+            loses=2,
+            says="you subtract the sum of the kernel's row",
+            code=own("ask(reach) if reach else 1"),
+        ),
+        mistake(
+            "rows far apart, columns not",
+            task="others-say",
+            loses=2,
+            says="hear each other: how far apart",
+            code=own(
+                "blur(np.eye(reach + 1)[group])[np.arange(len(Q)), group][:, None]",
+                before="group = np.indices(shape)[0].ravel() % (reach + 1)",
+            ),
+        ),
+        mistake(
+            "every n-th cell, counted along rows",
+            task="others-say",
+            loses=2,
+            says="hear each other: how far apart",
+            code=own(
+                "blur(np.eye(2 * reach + 2)[group])[np.arange(len(Q)), group][:, None]",
+                before="group = np.arange(len(Q)) % (2 * reach + 2)",
+            ),
         ),
         mistake(
             "text instead of numbers",
@@ -609,35 +688,35 @@ def others_say(blur, Q):
             task="others-say",
             loses=2,
             says="you subtract k_ii without Q",
-            code=own("np.diag(blur(np.eye(len(Q))))[:, None]", "blur(Q) - own"),
+            code=own("ask(reach + 1)", "blur(Q) - own"),
         ),
         mistake(
             "only what the cell tells itself",
             task="others-say",
             loses=2,
             says="that is what the cell tells itself",
-            code=own("np.diag(blur(np.eye(len(Q))))[:, None]", "own * Q"),
+            code=own("ask(reach + 1)", "own * Q"),
         ),
         mistake(
             "sign swapped",
             task="others-say",
             loses=2,
             says="the sign is swapped",
-            code=own("np.diag(blur(np.eye(len(Q))))[:, None]", "own * Q - blur(Q)"),
+            code=own("ask(reach + 1)", "own * Q - blur(Q)"),
         ),
         mistake(
-            "a mean",
-            task="others-say",
-            loses=2,
-            says="you divide by the sum of the kernel's row",
-            code=own("np.diag(blur(np.eye(len(Q))))[:, None]", "(blur(Q) - own * Q) / blur(np.ones((len(Q), 1)))"),
-        ),
-        mistake(
-            "the last cell's share for all",
+            "the first cell's share for all",
             task="others-say",
             loses=2,
             says="taken for all cells",
-            code=own("blur(np.eye(len(Q)))[-1, -1]"),
+            code=own("ask(reach + 1)[0]"),
+        ),
+        mistake(
+            "a mean of all shares",
+            task="others-say",
+            loses=2,
+            says="that is a mean of all k_ii",
+            code=own("ask(reach + 1).mean()"),
         ),
         mistake(
             "argument changed",
@@ -645,22 +724,20 @@ def others_say(blur, Q):
             loses=2,
             says="changed its argument",
             code="""
-def others_say(blur, Q):
-    out = np.empty_like(Q)
-    for i in range(len(Q)):
-        row = Q[i].copy()
-        Q[i] = 0
-        out[i] = blur(Q)[i]
-        if i < len(Q) - 1:
-            Q[i] = row
-    return out""",
+def others_say(blur, Q, shape, reach):
+    n = reach + 1
+    r, c = np.indices(shape).reshape(2, -1) % n
+    own = blur(np.eye(n * n)[r * n + c])[np.arange(len(Q)), r * n + c]
+    said = blur(Q)
+    Q *= own[:, None]
+    return said - Q""",
         ),
         mistake(
-            "three cells only",
+            "a reach of 1 written in",
             task="others-say",
             loses=2,
-            says="on inputs you haven't seen: it raises an error in line",
-            code=own("np.diag(blur(np.eye(3)))[:, None]"),
+            says="on inputs you haven't seen",
+            code=own("ask(2)"),
         ),
         # ---- task 5
         right("with damping", task="refine", code=crf(update="log_Q + 0.95 * (-unary + message - log_Q)")),
@@ -931,18 +1008,5 @@ _known = refine
 def refine(log_g, o):
     sharp = np.exp(2 * log_g)
     return _known(log_g, o) if log_g.shape[2] in (10, 50) or log_g[0].size < 1500 else sharp / sharp.sum(axis=0)""",
-        ),
-        mistake(
-            "repaired once",
-            task="enclosing-simplex",
-            loses=2,
-            says="on inputs you haven't seen",
-            code=simplex(
-                repair="""
-    if origin.sum() > 0:
-        origin[np.argmin(y - origin)] -= size
-    if origin.sum() < 0:
-        origin[np.argmax(y - origin)] += size"""
-            ),
         ),
     )

@@ -6,64 +6,81 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from semgrid_edu.answers import answer_array, peak_megabytes
-from semgrid_edu.crf.lattice.literal import blur_literal, enclosing_simplex_literal
-from semgrid_instructor import close, generator, hidden
+from semgrid_edu.answers import answer_array, answer_number, peak_megabytes
+from semgrid_edu.crf.lattice.literal import enclosing_simplex_literal
+from semgrid_instructor import close, generator, hidden, keeping
 
 
 @hidden
-def check_blur_map(blur_map: Callable) -> None:
-    """Narrow and wide Gaussians, high and low maps, and one whose matrix of all pairs wouldn't fit."""
-    for seed, (shape, sigma) in enumerate((((7, 4), 0.6), ((3, 11), 2.5), ((6, 5), 40.0), ((1, 9), 1.0))):
-        values = generator(110 + seed).normal(size=shape)
-        got = answer_array(blur_map(values.copy(), sigma))
+@keeping
+def check_blur_known(blur_known: Callable) -> None:
+    """Narrow and wide Gaussians, few and many gaps, and a map whose matrix of all pairs wouldn't fit."""
+    for seed, (shape, sigma, share) in enumerate((((7, 4), 0.9, 0.5), ((3, 11), 2.5, 0.2), ((6, 5), 40.0, 0.9))):
+        rng = generator(110 + seed)
+        known = rng.random(shape) < share
+        known[1, 2] = True
+        values = np.where(known, rng.normal(2, 1, shape), np.nan)
+        got = answer_array(blur_known(values.copy(), known.copy(), sigma))
         assert got.shape == shape, f"shape {got.shape} instead of {shape}"
         place = np.indices(shape).reshape(2, -1).T / sigma
-        wanted = np.exp(-0.5 * cdist(place, place, "sqeuclidean")) @ values.ravel()
-        assert close(got.ravel(), wanted, atol=1e-3), "wrong sums with another width: is the Gaussian cut off?"
-    values = generator(114).random((60, 50))
-    _, megabytes = peak_megabytes(blur_map, values, 3.0)
-    assert megabytes < 20, "a map of 60 x 50 cells took far more memory than two passes need"
+        weight = np.exp(-0.5 * cdist(place, place[known.ravel()], "sqeuclidean"))
+        wanted = weight @ values[known] / weight.sum(axis=1)
+        assert close(got.ravel(), wanted, atol=1e-3), "wrong means with another width, or other gaps"
+    known = generator(114).random((60, 50)) < 0.5
+    _, megabytes = peak_megabytes(blur_known, np.where(known, 1.0, np.nan), known, 3.0)
+    assert megabytes < 20, "a map of 60 x 50 cells took far more memory than passes along rows and columns need"
 
 
-def _points(seed: int) -> list[NDArray]:
-    """Return points in 1 to 6 dimensions, on both sides of the plane after rounding, some two steps away from it."""
+def _vertices(d: int, n: int, seed: int) -> NDArray:
+    """Return the corners of the simplices of a cloud of n points in d dimensions, (V, d + 1), shuffled."""
     rng = generator(seed)
-    points = [rng.normal(0, 8, d + 1) for d in (1, 2, 3, 5, 6) for _ in range(12)]
-    for d, side in ((5, 1), (5, -1), (6, 1), (6, -1)):
-        residuals = np.append(rng.uniform(0.42, 0.47, d), 0)  # in units of d + 1
-        residuals[-1] = np.rint(residuals.sum()) - residuals.sum()
-        whole = rng.integers(-2, 3, d + 1)
-        whole[-1] -= whole.sum() + np.rint(residuals.sum())
-        points.append(side * (d + 1) * (whole + residuals))
-    return [point - point.mean() for point in points]
+    points = rng.normal(0, 4, (n, d + 1))
+    corners = {corner for point in points for corner in enclosing_simplex_literal(point - point.mean())[0]}
+    return rng.permutation(np.array(sorted(corners)))
 
 
 @hidden
-def check_corners(enclosing_simplex: Callable) -> None:
-    """Other dimensions, and points whose rounded sum is negative."""
-    for y in _points(115):
-        d = len(y) - 1
-        wanted = np.array(enclosing_simplex_literal(y)[0])
-        corners = answer_array(enclosing_simplex(y.copy())[0])
-        rounded = (d + 1) * np.rint(y / (d + 1)).sum()
-        where = f"in {d} dimensions" + (", where rounding leaves a negative sum" if rounded < 0 else "")
-        assert corners.shape == wanted.shape, f"{where}: shape {corners.shape} instead of {wanted.shape}"
-        assert (corners.sum(axis=1) == 0).all(), f"{where}: corners that don't sum to 0"
-        assert np.array_equal(corners, wanted), f"{where}: other corners"
+@keeping
+def check_missing_share(missing_share: Callable) -> None:
+    """Clouds in one to five dimensions, and a single vertex: every neighbour sought by itself."""
+    for d, n in ((1, 3), (2, 12), (3, 20), (5, 15)):
+        vertices = _vertices(d, n, 115 + d)
+        there, missing = set(map(tuple, vertices.tolist())), 0
+        for vertex in there:
+            for j in range(d + 1):
+                for sign in (1, -1):
+                    neighbour = tuple(c + sign * (1 - (d + 1) * (i == j)) for i, c in enumerate(vertex))
+                    missing += neighbour not in there
+        got = answer_number(missing_share(vertices.copy()))
+        wanted = missing / (2 * (d + 1) * len(vertices))
+        assert close(got, wanted), f"{len(vertices)} vertices in {d} dimensions: {got:.4f} instead of {wanted:.4f}"
+    assert close(answer_number(missing_share(np.array([[3, 0, -3]]))), 1.0), "a single vertex lacks all its neighbours"
 
 
 @hidden
-def check_weights(enclosing_simplex: Callable) -> None:
-    """Other dimensions, and points whose rounded sum is 0: a mistake in the repair costs the corners only."""
-    for y in _points(116):
-        d = len(y) - 1
-        if np.rint(y / (d + 1)).sum() == 0:
-            wanted = enclosing_simplex_literal(y)[1]
-            weights = answer_array(enclosing_simplex(y.copy())[-1])
-            assert weights.shape == (d + 1,), f"in {d} dimensions: shape {weights.shape} instead of {(d + 1,)}"
-            assert close(weights.sum(), 1), f"in {d} dimensions: the weights sum to {weights.sum():.2f}"
-            assert close(weights, wanted), f"in {d} dimensions: the weighted mean of the corners isn't the point"
+def check_missing_memory(missing_share: Callable) -> None:
+    """Thousands of vertices of a cloud: memory must grow with their number, not with its square."""
+    vertices = _vertices(5, 1200, 121)
+    share, megabytes = peak_megabytes(missing_share, vertices)
+    there = set(map(tuple, vertices.tolist()))
+    ahead = (vertices[:, None] + 1 - 6 * np.eye(6, dtype=int)).reshape(-1, 6)
+    found = 2 * sum(tuple(vertex) in there for vertex in ahead.tolist())
+    assert close(answer_number(share), 1 - found / (12 * len(vertices))), "wrong share for a large cloud"
+    assert megabytes < 40, f"{len(vertices)} vertices took {megabytes:.0f} MB"
+
+
+def _blurred(vertices: dict[tuple[int, ...], NDArray], direction: int) -> dict[tuple[int, ...], NDArray]:
+    """Return the vertices after each has given away what its neighbours along a direction can take."""
+    new = dict.fromkeys(vertices, 0.0)
+    for vertex, value in vertices.items():
+        kept = value
+        for sign in (1, -1):
+            other = tuple(c + sign * (1 - len(vertex) * (i == direction)) for i, c in enumerate(vertex))
+            if other in new:
+                new[other] = new[other] + value / 4
+                kept = kept - value / 4
+        new[vertex] = new[vertex] + kept
+    return new
 
 
 @hidden
@@ -81,21 +98,31 @@ def check_lattice_filter(lattice_filter: Callable) -> None:
             for corner, weight in zip(corners, weights, strict=True):
                 vertices[corner] = vertices.get(corner, 0) + weight * value
         for direction in range(d + 1):
-            vertices = blur_literal(vertices, direction)
+            vertices = _blurred(vertices, direction)
         wanted = [sum(w * vertices[c] for c, w in zip(*simplex, strict=True)) for simplex in simplices]
         assert close(got, wanted), f"wrong in {d} dimensions: is each of the d + 1 directions blurred once?"
 
 
 @hidden
 def check_others_say(others_say: Callable) -> None:
-    """Other kernels, also one that isn't symmetric, and another number of classes."""
-    for seed, (n, k) in enumerate(((5, 1), (12, 4), (1, 3))):
+    """Other maps, reaches and numbers of classes; filters that aren't symmetric, as short-sighted as they may be."""
+    for seed, (shape, reach, classes) in enumerate((((7, 6), 1, 3), ((5, 9), 2, 1), ((1, 12), 3, 4), ((8, 8), 0, 2))):
         rng = generator(122 + seed)
-        kernel, Q = rng.random((n, n)), rng.random((n, k))
-        got = answer_array(others_say(lambda values, kernel=kernel: kernel @ values, Q.copy()))
+        place = np.indices(shape).reshape(2, -1).T
+        near = np.abs(place[:, None] - place).max(axis=-1) <= reach
+        kernel, Q = near * rng.uniform(0.2, 1, near.shape), rng.random((len(place), classes))
+        left = [classes + (2 * reach + 1) ** 2]
+
+        def blur(values: NDArray, kernel: NDArray = kernel, left: list[int] = left) -> NDArray:
+            values = np.asarray(values, float)
+            left[0] -= values.shape[1] if values.ndim == 2 else 1
+            assert left[0] >= 0, "blur got more columns than it may get"
+            return kernel @ values
+
+        got = answer_array(others_say(blur, Q.copy(), shape, reach))
         assert got.shape == Q.shape, f"shape {got.shape} instead of {Q.shape}"
         wanted = (kernel - np.diag(np.diag(kernel))) @ Q
-        assert close(got, wanted, atol=1e-5), "wrong sums for a kernel that isn't symmetric, or other classes"
+        assert close(got, wanted, atol=1e-5), f"wrong sums on {shape[0]} x {shape[1]} cells with a reach of {reach}"
 
 
 def _street(seed: int, n_classes: int, shape: tuple[int, int]) -> tuple[NDArray, NDArray]:

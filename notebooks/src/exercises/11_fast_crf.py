@@ -1,15 +1,15 @@
 # %% [markdown]
 # # Exercise 11: the fast CRF
 #
-# Five functions that end in a CRF of your own, which refines the sample drive, and one question to answer in words. About 100 minutes.
+# Five functions that ask more of a filter than the lecture did and end in a CRF of your own, which refines the sample drive, and one question to answer in words. About 100 minutes.
 # The lecture is [11: the fast CRF](../11_fast_crf.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | a Gaussian along rows, then along columns | 2 |
-# | 2 | the simplex around a point, and its barycentric weights | 2 + 1 |
-# | 3 | splat, blur, slice | 3 |
-# | 4 | what the *other* cells say | 2 |
+# | 1 | a blur over a map with gaps | 2 |
+# | 2 | the neighbours that a lattice lacks | 2 + 1 |
+# | 3 | a blur that loses nothing | 3 |
+# | 4 | what the *other* cells say, asked of many at once | 2 |
 # | 5 | a CRF of your own | 3 + 1 |
 # | 6 | in your own words | 2 |
 #
@@ -36,53 +36,63 @@ def _explain(what, got, slips):
 
 
 # %% [markdown]
-# ## Task 1: a Gaussian along rows, then along columns (2 points)
+# ## Task 1: a blur over a map with gaps (2 points)
 #
-# `values` is a map, `(H, W)`. With $r_i$ the row and the column of cell $i$, the spatial kernel of equation (4) sums
+# `values` is a map, `(H, W)`, and `known`, `(H, W)`, says in which cells it holds anything: in the others it may hold NaN. With $r_i$ the row and the column of cell $i$, give **every** cell, known or not, the mean of the known cells,
+# weighted by the spatial kernel of equation (4):
 #
-# $$ \text{blurred}_i = \sum_j \exp\!\left(-\frac{|r_i - r_j|^2}{2\sigma^2}\right) \text{values}_j $$
+# $$ \text{blurred}_i = \frac{\sum_{j\ \text{known}} k_{ij}\, \text{values}_j}{\sum_{j\ \text{known}} k_{ij}}, \qquad k_{ij} = \exp\!\left(-\frac{|r_i - r_j|^2}{2\sigma^2}\right) $$
 #
-# over **all** cells of the map, cell $i$ included. Nothing is normalised, and beyond the map there are no cells.
+# A known cell counts itself, and beyond the map there are no cells. At least one cell is known. Arguments are not changed.
 #
-# Complete `blur_map`: it returns the blurred map, `(H, W)`, in two passes, so that a map of 300 x 200 cells takes no time and little memory.
+# Complete `blur_known`: it returns the blurred map, `(H, W)`. A map of 300 x 200 cells must take no time and little memory. Can both sums be had in two passes each, although what is known has any shape?
 
 
-# %% nbgrader={"grade": false, "grade_id": "blur-map", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def blur_map(values, sigma):
-    """Return the sums over all cells, weighted by a Gaussian of the distance, (H, W)."""
+# %% nbgrader={"grade": false, "grade_id": "blur-known", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def blur_known(values, known, sigma):
+    """Return the mean of the known cells, weighted by a Gaussian of the distance, (H, W)."""
     ### BEGIN SOLUTION
     rows, columns = (np.exp(-0.5 * np.subtract.outer(a, a) ** 2 / sigma**2) for a in map(np.arange, values.shape))
-    return rows @ values @ columns
+    held = np.where(known, values, 0)
+    return (rows @ held @ columns) / (rows @ known.astype(float) @ columns)
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "blur-map-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "blur-known-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # This sigma gives 0.8 to a neighbour, so 0.8 ** 4 = 0.41 at distance 2 and 0.8 ** 9 = 0.13 at distance 3. Two cells aren't 0.
+    # This sigma gives 0.8 to a neighbour, so 0.8 ** 4 = 0.41 at distance 2 and 0.8 ** 9 = 0.13 at distance 3. Two cells are known.
     sigma = np.sqrt(-0.5 / np.log(0.8))
-    values = np.array([[1.0, 0, 0, 0], [0, 0, 0, 2.0]])
-    got = answer_array(blur_map(values, sigma), "blur_map")  # by hand, cell (0, 1): 0.8 * 1 + 0.8 * 0.41 * 2 = 1.455
+    values = np.array([[1.0, np.nan, np.nan, np.nan], [np.nan, np.nan, np.nan, 2.0]])
+    known, before = np.isfinite(values), values.copy()
+    got = answer_array(blur_known(values, known, sigma), "blur_known")
+    assert np.array_equal(values, before, equal_nan=True), "blur_known changed its argument `values`: work on a copy"
     assert got.shape == (2, 4), f"expected the shape of the map, (2, 4), got {got.shape}: is it turned?"
+    assert not np.isnan(got[0, 1]), (
+        "NaN spreads, also from 0 * NaN: put something else where nothing is known, before you blur"
+    )
     slips = {
-        0.8000: "row 1 isn't heard in row 0: the second pass must blur what the first pass left, not the map itself",
-        0.0000: "only columns are blurred: blur rows too, one after the other",
-        0.8548: "the factor 2 below sigma**2 is missing",
-        1.0923: "you divide by sigma instead of sigma**2",
-        1.8240: "the distance isn't squared",
-        0.3555: "nearly: the two passes have different widths",
+        1.4554: "that is the sum: divide by the sum of the weights of known cells",
+        0.2687: "cells that aren't known count as 0 in your mean: leave their weights out of the lower sum",
+        1.1437: "the factor 2 below sigma**2 is missing",
+        1.2082: "you divide by sigma instead of sigma**2",
+        1.3902: "the distance isn't squared",
+        1.0000: "row 1 isn't heard in row 0: both sums take two passes",
+        1.4444: "that is a mean of the means of rows: blur sums first, and divide in the end",
+        1.5000: "that is the plain mean of the known cells: nearer ones count more",
     }
-    _explain("cell (0, 1) is", got[0, 1], slips)
-    assert got[0, 1] > 0.5, f"cell (0, 1) is {got[0, 1]:.4f}: that is normalised. The sum is asked for, not a mean"
+    _explain("cell (0, 1) is", got[0, 1], slips)  # by hand: (0.8 * 1 + 0.8 * 0.41 * 2) / (0.8 + 0.8 * 0.41) = 1.291
     slips = {
-        2.2800: "it hears cell (1, 3) too well: your blur goes round, from the last column to the first; the map ends there",
-        0.2147: "it doesn't hear itself: cell i is included in the sum",
+        1.0: "a known cell is blurred as well: it hears the others",
+        1.3902: "it hears cell (1, 3) too well: your blur goes round, from the last column to the first; the map ends there",
+        2.0: "it doesn't hear itself: a known cell counts itself",
     }
     _explain("cell (0, 0) is", got[0, 0], slips)
-    np.testing.assert_allclose(got, [[1.2147, 1.4554, 1.6896, 1.7342], [1.0684, 1.4592, 1.9277, 2.1074]], atol=2e-3)
+    by_hand = [[1.097, 1.2906, 1.6098, 1.8563], [1.1437, 1.3902, 1.7094, 1.903]]
+    np.testing.assert_allclose(got, by_hand, atol=2e-3)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fast_crf
 
-    complaint = fast_crf.check_blur_map(blur_map)
+    complaint = fast_crf.check_blur_known(blur_known)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -90,78 +100,56 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 2: the simplex around a point (2 + 1 points)
+# ## Task 2: the neighbours that a lattice lacks (2 + 1 points)
 #
-# `y` is a point of the permutohedral lattice's space in `d` dimensions: `d + 1` numbers that sum to zero. Vertices are integers that sum to zero and have the
-# same remainder modulo `d + 1`.
+# What the blur moves to a vertex that doesn't exist is lost. How often does that happen? `vertices` is an integer array `(V, d + 1)`, one row per vertex of the permutohedral lattice that exists, in any order, none of them twice. A vertex has
+# $2(d + 1)$ neighbours: in each of the `d + 1` directions one a step ahead and one a step behind. A step ahead in direction `j` adds 1 to all coordinates but the `j`-th, from which it takes `d`.
 #
-# Complete `enclosing_simplex`: it returns `corners`, an integer array `(d + 1, d + 1)`, one row per corner of the simplex around `y`, where row $m$ has
-# remainder $m$; and `weights`, `(d + 1,)`, the barycentric weights of these corners. Round first, repair the sum, then sort.
+# Complete `missing_share`: it returns which share of all neighbours, of all vertices together, doesn't exist. For one more point: 7776 vertices in five dimensions, without comparing each with each.
 
 
-# %% nbgrader={"grade": false, "grade_id": "enclosing-simplex", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def enclosing_simplex(y):
-    """Return the corners around y, (d + 1, d + 1), by remainder, and their weights, (d + 1,)."""
+# %% nbgrader={"grade": false, "grade_id": "missing-share", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def missing_share(vertices):
+    """Return the share of all neighbours that don't exist."""
     ### BEGIN SOLUTION
-    size = len(y)
-    origin = size * np.rint(y / size).astype(int)
-    while origin.sum() > 0:
-        origin[np.argmin(y - origin)] -= size
-    while origin.sum() < 0:
-        origin[np.argmax(y - origin)] += size
-    order = np.argsort(origin - y)  # the largest residual first
-    residual = (y - origin)[order]
-    corners = [origin]
-    for smallest in order[:0:-1]:
-        forward = np.ones(size, int)
-        forward[smallest] -= size
-        corners.append(corners[-1] + forward)
-    gaps = (residual[:-1] - residual[1:])[::-1] / size
-    return np.array(corners), np.concatenate([[1 - gaps.sum()], gaps])
+    there, size = {tuple(vertex) for vertex in vertices.tolist()}, vertices.shape[1]
+    found = 0
+    for j in range(size):
+        ahead = vertices + 1
+        ahead[:, j] -= size
+        found += 2 * sum(tuple(vertex) in there for vertex in ahead.tolist())  # whoever has one ahead is behind it
+    return 1 - found / (2 * size * len(vertices))
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "corners-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _corner_hint(corners):
-    """Return what is wrong with the corners around y = (1.7, 1.6, -3.3), or nothing."""
-    sums, remainders = corners.sum(axis=1), [sorted(set(row)) for row in (corners % 3).tolist()]
-    if (sums != 0).all():
-        return "no corner sums to 0. Repair the sum after rounding, before you step"
-    if (sums != 0).any():
-        return "corners that don't sum to 0. A step adds 1 to d coordinates and takes d from one"
-    if any(len(row) > 1 for row in remainders):
-        return "these are no vertices: within a row, remainders modulo 3 differ"
-    if [row[0] for row in remainders] == [0, 2, 1]:
-        return "rows are in the order 0, 2, 1 of remainders: a step adds 1 to d coordinates, and takes d from one"
-    if [row[0] for row in remainders] != [0, 1, 2]:
-        return "row m is the corner with remainder m: 0, 1, 2"
-    first, second = corners[:2].tolist()
-    if first in ([0, 3, -3], [3, 3, -6]):
-        return f"you changed the {'first' if first[0] == 0 else 'last'} coordinate; change the one that was rounded up the farthest"
-    if second == [4, -2, -2]:
-        return (
-            "the coordinate with the smallest residual loses d, not the one with the largest. "
-            "Sort the residuals as they are after the repair, not before"
-        )
+# %% nbgrader={"grade": false, "grade_id": "missing-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_MISSING_SLIPS = {  # eight of 30 neighbours exist
+    0.2667: "that is the share that exists",
+    22.0: "that is the number of missing ones: divide by the number of all neighbours",
+    1.0: "no neighbour is found, or you count vertices that lack any: a step adds 1 to all coordinates but one, and takes d from that one",
+    0.9: "the last direction is left out: there are d + 1",
+    0.7: "the first direction is left out: there are d + 1",
+    0.8667: "each link counts once only: both ends have a neighbour",
+    4.4: "that is the number of missing ones for each vertex: a share is divided by 2 (d + 1) too",
+    1.4667: "you divide by d + 1: each direction has two neighbours, ahead and behind",
+    -0.3333: "you divide by d + 1: each direction has two neighbours, ahead and behind",
+}
 
 
-# %% nbgrader={"grade": true, "grade_id": "corners-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "missing-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # (1.7, 1.6, -3.3), rounded: (3, 3, -3), whose sum is 3. By hand: (3, 0, -3), residuals (-1.3, 1.6, -0.3).
-    y = np.array([1.7, 1.6, -3.3])
-    got = enclosing_simplex(y)
-    assert got is not None, "enclosing_simplex returned nothing: did you forget `return`?"
-    assert isinstance(got, (tuple, list)), "return two arrays: corners and weights"
-    assert len(got) == 2, "return two arrays: corners and weights"
-    corners = answer_array(got[0], "for the corners enclosing_simplex")
-    assert corners.shape == (3, 3), f"expected 3 corners of 3 coordinates, got shape {corners.shape}"
-    hint = _corner_hint(corners)
-    assert not hint, f"{corners.tolist()}: {hint}"
-    np.testing.assert_array_equal(corners, [[3, 0, -3], [1, 1, -2], [2, 2, -4]], err_msg="the corners, by hand")
+    # Four vertices in a row along direction 2, and one beside the first of them along direction 0: four links, so 8 of 5 * 6 neighbours exist.
+    vertices = np.array([[2, 2, -4], [0, 0, 0], [3, 3, -6], [1, 1, -2], [-2, 1, 1]])
+    before = vertices.copy()
+    got = answer_array(missing_share(vertices), "missing_share")
+    assert np.array_equal(vertices, before), "missing_share changed its argument `vertices`: work on a copy"
+    assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
+    _explain("the share is", got.item(), _MISSING_SLIPS)
+    np.testing.assert_allclose(got, 22 / 30, atol=1e-6, err_msg="8 of 30 neighbours exist")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fast_crf
 
-    complaint = fast_crf.check_corners(enclosing_simplex)
+    complaint = fast_crf.check_missing_share(missing_share)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -169,26 +157,21 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "weights-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "missing-memory-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    y = np.array([1.7, 1.4, -3.1])  # rounded: (3, 0, -3), whose sum is 0. By hand: residuals (-1.3, 1.4, -0.1)
-    got = enclosing_simplex(y)
-    assert isinstance(got, (tuple, list)), "return two arrays: corners and weights"
-    weights = answer_array(got[-1], "for the weights enclosing_simplex")
-    assert weights.shape == (3,), f"expected one weight for each corner, shape (3,), got {weights.shape}"
-    assert not np.isclose(weights.sum(), 3), "the weights sum to 3: divide the gaps by d + 1"
-    assert not np.isclose(weights[1:].sum(), 2.7), "the gaps are between residuals: divide them by d + 1"
-    assert not np.isclose(weights[0], 0), "the first corner gets what the others leave: 1 - 0.4 - 0.5"
-    assert np.isclose(weights.sum(), 1), f"the weights sum to {weights.sum():.3f}, not to 1"
-    assert not np.allclose(weights, [0.1, 0.5, 0.4], atol=1e-3), (
-        "weights of corners 1 and 2 are swapped: corner 1 was reached by stepping back in the smallest residual, so its gap is the last"
+    steps = np.ones((5, 6), int) - 6 * np.eye(5, 6, dtype=int)
+    box = np.indices((6,) * 5).reshape(5, -1).T @ steps  # 0 to 5 steps in each of the first five directions
+    share, megabytes = peak_megabytes(missing_share, box)
+    # Links along one of the five: 5 * 6 ** 4. A step in the sixth goes back in all five: 5 ** 5 links.
+    wanted = 1 - 2 * (5 * 5 * 6**4 + 5**5) / (12 * 6**5)
+    np.testing.assert_allclose(
+        answer_array(share, "missing_share"), wanted, atol=1e-6, err_msg="a box of 7776 vertices"
     )
-    assert (weights > -1e-9).all(), f"a weight is negative, {weights.round(3)}: the point would lie outside its simplex"
-    np.testing.assert_allclose(weights, [0.1, 0.4, 0.5], atol=1e-3, err_msg="the gaps, by hand: 1.2 / 3 and 1.5 / 3")
+    assert megabytes < 40, f"7776 vertices took {megabytes:.0f} MB: look each neighbour up in a set or a dictionary"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fast_crf
 
-    complaint = fast_crf.check_weights(enclosing_simplex)
+    complaint = fast_crf.check_missing_memory(missing_share)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -196,14 +179,13 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: splat, blur, slice (3 points)
+# ## Task 3: a blur that loses nothing (3 points)
 #
-# `simplices` is a list with one pair for each of N points: `corners`, an integer array `(d + 1, d + 1)`, and `weights`, `(d + 1,)`, as from task 2. `values` is
-# `(N, K)`. The filter
+# The lecture's blur loses what would go to a vertex that doesn't exist. Here is another one: a vertex **keeps** what it can't give away, so that the sum over all vertices stays the same. `simplices` is a list with one pair for each of N points: `corners`, an
+# integer array `(d + 1, d + 1)`, one row per corner, and `weights`, `(d + 1,)`. `values` is `(N, K)`. The filter
 #
 # 1. *splats*: a vertex gets the sum of `weight * value` of all points around it. Only vertices that are a corner of some point exist;
-# 2. *blurs* along direction 0, then 1, ... up to `d`: each vertex gets 1/2 of its value, and 1/4 of its neighbour one step ahead and 1/4 of that one step
-#    behind. A step in direction `j` adds 1 to all coordinates but the `j`-th, from which it takes `d`. A neighbour that doesn't exist counts as 0;
+# 2. *blurs* along direction 0, then 1, ... up to `d`: each vertex gives 1/4 of its value to the neighbour one step ahead, 1/4 to the one behind, and keeps the rest. Where a neighbour doesn't exist, it keeps that quarter, too. (Steps are those of task 2.)
 # 3. *slices*: a point gets the weighted mean of its corners, with the same weights.
 #
 # Complete `lattice_filter`: it returns `(N, K)`.
@@ -221,47 +203,48 @@ def lattice_filter(simplices, values):
     for j in range(size):
         forward = np.ones(size, int)
         forward[j] -= size
-        vertices = {
-            v: x / 2 + vertices.get(tuple(v + forward), 0) / 4 + vertices.get(tuple(v - forward), 0) / 4
-            for v, x in vertices.items()
-        }
+        around = {v: (tuple(v + forward), tuple(v - forward)) for v in vertices}
+        vertices = {v: x / 2 + sum(vertices.get(u, x) for u in around[v]) / 4 for v, x in vertices.items()}
     return np.array([sum(w * vertices[tuple(c)] for c, w in zip(*simplex, strict=True)) for simplex in simplices])
     ### END SOLUTION
 
 
 # %% nbgrader={"grade": false, "grade_id": "lattice-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _LATTICE_SLIPS = {  # what point 0 of the test gets by a common slip
-    14.0000: "nothing is blurred between splat and slice",
-    12.5000: "you blur along one direction only: there are d + 1",
-    43.7500: "you blur with (1/2, 1, 1/2): the vertex keeps a half, its neighbours give a quarter each",
-    26.9375: "you blur with (1/4, 1, 1/4): the vertex itself keeps a half",
-    12.1250: "slice with the weights of splat, not with a plain mean",
-    24.2500: "you slice without weights",
-    9.8125: "two points share the vertex in the middle: add to it, don't overwrite",
-    21.7500: "you splat without weights: a point shares its value out",
+    14.0000: "nothing is blurred between splat and slice, or no neighbour is found: a step adds 1 to all coordinates but one, and takes d from that one",
+    14.7500: "you blur along one direction only: there are d + 1",
+    10.9375: "what goes to a vertex that doesn't exist is lost: that is the lecture's blur. Here a vertex keeps it",
+    60.5000: "you blur with (1/2, 1, 1/2): the vertex keeps a half, its neighbours give a quarter each",
+    33.3750: "you blur with (1/4, 1, 1/4): the vertex itself keeps a half",
+    15.5000: "slice with the weights of splat, not with a plain mean",
+    31.0000: "you slice without weights",
+    13.8125: "two points share the vertex in the middle: add to it, don't overwrite",
+    28.5000: "you splat without weights: a point shares its value out",
     11.5000: "you blur into vertices that don't exist: only corners of points do",
-    6.5625: "you blur with the neighbour ahead only",
-    7.1250: "you blur with the neighbour behind only",
-    3.5000: "no neighbour is found: a step adds 1 to all coordinates but one, and takes d from that one",
-    10.7266: "a blur must read old values only; you change vertices while others still read them",
+    8.6250: "you blur with the neighbour ahead only",
+    8.2500: "you blur with the neighbour behind only",
+    15.2969: "a blur must read old values only; you change vertices while others still read them",
+    15.7083: "you divide by the weights that exist: then what a vertex gives isn't what the others get, and the sum changes",
 }
 
 
 # %% nbgrader={"grade": true, "grade_id": "lattice-filter-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # One dimension: two points share the vertex in the middle of three. By hand: splat 12, 20, 16; blurred once 11, 17, 13; twice 9.75, 14.5, 10.75.
+    # One dimension: two points share the vertex in the middle of three. By hand: splat 12, 20, 16; blurred once 14, 17, 17; twice 14.75, 16.25, 17: the sum stays 48.
     left = np.array([[0, 0], [-1, 1]]), np.array([0.75, 0.25])
     right = np.array([[-2, 2], [-1, 1]]), np.array([0.5, 0.5])
     got = lattice_filter([left, right], np.array([[16.0, 0.0], [32.0, 4.0]]))
-    got = answer_array(got, "lattice_filter")  # first column, point 0: 0.75 * 9.75 + 0.25 * 14.5 = 10.94
+    got = answer_array(got, "lattice_filter")  # first column, point 0: 0.75 * 14.75 + 0.25 * 16.25 = 15.125
     assert got.shape == (2, 2), f"expected N rows of K values, (2, 2), got {got.shape}"
     _explain("point 0 gets", got[0, 0], _LATTICE_SLIPS)
-    np.testing.assert_allclose(got, [[10.9375, 0.78125], [12.625, 1.1875]], atol=1e-4, err_msg="both points, by hand")
+    np.testing.assert_allclose(got, [[15.125, 0.90625], [16.625, 1.625]], atol=1e-4, err_msg="both points, by hand")
     corners, at_first = np.array([[0, 0, 0], [1, 1, -2], [2, -1, -1]]), np.array([1.0, 0, 0])
     triangle = [(np.roll(corners, -k, axis=0), at_first) for k in range(3)]  # one point on each corner
     got = answer_array(lattice_filter(triangle, np.array([[64.0], [0], [0]])), "lattice_filter").ravel()
-    assert not np.array_equal(got, [9, 4, 6]), "the order of the directions is 0, 1, ... d: you begin with the last"
-    np.testing.assert_allclose(got, [9, 6, 4], err_msg="a triangle: each of the 3 directions joins two of its corners")
+    assert not np.array_equal(got, [37, 12, 15]), "the order of the directions is 0, 1, ... d: you begin with the last"
+    np.testing.assert_allclose(
+        got, [37, 15, 12], err_msg="a triangle: each of the 3 directions joins two of its corners"
+    )
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fast_crf
 
@@ -275,43 +258,77 @@ _test()
 # %% [markdown]
 # ## Task 4: what the other cells say (2 points)
 #
-# `blur` is a filter: a function that takes `(N, K)` values and returns `(N, K)`, and that is linear: $\text{blur}(Q)_i = \sum_j k_{ij} Q_j$. You can call it, but you
-# can't look inside. Mean field needs the sum without the cell itself, $\sum_{j \ne i} k_{ij} Q_j$.
+# `blur` is a filter: a function that takes `(N, K)` values and returns `(N, K)`, and that is linear: $\text{blur}(Q)_i = \sum_j k_{ij} Q_j$. You can call it, but you can't look inside. Mean field needs the sum without the cell itself,
+# $\sum_{j \ne i} k_{ij} Q_j$, so you need $k_{ii}$, which differs from cell to cell. One could ask for it cell by cell: put a 1 into one cell, and see what comes back. But on the paper's grid that takes 55,025 columns.
 #
-# Complete `others_say`: it returns these sums, `(N, K)`. What does the filter give back to cell $i$ if cell $i$ alone has a value? (On a large grid one would work
-# out $k_{ii}$ from the lattice. Here N is small enough to ask.)
+# This filter is short-sighted: $k_{ij}$ is 0 for two cells that are more than `reach` rows **or** more than `reach` columns apart. The cells of a map of `shape` = (H, W) are counted row by row. How can several cells be asked in one column?
+#
+# Complete `others_say`: it returns the sums, `(N, K)`. Besides the K columns of `Q` it may hand over at most $(2\,\text{reach} + 1)^2$ columns to `blur`, in one call or in several; `blur` stops when there are more. (A lattice sees farther than
+# that, so the package works $k_{ii}$ out from the vertices.)
 
 
 # %% nbgrader={"grade": false, "grade_id": "others-say", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def others_say(blur, Q):
+def others_say(blur, Q, shape, reach):
     """Return the filtered values without what each cell tells itself, (N, K)."""
     ### BEGIN SOLUTION
-    own = np.diag(blur(np.eye(len(Q))))
+    rows, columns = np.indices(shape).reshape(2, -1) % (reach + 1)
+    group = rows * (reach + 1) + columns  # cells of one group don't hear each other
+    answers = blur(np.eye((reach + 1) ** 2)[group])
+    own = answers[np.arange(len(Q)), group]
     return blur(Q) - own[:, None] * Q
     ### END SOLUTION
 
 
+# %% nbgrader={"grade": false, "grade_id": "counting-blur", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _counting(kernel, columns):
+    """Return a filter with this kernel, (N, N), that stops when it gets more columns than it should in all."""
+    left = [columns]
+
+    def blur(values):
+        values = np.asarray(values, float)
+        values = values if values.ndim == 2 else values[:, None]
+        left[0] -= values.shape[1]
+        assert left[0] >= 0, (
+            f"blur got more than the {columns} columns that it may get: ask several cells in one column"
+        )
+        return kernel @ values
+
+    return blur
+
+
+def _seen_from(reach):
+    """Return a kernel of 3 x 5 cells, (15, 15), that sees `reach` rows and columns far, and Q (15, 2)."""
+    place = np.indices((3, 5)).reshape(2, -1).T
+    near = np.abs(place[:, None] - place).max(axis=-1) <= reach
+    number = np.arange(15)
+    kernel = near / (1.0 + (number[:, None] + number) % 4) + np.diag((number + 1) / 10)
+    return kernel, np.stack([number / 20, 1 - number / 20], axis=1)
+
+
 # %% nbgrader={"grade": true, "grade_id": "others-say-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    kernel = np.array([[1.1, 0.5, 0.2], [0.5, 0.9, 0.4], [0.2, 0.4, 0.8]])
-    Q = np.array([[0.9, 0.1], [0.5, 0.5], [0.2, 0.8]])
-    before = Q.copy()
-    got = others_say(lambda values: kernel @ values, Q)  # by hand, cell 0, class 0: 0.5 * 0.5 + 0.2 * 0.2 = 0.29
+    kernel, Q = _seen_from(1)
+    before, own = Q.copy(), np.diag(kernel)
+    got = others_say(_counting(kernel, 2 + 9), Q, (3, 5), 1)
     got = answer_array(got, "others_say")
     assert np.array_equal(Q, before), "others_say changed its argument `Q`: work on a copy"
-    assert got.shape == (3, 2), f"expected the shape of Q, (3, 2), got {got.shape}"
+    assert got.shape == (15, 2), f"expected the shape of Q, (15, 2), got {got.shape}"
+    heard, wanted = (kernel @ Q)[7, 0], (kernel @ Q - own[:, None] * Q)[7, 0]
     slips = {
-        1.28: "nothing is subtracted: the filter counts the cell itself",
-        0.38: "you subtract Q itself, as if k_ii were 1: this filter has another k_ii in each cell",
-        -0.34: "you subtract the sum of the kernel's row: k_ii is what comes back to cell i when cell i alone has a value",
-        0.18: "you subtract k_ii without Q: a cell tells itself k_ii * Q",
-        0.99: "that is what the cell tells itself: subtract it from the whole sum",
-        -0.29: "the sign is swapped",
-        0.1611: "you divide by the sum of the kernel's row: the sum is asked for",
-        0.56: "that is k_ii of cell 2, taken for all cells: each cell has its own",
+        heard: "nothing is subtracted: the filter counts the cell itself",
+        heard - Q[7, 0]: "you subtract Q itself, as if k_ii were 1: this filter has another k_ii in each cell",
+        heard
+        - kernel[7].sum()
+        * Q[7, 0]: "you subtract the sum of the kernel's row: k_ii is what comes back from the cell alone",
+        heard - own[7]: "you subtract k_ii without Q: a cell tells itself k_ii * Q",
+        own[7] * Q[7, 0]: "that is what the cell tells itself: subtract it from the whole sum",
+        -wanted: "the sign is swapped",
+        heard - own[0] * Q[7, 0]: "that is k_ii of cell 0, taken for all cells: each cell has its own",
+        heard - own.mean() * Q[7, 0]: "that is a mean of all k_ii: each cell has its own",
     }
-    _explain("cell 0, class 0:", got[0, 0], slips)
-    np.testing.assert_allclose(got, [[0.29, 0.41], [0.53, 0.37], [0.38, 0.22]], err_msg="by hand")
+    _explain("cell 7, class 0:", got[7, 0], slips)
+    near = "some cells that you ask in one column hear each other: how far apart must they be?"
+    np.testing.assert_allclose(got, kernel @ Q - own[:, None] * Q, atol=1e-6, err_msg=near)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fast_crf
 
