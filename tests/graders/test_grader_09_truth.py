@@ -611,6 +611,18 @@ def labels_and_wrong(frame, o, spec, reach, gap, rule=open_to_view):
     cells = [(m, s) for m, s in zip(made.ravel(), stands.ravel()) if m < 10]
     return [len(cells), sum(m != s for m, s in cells)]""",
         ),
+        right(
+            "points out of view dropped, votes compared where there are any",
+            task="labels-and-wrong",
+            code="""
+def labels_and_wrong(frame, o, spec, reach, gap, rule=open_to_view):
+    numbers, uv, Z = in_view(frame)
+    keep = np.zeros(len(frame.points), bool)
+    keep[numbers] = rule(uv, Z, reach, gap)
+    made = lidar_truth(replace(frame, points=frame.points[keep]), o, spec, TruthPolicy(cleanup="none"))
+    votes, stands = made[made < 10], frame.labels.birdseye_on(spec)[made < 10]
+    return np.array([votes.size, np.count_nonzero(votes != stands)])""",
+        ),
         mistake(
             "cleaned up",
             task="labels-and-wrong",
@@ -629,7 +641,7 @@ def labels_and_wrong(frame, o, spec, reach, gap, rule=open_to_view):
             "one's own rule in place of the one handed over",
             task="labels-and-wrong",
             loses=3,
-            says="a rule that hides nothing must leave the number of labels",
+            says="a rule that hides",
             code=measured(asked="open_to_view(uv, Z, reach, gap)"),
         ),
         mistake(
