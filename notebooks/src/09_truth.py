@@ -83,7 +83,7 @@ circle = {"ha": "center", "va": "center", "bbox": {"boxstyle": "circle", "fc": "
 for ax in fig.axes[1:]:
     for letter, place in {"A": (-8, 13), "B": (0, 64.5), "C": (6, 7)}.items():
         ax.annotate(letter, place, **circle)
-    ax.annotate("D", (6.5, 29.5), (1, 29.5), arrowprops={"arrowstyle": "->"}, **circle)
+    ax.annotate("D", (8.8, 31), (2, 31), arrowprops={"arrowstyle": "->"}, **circle)
 plt.show()
 
 # %% jupyter={"source_hidden": true}

@@ -335,11 +335,12 @@ def cube_corners(features):
     return np.prod(sides), len(np.unique(used, axis=0))
 
 
-print("sigma_beta   grid points   used   corners of simplices, see below")
+table = ["sigma_beta   grid points   used   corners of simplices, see below"]
 for sigma_beta in (0.2, 0.1, 0.05):
     narrow = features_of(o, replace(params, sigma_beta=sigma_beta))
     vertices = {corner for y in narrow @ elevation(5).T for corner in enclosing_simplex_literal(y)[0]}
-    print("{:10.2f} {:13,d} {:6,d}".format(sigma_beta, *cube_corners(narrow)), f"{len(vertices):12,d}")
+    table.append("{:10.2f} {:13,d} {:6,d} {:12,d}".format(sigma_beta, *cube_corners(narrow), len(vertices)))
+print("\n".join(table))
 
 # %% [markdown]
 # Two things speak against this grid. The box around all features is nearly empty. And with each halving of `sigma_beta`
@@ -911,8 +912,8 @@ def row_sums(params):
     return np.exp(-0.5 * cdist(f, f, "sqeuclidean")).sum(axis=1), of_lattice
 
 
-print("   widths            lattice's    normalised:              not normalised:")
-print("cells   o    row sums / Gaussian's  |dQ|   worst  labels     |dQ|   worst  labels")
+table = ["   widths            lattice's    normalised:              not normalised:"]
+table.append("cells   o    row sums / Gaussian's  |dQ|   worst  labels     |dQ|   worst  labels")
 for widths in ((0.3, 0.2), (1, 0.2), (3.2, 0.2), (10, 0.2), (3.2, 0.02), (3.2, 2.0)):
     other = replace(params, sigma_alpha=widths[0], sigma_beta=widths[1])
     gaussian, of_lattice = row_sums(other)
@@ -925,7 +926,8 @@ for widths in ((0.3, 0.2), (1, 0.2), (3.2, 0.2), (10, 0.2), (3.2, 0.02), (3.2, 2
         errors.append(off)
         line += f"{off:7.4f} {np.abs(nearly - exact).max():6.2f} {alike:6.1f} %   "
     assert errors[0] < errors[1]
-    print(line.rstrip())
+    table.append(line.rstrip())
+print("\n".join(table))
 
 # %% [markdown]
 # For each of these widths, what a typical cell hears from all cells is between six and nine tenths of what it should be.

@@ -12,7 +12,6 @@ from semgrid_instructor import close, generator, hidden, keeping
 
 
 @hidden
-@keeping
 def check_blur_known(blur_known: Callable) -> None:
     """Narrow and wide Gaussians, few and many gaps, and a map whose matrix of all pairs wouldn't fit."""
     for seed, (shape, sigma, share) in enumerate((((7, 4), 0.9, 0.5), ((3, 11), 2.5, 0.2), ((6, 5), 40.0, 0.9))):
