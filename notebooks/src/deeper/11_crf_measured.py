@@ -320,10 +320,10 @@ assert [signs[name, "LIDAR labels", "true labels"] for name in FILES] == ["open"
 Markdown("\n".join(table))
 
 # %% [markdown]
-# Class accuracy falls in every row, by more than a point. The sign of pixel accuracy depends on the judge: by LIDAR labels
-# it rises for all three networks, by true labels only for DeepLab, whatever the networks were trained on. Labels made from
-# LIDAR are smoothed by their own clean-up (lecture 09), which may be why smoothing agrees with them; this table doesn't
-# test that.
+# Class accuracy falls in every row, by more than a point. Pixel accuracy depends on the judge: the three networks trained on
+# LIDAR labels all gain by LIDAR labels, and by true labels only DeepLab's interval excludes zero. Trained on true labels, DeepLab
+# gains, FCN loses, and SegNet's interval holds both signs. LIDAR labels are smoothed by their own clean-up (lecture 09), which
+# may be why smoothing agrees with them; this table doesn't test that.
 #
 # ## Where this breaks
 #
