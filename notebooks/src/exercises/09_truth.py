@@ -85,6 +85,8 @@ _RETURNS = np.array(  # u, v, Z; by hand with a reach of 2 pixels and a gap of 0
         [60, 6, 10.0],  # 13
     ]
 )
+
+# %% nbgrader={"grade": false, "grade_id": "open-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _OPEN_SLIPS = {  # number of the return: what is wrong when its answer is
     1: "return 1 is dropped, but what is near it is farther away: only a closer return hides",
     10: "return 10 shares its pixel with a closer one: such a return is hidden, as in the lecture",
@@ -240,6 +242,7 @@ def _finished():
     return votes, unseen, np.array(made)
 
 
+# %% nbgrader={"grade": false, "grade_id": "audit-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _AUDIT_SLIPS = (  # rule, count: hint
     {0: "the vote of cell (0, 5), CAR, has become ROAD", 16: "a cell without a vote can't break it: leave 255 out"},
     {
