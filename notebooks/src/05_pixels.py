@@ -98,7 +98,7 @@ def read_at(height):
 def raised():
     """Yield the figure with the plane at each height."""
     fig = plt.figure(figsize=(8.4, 4.3), layout="constrained")
-    for height in np.linspace(-1, 3, 21):
+    for height in np.linspace(-1, 3, 11):
         fig.clear()
         axes = fig.subplot_mosaic([["A", "C"], ["B", "C"]], width_ratios=(2.7, 1), height_ratios=(1.6, 1))
         plotting.plane_on_image(coarse, height, pale, ax=axes["A"], size=2, colour_bar=False)
@@ -666,7 +666,7 @@ for x in (15, 20, 30, 40, 50):
     print(f"road {x} m ahead: {height:+.2f} m high, so the ground plane draws it {lands:.1f} m ahead")
 
 # %% jupyter={"source_hidden": true} alt="a real street with LIDAR returns on it, coloured by depth, that follow the cars' outlines; below it the dots of the ground plane, which lie on the road and also over the cars"
-fig, axes = plt.subplots(2, 1, figsize=(7, 4.8), layout="constrained")
+fig, axes = plt.subplots(2, 1, figsize=(5.6, 4), layout="constrained")
 plotting.points_on_image(real, axes[0], size=2, colour_bar=False)
 plotting.plane_on_image(coarse, 0.0, paled(real), ax=axes[1], size=4, colour_bar=False)
 axes[0].set_title("A: LIDAR returns", fontsize="medium")

@@ -247,7 +247,7 @@ assert brings_right < inside_map / 2
 # %% jupyter={"source_hidden": true} alt="part of the camera image with the labels laid over it and LIDAR returns as dots; those in white lie on what the pixel shows, red crosses lie behind it, most of them at the fence"
 numbers, uv = closest_returns(frame)
 hidden = hidden_returns(frame, numbers, uv)
-fig, ax = plt.subplots(figsize=(10, 4.3), layout="constrained")
+fig, ax = plt.subplots(figsize=(7.4, 3.4), layout="constrained")
 plotting.image_labels(frame.image, frame.labels.image, KITTI_14, ax, opacity=0.5)
 ax.plot(*uv[~hidden].T, ".", color="w", markersize=4, label="lies on what its pixel shows")
 ax.plot(*uv[hidden].T, "x", color="r", markersize=6, label="lies behind it")

@@ -664,7 +664,7 @@ assert F_of[0] - F_of[10] > 0.9 * (F_of[0] - F_of[60])
 
 
 # %% jupyter={"source_hidden": true} alt="animation: the map of one frame from update to update; within five updates ragged patches of the network become smooth, and to the right a map of how sure each cell is turns bright except at borders"
-def updates_moving(shown_updates=(0, 1, 2, 3, 4, 5, 7, 10, 20)):
+def updates_moving(shown_updates=(0, 1, 2, 3, 5, 10, 20)):
     """Yield a frame for each update shown."""
     for n in shown_updates:
         fig, axes = plt.subplots(1, 2, figsize=(7, 4.6), dpi=plotting.FIGURE_DPI, layout="constrained")

@@ -113,7 +113,7 @@ if drive.credit:
 
 # %% jupyter={"source_hidden": true} alt="a street image with LIDAR points coloured by distance; A marks a white car just ahead, B parked cars to the right, C a house wall; below, the occupancy grid and the semantic grid of the same instant with the same letters"
 LETTERS = {"A": (246, 78, 11, 0.3), "B": (360, 84, 11, -3.4), "C": (465, 55, 14, -8.8)}
-fig = plt.figure(figsize=(7.4, 6.4), layout="constrained")
+fig = plt.figure(figsize=(6.2, 5.6), layout="constrained")
 top, bottom = fig.subfigures(2, 1, height_ratios=[2.1, 3.6])
 image_axes = plotting.points_on_image(frames[-1], ax=top.subplots(), size=0.8)
 axes = bottom.subplots(1, 2)
@@ -220,9 +220,9 @@ with tempfile.TemporaryDirectory() as folder:
 # Each damage is named with its file. Whether the files that are there show what you think is another matter: look.
 
 # %% jupyter={"source_hidden": true} alt="contact sheet of four frames of the drive: in all of them the white car stands at the same place, while cars on the left come nearer"
-fig, axes = plt.subplots(2, 2, figsize=(8, 2.9), layout="constrained")
+fig, axes = plt.subplots(2, 2, figsize=(6.4, 2.4), layout="constrained")
 for ax, k in zip(axes.flat, np.linspace(0, len(frames) - 1, 4).round().astype(int), strict=True):
-    ax.imshow(frames[k].need_image())
+    ax.imshow(frames[k].need_image() // 8 * 8)  # fewer colours: a smaller file
     ax.set_title(f"frame {k}, {frames[k].time:.1f} s", fontsize=9)
     ax.axis("off")
 plt.show()

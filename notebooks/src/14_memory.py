@@ -85,7 +85,7 @@ def passing():
     for result in street:
         fig.clear()
         axes = fig.subplot_mosaic([["A", "B", "C"]], width_ratios=(2.2, 1, 1))
-        axes["A"].imshow(result.frame.image[::2, ::2] // 8 * 8)
+        axes["A"].imshow(result.frame.image[::2, ::2] // 16 * 16)
         axes["A"].set_axis_off()
         axes["A"].set_title(f"A: image, {result.frame.time:.1f} s", fontsize="medium")
         fig.supxlabel(real.credit, fontsize=6)
