@@ -573,7 +573,7 @@ def pictures(between, hold):
             yield fig
 
 
-plotting.animate(pictures(between=3, hold=4), period=0.25, alt="36 points splat onto triangles, blur, and slice back")
+plotting.animate(pictures(between=1, hold=4), period=0.25, alt="36 points splat onto triangles, blur, and slice back")
 
 # %% jupyter={"source_hidden": true} alt="four panels in two rows: points with their colours, vertices after the splat, vertices after three blurs, and points with smoothed colours in two groups"
 story = {frame.title: frame for frame in plotting.lattice_story(street, p_road)}
