@@ -659,6 +659,7 @@ EXPERIMENTS = (
     Row("an unknown grid", "reproduce point-labels --grid huge --out log.json", "grid: expected"),
     Row("an unknown LIDAR of labelled returns", "reproduce point-labels --lidar sonar", "lidar: expected one of"),
     Row("no scene", "reproduce real-streets --pandaset NONE --simulated . --runs RUNS --out log.json", "NONE/002"),
+    Row("no scene to remember", "reproduce memory --pandaset NONE --out log.json", "NONE/002"),
     Row("a scene that isn't there", "data index OUT --pandaset TINY --scene 002", "TINY/002"),
     Row(
         "a network of another kind to start from",
@@ -797,6 +798,7 @@ SINGLE = {
     "learned-crf": "--data TINY --validation TINY --weights weights.safetensors --runs RUNS",
     "real-streets": "--pandaset NONE --simulated TINY --runs RUNS",
     "real-drive": "--kitti NONE",
+    "memory": "--pandaset NONE",
 }
 """The lectures' experiments that write their result at the end, with what they need."""
 
@@ -867,7 +869,7 @@ REFUSED_FIRST = (
     ),
     *(
         Row(f"10^18 drives, {name}", f"reproduce {name} --drives {MANY} --out a.json", "Invalid value for '--drives'")
-        for name in ("occupancy", "streets", "point-labels", "truth-policies")
+        for name in ("occupancy", "streets", "point-labels", "truth-policies", "memory")
     ),
     Row("10^18 draws", f"reproduce crf-coupling --draws {MANY} --out a.json", "Invalid value for '--draws'"),
     Row("10^18 trials", f"{SEARCH} --trials {MANY}", "Invalid value for '--trials'"),

@@ -3,11 +3,16 @@
 Nothing here changes a number.
 """
 
+import ctypes
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 
 import numpy as np
+
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
+"""Numbers of glibc's `mallopt`, from malloc.h."""
 
 
 @contextmanager
@@ -49,9 +54,11 @@ def undo_after_errors(rng: np.random.Generator) -> Iterator[None]:
 def keep_memory() -> None:
     """Let the memory of one step serve the next.
 
-    On Linux, glibc hands idle memory back to the system as soon as it is more than twice the largest buffer that was
-    ever freed, and what a step frees often is. The system clears each page before it lends it again: up to 5 ms a step.
-    In a process that once freed a buffer of 25 MB, such as an image network's, up to 50 MB stay. So this function frees
-    a buffer of that size.
+    On Linux, glibc hands idle memory back to the system as soon as it is more than `M_TRIM_THRESHOLD`, and a buffer
+    larger than `M_MMAP_THRESHOLD` as soon as it is freed. The system clears each page before it lends it again: up to
+    5 ms a step. Larger thresholds keep what a step frees. By itself glibc raises them only after a large buffer was
+    freed, and never where the environment sets one of them. Other allocators are left as they are.
     """
-    np.empty(3 * 2**23, np.uint8)
+    if mallopt := getattr(ctypes.CDLL(None) if sys.platform == "linux" else None, "mallopt", None):
+        mallopt(M_MMAP_THRESHOLD, 2**25)
+        mallopt(M_TRIM_THRESHOLD, 2**26)

@@ -20,8 +20,8 @@ def serve(files, break_after=(), tags=True, ranges=True):
             asked = self.headers.get("Range")
             requests.append((self.path, asked))
             if breaks and breaks[0] is None:
+                breaks.pop(0)  # first: the client asks again as soon as it has the answer
                 self.send_error(503)
-                breaks.pop(0)
                 return
             content = files.get(self.path)
             if content is None:
@@ -31,6 +31,7 @@ def serve(files, break_after=(), tags=True, ranges=True):
             if start and start >= len(content):
                 self.send_error(416)
                 return
+            end = breaks.pop(0) if breaks else None
             self.send_response(206 if start else 200)
             if start:
                 self.send_header("Content-Range", f"bytes {start}-{len(content) - 1}/{len(content)}")
@@ -38,7 +39,7 @@ def serve(files, break_after=(), tags=True, ranges=True):
                 self.send_header("ETag", f'"{hash(content)}"')
             self.send_header("Content-Length", str(len(content) - start))
             self.end_headers()
-            self.wfile.write(content[start:][: breaks.pop(0) if breaks else None])
+            self.wfile.write(content[start:][:end])
 
         def log_message(self, *_):
             pass
