@@ -284,8 +284,9 @@ for name, m in matrices.items():
 
 # %% [markdown]
 # Blind, each network gains about one point of pixel accuracy and loses more than ten of class accuracy. The classes are
-# small, and at least 70 % of what the networks call signage or pedestrian is something else (*right* is 30 % at best), so little is lost by never saying it. By the first number alone you would choose the network that sees no
-# pedestrian. So look at both, as the paper does; and lecture 08 weights the classes in the loss by their frequency.
+# small, and at least 70 % of what the networks call signage or pedestrian is something else (*right* is 30 % at best),
+# so little is lost by never saying it. By the first number alone you would choose the network that sees no pedestrian.
+# So look at both, as the paper does; and lecture 08 weights the classes in the loss by their frequency.
 #
 # ## Where this breaks
 #
@@ -383,9 +384,10 @@ for name in TRAINED:
     print(f"{NAMES[name]:<11} image {noise_share(clean, noisy):.1f}, after the first layer {noise_share(*inside):.1f}")
 
 # %% [markdown]
-# The first layers of SegNet and FCN, with kernels of 3x3, amplify the noise; DeepLab's, with kernels of 7x7, damps it. Two swapped colours are a common bug
-# (OpenCV reads blue first): no error is raised, and each of the three loses more than ten points. Lecture 07's real
-# street was another world, too; lecture [13](../13_real_drive.ipynb) measures more of it.
+# The first layers of SegNet and FCN, with kernels of 3x3, amplify the noise; DeepLab's, with kernels of 7x7, damps it.
+# Two swapped colours are a common bug (OpenCV reads blue first): no error is raised, and each of the three loses more
+# than ten points. Lecture 07's real street was another world, too; lecture [13](../13_real_drive.ipynb) measures more
+# of it.
 #
 # ## In five lines
 #
