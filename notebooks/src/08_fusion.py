@@ -119,8 +119,8 @@ pixel_truth = np.stack([resize_labels(frame.labels.image, size) for frame in fra
 # %% [markdown]
 # ## Pixels that learn from the map
 #
-# An image network that has learnt labels of pixels; behind it a reduction and a fusion with random weights; two
-# training frames. Nobody gives it another label of a pixel. Forty steps, in which only the loss *on the map* counts:
+# Take an image network that has learnt labels of pixels, and put a reduction and a fusion with random weights behind it.
+# It gets two training frames and no further label of a pixel: in forty steps only the loss *on the map* counts.
 
 # %% jupyter={"source_hidden": true}
 two = Sample(*map(torch.stack, zip(*few[:2], strict=True)))
@@ -147,7 +147,7 @@ for step in range(41):
     F.cross_entropy(grid_logits(learner, batch), two.truth.long(), weight=alpha, ignore_index=IGNORE).backward()
     optimiser.step()
 
-# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="animation: A, the classes of pixels, which begin as a tidy street of road, sidewalk, car and buildings, and get patches of wrong classes; B, the map, noise at first, in which road, sidewalk and cars take shape; C, the true map; D, the share of right cells rises from near zero to about 90 per cent while that of pixels falls from about 85 to about 60"
+# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="animation: A, the classes of pixels, which begin as a tidy street of road, sidewalk, car and buildings, and get patches of wrong classes; B, the map, at first nearly all one wrong class, in which road, sidewalk and cars take shape; C, the true map; D, the share of right cells rises from near zero to about 90 per cent while that of pixels falls from about 85 to about 60"
 
 
 def trained():
@@ -182,9 +182,9 @@ assert story[-1][3][0] < story[0][3][0] - 5
 
 # %% [markdown]
 # A: the class with the highest score in each pixel. B: the map. C: its truth. D: the share of each that is right. The
-# map gets better, and the labels of the pixels get *worse*. Both follow from one fact: the gradient of the map's loss
-# reaches every weight of the image network, and asks it for scores that help the map, whatever they say about pixels.
-# This is what the paper's title calls *end to end*. The lecture builds it piece by piece.
+# map gets better, while the labels of the pixels get *worse*. The gradient of the map's loss reaches every weight of
+# the image network, and asks it for scores that help the map, whatever they say about pixels. This is what the paper's
+# title calls *end to end*. The lecture builds it piece by piece.
 #
 # ### The graph
 #
@@ -201,14 +201,15 @@ plt.show()
 # %% [markdown]
 # *Late fusion* lets each sensor decide about the cell and multiplies: $P(m)\,P(a \mid m)\,P(o \mid m)$, normalised.
 #
-# **Predict before you run.** Beforehand a car has 0.2, and half of all cells are hidden. The label of a seen cell is right
-# with 0.95; the hider is a car with 0.9. $o$ is UNKNOWN with 0.1 where the cell is seen, and with 0.95 where it is
-# hidden. Now the pixel says car, and $o$ says UNKNOWN. How probable is a car, by late fusion and exactly? And are $a$
-# and $o$ independent given $m$?
+# **Predict before you run.** Beforehand P(car) is 0.2, and half of all cells are hidden. The label of a seen cell is
+# right with 0.95; the hider is a car with 0.9. $o$ is UNKNOWN with 0.1 where the cell is seen, and with 0.95 where it
+# is hidden. Now the pixel says car, and $o$ says UNKNOWN. How probable is a car, by late fusion and exactly? And are
+# $a$ and $o$ independent given $m$?
 #
 # <details><summary>Answer</summary>
 #
-# Exactly: P(both readings given car) is $0.5 \cdot 0.95 \cdot 0.1 + 0.5 \cdot 0.9 \cdot 0.95 = 0.475$, given road $0.5 \cdot
+# Exactly: P(both readings given car) is $0.5 \cdot 0.95 \cdot 0.1 + 0.5 \cdot 0.9 \cdot 0.95 = 0.475$, given road $0.5
+# \cdot
 # 0.05 \cdot 0.1 + 0.5 \cdot 0.9 \cdot 0.95 = 0.430$. So the odds of 0.25 become 0.276, and P(car) is 0.22: UNKNOWN
 # suggests that the cell is hidden, and then the label says next to nothing about it. Late fusion uses the label alone,
 # $0.925 : 0.475$, and $o$ alone, which says nothing of $m$: the odds become 0.49, P(car) 0.33. Given $m$ the readings
@@ -320,7 +321,7 @@ print("road", reduce(p, theta, beta)[0], "  car", reduce(p, theta, beta)[1])
 #
 # One detail matters later. A point of a plane that the camera doesn't see takes the score 0 for every class. So on
 # planes zero has a meaning, "nobody looked". Under a soft-max the same number may be added to all scores of a pixel
-# and nothing changes (lecture 07). Here something does:
+# and nothing changes (lecture 07). Here the map changes:
 
 # %% tags=["nbval-ignore-output"]
 print(f"weights of the reduction: {sum(part.numel() for part in net.fusion.reduce[0].parameters()):,}")
@@ -347,9 +348,9 @@ axes[0].set_ylabel("x, forward [m]")
 plt.show()
 
 # %% [markdown]
-# Four of the 16 maps in one frame, bright for large. Everything that stands is smeared away from the camera, and no
-# single cell can tell how far. Maps 4, 8 and 12 also light up in the corners: there nobody looked. Whether the reduction costs accuracy and saves time (claim 8) is measured in lecture
-# [12](12_experiments.ipynb).
+# Four of the 16 maps in one frame, bright for large. What stands is smeared away from the camera, and a single cell
+# can't tell how far away it is. Maps 4, 8 and 12 also light up in the corners: there nobody looked. Whether the
+# reduction costs accuracy and saves time (claim 8) is measured in lecture [12](12_experiments.ipynb).
 #
 # ## Where it stands: $o$ joins
 #
@@ -488,8 +489,8 @@ print(f"class: {bits(m):.2f} bits; open with label {by_label:.2f}, with o {by_st
 print(f"label and state share {shared(a, b, m):.2f} bits once the class is known")
 
 # %% [markdown]
-# The pair leaves a whole bit open. The pixel on the ground plane often shows what stands *in front of* the cell: in more
-# than half of the cells in view (lecture 05). That is why the paper's network gets more: all planes, and neighbours.
+# The pair leaves a whole bit open. The pixel on the ground plane often shows what stands *in front of* the cell (lecture
+# 05). The paper's network gets more: all planes, and the neighbours.
 #
 # Does the trained network use both? Give it, in place of $o$, the mean of $o$ over all cells, the same everywhere; then
 # do the same with the planes.
@@ -499,9 +500,9 @@ print(f"label and state share {shared(a, b, m):.2f} bits once the class is known
 #
 # <details><summary>Answer</summary>
 #
-# Without $o$ what stands is lost, cars and buildings: the image knows their direction, not their distance. Without the
-# image buildings lose most, and of the sidewalk nearly a third is gone: road and sidewalk are both FREE, so in a single cell $o$
-# can't tell them apart (claim 7). What is left of the sidewalk comes from the neighbours' $o$.
+# Without $o$ hardly any cell of cars and buildings is found, and sidewalk falls from 57 to 19 %. Without the image
+# buildings lose most, from 85 to 17 %. The sidewalk loses less, from 57 to 40 %: both it and road are FREE, so $o$ in a
+# single cell can't tell them apart (claim 7), but the neighbours' $o$ helps.
 #
 # </details>
 
@@ -519,7 +520,7 @@ def found(grids, truth):
     return 100 * np.diag(counts) / np.where(counts.any(axis=1), counts.sum(axis=1), np.nan)
 
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="bars by class: with o silent buildings, cars, bicycles, fences, signage and pedestrians fall to nothing; with the image silent buildings and vegetation lose most, sidewalk a third, and road little"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="bars by class: with o silent buildings, cars, bicycles, fences, signage and pedestrians fall to nothing, sidewalk falls to a third, and vegetation is found a little more often; with the image silent buildings and vegetation lose most, sidewalk a third, road little, and signage is found more often"
 seen = (planes != 0).any(dim=1, keepdim=True)  # (B, 1, D, H, W): which points of the planes the camera sees
 grids = {
     "image and o": whole,
@@ -552,8 +553,8 @@ assert shares["image silent"][building] < 0.5 * shares["image and o"][building]
 assert shares["image silent"][SIDEWALK] < 0.8 * shares["image and o"][SIDEWALK]
 
 # %% [markdown]
-# One caution: this network has never learnt with a silent input. One that is *trained* without $o$ would make more of
-# the image; that number comes with the real street below.
+# One caution: this network has never learnt with a silent input. For one that is *trained* without $o$ see the
+# real street below.
 #
 # ## One cell sees little: the conv-deconv network
 #
@@ -563,7 +564,7 @@ assert shares["image silent"][SIDEWALK] < 0.8 * shares["image and o"][SIDEWALK]
 # each way, 22, and with the windows of pooling at most 36 cells, 18 m. How far does it really listen? Differentiate the
 # winning score of one cell with respect to $o$ in every other:
 
-# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="a map of how strongly the score of one cell depends on the occupancy of others: strongest in the cell itself, a hundred times weaker a few metres away, and nothing beyond about 11 m"
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="a map of how strongly the score of one cell depends on the occupancy of others: strongest in the cell itself, about a hundred times weaker 5 m away, and nothing beyond about 11 m"
 row, col = 100, 31  # 20.75 m ahead, in the middle
 o_one = o[shown, None].clone().requires_grad_()
 logits = net.fusion(planes[shown, None], o_one)
@@ -571,7 +572,9 @@ logits = net.fusion(planes[shown, None], o_one)
 strength = by_o[0].abs().sum(dim=0).numpy()
 apart = np.abs(np.argwhere(strength > 0) - [row, col]).max(axis=1)
 assert 22 <= apart.max() <= 36
-ax = plotting.grid_values(spec, np.log10(strength / strength.max() + 1e-9), "|gradient|, log10 of the largest", vmin=-4)
+ax = plotting.grid_values(
+    spec, np.log10(strength / strength.max() + 1e-9), "|gradient| relative to the largest (log10)", vmin=-4
+)
 ax.plot(*spec.centers()[row, col, ::-1], "c+", markersize=10)
 ax.set_ylim(0, 45)
 plt.show()
@@ -579,8 +582,8 @@ near_by = strength[row - 4 : row + 5, col - 4 : col + 5].sum() / strength.sum()
 print(f"reaches {apart.max()} cells; within 2 m lies {100 * near_by:.0f} % of it")
 
 # %% [markdown]
-# The cross is the cell that is asked about. Its own occupancy counts most, and the influence falls fast with the
-# distance.
+# The cross is the cell that is asked about. A change of its own occupancy counts most, and of a cell 5 m away about a
+# hundred times less. But there are many such cells: more than half of the sum lies beyond 2 m.
 #
 # ## What the loss balances
 #
@@ -764,12 +767,13 @@ for place in ((0, 0, 1, 1), (5, 1, 0, 2)):
 #
 # <details><summary>Answer</summary>
 #
-# The cell's 20 points lie above each other, so their pixels lie on a vertical line in the image. The gradient arrives
-# along this line, from the foot to 3.8 m up, and along the lines of neighbouring cells, fainter.
+# Neither. The cell's 20 points lie above each other, so their pixels lie on a vertical line in the image, from the foot
+# to 3.8 m up: on the car and on the trees behind it. Neighbouring cells pass gradient on to lines of their own, so that
+# nearly half of all pixels get some.
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, the image with a vertical line of points from the ground to 3.8 m beside a car; right, the size of the gradient in the same piece: bright along that line, fainter along neighbouring vertical lines"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, the image with a vertical line of points from the ground to 3.8 m, over a silver car and the trees behind it; right, the size of the gradient in the same piece: bright along that line and along neighbouring vertical lines between the same heights, fainter towards the sides"
 x = spec.centers()[..., 0]
 with torch.inference_mode():
     logits = net.fusion(planes[shown, None], o[shown, None])
@@ -792,14 +796,21 @@ for ax, colour in zip(axes, ("#fc7200", "white"), strict=True):
 axes[0].set_title("A: the points above the cell", fontsize="medium")
 axes[1].set_title("B: size of the gradient, square root", fontsize="medium")
 plt.show()
+
+# %% jupyter={"outputs_hidden": true, "source_hidden": true}
+strength = s_bar[0].abs().sum(dim=0).numpy()
 print(f"{x[row, col]:.1f} m ahead, truth car, called {KITTI_14.names[whole[shown, row, col]]}")
+for name in ("vegetation", "car"):
+    share = strength[pixel_truth[shown] == KITTI_14.index(name)].sum() / strength.sum()
+    print(f"of the gradient {share:.0%} arrives at {name}", end=", ")
+print(f"{(strength > 0).mean():.0%} of the pixels get some")
 
 # %% [markdown]
-# A step of training changes the scores *there*, at all heights, although nobody has said what these pixels show: the
-# gradient reaches the car's pixels, and those of the tree above it just as much. That is what the animation showed, and
-# what 2000 steps did to the shipped network:
+# A step of training changes the scores *there*, at all heights, although nobody has said what these pixels show. More of
+# this gradient arrives at vegetation than at cars. That is behind the animation, and behind what 2000 steps did to the
+# shipped network:
 
-# %% jupyter={"source_hidden": true} alt="A, the true classes of a street's pixels; B, after the first stage nearly the same; C, after training end to end: road and cars are still recognised, the fence and the sidewalk are speckled with other classes"
+# %% jupyter={"source_hidden": true} alt="A, the true classes of a street's pixels; B, after the first stage the large parts are right, with ragged borders and without thin posts; C, after training end to end: road, sidewalk and cars are still recognised, and in place of the fence there are patches of building, car and pedestrian"
 before, after = (scores_of(each, image).argmax(dim=1).numpy() for each in (stage_one, net))
 fig, axes = plt.subplots(3, 1, figsize=(6.4, 6.2), layout="constrained")
 for ax, (name, shown_labels) in zip(
@@ -820,12 +831,12 @@ found_less = [(before == c)[pixel_truth == c].mean() - (after == c)[pixel_truth 
 assert np.argmax(found_less) == FENCE
 taken = np.bincount(after[pixel_truth == FENCE], minlength=14)
 print(
-    f"pixels of fences are mostly called {KITTI_14.names[taken.argmax()]} now, {100 * taken.max() / taken.sum():.0f} %"
+    f"pixels of fences are most often called {KITTI_14.names[taken.argmax()]} now, {100 * taken.max() / taken.sum():.0f} %"
 )
 
 # %% [markdown]
-# End-to-end training rewards only a good map, so the scores drift towards whatever helps the map. As labels of pixels
-# they get worse, from 80 % to 67 % on this drive. The fence loses most.
+# End-to-end training rewards only a good map, and nothing holds the scores to the labels of pixels. As such they get
+# worse, from 80 % to 67 % on this drive. The fence loses most.
 #
 # ## End to end, or in two stages?
 #
@@ -857,10 +868,10 @@ Markdown(
 )
 
 # %% [markdown]
-# With every seed end to end gets more cells right, by half a point, has the lower class accuracy, and far worse labels
-# of pixels. So here it pays a little in the counts that large areas decide, and no further. Our stage one is a strong
-# one: it learns true labels of every pixel of the same images. The paper starts from ImageNet weights, so it may have
-# had more to gain.
+# With every seed end to end gets more cells right, by half a point on average, has the lower class accuracy, and far
+# worse labels of pixels. So here it pays a little, and only in a count that large areas decide. Our stage one is a
+# strong one: it learns true labels of every pixel of the same images. The paper starts from ImageNet weights; what end
+# to end would buy after such a start these runs don't say.
 #
 # ## A real street
 #
@@ -891,12 +902,13 @@ rows = [
 Markdown("\n".join([head, *rows]))
 
 # %% [markdown]
-# In brackets 95 % intervals; the simulated rows are of an earlier version of the simulator. By true labels $o$ brings about six points; by real labels about thirty, but with
-# intervals so wide that they overlap, and one network without $o$. The judges differ, too: a real cell is labelled
-# only where a *LIDAR return* lies, and there $o$ has evidence. And look at the last column: on cameras that
-# no network has seen, a table of $o$ alone is as good as the network. The second row is a surprise of its own: a network
-# that was trained with the ground plane alone does as well as one with twenty. So what the network has over a table
-# isn't the number of planes.
+# In brackets 95 % intervals; the simulated rows are of an earlier version of the simulator. By true labels $o$ brings
+# about six points; by real labels about thirty, but with intervals so wide that they overlap, and one network without
+# $o$. The judges differ, too: a real cell is labelled only where a *LIDAR return* lies, and there $o$ has evidence. And
+# look at the last column: on cameras that no network has seen, a table of $o$ alone does no worse than the network, as
+# far as these wide intervals tell. The second row is a surprise of its own: a network that was trained with the ground
+# plane alone does as well as one with twenty. So on these simulated streets it isn't the number of planes that a
+# network has over a table.
 #
 # Is late fusion nearly free on the real street, too? Labels by the shipped real network, state by the filter, truth by
 # people:
@@ -915,7 +927,7 @@ print(f"label and state share {shared(*real_columns):.2f} bits once the class is
 assert 0 < real_rows["table of both"][0] - real_rows["late fusion"][0] < 1
 Markdown(as_table(real_rows))
 
-# %% jupyter={"source_hidden": true} alt="three maps of the real street: the network's classes; late fusion, with road, cars and walls in place, but neither vegetation nor sidewalk; and the labels, which have gaps"
+# %% jupyter={"source_hidden": true} alt="three maps of the real street: the network's classes; late fusion, with the road beyond 13 m and several cars and walls in place, more cars and walls than there are, and neither vegetation nor sidewalk; and the labels, which have gaps"
 late_grid = np.full(real_truth.shape, IGNORE)
 late_grid[use] = late(fit_table(*real_columns), *real_columns[:2]).argmax(axis=1)
 last_maps = {"A: the network": real_grid[-1], "B: late fusion": late_grid[-1], "C: labels": real_truth[-1]}
@@ -925,9 +937,10 @@ plt.show()
 
 # %% [markdown]
 # Twice as many bits are shared as on the simulated drive, and again late fusion loses half a point against the table.
-# (The network has learnt from these very frames, so its row shows what it can hold, not how it does on a new street.)
-# B has road, cars and walls in place, because $o$ says where they stand. Vegetation, sidewalk and bicycle, which need the
-# image at the right distance, are missing, and so is the road nearer than 13 m, where the image shows no ground.
+# (The network has learnt from these very frames, so its row shows what it can hold, not how it does on a new street.) B
+# finds most of the road, half of the cells of cars and two thirds of those of buildings, and calls many others so. It
+# names no vegetation, sidewalk, bicycle or pedestrian at all. The road nearer than 13 m is missing, too: this camera
+# doesn't see the ground so near, and a table can't ask the neighbours.
 #
 # ## Play with it
 #
@@ -971,9 +984,9 @@ _ = interact(show, pitch=FloatSlider(value=1.0, min=-3, max=3, step=0.25, descri
 #
 # <details><summary>Answer</summary>
 #
-# Yaw moves a cell 30 m ahead by half a metre, pitch makes it read the ground at 46 or 22 m (lecture 05). Pointing too
-# high by one degree costs the three networks 4 to 14 points, yaw of one degree 3 at most. Pointing too *low* by one
-# degree costs none of them anything: SegNet gains one point and FCN four.
+# Yaw moves a cell 30 m ahead by half a metre; pitch makes it read the ground 16 m too far or 8 m too near (lecture 05,
+# for a camera at 1.5 m). Pointing too high by one degree costs the three networks 4 to 14 points, yaw of one degree 3
+# at most. Pointing too *low* by one degree costs none of them anything: SegNet gains one point and FCN four.
 #
 # </details>
 
@@ -1011,9 +1024,9 @@ assert all(abs(usual[n, "yaw"] - curves[n, "yaw"][k]) < 3.5 for n in looks for k
 
 # %% [markdown]
 # Two degrees too high are worse still; two degrees too low cost DeepLab six points and the others nothing. The last two
-# lines show why too low can help: nearer than 20 m it costs, beyond 30 m it gains. A far cell that reads too near mostly
-# reads more of the same street; one that reads too far reads what stands on it. And beyond this street's crest the
-# road lies below the plane, which a camera that points lower follows. We haven't told the two apart.
+# lines show where SegNet gains: it loses two points nearer than 20 m, and gains four beyond 30 m. Two reasons are
+# possible, and this test doesn't tell them apart: a far cell that reads too near mostly reads more of the same street,
+# while one that reads too far reads what stands on it; and where the road falls, it lies below the plane.
 #
 # **A light that it hasn't met.** Training varied brightness by a fifth:
 
@@ -1025,10 +1038,10 @@ for name in looks:
 
 # %% [markdown]
 # **What it makes up.** Where no beam has been and the camera doesn't see the cell either, the truth is
-# *unknown-unobserved*. Which of these cells get a name all the same, and can the probabilities tell a guess from a
+# *unknown-unobserved*. How many of these cells get a name all the same, and can the probabilities tell a guess from a
 # sight?
 
-# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="histograms of the confidence of named cells: where a beam has been most lie above 0.9, where nobody has looked they spread from 0.3 to 0.9"
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="histograms of the confidence of named cells: where a beam has been most lie above 0.9, where nobody has looked they spread from 0.3 to 1"
 dark = o[:, State.UNKNOWN].numpy() > 0.9
 nobody, named = dark & (truth == unobserved), whole < KITTI_14.n_semantic
 with torch.inference_mode():
@@ -1061,7 +1074,8 @@ Markdown(ledger_table(ledger("fusion")))
 
 # %% [markdown]
 # Late fusion cuts it; this network needn't. On both drives the edge is worth half a point of all cells. What the network
-# has over a table must lie elsewhere: not in the number of planes, so in neighbours, or in scores learnt for the map.
+# has over a table must lie elsewhere. On simulated streets it isn't the number of planes; neighbours are left, and scores
+# that were learnt for the map.
 #
 # ## In five lines
 #
@@ -1072,7 +1086,7 @@ Markdown(ledger_table(ledger("fusion")))
 #    keep 54 %.
 # 4. A wrong cell's gradient reaches pixels through $\theta^T$ and $A^T$. The scores then serve the map: 80 % of pixels
 #    right become 67 %.
-# 5. A camera that points too high costs 4 to 14 points per degree, one that points too low none at one degree.
+# 5. A camera that points one degree too high costs 4 to 14 points, one that points one degree too low none.
 #
 # **What you can do now.** Train a network from camera and LIDAR to a map, name the baseline that it has to beat, and
 # measure what each input is worth.
