@@ -838,7 +838,7 @@ def judged(net):
     return classes[1], np.array([[100 * pixel_accuracy(m), 100 * class_accuracy(m)] for m in matrices])
 
 
-# %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true, "source_hidden": true}
 views = {name: {"before": judged(nets[name])} for name in NAMES}
 for name in NAMES:
     views[name] |= {half: judged(after_learning(name, half)) for half in halves}

@@ -66,6 +66,7 @@ from semgrid_edu.training.devices import keep_freed_memory
 from semgrid_edu.training.loss import class_frequencies, class_weights, median_frequency_weights
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
+plt.rcParams["image.interpolation"] = "nearest"  # pixels stay pixels, and classes are not mixed
 torch.set_num_threads(1)
 keep_freed_memory()  # training is faster when the allocator keeps what is freed
 spec, heights, size = GridSpec.compact(), plane_heights(), Architecture.image_size

@@ -336,13 +336,12 @@ plt.show()
 #
 # </details>
 
-# %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
-rng = np.random.default_rng(0)
+# %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true, "source_hidden": true}
 changes = {
     "as it is": images,
     "half the light": images // 2,
     "double the light": np.minimum(images.astype(int) * 2, 255).astype(np.uint8),
-    "noise of 10 %": np.clip(images + rng.normal(0, 25, images.shape), 0, 255).astype(np.uint8),
+    "noise of 10 %": np.clip(images + np.random.default_rng(0).normal(0, 25, images.shape), 0, 255).astype(np.uint8),
     "red and blue swapped": images[..., ::-1].copy(),
     "left and right swapped": images[:, :, ::-1].copy(),
     "upside down": images[:, ::-1].copy(),
