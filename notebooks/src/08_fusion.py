@@ -210,11 +210,10 @@ plt.show()
 # <details><summary>Answer</summary>
 #
 # Exactly: P(both readings given car) is $0.5 \cdot 0.95 \cdot 0.1 + 0.5 \cdot 0.9 \cdot 0.95 = 0.475$, given road $0.5
-# \cdot
-# 0.05 \cdot 0.1 + 0.5 \cdot 0.9 \cdot 0.95 = 0.430$. So the odds of 0.25 become 0.276, and P(car) is 0.22: UNKNOWN
-# suggests that the cell is hidden, and then the label says next to nothing about it. Late fusion uses the label alone,
-# $0.925 : 0.475$, and $o$ alone, which says nothing of $m$: the odds become 0.49, P(car) 0.33. Given $m$ the readings
-# are dependent, because $hid$ is a common cause of both; given $m$ and $hid$ they are independent.
+# \cdot 0.05 \cdot 0.1 + 0.5 \cdot 0.9 \cdot 0.95 = 0.430$. So the odds of 0.25 become 0.276, and P(car) is 0.22:
+# UNKNOWN suggests that the cell is hidden, and then the label says next to nothing about it. Late fusion uses the label
+# alone, $0.925 : 0.475$, and $o$ alone, which says nothing of $m$: the odds become 0.49, P(car) 0.33. Given $m$ the
+# readings are dependent, because $hid$ is a common cause of both; given $m$ and $hid$ they are independent.
 #
 # </details>
 

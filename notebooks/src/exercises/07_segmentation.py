@@ -455,7 +455,7 @@ _test()
 # |---|---|
 # | `INDICES` | max-pooling, one to three times, and unpooling by the indices |
 # | `SKIPS` | max-pooling, one to three times; on the way up, interpolation, and each finer map added with a weight |
-# | `STRIDED` | a positive kernel with stride 2, one to three times, then interpolation |
+# | `STRIDED` | a kernel without negative weights, with stride 2, one to three times, then interpolation |
 # | `ATROUS` | the same kernels without stride, with rates 1, then 2, then 4: an output sees at most 7 pixels to either side |
 #
 # Complete `name_mechanism`: it returns one of the four. You may feed the box as many images as you like. Don't compare with the lecture's numbers, because the boxes of the
