@@ -26,6 +26,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import Markdown
 from ipywidgets import FloatSlider, interact
+from scipy.ndimage import label
 
 from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
@@ -54,15 +55,16 @@ measured = json.loads(Path("../docs/results/memory.json").read_text())
 # %% [markdown]
 # ## A car drives out of the picture
 #
-# The vehicle waits at a crossing. An oncoming car passes on the left, and after a second it has left the image, but not
-# the laser scan. What does the map say of it?
+# The vehicle waits at a crossing. An oncoming car passes on the left. After 1.4 seconds it has left the image, but
+# not the laser scan. What does the map say of it?
 
 
 # %% jupyter={"source_hidden": true}
 def oncoming(result):
-    """Return the middle of the oncoming car's cells, x and y in metres: what moves on the left, up to 35 m ahead."""
+    """Return the middle of the oncoming car's cells, x and y in metres: the largest patch that moves on the left."""
     x, y = np.moveaxis(spec.centers(), -1, 0)
-    cells = (result.belief.probability[State.DYNAMIC] > 0.5) & (y > 6) & (y < 11) & (x > 6) & (x < 35)
+    patches, _ = label((result.belief.probability[State.DYNAMIC] > 0.5) & (y > 6) & (y < 11) & (x > 6) & (x < 35))
+    cells = patches == 1 + np.bincount(patches.ravel(), minlength=2)[1:].argmax()
     return np.array([x[cells].mean(), y[cells].mean()]) if cells.sum() > 5 else None
 
 
@@ -88,7 +90,7 @@ def passing():
         axes["A"].imshow(result.frame.image[::2, ::2] // 16 * 16)
         axes["A"].set_axis_off()
         axes["A"].set_title(f"A: image, {result.frame.time:.1f} s", fontsize="medium")
-        fig.supxlabel(real.credit, fontsize=6)
+        fig.supxlabel(real.credit, fontsize=8)
         ring = oncoming(result)
         draw_map(axes["B"], result.grid, "B: one frame", ring)
         draw_map(axes["C"], result.remembered, "C: with memory", ring)
@@ -98,22 +100,23 @@ def passing():
 plotting.animate(passing(), period=0.6, alt="a car leaves the image; only the map with memory still calls it a car")
 
 # %% [markdown]
-# Follow the ring. In B, the map of one frame, the car is blue, *car*, as long as the image shows it, and then it turns
-# pale orange: *unknown-dynamic*. The filter knows that something moves there. That it is a car, the system knew half a
-# second ago, and has forgotten. In C it stays a car, because there the class is kept and moves along.
+# Follow the ring, which appears when the filter finds that the car moves. In B, the map of one frame, the car is
+# blue, *car*, as long as the image shows it, and then it turns pale orange: *unknown-dynamic*. The filter knows that
+# something moves there. That it is a car, the system knew half a second ago, and has forgotten. In C it stays a car,
+# because there the class is kept and moves along.
 #
 # Now a vehicle that drives. This is the last frame of the simulated drive, after two seconds:
 
-# %% jupyter={"source_hidden": true} alt="three maps of the simulated street: with one frame, everything beside and before the view is pale or black, unknown; with memory, road, sidewalk and vegetation reach to the vehicle; the truth"
+# %% jupyter={"source_hidden": true} alt="three maps of the simulated street: with one frame, most cells beside the view and right before the vehicle are pale, brown or black, unknown; with memory, road, sidewalk and vegetation reach to the vehicle; the truth"
 maps = {"one frame": simulated[-1].grid, "with memory": simulated[-1].remembered}
 maps = {name: grid.argmax(axis=0) for name, grid in maps.items()}
 plotting.label_maps(spec, maps | {"truth": simulated[-1].frame.labels.birdseye_on(spec)}, KITTI_14)
 plt.show()
 
 # %% [markdown]
-# With one frame, all that the camera doesn't see now is one of the four unknown classes (pale, brown and black), also
-# the road right before the vehicle, which it has looked at for two seconds. The paper defines it so. The lecture asks
-# what this costs, and how much of it a memory gets back.
+# With one frame, most of what the camera doesn't see now is called one of the four unknown classes (pale, brown,
+# orange and black), also the road right before the vehicle, which it saw less than a second ago. The paper defines it
+# so. The lecture asks what this costs, and how much of it a memory gets back.
 #
 # ## The graph, with the edge put back
 #
@@ -123,7 +126,7 @@ plt.show()
 # shadow that made the network wrong is mostly still there a tenth of a second later. In this toy world an error
 # stays with probability $r = 0.6$, and is otherwise drawn anew; by itself each frame is right with 0.8.
 
-# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph of three frames: contents m0 to m2 in a row, above them scans, below them the classes named, which also depend on a row of errors e0 to e2; the edge between errors is dashed with its price"
+# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph of three frames: contents m0 to m2 in a row, above them scans, below them the classes named, which also depend on a row of errors e0 to e2; a dashed arc below the last two errors has the price .34 to .38, and another one joins scan l1 and class named z1"
 world = MemoryWorld(steps=3, repeats=0.6)
 stage = class_over_time(world)
 fig, ax = plt.subplots(figsize=(6.6, 4.2), layout="constrained")
@@ -131,9 +134,9 @@ stage.draw(ax)
 plt.show()
 
 # %% [markdown]
-# **Predict before you run.** The class memory that everybody writes first multiplies what the frames say. This is right
-# if $z_0$ and $z_1$ are independent once the contents $m_0, m_1$ are known. Are they? And $z_0$ and $l_1$, once $m_0$
-# and $m_1$ are known?
+# **Predict before you run.** The simplest memory of classes multiplies what the frames say. This is right if $z_0$
+# and $z_1$ are independent once the contents $m_0, m_1$ are known. Are they? And $z_0$ and $l_1$, once $m_0$ and
+# $m_1$ are known?
 #
 # <details><summary>Answer</summary>
 #
@@ -173,9 +176,10 @@ for name, again_right, again_wrong in (
     print(f"{name:<15} P(building | building, building) = {building / (building + other):.2f}")
 
 # %% [markdown]
-# The exact answer needs the errors of every cell as a second chain, which no real system can afford: the number of ways
-# to err is that of all textures of the street. What it can afford is one belief per cell and an **exponent** $w$. The
-# scan is a full witness, each frame of the camera counts as $w$ of one:
+# The exact answer needs a second chain in every cell, that of the errors. The toy has four ways to be wrong; a
+# network has as many as there are textures on the street, so a real system can't write this chain down. What it can
+# keep is one belief per cell and an **exponent** $w$. The scan is a full witness, each frame of the camera counts as
+# $w$ of one:
 #
 # $$ b_t(m) \;\propto\; P(l_t \mid m)\; P(z_t \mid m)^{w} \sum_{m'} P(m \mid m')\, b_{t-1}(m') $$
 #
@@ -292,17 +296,16 @@ assert min(rates[1], on_street[1]) > 0.5
 assert rates[10] > 5 * rates[1] ** 10  # far more than if it fell like r^k
 
 # %% [markdown]
-# So a network that errs once errs again. (The filter draws particles, so on another processor the last digit may
-# differ, here and below; assertions hold what the text says.) Note also how slowly the correlation falls from one frame
-# apart to ten. The formula assumes that it falls like $r^k$; here it falls more slowly. One cause may be that much of
-# what makes a network wrong doesn't pass: a kind of hedge that it never saw stays that kind of hedge. So the formula is
-# too hopeful.
+# So errors repeat: their correlation from one frame to the next is 0.7 on both drives. (The filter draws particles,
+# so on another processor the last digit may differ, here and below; assertions hold what the text says.) Note also
+# how slowly the correlation falls from one frame apart to ten. The formula assumes that it falls like $r^k$, so that
+# frames far apart are nearly independent. Here they aren't, so the formula promises too much.
 #
 # ## The exponent, measured
 #
-# Therefore the package doesn't assume an exponent. On fresh simulated streets, whose true labels are known everywhere,
-# we let a memory run with each of six exponents and look which one knows the classes in view best, by distance
-# ([memory.json](../docs/results/memory.json), made by `semgrid-edu reproduce memory`):
+# Therefore the package doesn't take its exponent from the formula. On fresh simulated streets, whose true labels are
+# known everywhere, we let a memory run with each of six exponents and look which one knows the classes in view best,
+# by distance ([memory.json](../docs/results/memory.json), made by `semgrid-edu reproduce memory`):
 
 # %% jupyter={"source_hidden": true}
 worth = measured["worth"]
@@ -319,35 +322,37 @@ Markdown(f"Loss in nats in cells in view, {measured['drives']} streets:\n\n" + "
 
 
 # %%
-def semantic_loss(maps, results, group):
-    """Return the mean of -log P(true class), unknown classes left aside, over a group of cells, nats."""
+def semantic_scores(maps, results, group):
+    """Return means over a group of cells, unknown classes left aside: -log P(true class), how sure, how often right."""
     since, found = frames_since_seen([result.frame for result in results], spec), []
     for seen_ago, grid, result in zip(since, maps, results, strict=True):
         truth = result.frame.labels.birdseye_on(spec)
         cells = (seen_ago == 0 if group == "in view" else seen_ago > 0) & (truth != IGNORE)
         p = grid[:S, cells] / np.maximum(grid[:S, cells].sum(axis=0), 1e-9)
-        found.append(-np.log(np.maximum(p[truth[cells], np.arange(cells.sum())], 1e-3)))
-    return np.concatenate(found).mean()
+        loss = -np.log(np.maximum(p[truth[cells], np.arange(cells.sum())], 1e-3))
+        found.append([loss, p.max(axis=0), p.argmax(axis=0) == truth[cells]])
+    return np.concatenate(found, axis=1).mean(axis=1)
 
 
 # %% tags=["nbval-ignore-output"]
 views = [View(result.frame, result.belief, result.grid) for result in simulated]
 one_frame = [result.grid for result in simulated]
-print("simulated drive, nats            in view   seen before")
-table = {"one frame": [semantic_loss(one_frame, simulated, group) for group in ("in view", "seen before")]}
-for most in (1.0, 2.0, 4.0, 20.0):
-    piled = list(remember_drive(views, spec, MemoryParams(most=most)))
-    table[most] = [semantic_loss(piled, simulated, group) for group in ("in view", "seen before")]
-for name, losses in table.items():
-    words = name if name == "one frame" else f"memory, worth {name:g} frames at most"
-    print(f"{words:<34}{losses[0]:.2f}        {losses[1]:.2f}")
+groups, table = ("in view", "seen before"), {}
+print("simulated drive                   in view: nats   sure  right   seen before: nats")
+for most in (None, 1.0, 2.0, 4.0, 20.0):
+    name = "one frame" if most is None else f"memory, worth {most:g} frames at most"
+    piled = one_frame if most is None else list(remember_drive(views, spec, MemoryParams(most=most)))
+    view, before = (semantic_scores(piled, simulated, group) for group in groups)
+    table[most] = [view[0], before[0]]
+    print(f"{name:<34}{view[0]:13.2f}{100 * view[1]:5.0f} %{100 * view[2]:5.0f} %{before[0]:20.2f}")
 assert table[1.0] < table[2.0] < table[4.0] < table[20.0]  # the more may pile up, the worse
-assert np.all(np.array(table[1.0]) < table["one frame"])
+assert np.all(np.array(table[1.0]) < table[None])
 
 # %% [markdown]
-# The best limit of these is 1: all frames *together* are worth one. More evidence makes the map surer and not better,
-# as in the hand calculation with the frame that repeats itself. A limit of 1 still gains, because the memory keeps a
-# running mean of log P: a blunder in a single frame is diluted.
+# The best limit of these is 1: all frames *together* are worth one. With more, the map only gets surer and not
+# better, as in the hand calculation with the frame that repeats itself: in view, a limit of 20 makes it 94 % sure in
+# place of 88 %, and right in 80 % in place of 82 %. A limit of 1 still gains, because the memory keeps a running mean
+# of log P: a blunder in a single frame is diluted.
 #
 # ## The memory of one cell
 #
@@ -385,7 +390,8 @@ for p in ([0.8, 0.2], [0.5, 0.5], [0.3, 0.7]):
 #
 # - *Where.* The map stays aligned with the world and scrolls under the vehicle by whole cells, as that of the occupancy
 #   filter does (lecture 04). If it were interpolated at every frame, it would blur more with each of them.
-# - *Near and far.* $w$ falls with the distance as $e^{-d/100\,\text{m}}$: a cell 50 m away covers a pixel or two.
+# - *Near and far.* $w$ falls with the distance as $e^{-d/100\,\text{m}}$: a cell on the ground 50 m away is two
+#   pixels wide in the network's image, and less than a tenth of one high.
 # - *What comes and goes.* Where a frame shows a car, a person or a bicycle, it counts fully. A hundred frames of empty
 #   road are no witness against a car that has just come.
 #
@@ -433,9 +439,10 @@ for step in range(11):
 #
 # ## What it gains
 #
-# Cells are scored in three groups: those that the camera sees now; those that it saw before and doesn't see now; those
-# that it never saw. The first group is what the paper's tables count. Each drive is compared with itself, so that easy
-# and hard streets don't hide the difference; the intervals are over drives (lecture 12).
+# Cells are scored in three groups: those that the camera sees now; those that it saw before and doesn't see now;
+# those that it never saw. The first group is what the paper's tables count. Each drive is compared with itself, so
+# that easy and hard streets don't hide the difference; the intervals are over drives (lecture 12), on the real street
+# over blocks of two seconds of one of its six cameras.
 
 # %% jupyter={"source_hidden": true}
 names = {"fresh simulated streets": "simulated", "sample drive": "sample drive"}
@@ -461,11 +468,12 @@ for street_name, short_name in names.items():
 Markdown("In per cent:\n\n" + "\n".join(rows))
 
 # %% [markdown]
-# Read the rows *in view* first. On streets that are new to it, the memory gains 4.5 points, and the interval is far
-# from zero. The two memories that one writes first, mean and product of the last five maps, *lose* points there. The
-# gain isn't one of the simulator: the network from simulated streets gains 3.5 points on the real scene, whose labels
-# people made. The last rows are for a network that learned from these very frames. It errs little, so there is nothing
-# to gain in view, and nothing is lost: 0.0, with an interval from −0.2 to 0.2.
+# Read the rows *in view* first, and in them pixel accuracy. On streets that are new to it, the memory gains 4.5
+# points, and the interval is far from zero. The two memories that one writes first, mean and product of the last five
+# maps, *lose* points there. The gain isn't one of simulated streets alone: the network from simulated streets gains
+# 3.5 points on the real scene, whose labels people made. The last rows are for a network that learned from these very
+# frames. In view it errs in fewer than 8 cells of 100, and the memory changes nothing: 0.0, with an interval from
+# −0.2 to 0.2.
 #
 # Is this knowledge, or does the memory only say *unknown* less frequently? Ask both maps for the most probable
 # *semantic* class, also where an unknown one is more probable:
@@ -491,39 +499,43 @@ for group in ("in view", "seen before"):
     assert (shares[3] - shares[2] < 2) == (group == "in view")
 
 # %% [markdown]
-# In view nearly the whole gain is of that kind: the memory knows that the camera saw the cell, so it doesn't answer
-# *unknown*, but its classes are hardly better than those of one frame. This is what line 3 of the toy's table said:
-# frames that err together know little more than one. In cells seen before, the classes themselves are better.
+# On this drive nearly the whole gain in view is of that kind: the memory knows that the camera saw the cell, so it
+# doesn't answer *unknown*, but its classes are hardly better than those of one frame. This is what line 3 of the
+# toy's table said: frames that err together know little more than one. In cells seen before, the classes themselves
+# are better.
 #
-# In the rows *seen before* the paper's map is right in 15 of 100 cells, because it calls most of the others unknown.
-# With memory it is right in 73. What did these cells say when the camera last saw them?
+# In the rows *seen before* of the simulated streets one frame is right in 15 of 100 cells, because it calls most of
+# the others unknown. With memory it is 73. What did such cells say when the camera last saw them?
 
 
 # %% tags=["nbval-ignore-output"]
-def last_calls(results):
-    """Return how frequently the last call while in view, and the memory, are right in cells seen before."""
-    frames, right = [result.frame for result in results], []
+def last_calls(results, classes):
+    """Return how often the last call in view and the memory are right in cells seen before, and how many changed."""
+    frames, found = [result.frame for result in results], []
     since = frames_since_seen(frames, spec)
     for now, result in enumerate(results):
         truth = result.frame.labels.birdseye_on(spec)
         for ago in range(1, now + 1):
             then = results[now - ago]
             motion = PlanarMotion.from_poses(then.frame.T_world_from_lidar, result.frame.T_world_from_lidar)
-            called = look_up(then.grid, np.zeros(S + 4, np.float32), spec, spec, motion).argmax(axis=0)
-            cells = (since[now] == ago) & (truth != IGNORE)
-            right.append(
-                np.stack([called[cells] == truth[cells], result.remembered.argmax(axis=0)[cells] == truth[cells]])
-            )
-    return 100 * np.concatenate(right, axis=1).mean(axis=1)
+            was = np.concatenate([then.grid, then.frame.labels.birdseye_on(spec)[None]]).astype(np.float32)
+            was = look_up(was, np.full(S + 5, IGNORE, np.float32), spec, spec, motion)
+            cells = (since[now] == ago) & (truth != IGNORE) & (was[-1] != IGNORE)
+            calls = was[:classes].argmax(axis=0), result.remembered[:classes].argmax(axis=0)
+            found.append([*((called == truth)[cells] for called in calls), (was[-1] != truth)[cells]])
+    return 100 * np.concatenate(found, axis=1).mean(axis=1)
 
 
-last, kept = last_calls(simulated)
-print(f"sample drive, cells seen before: right when last in view {last:.0f} %, remembered {kept:.0f} %")
-assert kept > last + 15
+for name, classes in {"any class": S + 4, "unknown forbidden": S}.items():
+    last, kept, changed = last_calls(simulated, classes)
+    print(f"sample drive, seen before, {name:<17}: right when last in view {last:.0f} %, remembered {kept:.0f} %")
+    assert (kept < last + 5) == (classes == S)
 
 # %% [markdown]
-# So the memory knows more than the last look. It holds all looks together, and the last one before a cell leaves the
-# view is right in fewer than half of them.
+# The last look before a cell leaves the view is right in fewer than half of them, because it is a look at the edge of
+# the image, where the network often answers *unknown*. Forbidden to do so, it is right in 69 %, and memory in 71 %.
+# So the memory keeps the class that was seen, and holding all looks together makes it only a little better than the
+# last one.
 #
 # Where does it help most, and where does it harm? We let the program choose, so that nobody picks the pretty places: of
 # all squares of 8 x 8 m in all frames of both drives, those in which the number of right cells rises most. Three per
@@ -572,9 +584,9 @@ def show_windows(chosen, side=16):
 show_windows([(results, one) for results in (simulated, street) for one in windows(results, 1)])
 
 # %% [markdown]
-# White cells of the truth are those that nobody labelled. In the simulated squares unknown cells become what they are:
-# vegetation, road, sidewalk. On the real street two of the three squares show the oncoming car of the opening; the
-# third gains four cells, so there is little else to gain.
+# White cells of the truth are those that nobody labelled. In the simulated squares unknown cells become what they
+# are: vegetation, road, sidewalk. On the real street two of the three squares show the oncoming car of the opening;
+# the third gains four cells.
 #
 # ## The ledger's line, paid back
 #
@@ -587,9 +599,9 @@ show_windows([(results, one) for results in (simulated, street) for one in windo
 #
 # <details><summary>Answer</summary>
 #
-# Seen before: 0.34 nats against 0.08. A cell in view has an image already, and further ones repeat its errors. The real
-# memory gets about the predicted 0.34 or more on the simulated drive for cells seen before, and a third of the 0.08 in
-# view: an exponent can't follow the errors, and they last longer than the toy's.
+# Seen before: 0.34 nats against 0.08. A cell in view has an image already, and further ones repeat its errors. On the
+# sample drive the real memory gets 0.45 for cells seen before, and in view a third of the 0.08. On the real street it
+# gets neither.
 #
 # </details>
 
@@ -606,23 +618,27 @@ predicted = {
     "in view": toy_loss(*scans, "z2") - toy_loss(*scans, *earlier, "z2"),
     "seen before": toy_loss(*scans) - toy_loss(*scans, *earlier),
 }
-print("nats gained      predicted, exact   sample drive   real street")
+untaught = list(run_pipeline(real, load_net(sample_weights(), real.camera), memory=True))
+print("nats gained      predicted, exact   sample drive   real street   by simulated net")
 for group, gain in predicted.items():
     gains = []
-    for results in (simulated, street):
+    for results in (simulated, street, untaught):
         before, after = ([getattr(result, name) for result in results] for name in ("grid", "remembered"))
-        gains.append(semantic_loss(before, results, group) - semantic_loss(after, results, group))
-    print(f"{group:<16}{gain:>12.2f}{gains[0]:>19.2f}{gains[1]:>14.2f}")
+        gains.append(semantic_scores(before, results, group)[0] - semantic_scores(after, results, group)[0])
+    print(f"{group:<16}{gain:>12.2f}{gains[0]:>19.2f}{gains[1]:>14.2f}{gains[2]:>19.2f}")
     assert gains[0] > 0 > gains[1]
 assert predicted["seen before"] > 4 * predicted["in view"]
 assert gains[0] > predicted["seen before"]
+for name, results in {"sample drive": simulated, "real street": street}.items():
+    print(f"{name}: {last_calls(results, S)[2]:.0f} % of the cells seen before have another class than when last seen")
 
 # %% [markdown]
-# The toy gets the order right: most of what memory gives lies where the camera doesn't look any more. On the simulated
-# drive the gain there is even larger than predicted. On the real street both are *negative*. Two things
-# are different there, of which the toy knew nothing. This network learned from these frames, so one frame is right in
-# 92 of 100 cells in view. And the vehicle waits, so what is hidden now is hidden by traffic, and the street has changed
-# meanwhile. A prediction that fails tells where the model is too simple.
+# On the sample drive the toy gets the order right: most of what memory gives lies where the camera doesn't look any
+# more, even more than predicted. On the real street both are *negative*. Two things are different there, of which the
+# toy knew nothing. This network learned from these frames, so that one frame is right in 92 of 100 cells in view.
+# With the network from simulated streets (last column) the gain in view is positive, but not that for cells seen
+# before. And the vehicle waits, so what is hidden now is hidden by traffic: 38 % of these cells have another class
+# than when they were last seen, on the sample drive 5 %. A prediction that fails tells where the model is too simple.
 #
 # This is the price that stays, the errors that no exponent follows:
 
@@ -669,44 +685,48 @@ show_windows([(results, one) for results in (simulated, street) for one in windo
 
 # %% [markdown]
 # In the simulated squares, 45 to 67 m ahead, earlier guesses of *sidewalk* and *vegetation* stay where the newest
-# frame, from nearer by, has fewer of them. The exponent falls with the distance, but perhaps not fast enough there. On
-# the real street it is a few cells at the edges of cars.
+# frame, from nearer by, has fewer of them. On the real street it is a few cells at the edges of cars.
 #
 # **A car that leaves.** And what of a car that stood, was seen, and drove away out of view?
 
 # %% tags=["nbval-ignore-output"]
-cars, left = KITTI_14.index("car"), [0, 0]
+cars, left = KITTI_14.index("car"), np.zeros(3, int)
 since = frames_since_seen([result.frame for result in simulated], spec)
-for seen_ago, result in zip(since, simulated, strict=True):
+for now, (seen_ago, result) in enumerate(zip(since, simulated, strict=True)):
     truth, free = result.frame.labels.birdseye_on(spec), result.belief.probability[State.FREE] > 0.5
     ghosts = (seen_ago > 0) & (truth == KITTI_14.index("road")) & (result.remembered.argmax(axis=0) == cars)
-    left[0] += int(ghosts.sum())
-    left[1] += int((ghosts & free).sum())
-print(
-    f"road cells, seen before, that memory calls car: {left[0]}; in {100 * left[1] / left[0]:.0f} % the scan says FREE"
-)
+    parked = np.zeros(spec.shape, bool)
+    for then in simulated[:now]:
+        motion = PlanarMotion.from_poses(then.frame.T_world_from_lidar, result.frame.T_world_from_lidar)
+        was = np.float32(then.frame.labels.birdseye_on(spec) == cars)[None]
+        parked |= look_up(was, np.zeros(1, np.float32), spec, spec, motion)[0] > 0
+    left += [cells.sum() for cells in (ghosts, ghosts & free, ghosts & parked)]
+print(f"road cells, seen before, that memory calls car: {left[0]}; in", end=" ")
+print("{:.0f} % the filter says FREE; in {:.0f} % an earlier frame had a car".format(*100 * left[1:] / left[0]))
 assert left[0] > 500
-assert left[1] > 0.4 * left[0]
+assert min(left[1:]) > 0.4 * left[0]
 
 # %% [markdown]
-# Such a car was learnt as a standing thing and stays behind as a ghost; so does one whose motion the filter noticed
-# late. In part of these cells the laser sees that nothing stands there any more, but the two memories, of occupancy
-# and of classes, don't talk to each other: that is the dashed arc from $l_1$ to $z_1$ in the graph. In the exercise you
-# make them talk.
+# In six of ten of these cells a car was in an earlier frame and has left: the memory keeps a ghost. In six of ten the
+# filter believes by now that the cell is FREE, but the two memories, of occupancy and of classes, don't talk to each
+# other: that is the dashed arc from $l_1$ to $z_1$ in the graph. In the exercise you make them talk.
 #
-# **What this doesn't show.** The fresh streets come from the simulator that the network learned from. The real scene is
-# four seconds at one corner. And at intervals longer than ours, with poses from a cheaper sensor, the map drifts.
+# **What this doesn't show.** The fresh streets come from the simulator that the network learned from. The real scene
+# is four seconds at one corner. Its poses and the simulator's hardly drift; what a memory is worth with poses that
+# do, we haven't measured.
 #
 # ## In five lines
 #
 # 1. Frames share their errors, so they are no independent witnesses; their product is worse than one frame once errors
 #    stay with 0.6.
 # 2. An exponent below 1 repairs most of it (0.52 to 0.38 nats, exact 0.34); on drives it is measured, not assumed.
-# 3. On these drives all frames of a cell together are worth one: a running mean of log P.
+# 3. On the sample drive the best limit was the smallest: all frames of a cell together are worth one, a running mean
+#    of log P.
 # 4. Most of the gain lies where the camera doesn't look any more: 15 to 73 % of the cells on fresh streets; in view
-#    +4.5 points there, nearly all of it fewer answers *unknown*, and 0.0 for the network that knows the real street.
-# 5. The graph named this edge in lecture 00, before anybody had built it. Its order of the gains was right; its sign on
-#    the real street wasn't.
+#    +4.5 points there, and 0.0 for the network that knows the real street. On the sample drive nearly all of the gain
+#    in view is fewer answers *unknown*.
+# 5. The graph named this edge in lecture 00, before anybody had built it. The order of the gains that it predicted
+#    was right on the sample drive; on the real street neither order nor sign was.
 #
 # **What you can now do.** You can draw a perception system as a graph, find what it cuts, put a price on each edge with
 # exact inference on a toy, choose the edge that is worth paying for, build it, and measure whether the price was right.
