@@ -109,10 +109,12 @@ print(f"scale: {table1['scale']}; seeds: {table1['seeds']}; test frames: {frames
 # because each has circles (other training runs) and a bar (other drives *and* other training runs). This lecture is
 # about where such a bar comes from, when you may believe it, and what it lets you conclude about the paper's claims.
 #
-# All numbers below come from [docs/results/reduced](../docs/results/reduced/), or from code that you see. Those tables
-# were made on an earlier version of the simulator, and will be made again. The rule by which they are judged was
-# written before them, but not blindly: these test streets had been scored before, and SegNet's architecture was changed
-# by some of those scores. The sentences that name an outcome came later, and a cell prints or asserts what they say.
+# The results below are read from [docs/results/reduced](../docs/results/reduced/), unless a sentence names another
+# place or you see the code. They are of an earlier version of the simulator, from before its LIDAR and its ground
+# were made like KITTI's: it had a fifth of KITTI's columns, and all roads lay in one plane. The rule by which they
+# are judged was written before them, but not blindly: these test streets had been scored before, and SegNet's
+# architecture was changed by some of those scores. The sentences that name an outcome came later, and a cell prints
+# or asserts what they say.
 #
 # ## A score has two parents
 #
@@ -300,9 +302,9 @@ beside.set(yticks=(0, 1), yticklabels=("one left out", "each alone"), ylim=(-0.6
 plt.show()
 
 # %% [markdown]
-# Left, each row below the first leaves one drive out (\u00d7), and the score moves a little. Right, the four scores
-# without a drive lie three times as close together as the drives' own: each still shares two drives of three with every
-# other. So their squares are summed and kept, not divided by $V - 1$ as those of independent values are.
+# Left, each row below the first leaves one drive out (×), and the score moves a little. Right, the four scores
+# without a drive lie three times as close together as the drives' own: each still shares two drives of three with
+# every other. So their squares are summed and kept, not divided by $V - 1$ as those of independent values are.
 
 
 # %% tags=["jackknife"]
@@ -445,8 +447,8 @@ plt.show()
 #
 # ## Table 1, read
 #
-# Now the differences of Table 1, paired. In each row look first on which side of zero the bar lies, then how long it
-# is.
+# Now the differences of Table 1, paired, by labels made with the LIDAR. In each row look first on which side of zero
+# the bar lies, then how long it is.
 
 # %% jupyter={"source_hidden": true} alt="three panels, one for each metric, of paired differences with intervals: with the CRF minus without it for three networks, and each network minus the next one, with a dashed line at zero"
 differences = {row["what"]: row["scores"]["lidar"]["all"] for row in table1["differences"]}
@@ -479,8 +481,9 @@ for metric in METRICS:
 
 # %% [markdown]
 # With each of the networks, the CRF adds about half a point of pixel accuracy and costs about two and a half of class
-# accuracy: the paper's signs. FCN is better than DeepLab v2, as in the paper, though by less. But FCN is also better
-# than SegNet, and in the paper it is worse.
+# accuracy: the paper's signs. Its FmIoU rises clearly with SegNet and DeepLab v2; in the paper it falls with SegNet.
+# FCN is better than DeepLab v2, as in the paper, though by less. But FCN is also better than SegNet, and in the paper
+# it is worse.
 #
 # Two things to notice about the *kind* of evidence. First, the paper's column has no interval, so a difference of 0.1
 # or 0.2 points there may be anything. Second, the metrics may disagree, because they ask different questions. Take 90
@@ -633,10 +636,10 @@ for count in (1, 2, 3):
 # Half a point was chosen before the numbers, too.
 #
 # The rule is strict in both directions. A claim with six statements must pass six times, and a single interval on the
-# wrong side sinks it, be it by chance. **Holm's** correction is as safe as Bonferroni's and misses less. Each statement
-# has a one-sided *p-value*, 2.5 % where its interval ends at the limit, and less on the wrong side. Of $m$ statements,
-# give up that with the smallest p-value if it is at most 2.5 % / $m$, then the next if at most 2.5 % / $(m - 1)$, and
-# so on.
+# wrong side sinks it, be it by chance. **Holm's** correction is as safe as Bonferroni's and misses less. Each
+# statement has a one-sided *p-value*, 2.5 % when its interval lies on the wrong side and just ends at the limit, and
+# less the farther away it lies. Of $m$ statements, give up that with the smallest p-value if it is at most 2.5 % /
+# $m$, then the next if at most 2.5 % / $(m - 1)$, and so on until one isn't given up.
 
 # %% tags=["holm"]
 p_values = [0.004, 0.006, 0.02, 0.3, 0.9]
@@ -720,10 +723,10 @@ plt.show()
 # %% [markdown]
 # Some claims deserve a second look, because of how they are *built* or how they came out:
 #
-# - **Claim 1** ("SegNet before FCN before DeepLab, since fewer parameters learn better from few images") gives an order
-#   *and* a reason. Our statements test the order alone, and FCN is clearly ahead of SegNet in all three metrics,
-#   although our SegNet is still the smallest of the three. That speaks against the reason, too, but weakly: all three
-#   have less than a million parameters. Whether SegNet loses least when frames are few is in the companion.
+# - **Claim 1** ("SegNet before FCN before DeepLab, since fewer parameters learn better from few images") gives an
+#   order *and* a reason. Our statements test the order alone, and FCN is clearly ahead of SegNet in all three
+#   metrics, although our SegNet is still the smallest of the three. That speaks against the reason, too, but weakly:
+#   all three have less than a million parameters. Whether SegNet loses least when frames are few is in the companion.
 # - **Claims 1 and 2** are judged with labels made with the LIDAR, like the paper's. The cell below judges the same
 #   statements with true labels, and can't tell either: SegNet and FCN no longer differ clearly, and the CRF's gain in
 #   pixel accuracy is clear for one network of three. And no statement tests the claim's word *slightly*.
@@ -771,9 +774,9 @@ for number, lidar, true in zip("12", as_claimed(differences), as_claimed(differe
 # semgrid-edu reproduce table1 --scale quick --runs RUNS --out OUT      # add --plan to see only how long it will take
 # ```
 #
-# It plans about three minutes. (Where the outputs of this page were made, other programs had most of the processor, and
-# it took nine; so it isn't run here. Its table is in [docs/results/quick](../docs/results/quick/table1.md).) *Quick*
-# says what it is: 18 frames to learn from, 12 + 10 steps, two seeds, eight test drives.
+# It plans about three minutes, so it isn't run here. Its table is in
+# [docs/results/quick](../docs/results/quick/table1.md), made with today's simulator. *Quick* says what it is: 18
+# frames to learn from, 12 + 10 steps, two seeds, eight test drives.
 #
 # **Predict before you run.** Fill in your own table: pixel accuracy of each network, in per cent, by labels made with
 # the LIDAR. Then say whether the CRF will raise it. Then the verdict of our rule on claim 1 (SegNet before FCN before
@@ -828,8 +831,9 @@ assert min(crf_gains) > 0
 #
 # Is SegNet now better than FCN, as the paper says, or worse, as our long runs say? **Neither follows.** Two seeds and
 # eight drives give no interval, so the rule refuses, and it does so before it looks at the means. That is what it is
-# for: these means are as pretty as those of any published table. What a quick run does show is that every step works on
-# your machine, and that the ranking of networks changes with the number of steps.
+# for: these means are as pretty as those of any published table. What a quick run does show is that every step works
+# on your machine. That its ranking isn't the one of the long runs has many possible reasons: fewer frames, fewer
+# steps, two seeds, other streets.
 #
 # ## What the scale permits
 #
@@ -926,13 +930,12 @@ live = {name: np.array([retrain(variant, seed) for seed in range(3)]) for name, 
 #
 # <details><summary>Answer</summary>
 #
-# The occupancy grid tells nearly by itself which kind of unknown a cell is, and about
-# half of the test cells are unknown. In the run stored here, this comparison was clear in all three metrics:
-# *reproduced*. The upper ten planes lie 2 m and more above the ground, higher than road and most cars. The differences
-# were a point and a half or less, in favour of ten planes, and all three intervals contained zero: *cannot tell*, with
-# Holm's correction or without. On another machine rounding differs. If one interval ended just below zero there, the
-# uncorrected rule would say *not reproduced*. Would you bet on it, after six comparisons, on one drive to learn
-# from?
+# The occupancy grid tells nearly by itself which kind of unknown a cell is, and about half of the test cells are
+# unknown. In the run stored here, this comparison was clear in all three metrics: *reproduced*. The upper ten planes
+# lie 2 m and more above the ground, higher than road and most cars. The differences were 1.4 to 2.0 points, in favour
+# of ten planes, and all three intervals contained zero: *cannot tell*, with Holm's correction or without. On another
+# machine rounding differs. If one interval ended just below zero there, the uncorrected rule would say *not
+# reproduced*. Would you bet on it, after six comparisons, on one drive to learn from?
 #
 # </details>
 
@@ -959,12 +962,12 @@ plt.show()
 
 # %% [markdown]
 # The two upper rows of each panel belong to the occupancy grid, the two lower ones to the planes. On the left stands
-# what you just made, with true labels to learn from; on the right the same comparison from the committed results, with
-# longer training, end to end, on more data, from LIDAR labels. Of the occupancy grid both panels say the same, though
-# by other amounts. Of the planes neither sees a difference, but the bars on the right are less than half as long as
-# those stored here on the left. If an interval contains zero, the honest sentence is: *this experiment cannot tell*.
-# That isn't a failure. It tells you how large an experiment would have to be: to halve a bar that drives dominate, you
-# need four times as many drives.
+# what you just made, with true labels to learn from; on the right the same comparison from the committed results,
+# with longer training, end to end, on more data, from LIDAR labels. Of the occupancy grid both panels say the same,
+# though by other amounts. Of the planes neither sees a difference, but the bars on the right are less than a fifth as
+# long as those stored here on the left. If an interval contains zero, the honest sentence is: *this experiment cannot
+# tell*. That isn't a failure. It tells you how large an experiment would have to be: to halve a bar that drives
+# dominate, you need four times as many drives.
 #
 # ## Where this breaks
 #
@@ -1007,10 +1010,10 @@ for share in (0.8, 0.3, 0.1, 0.05):
     print(f"; in {100 * lonely:3.0f} % the class is in one drive at most")
 
 # %% [markdown]
-# With a class in most drives the intervals keep their promise. With one in twenty they don't, and no formula can mend
-# it: there are too few drives that speak of the class. If it is in one drive alone, leaving that drive out even changes
-# over which classes the mean runs. What helps is to look at the number of *drives* behind each class before you believe
-# a class accuracy.
+# With a class in most drives the intervals keep their promise. With one in ten or in twenty they don't, because too
+# few drives speak of the class. If it is in one drive alone, leaving that drive out even changes over which classes
+# the mean runs. What helps is to look at the number of *drives* behind each class before you believe a class
+# accuracy.
 #
 # **What no interval sees.** All our drives come from one simulator. If its streets are all alike in some way, all
 # drives share that parent, and it never varies in our data. **Looking first.** If you try ten variants, choose the best

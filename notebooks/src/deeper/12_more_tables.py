@@ -14,8 +14,9 @@
 #
 # **Time.** 20 minutes, of which the computer needs less than one.
 #
-# All numbers are read from [docs/results/reduced](../../docs/results/reduced/), made on an earlier version of the
-# simulator, or come from code that you see.
+# All numbers are read from [docs/results/reduced](../../docs/results/reduced/), or come from code that you see. Those
+# results are of an earlier version of the simulator, from before its LIDAR and its ground were made like KITTI's: it
+# had a fifth of KITTI's columns, and all roads lay in one plane.
 
 # %% jupyter={"source_hidden": true}
 import json
@@ -79,11 +80,11 @@ plt.show()
 
 # %% [markdown]
 # In the paper's matrix the first column is dark: in eight of the nine other rows, more cells are called void than any
-# other wrong class. In ours that holds in two rows. In four it is *vegetation* (96 % of the building cells, 73 % of the
-# sidewalk), in three *road*, and no cell at all is called building or fence. Why, this table can't say. Nor does it
-# refute claim 4: it is one street, without an interval. Over the twenty routes of claim 4, of the things called wrong
-# 44 % (32 to 55) are called void, where the claim needs more than half; and whether a marking is called lane more often
-# than road is, we can't tell.
+# other wrong class. In ours that holds in two rows. In four it is *vegetation* (96 % of the building cells, 73 % of
+# the sidewalk), in three *road*, and no cell at all is called building or fence. Why, this table can't say. Nor does
+# it refute claim 4: it is one street, without an interval. Over the twenty routes of claim 4, of the things called
+# wrong 43.9 % (32.5 to 55.2) are called void, where the claim needs more than half; and whether a marking is called
+# lane more often than road is, we can't tell.
 
 # %% jupyter={"source_hidden": true}
 for whose, matrix in (("paper", np.array(table3["paper"]["matrix"])), ("ours ", np.array(table3["confusion"]))):
@@ -171,12 +172,13 @@ for metric in METRICS:
 #
 # - **Occupancy grid.** Without it 11 points of pixel accuracy are lost, and 22 of class accuracy.
 # - **Planes.** One plane, the lowest, does about as well as twenty: the bar contains zero, and it is *short*, half a
-#   point to each side. By LIDAR labels twenty planes are clearly better than one, by about half a point. A spacing of
+#   point to each side. By LIDAR labels twenty planes are clearly better than one, by 0.5 to 0.8 points. A spacing of
 #   0.4 m in place of 0.2 m costs half to three quarters of a point by true labels and less by LIDAR labels; the cell
 #   below prints both.
 # - **Reduction.** Without it all seeds are worse, by very different amounts, and class accuracy is clearly worse.
 # - **Balancing** costs half a point of pixel accuracy and brings twelve of class accuracy.
-# - **True labels to learn from** bring 11 and 18 points, more than any choice of network in Table 1.
+# - **True labels to learn from** bring 11 points of pixel accuracy and 18 of class accuracy, more than any choice of
+#   network in Table 1.
 # - **A quarter of the frames**, each network against itself with all. If few frames favour SegNet, as claim 1's reason
 #   says, it should lose least. In the mean FCN does, though the losses differ by less than half a point. By LIDAR
 #   labels SegNet loses least class accuracy, FCN least in the other two.
@@ -258,7 +260,7 @@ def draw_reliability(ax):
         ax.plot(
             *((cells * part).sum(0)[some] / cells.sum(0)[some] for part in (sure, found)), mark, ms=4, label=row["what"]
         )
-    ax.set(title="reliability, true labels", xlabel="how sure", ylabel="how often right", xlim=(0, 1), ylim=(0, 1))
+    ax.set(title="reliability, true labels", xlabel="probability", ylabel="share right", xlim=(0, 1), ylim=(0, 1))
 
 
 # %% jupyter={"source_hidden": true} alt="three panels: pixel accuracy lost against the angle by which the camera is turned in pitch and yaw; pixel accuracy by distance, from near to far; a reliability diagram of network, CRF and searched CRF against the diagonal"
@@ -286,9 +288,10 @@ plt.show()
 # of 32 % ([what wrong labels cost](09_truth_costs.ipynb)); but its accuracy falls as well.
 #
 # On the right, nearly all points lie below the diagonal: by true labels all three are too sure. But this network
-# learned from LIDAR labels. In the mean it is 86 % sure, and by LIDAR labels it is right in 86 % of the cells, by true
-# ones in 69 %. So its error may be that of its labels. Mean field makes neighbours agree, and so makes cells sure. With
-# the CRF's default weights the 17 points become 29, with the searched ones 24, and all seeds say the same.
+# learned from LIDAR labels. In the mean it is 86 % sure, and by LIDAR labels it is right in 86 % of the cells, by
+# true ones in 69 %. So by labels like those that it learned from, it isn't too sure in the mean. Mean field makes
+# neighbours agree, and so makes cells sure. With the CRF's default weights the 17 points become 29, with the searched
+# ones 24, and all seeds say the same.
 
 # %% jupyter={"source_hidden": true}
 by_labels = {row["what"]: row["scores"] for row in ablations["variants"]}
@@ -315,8 +318,8 @@ assert sum(not clear(cost["pitch" + size]) for size in sizes) == 3
 # %% [markdown]
 # ## What this does not show
 #
-# All of it is one simulator, one earlier version of it, and small networks. Table 3 rests on a single street, so its
-# matrix has no interval. A part whose removal costs nothing here may be needed where streets, cameras or labels differ.
+# All of it is one simulator and small networks. Table 3 rests on a single street, so its matrix has no interval. A
+# part whose removal costs nothing here may be needed where streets, cameras or labels differ.
 #
 # ## Further reading
 #

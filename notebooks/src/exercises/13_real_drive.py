@@ -303,8 +303,8 @@ _test()
 # %% [markdown]
 # ## Task 5: a better map of a real street (2 + 2 points)
 #
-# The open end. The network from simulated streets has 55 % of the labelled cells of the real street right, and you have seen how its map fails: the road before us is called *unknown-free*
-# or vegetation, cars are called *unknown-static*. Exchange one stage: write a `refine` that makes this map better. It gets `log_g` (14, H, W), natural logarithms of the network's probabilities, and `o` (4, H, W), the
+# The open end. The network from simulated streets has 55 % of the labelled cells of the real street right, and you have seen how its map fails: the road right before us is called
+# vegetation or sidewalk, and a quarter of the cells of cars has one of the four unknown classes. Exchange one stage: write a `refine` that makes this map better. It gets `log_g` (14, H, W), natural logarithms of the network's probabilities, and `o` (4, H, W), the
 # probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, and returns probabilities (14, H, W) that sum to 1 in each cell. It doesn't see the labels, must work on grids of any size, and leaves its arguments as they are.
 #
 # What counts as better is fixed before you begin. Over squares of 8 m of the street, in the labelled cells:
