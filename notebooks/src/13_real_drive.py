@@ -114,8 +114,8 @@ if drive.credit:
 
 # %% jupyter={"source_hidden": true} alt="a street image with LIDAR points coloured by distance; A marks a white car just ahead, B parked cars to the right, C a house wall; below, the occupancy grid and the semantic grid of the same instant with the same letters"
 LETTERS = {"A": (246, 78, 11, 0.3), "B": (360, 84, 11, -3.4), "C": (465, 55, 14, -8.8)}
-fig = plt.figure(figsize=(6.2, 5.6), layout="constrained")
-top, bottom = fig.subfigures(2, 1, height_ratios=[2.1, 3.6])
+fig = plt.figure(figsize=(6.2, 5.1), layout="constrained")
+top, bottom = fig.subfigures(2, 1, height_ratios=[2.1, 3.0])
 coarse = replace(frames[-1], image=frames[-1].need_image() // 8 * 8)  # fewer colours: a smaller file
 image_axes = plotting.points_on_image(coarse, ax=top.subplots(), size=0.8)
 axes = bottom.subplots(1, 2)
