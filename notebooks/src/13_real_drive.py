@@ -121,7 +121,7 @@ image_axes = plotting.points_on_image(coarse, ax=top.subplots(), size=0.8)
 axes = bottom.subplots(1, 2)
 plotting.occupancy(spec, results[-1].belief.probability, ax=axes[0]).set(ylim=(0, 45), title="occupancy grid")
 called = results[-1].grid.argmax(axis=0)
-plotting.grid_labels(spec, called, KITTI_14, ax=axes[1]).set(ylim=(0, 45), title="semantic grid")
+plotting.grid_labels(spec, called, KITTI_14, ax=axes[1]).set(ylim=(0, 45), ylabel="", title="semantic grid")
 box = {"boxstyle": "circle,pad=0.15", "fc": "white", "ec": "black", "alpha": 0.9}
 for letter, (u, v, x, y) in LETTERS.items() if ours else ():
     image_axes.text(u, v, letter, bbox=box, fontsize=9, ha="center", va="center")
@@ -225,7 +225,7 @@ with tempfile.TemporaryDirectory() as folder:
 # %% jupyter={"source_hidden": true} alt="contact sheet of four frames of the drive: in all of them the white car stands at the same place, while a dark car on the left comes nearer and leaves the image"
 fig, axes = plt.subplots(2, 2, figsize=(6.4, 2.4), layout="constrained")
 for ax, k in zip(axes.flat, np.linspace(0, len(frames) - 1, 4).round().astype(int), strict=True):
-    ax.imshow(frames[k].need_image() // 8 * 8)  # fewer colours: a smaller file
+    ax.imshow(frames[k].need_image() // 16 * 16)  # fewer colours: a smaller file
     ax.set_title(f"frame {k}, {frames[k].time:.1f} s", fontsize=9)
     ax.axis("off")
 plt.show()
