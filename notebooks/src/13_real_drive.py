@@ -118,7 +118,7 @@ fig = plt.figure(figsize=(6.2, 5.1), layout="constrained")
 top, bottom = fig.subfigures(2, 1, height_ratios=[2.1, 3.0])
 coarse = replace(frames[-1], image=frames[-1].need_image() // 8 * 8)  # fewer colours: a smaller file
 image_axes = plotting.points_on_image(coarse, ax=top.subplots(), size=0.8)
-axes = bottom.subplots(1, 2)
+axes = bottom.subplots(1, 2, sharey=True)
 plotting.occupancy(spec, results[-1].belief.probability, ax=axes[0]).set(ylim=(0, 45), title="occupancy grid")
 called = results[-1].grid.argmax(axis=0)
 plotting.grid_labels(spec, called, KITTI_14, ax=axes[1]).set(ylim=(0, 45), ylabel="", title="semantic grid")
