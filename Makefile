@@ -6,9 +6,9 @@ BIN := .venv/bin
 export OMP_WAIT_POLICY := PASSIVE
 PYTEST := OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest
 
-.PHONY: demo test test-browser test-real notebooks lint bench clean
+.PHONY: demo test test-browser site test-real notebooks lint bench clean
 
-demo test test-browser lint:
+demo test test-browser site lint:
 	$(PYTHON) make.py $@
 
 test-real: .venv/made

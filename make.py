@@ -1,4 +1,4 @@
-"""What `make demo`, `make test` and `make test-browser` do, for machines without make.
+"""What `make demo`, `make test`, `make test-browser` and `make site` do, for machines without make.
 
 `python make.py demo` in a clone needs nothing but Python's own library, since it makes the environment in
 which everything else is installed.
@@ -90,7 +90,17 @@ def _run(program: str, *arguments: str, **variables: str) -> None:
         sys.exit(done.returncode)
 
 
-TARGETS = {target.__name__.replace("_", "-"): target for target in (environment, demo, lint, test, test_browser)}
+def site() -> None:
+    """Build the course site, out/site/index.html; fails on a warning, a dead link, or a figure without words."""
+    environment()
+    _run("python", "-m", "pip", "install", "--quiet", "-c", "constraints.txt", "-e", ".[site]")
+    sources, trees, pages = (str(Path("out") / name) for name in ("site-sources", "site-trees", "site"))
+    _run("python", "docs/site/stage.py", sources)
+    _run("python", "-m", "sphinx", "--quiet", "--fail-on-warning", "-E", "-d", trees, sources, pages)
+    _run("python", "docs/site/check.py", pages)
+
+
+TARGETS = {target.__name__.replace("_", "-"): target for target in (environment, demo, lint, test, test_browser, site)}
 """What can be asked for, by name."""
 
 

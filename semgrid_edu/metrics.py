@@ -142,7 +142,7 @@ METRICS = {"pixel accuracy": pixel_accuracy, "class accuracy": class_accuracy, "
 
 
 def total_variation(p: ArrayLike, q: ArrayLike) -> NDArray[np.float64]:
-    """Return how far two distributions are apart, sum |p - q| / 2: the most by which they disagree about any event.
+    """Return how far two distributions are apart, ``sum |p - q| / 2``: the most by which they disagree about any event.
 
     Parameters
     ----------

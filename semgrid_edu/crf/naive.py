@@ -180,14 +180,14 @@ def settled(updates: Iterator[NDArray], iterations: int, tolerance: float) -> ND
 def damping(own: NDArray) -> NDArray:
     """Return how far an update of all cells at once may go, so that it can't raise the free energy.
 
-    With k_ii the weight of a cell with itself (the diagonal of `gram_matrix`), the free energy is
+    With k_ii the weight of a cell with itself (the diagonal of `gram_matrix`), the free energy is::
 
         F(Q) = sum_i Q_i . phi_i - 1/2 sum_ij k_ij Q_i . Q_j + 1/2 sum_i k_ii |Q_i|^2 - H(Q) + constant
 
     The first sum over pairs has a positive semidefinite matrix, so with its minus sign it is concave, and lies below
-    its tangent at the present Q. The next sum lies above its tangent by k_ii / 2 |Q'_i - Q_i|^2, which is at most
-    k_ii / 2 KL(Q'_i || Q_i) by Pinsker's inequality. Tangents and bound together lie above F and touch it at Q; so the
-    Q' that makes them smallest has no larger F than Q. Setting the derivative to zero gives
+    its tangent at the present Q. The next sum lies above its tangent by ``k_ii / 2 |Q'_i - Q_i|^2``, which is at most
+    ``k_ii / 2 KL(Q'_i || Q_i)`` by Pinsker's inequality. Tangents and bound together lie above F and touch it at Q; so
+    the Q' that makes them smallest has no larger F than Q. Setting the derivative to zero gives::
 
         log Q'_i = (1 - p_i) log Q_i + p_i (-phi_i - sum_{j != i} k_ij (1 - Q_j)) + constant,   p_i = 1 / (1 + k_ii / 2)
 

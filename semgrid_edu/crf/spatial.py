@@ -13,7 +13,7 @@ from semgrid_edu.crf.params import NARROWEST
 
 @dataclass(frozen=True)
 class SeparableGaussian:
-    """Sums over all cells of a grid, weighted by exp(-|c_i - c_j|^2 / (2 sigma^2)): one convolution along each axis.
+    """Sums over all cells of a grid, weighted by ``exp(-|c_i - c_j|^2 / (2 sigma^2))``: a convolution per axis.
 
     Parameters
     ----------

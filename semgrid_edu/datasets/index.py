@@ -78,7 +78,7 @@ class DatasetIndex:
     splits : dict of str to tuple of LabelledFrame
         Labelled frames by split, such as "train" and "test"; no drive is in two of them.
     reader : callable
-        (root, *drive) -> `LabelledDrive`: opens a drive. Worker processes must be able to import it.
+        ``(root, *drive)`` -> `LabelledDrive`: opens a drive. Worker processes must be able to import it.
     folder : Path, optional
         What is made of the drives goes to `cache/` in this folder; `root` when left out.
     """

@@ -9,7 +9,7 @@ from semgrid_edu.planes.pixels import check_plane_points
 def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike) -> NDArray[np.float64]:
     """Resample the scores on the planes: equation (2), literally, one point at a time.
 
-    p[c, i, j] = sum_n sum_m s[c, n, m] k(u_j - m) k(v_j - n), with the bilinear kernel k(t) = max(0, 1 - |t|).
+    p[c, i, j] = sum_n sum_m s[c, n, m] k(u_j - m) k(v_j - n), with the bilinear kernel ``k(t) = max(0, 1 - |t|)``.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ class PermutohedralLattice:
     """Sums over points, weighted by a Gaussian of the distance between their features (eq. (4)).
 
     A lattice is built once for the features and then filters any number of values. Its kernel approximates
-    exp(-|f_i - f_j|^2 / 2): the blur has the variance and the integral of the Gaussian but a finite reach, and what it
+    ``exp(-|f_i - f_j|^2 / 2)``: the blur has the Gaussian's variance and integral but a finite reach, and what it
     moves to a corner without points is lost.
 
     Parameters

@@ -163,7 +163,7 @@ def lattice_literal(features: ArrayLike, values: ArrayLike) -> NDArray[np.float6
     Returns
     -------
     (N, K) float64
-        sum_j k(f_i, f_j) values_j, where k(f_i, f_j) is nearly exp(-|f_i - f_j|^2 / 2); the point itself is included.
+        sum_j k(f_i, f_j) values_j, where k(f_i, f_j) is nearly ``exp(-|f_i - f_j|^2 / 2)``; the point itself counts.
     """
     vertices, dimensions = splat_literal(features, values), np.shape(features)[1]
     for direction in range(dimensions + 1):

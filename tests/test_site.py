@@ -1,0 +1,74 @@
+"""The course site: what is laid out for Sphinx, and what its check finds."""
+
+import nbformat
+import pytest
+from check import problems
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from stage import CLONE, relinked, translated
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("[one](01_bayes.ipynb#toy)", "[one](01_bayes.ipynb#toy)"),
+        ("[`exercise`](exercises/01_bayes.ipynb)", "[`exercise`](exercises/01_bayes.ipynb)"),
+        ("[elsewhere](https://example.org/a)", "[elsewhere](https://example.org/a)"),
+        ("[below](#here)", "[below](#here)"),
+        ("[start](../README.md)", "[start](../index.md)"),
+        ("[a folder](exercises)", "a folder"),
+        ("`a[0](b)` and\n```\n[no](link.md)\n```", "`a[0](b)` and\n```\n[no](link.md)\n```"),
+    ],
+)
+def test_links_lead_to_pages(tmp_path, text, expected):
+    assert relinked(text, CLONE / "notebooks", tmp_path) == expected
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_linked_file_comes_along(tmp_path):
+    text = "[licence](../LICENSE) and ![a picture](../docs/overview.png)"
+    assert relinked(text, CLONE / "notebooks", tmp_path) == text
+    for name in ("LICENSE", "docs/overview.png"):
+        assert (tmp_path / name).read_bytes() == (CLONE / name).read_bytes()
+
+
+def test_a_dead_link_is_no_page(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"gone\.ipynb"):
+        relinked("[gone](gone.ipynb)", CLONE / "notebooks", tmp_path)
+
+
+def test_folded_parts_and_words_of_figures_are_kept(tmp_path):
+    picture = new_output("display_data", {"image/png": "AA=="}, metadata={"image/png": {"alt": "a street"}})
+    cell = new_code_cell("draw()", outputs=[picture], metadata={"jupyter": {"source_hidden": True}, "tags": ["eq-1"]})
+    table = new_code_cell("t()", outputs=[new_output("display_data", {"text/markdown": "[a folder](exercises)"})])
+    found = translated(
+        new_notebook(cells=[cell, table, new_markdown_cell("[up](../README.md)")]), CLONE / "notebooks", tmp_path
+    )
+    nbformat.validate(found)
+    assert found.cells[0].metadata.tags == ["eq-1", "hide-input"]
+    assert found.cells[0].metadata.mystnb.image.alt == "a street"
+    assert found.cells[1].outputs[0].data["text/markdown"] == "a folder"
+    assert found.cells[2].source == "[up](../index.md)"
+
+
+def test_a_figure_without_words_is_refused(tmp_path):
+    cell = new_code_cell("draw()", outputs=[new_output("display_data", {"image/png": "AA=="})])
+    with pytest.raises(ValueError, match="alternative text"):
+        translated(new_notebook(cells=[cell]), CLONE / "notebooks", tmp_path)
+
+
+def test_the_check_finds_what_is_dead_or_foreign(tmp_path):
+    (tmp_path / "a.html").write_text(
+        '<h1 id="top">A</h1><a href="b.html#here">b</a><a href="https://example.org">out</a><img src="p.png" alt="p">'
+    )
+    (tmp_path / "b.html").write_text('<p id="here"></p><a href="a.html#top"></a><a href="#here"></a>')
+    (tmp_path / "p.png").touch()
+    assert problems(tmp_path) == []
+    (tmp_path / "c.html").write_text(
+        '<a href="gone.html"></a><a href="a.html#gone"></a><img src="p.png"><script src="https://example.org/s.js">'
+    )
+    assert problems(tmp_path) == [
+        "c.html: a picture without words",
+        "c.html: fetches https://example.org/s.js",
+        "c.html: leads to a.html#gone",
+        "c.html: leads to gone.html",
+    ]
