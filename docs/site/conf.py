@@ -20,11 +20,14 @@ nb_render_markdown_format = "myst"
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 4
 autodoc_typehints = "none"
+default_role = "autolink"  # a name in a docstring links to the thing
 numpydoc_show_class_members = False
 
+html_title = "semgrid_edu"
 html_theme = "pydata_sphinx_theme"
 html_theme_options = {
     "show_prev_next": True,
+    "header_links_before_dropdown": 8,
     "navigation_with_keys": False,
     "navbar_align": "left",
     "navbar_end": ["theme-switcher"],
@@ -32,9 +35,13 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
+html_sidebars = {"index": [], "graphs": [], "gallery": []}
 html_static_path = ["static"]
 html_extra_path = ["extra"]
 html_css_files = ["site.css"]
+# Summaries would be fetched, which a browser refuses for files.
+html_show_search_summary = False
 html_show_sourcelink = html_copy_source = False
 # MathJax 4 fetches its fonts from elsewhere; this file of version 3.2.2 needs nothing else.
 mathjax_path = "tex-svg.js"
+html_context = {"default_mode": "auto"}

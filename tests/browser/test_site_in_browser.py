@@ -11,6 +11,7 @@ def test_one_can_click_from_the_first_page_to_a_lecture_and_its_code(open_page):
     page = open_page(SITE / "index.html")
     page.locator("nav >> text=Lectures").first.click()
     page.locator("article a", has_text="The CRF by hand").first.click()
+    page.wait_for_selector("mjx-container")
     assert page.locator("mjx-container").count() > 50
     assert page.locator("mjx-merror").count() == 0
     pictures = page.locator("article img")
