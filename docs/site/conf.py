@@ -20,7 +20,6 @@ nb_render_markdown_format = "myst"
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 4
 autodoc_typehints = "none"
-default_role = "autolink"  # a name in a docstring links to the thing
 numpydoc_show_class_members = False
 
 html_title = "semgrid_edu"

@@ -1,4 +1,4 @@
-"""The course site in a real browser, where `make site` has built it: nothing is fetched from elsewhere (`open_page`)."""
+"""The course site in a real browser, where `make site` has built it; no page fetches from elsewhere (`open_page`)."""
 
 import pytest
 from stage import CLONE
