@@ -6,7 +6,8 @@ import sys
 import zipfile
 
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from nbconvert import HTMLExporter
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
 from tiny_course import tiny_notebooks
 
 from semgrid_edu.errors import DataError
@@ -20,6 +21,7 @@ from semgrid_edu.workshop.course.nbgrader.autograde import (
     submission,
 )
 from semgrid_edu.workshop.course.nbgrader.build import MARKER, build_course
+from semgrid_edu.workshop.course.nbgrader.cleaning import without_scripts
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, write_notebook
 
@@ -87,6 +89,43 @@ def test_a_helper_that_was_handed_in_beside_is_found(course, right):
     helper.parent.mkdir(parents=True)
     helper.write_text("def twice(x):\n    return 2 * x")
     assert graded(course, "helped", right).score == 2
+
+
+@pytest.mark.parametrize("name", ["prepared", ".prepared", ".prepared/fonts.json", "semgrid_edu/__init__.py"])
+def test_a_file_in_the_graders_place_costs_nothing(course, right, name):
+    student = re.sub(r"\W", "-", name)
+    file = place(course, "submitted", student, TINY).parent / name
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text("raise SystemExit")
+    result = graded(course, student, right)
+    assert (result.score, result.note) == (2, "")
+
+
+def test_thousands_of_cells_are_left_to_a_person(course, right):
+    right.cells += [new_markdown_cell("more") for _ in range(1000)]
+    result = graded(course, "cells", right)
+    assert result.score == 0
+    assert "expected at most 1000 cells, found 10" in result.note
+
+
+def test_thousands_of_files_are_left_to_a_person(course, right):
+    folder = place(course, "submitted", "files", TINY).parent
+    folder.mkdir(parents=True)
+    for number in range(1001):
+        (folder / f"{number}.txt").touch()
+    result = graded(course, "files", right)
+    assert result.score == 0
+    assert "expected at most 1000 files and folders with it, found 1002" in result.note
+
+
+def test_a_raw_cell_is_shown_as_text_is_which_fetches_nothing(course, right):
+    right.cells.append(new_raw_cell('my note <img src="http://elsewhere.example/seen.png">'))
+    assert graded(course, "raw", right).score == 2
+    exporter = HTMLExporter()
+    exporter.register_filter("strip_files_prefix", without_scripts)  # as the course's settings do
+    page, _ = exporter.from_filename(place(course, "autograded", "raw", TINY))
+    assert "my note" in page
+    assert "elsewhere.example" not in page
 
 
 @pytest.mark.parametrize("student", ["Anna Maria Silva_4711", "o'neill", "josé", "joao.silva"])

@@ -26,7 +26,7 @@ from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import cell_name, run_submission
-from semgrid_edu.workshop.course.sandbox.process import StudentProcess, keep_compiled, worker_environment
+from semgrid_edu.workshop.course.sandbox.process import PREPARED, StudentProcess, keep_compiled, worker_environment
 from semgrid_edu.workshop.course.sandbox.session import Session
 
 SERVER = Path(__file__).with_name("warm_server.py")
@@ -79,14 +79,14 @@ def warm_processes(source, prepared):
         yield lambda: StudentProcess(Limits(), prepared)
         return
     with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(prepared, Path(folder, "prepared"))
+        shutil.copytree(prepared, Path(folder, PREPARED))
         ours, theirs = socket.socketpair()
         command = [sys.executable, SERVER, source, str(theirs.fileno())]
         environment = worker_environment(Path(folder)) | {"NUMBA_THREADING_LAYER": "workqueue"}
         with subprocess.Popen(command, cwd=folder, env=environment, pass_fds=[theirs.fileno()]), ours:
             theirs.close()
             assert ours.recv(1), "the exercise has run"
-            keep_compiled(Path(folder, "prepared"), prepared)
+            keep_compiled(Path(folder, PREPARED), prepared)
             yield lambda: ForkedProcess(ours)
 
 

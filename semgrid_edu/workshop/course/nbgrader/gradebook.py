@@ -21,6 +21,9 @@ from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED
 LARGEST = 100_000_000
 """Bytes of a submission with all its files."""
 
+MOST = 1000
+"""Files and folders of a submission, and cells of its notebook: nbgrader takes time for each."""
+
 GRADED = "graded.csv"
 """The file with one line for each submission."""
 
@@ -102,20 +105,26 @@ def check_file(path: Path) -> None:
     Raises
     ------
     DataError
-        When it is no notebook, is huge with the files beside it, or comes with links, which nbgrader would follow to
-        other people's files.
+        When it is no notebook, has thousands of cells or files, is huge with the files beside it, or comes with links,
+        which nbgrader would follow to other people's files.
     """
     folder = path.parent
     if links := [one for one in (folder.parent, folder, *folder.rglob("*")) if one.is_symlink()]:
         raise DataError(links[0].name, "a file or folder", "a link")
-    if (size := sum(one.lstat().st_size for one in folder.rglob("*"))) > LARGEST:
+    files = [*folder.rglob("*")]
+    if len(files) > MOST:
+        raise DataError(path.name, f"at most {MOST} files and folders with it", len(files))
+    if (size := sum(one.lstat().st_size for one in files)) > LARGEST:
         raise DataError(path.name, f"at most {LARGEST} bytes with all files beside it", size)
     try:
-        nbformat.validate(nbformat.read(path, as_version=4))
+        notebook = nbformat.read(path, as_version=4)
+        nbformat.validate(notebook)
     except OSError:
         raise
     except Exception as error:
         raise DataError(path.name, "a notebook", one_line(error)) from error
+    if len(notebook.cells) > MOST:
+        raise DataError(path.name, f"at most {MOST} cells", len(notebook.cells))
 
 
 def check_time(path: Path) -> None:

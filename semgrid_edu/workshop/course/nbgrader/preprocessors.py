@@ -113,6 +113,8 @@ def _mark(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> None:
     for cell in reversed(cells):
         blank = left.pop(cell_name(cell), None)
         cell.metadata = NotebookNode()
+        if cell.cell_type == "raw":
+            cell.cell_type = "markdown"  # pages show a raw cell as HTML, which `without_scripts` never sees
         if blank is not None:
             cell.metadata["nbgrader"] = blank.metadata.nbgrader.copy()
 

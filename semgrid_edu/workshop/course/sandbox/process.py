@@ -41,6 +41,9 @@ ALONE: tuple[str, ...] = table_beside(__file__)["alone"]
 INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
 """What a student's process inherits of the environment."""
 
+PREPARED = ".prepared"
+"""The folder of what is compiled already, in the folder of a process; no file that is handed in gets there."""
+
 WATCHED = 0.5
 """Seconds from one look at the files of a process to the next."""
 
@@ -91,7 +94,7 @@ class StudentProcess:
         self.prepared, self.keeps, self.contained = prepared, keeps, bool(container)
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
         if prepared is not None:
-            shutil.copytree(prepared, self.folder / "prepared")
+            shutil.copytree(prepared, self.folder / PREPARED)
         alone = () if container or not _can_be_alone() else ALONE
         # A container has a Python of its own.
         self.process = self._started([*container, *alone, "python" if container else sys.executable, *WORKER])
@@ -236,7 +239,7 @@ class StudentProcess:
                 with suppress(OSError):
                     pipe.close()
         if self.keeps:
-            keep_compiled(self.folder / "prepared", self.prepared)
+            keep_compiled(self.folder / PREPARED, self.prepared)
         delete_folder(self.folder)
 
 
@@ -248,7 +251,7 @@ def worker_environment(folder: Path) -> dict[str, str]:
     folder : Path
         The fresh folder of the process.
     """
-    here = {name: str(folder / "prepared") for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
+    here = {name: str(folder / PREPARED) for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
     here |= {name: str(folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
     # What is freed goes back at once, or else a measurement wouldn't see it taken again.
@@ -293,7 +296,8 @@ def _files(folder: Path) -> dict[str, NDArray]:
     """Return the files that lie beside a notebook: their bytes by their paths, as far as a message may hold them."""
     found, room = {}, MOST_BYTES
     for path in sorted(one for one in folder.rglob("*") if one.is_file() and not one.is_symlink()):
-        if path.suffix != ".ipynb" and path.stat().st_size <= room:
-            found[path.relative_to(folder).as_posix()] = np.fromfile(path, np.uint8)
+        name = path.relative_to(folder)
+        if path.suffix != ".ipynb" and name.parts[0] != PREPARED and path.stat().st_size <= room:
+            found[name.as_posix()] = np.fromfile(path, np.uint8)
             room -= path.stat().st_size
     return found
