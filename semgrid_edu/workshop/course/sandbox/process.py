@@ -287,17 +287,14 @@ def _called(callbacks: list[Callable], reply: dict) -> dict[str, Any]:
 @cache
 def _can_be_alone() -> bool:
     """Return whether this system lets a program have namespaces of its own."""
-    if shutil.which(ALONE[0]) is None:
-        return False
-    return subprocess.run([*ALONE, "true"], capture_output=True, check=False).returncode == 0
+    return bool(shutil.which(ALONE[0])) and not subprocess.run([*ALONE, "true"], capture_output=True).returncode
 
 
 def _files(folder: Path) -> dict[str, NDArray]:
     """Return the files that lie beside a notebook: their bytes by their paths, as far as a message may hold them."""
     found, room = {}, MOST_BYTES
     for path in sorted(one for one in folder.rglob("*") if one.is_file() and not one.is_symlink()):
-        name = path.relative_to(folder)
-        if path.suffix != ".ipynb" and name.parts[0] != PREPARED and path.stat().st_size <= room:
-            found[name.as_posix()] = np.fromfile(path, np.uint8)
+        if path.suffix != ".ipynb" and PREPARED not in path.relative_to(folder).parts and path.stat().st_size <= room:
+            found[path.relative_to(folder).as_posix()] = np.fromfile(path, np.uint8)
             room -= path.stat().st_size
     return found
