@@ -65,7 +65,7 @@ def address(folder: Path, server: subprocess.Popen) -> str:
     raise AssertionError("JupyterLab doesn't start")
 
 
-@pytest.mark.xfail(run=False, reason="waits for ever with an idle kernel since lecture 05 has grown; cause not found yet")
+@pytest.mark.xfail(run=False, reason="waits for ever with an idle kernel; cause not found yet")
 def test_lecture_05_runs_and_its_slider_changes_the_picture(browser, lab):
     page = browser.new_page(viewport={"width": 1400, "height": 1000})
     page.set_default_timeout(1000 * PATIENCE)
