@@ -25,7 +25,7 @@ from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
 from semgrid_edu.workshop.paper.runs.scales import SCALES, scale_named
 from semgrid_edu.workshop.paper.runs.variants import Variant
 from semgrid_edu.workshop.scheduler.execute import check_runs_folder, claim_folder, execute_plan, run_one
-from semgrid_edu.workshop.scheduler.plan import estimate, plan_hours, plan_table, with_needs
+from semgrid_edu.workshop.scheduler.plan import estimate, left_to_do, plan_hours, plan_table, with_needs
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
 
 A = Note("a")
@@ -152,6 +152,19 @@ def test_in_two_stages_the_image_network_stays_as_it_was(trained, tmp_path):
     assert apart.name != usual.name
     assert all(first[name].equal(two_stage[name]) for name in learnt)
     assert not any(first[name].equal(together[name]) for name in learnt)
+
+
+def test_what_is_deleted_is_made_again_only_for_a_run_that_reads_it(trained, tmp_path):
+    root, (first, second) = shutil.copytree(trained, tmp_path / "runs"), tiny_training_runs()
+    plan, image_stage, arrays = with_needs([first, second]), first.image_stage, first.arrays
+    weights = [run.folder(root) / WEIGHTS for run in (image_stage, second)]
+    weights[0].unlink()
+    assert left_to_do(plan, root) == []
+    weights[1].unlink()
+    assert left_to_do(plan, root) == [image_stage, second]
+    (arrays.data.dataset_dir(root) / "dataset.json").unlink()
+    assert left_to_do(plan, root) == [arrays.data, arrays, image_stage, second]
+    assert arrays.record(root)["seconds"] > 0
 
 
 def copied(trained, root, *kinds):

@@ -16,6 +16,7 @@ from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import commit, versions
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.workplace import Workplace
+from semgrid_edu.workshop.scheduler.plan import left_to_do
 from semgrid_edu.workshop.scheduler.runs import CLAIM, ENDED, OUTPUT, Run
 from semgrid_edu.workshop.scheduler.torchrun import THREADS, few_threads, work_together
 
@@ -26,7 +27,7 @@ _ONE_AT_A_TIME = threading.Lock()
 def execute_plan(
     runs: Sequence[Run], root: str | Path, place: Workplace, device: str = "cpu", processes: int = 1
 ) -> dict[Run, str]:
-    """Do all runs that haven't ended.
+    """Do all runs that are left to do.
 
     A run that fails stops only those that need it. The command can be killed at any time: what has ended stays, and a
     training run goes on from its checkpoint when the same command is given again.
@@ -50,7 +51,7 @@ def execute_plan(
         What went wrong, by run: the traceback, or the name of the run that would have been needed.
     """
     failed: dict[Run, str] = {}
-    waiting = [run for run in runs if not run.has_ended(root)]
+    waiting = left_to_do(runs, root)
     under_way: dict[Future, Run] = {}
     with tqdm(total=len(runs), initial=len(runs) - len(waiting), desc="runs", unit="run") as bar:
         while waiting or under_way:

@@ -1,6 +1,6 @@
 """A plan: the runs that an experiment needs, in an order in which they can be done, and how long they will take."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -33,8 +33,30 @@ def with_needs(wanted: Iterable[Run]) -> list[Run]:
     return list(ordered)
 
 
+def left_to_do(runs: Sequence[Run], root: str | Path) -> list[Run]:
+    """Return the runs of a plan that have to be done.
+
+    These are the runs that haven't ended, without those that only ended runs need: data and weights may be deleted as
+    soon as all that is read from them has been counted.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        The runs of a plan, each after those that it needs.
+    root : path-like
+        The folder of all runs.
+    """
+    needed = {one for run in runs for one in run.needs}
+    left: list[Run] = []
+    for run in reversed(runs):
+        is_read = run not in needed or any(run in later.needs for later in left)
+        if is_read and not run.has_ended(root):
+            left.append(run)
+    return left[::-1]
+
+
 def estimate(runs: list[Run], root: str | Path) -> dict[Run, float]:
-    """Estimate how long the runs of a plan will take that haven't ended, each were it alone.
+    """Estimate how long the runs of a plan will take that are left to do, each were it alone.
 
     Parameters
     ----------
@@ -53,13 +75,11 @@ def estimate(runs: list[Run], root: str | Path) -> dict[Run, float]:
     DataError
         When what a run recorded is damaged.
     """
-    left: list[Run] = []
+    left = left_to_do(runs, root)
     paces: dict[str, list[float]] = {}
     for run in runs:
         if run.has_ended(root):
             paces.setdefault(run.pace, []).append(run.record(root)["seconds"] / run.steps)
-        else:
-            left.append(run)
     for run in left:
         if run.pace not in paces:
             paces[run.pace] = [run.trial_seconds]

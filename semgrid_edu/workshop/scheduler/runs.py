@@ -70,7 +70,10 @@ class Run(ABC):
         return Path(root) / self.name
 
     def has_ended(self, root: str | Path) -> bool:
-        """Return whether nothing is left to do. Parameters are those of `Run.folder`."""
+        """Return whether nothing is left to do. Parameters are those of `Run.folder`.
+
+        A run that others read large files of, such as weights, hasn't ended when these were deleted.
+        """
         return (self.folder(root) / ENDED).exists()
 
     def record(self, root: str | Path) -> dict:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.training.run import architecture, chosen_truth
@@ -32,6 +33,10 @@ class DataRun(Run):
     def work(self, root: Path, device: str) -> None:
         """Make the data set. Parameters are those of `Run.work`."""
         make_from_recipe(self.recipe, self.folder(root), seed=0, workers=1)
+
+    def has_ended(self, root: str | Path) -> bool:
+        """Return whether the data are there. Parameters are those of `Run.folder`."""
+        return super().has_ended(root) and (self.dataset_dir(root) / INDEX_FILE).exists()
 
     def dataset_dir(self, root: str | Path) -> Path:
         """Return the folder of the data set itself. Parameters are those of `Run.folder`."""
@@ -81,6 +86,10 @@ class ArraysRun(Run):
     def work(self, root: Path, device: str) -> None:
         """Make the arrays. Parameters are those of `Run.work`."""
         self.frames(root)
+
+    def has_ended(self, root: str | Path) -> bool:
+        """Return whether the arrays are there, which go with the data. Parameters are those of `Run.folder`."""
+        return super().has_ended(root) and self.data.has_ended(root)
 
     def frames(self, root: str | Path) -> TrainingSet:
         """Return the frames of the split. Parameters are those of `Run.folder`.

@@ -60,6 +60,10 @@ class TrainingRun(Run):
                 net = self.net(root, frames.camera)
                 train(net, self.chosen(frames), folder, self.params, self.seed, True, chosen)
 
+    def has_ended(self, root: str | Path) -> bool:
+        """Return whether the network is there. Parameters are those of `Run.folder`."""
+        return super().has_ended(root) and (self.folder(root) / WEIGHTS).exists()
+
     def trained(self, root: Path, camera: Camera) -> SemanticGridNet:
         """Return the network after its last step. Parameters are those of `TrainingRun.net`."""
         return load_net(self.folder(root) / WEIGHTS, camera)
