@@ -1,11 +1,23 @@
 """Reading, executing and checking notebooks, on a lecture of a few lines."""
 
+import asyncio
+import time
+
 import nbformat
 import pytest
+import zmq
+import zmq.asyncio
+from jupyter_client.session import Session
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.workshop.course import checks
-from semgrid_edu.workshop.course.notebooks.build import build_lecture, lecture_sources, named, read_percent
+from semgrid_edu.workshop.course.notebooks.build import (
+    WakefulChannel,
+    build_lecture,
+    lecture_sources,
+    named,
+    read_percent,
+)
 
 LECTURE = """\
 # %% [markdown]
@@ -113,3 +125,24 @@ def test_missing_parts_of_a_lecture_are_named(source):
     found = checks.lecture_problems(source)
     assert "00_tiny.ipynb: lacks a failure" in found
     assert "00_tiny.ipynb: not built; run `semgrid-edu course notebooks`" in found
+
+
+def test_a_reply_whose_announcement_was_used_up_is_read_all_the_same():
+    """What a raw send does to the socket on which nbclient waits, done on purpose."""
+
+    async def wait_for_reply():
+        with zmq.asyncio.Context() as context, context.socket(zmq.DEALER) as ours, context.socket(zmq.DEALER) as theirs:
+            theirs.connect(f"tcp://127.0.0.1:{ours.bind_to_random_port('tcp://127.0.0.1')}")
+            session = Session()
+            waiting = asyncio.create_task(WakefulChannel(ours, session).get_msg(timeout=20))
+            await asyncio.sleep(0.2)
+            session.send(zmq.Socket.shadow(theirs.underlying), "execute_reply", {"status": "ok"})
+            time.sleep(0.5)  # the loop must not see the announcement first
+            zmq.Socket.shadow(ours.underlying).getsockopt(zmq.EVENTS)  # uses it up, as sending does
+            began = time.monotonic()
+            reply = await waiting
+            return reply["content"], time.monotonic() - began
+
+    content, seconds = asyncio.run(wait_for_reply())
+    assert content == {"status": "ok"}
+    assert seconds < 10  # a single wait of 20 seconds would end with its timeout

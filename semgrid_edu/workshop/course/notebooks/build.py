@@ -1,12 +1,19 @@
 """Notebooks from percent sources: stable cell ids, executed lectures, and no traces of a machine in the file."""
 
 import hashlib
+from math import inf
 from pathlib import Path
+from queue import Empty
+from time import monotonic
+from typing import Any
 
 import jupytext
 import nbformat
+from jupyter_client.asynchronous.client import AsyncKernelClient
+from jupyter_client.channels import AsyncZMQSocketChannel
 from nbclient import NotebookClient
 from nbformat import NotebookNode
+from traitlets import Type
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
@@ -160,6 +167,32 @@ def notebook_text(notebook: NotebookNode) -> str:
     return nbformat.writes(notebook)
 
 
+class WakefulChannel(AsyncZMQSocketChannel):
+    """A channel to a kernel that looks once a second whether a message has come.
+
+    ZeroMQ announces a message once, and sending on the same socket can use the announcement up. The output of a slider
+    does send there, while nbclient waits for the reply to the cell. A single long wait then sleeps until its timeout,
+    beside an idle kernel, though the reply has come.
+    """
+
+    async def get_msg(self, timeout: float | None = None) -> dict[str, Any]:  # type: ignore[override]
+        """Return the next message, or raise `queue.Empty` after so many seconds."""
+        end = inf if timeout is None else monotonic() + timeout
+        while True:
+            left = max(0, end - monotonic())
+            try:
+                return await super().get_msg(min(1, left))
+            except Empty:
+                if left <= 1:
+                    raise
+
+
+class WakefulClient(AsyncKernelClient):
+    """A client of a kernel whose shell channel is a `WakefulChannel`."""
+
+    shell_channel_class = Type(WakefulChannel)
+
+
 def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> NotebookNode:
     """Run all cells of a notebook, and keep the outputs that can be seen without a kernel.
 
@@ -182,6 +215,8 @@ def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> Noteboo
     """
     place = {"metadata": {"path": folder}}
     client = NotebookClient(notebook, timeout=timeout, record_timing=False, resources=place)
+    client.km = client.create_kernel_manager()
+    client.km.client_factory = WakefulClient
     client.execute()
     for cell in notebook.cells:
         if cell.cell_type == "code":
