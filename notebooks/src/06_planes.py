@@ -5,7 +5,7 @@
 # pixel receives its share of the gradient by the same four weights; so an error on the map can train the image network.
 #
 # **You will be able to**
-# - compute a bilinear sample by hand, and its gradient in the scores and in u and v;
+# - compute a bilinear sample by hand, and its gradient with respect to the scores and to u and v (short: *in* them);
 # - write equation (2) as a sparse matrix, and say why its transpose (the *adjoint*) carries the gradient;
 # - check any gradient by finite differences;
 # - calibrate a camera by gradient descent, and say what it finds when the ground isn't flat;
@@ -437,7 +437,7 @@ print(f"p_bar . (A s) = {p_bar @ (A @ s.ravel()):.3f},  (A^T p_bar) . s = {(A.T 
 # each other. With the transpose built once, each pixel *gathers* from its readers. The package's `PlaneSampler` is
 # that: two sparse matrices for a calibration, and one product for each direction. It passes the same test:
 
-# %%
+# %% jupyter={"source_hidden": true}
 s_some = torch.from_numpy(rng.normal(size=(1, 3, *camera.size)).astype(np.float32)).requires_grad_()
 planes = sampler(s_some)
 p_some = torch.from_numpy(rng.normal(size=planes.shape).astype(np.float32))
@@ -633,7 +633,7 @@ print(f"by hand {by_hand:.3f}, by PyTorch {gradient.item():.3f}")
 # <details><summary>Answer</summary>
 #
 # No. From +2° it ends at -0.1°, from -2° at -0.7° after twenty steps, and taken one by one the five images have
-# their minima between -0.7° and +0.2°: the loss explains the slope of the road by a pitch of the camera. With heights
+# their minima between -0.7° and +0.2°: the loss explains wrong heights by a pitch of the camera. With heights
 # of the ground from the LIDAR, both descents end at -0.3°, 0.9 pixels from the truth; the five minima still lie up to
 # 0.6° apart.
 #
@@ -693,8 +693,8 @@ axes[0].legend(fontsize="small")
 plt.show()
 
 # %% [markdown]
-# On the left the mean has a wide floor instead of one lowest point, because each image was taken on another slope. On
-# the right it has one, 0.3° from the truth: 0.9 pixels in this image. Most of this comes from cells beside things that
+# On the left the mean has a wide floor instead of one lowest point, because the heights are wrong by other amounts in each image.
+# On the right it has one, 0.3° from the truth: 0.9 pixels in this image. Most of this comes from cells beside things that
 # stand, because a point that lies too high reads the thing, and one too low still reads road: the curves rise faster to
 # the right. With the 77 % of the cells that keep two pixels away from such things, both descents end at -0.1°. So the
 # descent works; what was wrong on the left is what the model holds fixed, height 0. A gradient changes *whatever may
@@ -857,6 +857,8 @@ Markdown(ledger_table(ledger("planes")))
 #    the heights are right, and nothing at all if you read the nearest pixel.
 # 4. Half a pixel is 5 m of ground at 60 m. State where the centre of the first pixel is, and check it with a ramp.
 # 5. Cells that read one pixel share its error: 0.80, not 0.996.
+#
+# **What you can now do**: write a sampler with its way back, test both, and find out which convention any other one has.
 #
 # ## Further reading
 #

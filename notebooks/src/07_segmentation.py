@@ -724,7 +724,7 @@ _ = interact(draw_ways, column=IntSlider(9, 4, 16), width=IntSlider(1, 1, 6))
 #
 # </details>
 
-# %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true, "outputs_hidden": true}
 unseen, posts_of = draw_poles(200, seed=12345)
 drawn, reached = {"image": unseen[:, 0], "truth": posts_of}, {}
 print("              IoU [%]   rows missed [%]   width (truth) [pixels]   error in pixels")

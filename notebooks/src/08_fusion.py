@@ -120,7 +120,8 @@ pixel_truth = np.stack([resize_labels(frame.labels.image, size) for frame in fra
 # %% [markdown]
 # ## Pixels that learn from the map
 #
-# Take an image network that has learnt labels of pixels, and put a reduction and a fusion with random weights behind it.
+# Take an image network that has learnt labels of pixels (*stage one*), and put a reduction and a fusion with random weights
+# behind it.
 # It gets two training frames and no further label of a pixel: in forty steps only the loss *on the map* counts.
 
 # %% jupyter={"source_hidden": true}
@@ -316,12 +317,14 @@ np.testing.assert_allclose(reduce(p, theta, beta), theta.reshape(2, 4) @ p.resha
 print("road", reduce(p, theta, beta)[0], "  car", reduce(p, theta, beta)[1])
 
 # %% [markdown]
-# Then come batch normalisation and a ReLU, which cuts the -1 off. The network isn't told these weights; it learns them,
+# Then come batch normalisation ([what trained networks do](deeper/07_trained_networks.ipynb) has it by hand) and a ReLU,
+# which cuts the -1 off. The network isn't told these weights; it learns them,
 # and may find others. Its reduction leaves 16 maps, with $16 \cdot 280 + 16 = 4496$ weights.
 #
 # One detail matters later. A point of a plane that the camera doesn't see takes the score 0 for every class. So on
 # planes zero has a meaning, "nobody looked". Under a soft-max the same number may be added to all scores of a pixel
-# and nothing changes (lecture 07). Here the map changes:
+# and nothing changes (lecture 07). Here the map changes. (*Semantic cells* are those in which a class like road or car is
+# true, and not one of the four *unknown* ones.)
 
 # %% tags=["nbval-ignore-output"]
 print(f"weights of the reduction: {sum(part.numel() for part in net.fusion.reduce[0].parameters()):,}")

@@ -581,7 +581,7 @@ plt.show()
 # can lower the share of wrong labels by labelling less, and raise the share found by labelling everything, so both
 # numbers are needed.</details>
 
-# %% tags=["count"] jupyter={"outputs_hidden": true}
+# %% tags=["count"] jupyter={"source_hidden": true, "outputs_hidden": true}
 six = GridSpec(x_min=0, x_max=1, y_min=0, y_max=6, cell=1)
 free, unobserved = UNKNOWN_OF_STATE[State.FREE], UNKNOWN_OF_STATE[State.UNKNOWN]
 stands = np.array([[ROAD, ROAD, ROAD, CAR, CAR, ROAD]])
@@ -666,9 +666,9 @@ assert kinds[ROAD, CAR] in np.sort(kinds.ravel())[-4:]
 # Real data has errors of its own. The package's `TruthFlaws` adds four kinds: the camera is turned by about 0.2° about
 # each axis and displaced by 3 cm (the same for a whole drive); outlines are drawn 0.4 pixel off; half of the smallest
 # things are overlooked; and the scan is **skewed**, because the vehicle moves on while the scanner turns. The sizes
-# are assumptions, whose reasons stand in its documentation. The following numbers were measured on other simulated
-# drives, whose scanner had half as many columns as that of the sample drive, and are read from the file that `semgrid-edu
-# reproduce truth-policies` wrote.
+# are assumptions, whose reasons stand in its documentation. The following numbers, and those of the policy laboratory below,
+# were measured on other drives, of an earlier version of the simulator: flat roads, and a scanner with half as many columns
+# as that of the sample drive. They are read from the file that `semgrid-edu reproduce truth-policies` wrote.
 
 # %% tags=["laboratory"] jupyter={"source_hidden": true}
 result = json.loads(Path("../docs/results/truth_policies.json").read_text(encoding="utf-8"))
@@ -1158,6 +1158,9 @@ Markdown(ledger_table(ledger("label")))
 # 4. Count two things: which labels are wrong, and which cells lack one. No policy here was best in both.
 # 5. More scans fill gaps and smear what moves; carving and carrying are only as right as the filter that says what
 #    moves, and how fast.
+#
+# **What you can now do**: make labels for a drive of your own, say which of their errors votes can remove, and ask which
+# numbers are missing beside somebody else's labels.
 #
 # ## Further reading
 #

@@ -201,7 +201,7 @@ def priced(price):
     return CrfParams(w_bilateral=0, w_spatial=price * np.sqrt(np.e), sigma_gamma=1, normalization="none")
 
 
-# %% jupyter={"outputs_hidden": true}
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 two, free = two_classes([[0.9, 0.4]]), all_free((1, 2))  # classes: 0 road, 1 car; both cells are FREE
 k = np.array([[0, 1], [1, 0]])
 labellings, P, log_Z = enumerate_all(two.reshape(2, 2), k)
@@ -388,7 +388,7 @@ assert [P_beside[labellings[:, i] == 1].sum() > 0.5 for i in range(4)] == [False
 # accuracy counts. A planner that needs a probability per cell needs the marginals as well. So marginals are what we
 # want on the drive. Can we enumerate there?
 
-# %%
+# %% jupyter={"source_hidden": true}
 n_cells = np.prod(spec.shape)
 print(f"labellings of {n_cells} cells with 14 classes: a number of {int(n_cells * np.log10(14)) + 1} digits")
 
@@ -1033,7 +1033,8 @@ plt.show()
 # ## What the paper gained by it
 #
 # The paper says itself that the improvement "may not be as effective" as on images. Its table 1 has the numbers. Beside
-# them are this project's, from three networks trained on a simulated data set (`semgrid-edu evaluate`, one seed):
+# them are this project's, from three networks trained on a simulated data set (`semgrid-edu evaluate`, one seed, on an
+# earlier version of the simulator: flat roads, fewer columns in the scanner):
 
 
 # %% tags=["claim-2"] jupyter={"source_hidden": true}
@@ -1087,6 +1088,9 @@ Markdown(ledger_table(ledger("crf")))
 # 4. Beyond a critical coupling mean field picks a side: it is nearly certain where the exact answer is undecided.
 # 5. Equation (4) as printed over-smooths, because all neighbours together outweigh the network. Normalised, it repairs
 #    large areas and costs small things.
+#
+# **What you can now do**: put prices on a map, compute exactly what they imply where it is small, and say what mean field
+# makes of it where it isn't.
 #
 # ## Further reading
 #

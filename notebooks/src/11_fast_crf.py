@@ -117,8 +117,15 @@ all_but_two = tuple(name for name in graph.model.names if name not in ("x1", "x9
 assert not d_separated(graph.model, "x1", "x9", given=all_but_two)
 
 # %% [markdown]
-# No two cells are independent in this model, not even when all the other cells are known; the assertion checks it for
-# the first and the last cell. We don't change that: **this lecture cuts no edge**. It changes how the sum over the
+# **Predict before you run.** Are $x_1$ and $x_9$ independent in the model on the left, when the seven other cells are known?
+#
+# <details><summary>Answer</summary>
+#
+# No: they share a factor of their own, as any two cells do (`d_separated` says so in the folded cell).
+#
+# </details>
+#
+# We don't change that: **this lecture cuts no edge**, and the ledger gets no line. It changes how the sum over the
 # edges is computed. On the right, cells (orange) are not linked to each other. Each gives what it believes to a few
 # vertices of a lattice (grey squares), neighbouring vertices pass it on to each other, and each cell takes the sum from
 # its own vertices. The work grows with the number of cells, and no longer with the number of pairs. The price is that
@@ -171,8 +178,7 @@ for height, width in ((20, 15), (40, 30), (60, 40)):
 
 # %% [markdown]
 # The LIDAR delivers ten scans a second, so a map has a tenth of a second; at the end we shall see whether we keep to it.
-# A faster loop won't get us there, because the
-# number of pairs stays the same. We need another way to compute the sum.
+# A faster loop won't get us there, because the number of pairs stays the same. We need another way to compute the sum.
 #
 # ## Message passing is filtering
 #
@@ -408,7 +414,7 @@ for y in ([4.2, -0.4, -3.8], [1.7, 1.6, -3.3]):
     corners, weights = enclosing_simplex(np.array(y))
     print(tuple(y), "  corners", *map(tuple, corners.tolist()), "  weights", weights.round(2))
 
-# %%
+# %% jupyter={"source_hidden": true}
 rng = np.random.default_rng(0)
 for d in (2, 3, 5, 8):
     for point in rng.normal(0, 9, (100, d + 1)):
@@ -452,7 +458,7 @@ plt.show()
 #
 # In one picture:
 
-# %% jupyter={"source_hidden": true} alt="schematic: a row of six cells above, four vertices below; grey arrows lead from two cells down to their vertices, splat; orange double arrows join neighbouring vertices, blur; blue arrows lead from the vertices up to the same cells, slice"
+# %% jupyter={"source_hidden": true} alt="schematic, three times a row of six orange cells above and five grey vertices below: arrows lead from each cell down to vertices, splat; double arrows join neighbouring vertices, blur; arrows lead from the vertices up to the same cells, slice"
 fig, ax = plt.subplots(figsize=(9, 2.9), layout="constrained")
 cell_x, vertex_x = np.array([0.4, 1.1, 1.8, 4.3, 5.2, 5.9]), np.array([0, 1.5, 3, 4.5, 6.0])
 for step, start in (("splat", 0), ("blur", 7.5), ("slice", 15)):
@@ -730,8 +736,8 @@ for d in (1, 2, 3, 5, 7):
 # %% [markdown]
 # The number is the length of the difference of the two kernels, entry by entry, divided by the length of the Gaussian
 # (the Frobenius norm). On the drive more than half of its square lies on the diagonal: it is the self-response, which mean
-# field subtracts. What a cell hears from the *others* is off by a few per cent only. In a cloud of 2000 points it grows with the number of
-# dimensions, because the same points fill the space more and more thinly, and more vertices are missing. In 7
+# field subtracts. What a cell hears from the *others* is off by a few per cent only. In a cloud of 2000 points the number
+# grows with the dimensions. The same points fill the space more and more thinly there, so more vertices are missing. In 7
 # dimensions the difference is as large as the kernel itself.
 #
 # ## Speed and error of each way
@@ -745,7 +751,7 @@ for d in (1, 2, 3, 5, 7):
 #
 # We measure the first two on 60 x 40 cells of the drive, where all pairs can still be written out.
 
-# %% tags=["nbval-ignore-output"]
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 ROUNDS = (1, 2, 3, 5, 10, 20, 40)
 cells = piece(60, 40)
 exactly = list(itertools.islice(mean_field_updates(*cells, params), 101))
@@ -785,7 +791,7 @@ of_lattice = [compare(mean_field(*cells, params, n), settled)[0] for n in ROUNDS
 behind = {n: error / compare(exactly[n], settled)[0] for n, error in zip(ROUNDS, of_lattice, strict=True)}
 assert behind[1] < 1.3 < behind[40]
 
-# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="left: error against iterations, both ways fall alike up to twenty iterations, at forty the lattice lags behind; middle: time against the number of cells on logarithmic axes, the naive way steeper than the lattice; right: time against classes, which grows a few times from 2 to 48 classes"
+# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="left: error against iterations, both ways fall alike up to about five iterations, then the lattice levels off and all pairs go on falling; middle: time against the number of cells on logarithmic axes, the naive way steeper than the lattice; right: time against classes, which grows a few times from 2 to 48 classes"
 fig, axes = plt.subplots(1, 3, figsize=(13, 3.7), layout="constrained")
 axes[0].semilogy(ROUNDS, [compare(exactly[n], settled)[0] for n in ROUNDS], "o-", color="0.2", label="all pairs")
 axes[0].semilogy(ROUNDS, of_lattice, "s--", color="#d55e00", label="lattice")
@@ -799,7 +805,7 @@ for ax in axes:
     ax.legend(frameon=False)
 plt.show()
 
-# %% tags=["nbval-ignore-output"]
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 slope = np.polyfit(np.log([h * w for h, w in grids[1:]]), np.log(fast_times[1:]), 1)[0]
 naive_slope = np.polyfit(np.log([h * w for h, w in sizes]), np.log(naive_times), 1)[0]
 print(f"time grows with the number of cells to the power of {naive_slope:.1f} (all pairs), {slope:.1f} (lattice)")
@@ -825,9 +831,10 @@ for infer in (mean_field_naive, mean_field_accurate, mean_field):
 # as much as 2, by the kind of processor. One reason is that the package fills them up to a multiple of 16. On a quiet
 # machine you see steps after 16 and after 32; in a picture made on a busy one, chance hides them.
 #
-# **The tenth of a second.** The last but one output gives the balance on the machine that built this page: the CRF of the
-# drive's map, and of the paper's grid. On a quiet machine the paper's grid took 127 ms, so the CRF alone misses a tenth
-# of a second there; five iterations in place of ten would meet it. The drive's coarser map meets it.
+# **The tenth of a second.** The printed lines give the balance on the machine that built this page: the CRF of the drive's
+# map, and of the paper's grid. The drive's map leaves most of the tenth to the other stages. The paper's grid needs about
+# all of it (another machine took 127 ms), so there the CRF leaves hardly any time for the rest. Half of the iterations
+# take half of the time.
 #
 # **A third way** is in the last table. `mean_field_accurate` computes the Gaussian exactly for all cells in a window of
 # four widths around each cell, without writing a matrix down. Its kernel error is far smaller. Its time is proportional
@@ -1010,6 +1017,8 @@ Markdown("\n".join(rows))
 # 4. The filter counts the cell itself; subtract what this filter gives back at this cell, not 1.
 # 5. Time grows in proportion to the cells. The kernel is only nearly Gaussian; a window avoids that error and takes
 #    longer. Neither makes the model better: thin things are smoothed away by both.
+#
+# **What you can now do**: run a fully connected CRF on a map of any size, and say how much of its error is the filter's.
 #
 # ## Further reading
 #

@@ -889,6 +889,8 @@ plt.show()
 # 5. Paying back an edge is a measurement: memory brought the network from simulated streets 8 points on this street,
 #    all by fewer answers *unknown*, and the taught one none; the CRF brought neither of them any that is clear.
 #
+# **What you can now do**: put three lines before any drive, read its report card, and say which of its lines you don't believe.
+#
 # ## Further reading
 #
 # - Geiger, Lenz, Stiller, Urtasun, *Vision meets robotics: the KITTI dataset*, IJRR 32(11), 2013: sensors, clocks,

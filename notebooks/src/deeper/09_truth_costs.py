@@ -105,7 +105,9 @@ print(f"and {bad[0].sum() / bad.sum():.2f} are")
 # The simulator knows the truth, so we can let it judge. SegNet learned from the same 142 training frames, each time
 # with other labels: those of the paper's recipe (*usual*); the true ones; those of one scan without clean-up, de-skewed,
 # or only where the camera sees; and those of ten scans with moving things smeared, carved or carried (lecture 09). Image
-# stages, three seeds and steps are the same. Each was scored on 110 test drives (`semgrid-edu reproduce truth-costs`).
+# stages, three seeds and steps are the same. Each was scored on 110 test drives (`semgrid-edu reproduce truth-costs`). All of
+# it is of an earlier version of the simulator, from before its LIDAR and its ground were made like KITTI's: it had a fifth of
+# KITTI's columns, and all roads lay in one plane.
 #
 # **Predict before you run.** Labels of ten scans, moving things carved out, are more often right than those of one
 # scan: 56 % of the cells with a class against 49 %. Will the network that learned from them do better than the usual
