@@ -17,6 +17,9 @@ from semgrid_edu.errors import ArgumentError
 MAX_ANIMATION_BYTES = 600_000
 """The largest animation: readers download it with the notebook."""
 
+SAMPLE = 200_000
+"""The number of pixels, about, by which colours are chosen."""
+
 
 @dataclass(frozen=True)
 class Animation:
@@ -100,13 +103,26 @@ def _picture(frame: Figure | NDArray[np.uint8]) -> Image.Image:
 
 
 def _with_common_palette(pictures: list[Image.Image]) -> list[Image.Image]:
-    """Give all pictures the same 256 colours, so that what stands still keeps its colour and is stored once."""
-    width, height = pictures[0].size
-    together = Image.new("RGB", (width, height * len(pictures)))
-    for k, picture in enumerate(pictures):
-        together.paste(picture, (0, k * height))
-    reduced = together.quantize(256, dither=Image.Dither.NONE, kmeans=5)
-    return [reduced.crop((0, k * height, width, (k + 1) * height)) for k in range(len(pictures))]
+    """Give all pictures the same 256 colours, so that what stands still keeps its colour and is stored once.
+
+    Which colours these are is decided on a small picture, in which each colour is about as frequent as in all frames.
+    """
+    codes = np.stack([np.asarray(picture) @ np.array([1 << 16, 1 << 8, 1]) for picture in pictures])
+    counts = np.bincount(codes.ravel())
+    colours = np.flatnonzero(counts)
+    sample = np.repeat(colours, 1 + counts[colours] * SAMPLE // codes.size)
+    pixels = np.stack([sample >> 16, sample >> 8 & 255, sample & 255], axis=-1).astype(np.uint8)
+    reduced = Image.fromarray(pixels[None]).quantize(256, dither=Image.Dither.NONE, kmeans=5)
+    index = np.zeros(len(counts), np.uint8)
+    index[sample] = np.asarray(reduced)[0]
+    return [_paletted(index[code], reduced) for code in codes]
+
+
+def _paletted(indices: NDArray[np.uint8], like: Image.Image) -> Image.Image:
+    """Return a picture of indices into the palette of another."""
+    picture = Image.fromarray(indices)
+    picture.putpalette(like.getpalette())
+    return picture
 
 
 def _animated_png(pictures: list[Image.Image], milliseconds: int) -> bytes:
