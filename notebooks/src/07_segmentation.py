@@ -752,7 +752,7 @@ plt.show()
 # %% [markdown]
 # Each row is one unseen picture; the thin bar of the second column is the post, the other bar of the image is the wall.
 # The three ways that kept the column of the toy post are also the best three after learning (one training run each).
-# Atrous pays with time, because its maps keep all their pixels. Eight times the steps didn't repair what strides had
+# Atrous takes more time, because its maps keep all their pixels. Eight times the steps didn't repair what strides had
 # lost: after 1200 of them the strided network is still behind what indices have after 150.
 #
 # ## A post of the drive

@@ -443,7 +443,7 @@ plt.show()
 # as well.
 #
 # Two lessons. **Overlapping bars don't mean "no difference"**: never judge a comparison by two separate intervals. And
-# **train and test both methods on the same seeds and drives**, because it costs nothing and buys precision.
+# **train and test both methods on the same seeds and drives**, because it costs nothing and narrows the interval.
 #
 # ## Table 1, read
 #

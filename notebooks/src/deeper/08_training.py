@@ -6,7 +6,7 @@
 # frames show it.
 #
 # **You will be able to**
-# - make a step of gradient descent with momentum by hand, and say when momentum buys speed;
+# - make a step of gradient descent with momentum by hand, and say when momentum is faster;
 # - write a training loop in twenty lines, and test it by learning four frames by heart;
 # - tell *overfitting* (learning the frames by heart) from *generalisation* (being right on new ones);
 # - tell apart which heights are right, which have large weights, and which the result depends on.

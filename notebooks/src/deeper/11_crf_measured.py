@@ -180,7 +180,7 @@ Markdown(crf_error_tables(error))
 #
 # **On these maps the lattice's kernel costs less than stopping early.** On the crops, its kernel error is 0.2 % and its convergence
 # error 1.4 %; on the compact grid 0.3 % and 0.4 %. The two don't add up to the total, because some errors cancel. So
-# the exact kernel alone, in the same ten updates, makes the map only little better. It pays together with more updates.
+# the exact kernel alone, in the same ten updates, makes the map only little better. It helps together with more updates.
 # (On the present sample drive it is the other way round: lecture 11 finds a kernel error of 0.0006 and a convergence error of
 # 0.0004, as mean differences of probabilities.)
 #
@@ -288,7 +288,7 @@ for name, values in learned["learnt"].items():
 # half of what the default loses. Chosen for class accuracy, it hardly does anything: all changes are below 0.1 point,
 # and the weights are below a tenth. **Learning ends in the same place**: all weights shrink from 4 and 3 to below 0.3.
 # The variant that gains most class accuracy, 0.24 points, has learned which labels may stand beside each other, and
-# pays 0.15 points of pixel accuracy. None of these fourteen CRFs gains in both metrics. (One search for each network
+# loses 0.15 points of pixel accuracy. None of these fourteen CRFs gains in both metrics. (One search for each network
 # and one training run for each variant, on simulated streets. The ranges of the search were changed once, after we had
 # looked at the scores of an earlier search.)
 
