@@ -98,7 +98,8 @@ for ax in fig.axes[:3]:
         x, y = spec.centers()[cell]
         style = {"arrowstyle": "->", "color": "white", "linewidth": 1.5}
         text = (np.clip(y - 4 * np.sign(y), -9, 9), x + 2)
-        ax.annotate(letter, (y, x), text, color="white", fontsize=12, fontweight="bold", arrowprops=style)
+        box = {"facecolor": "black", "alpha": 0.6, "pad": 1.5}
+        ax.annotate(letter, (y, x), text, color="white", fontsize=12, fontweight="bold", arrowprops=style, bbox=box)
 plt.show()
 
 # %% [markdown]
@@ -152,8 +153,8 @@ print("cells that one square links, at most:", max(len(factor.names) for factor 
 #
 # What exactly is the price of a labelling, and how does it become a probability? Take two cells and two classes, road
 # and car. The network says that cell 1 is road with probability 0.9 and cell 2 with 0.4. The price of a label is the
-# negative logarithm of its probability, $-\log p$, so a sure label costs nothing. If the labels differ, that costs 1
-# more.
+# negative logarithm of its probability, $-\log p$, so a sure label costs nothing. (The logarithm is the natural one, and
+# the unit is the **nat**: 1 nat is 1.44 bits.) If the labels differ, that costs 1 more.
 #
 # | cell 1 | cell 2 | cell prices | pair price | energy $E$ | $e^{-E}$ | divided by the sum |
 # |---|---|---|---|---|---|---|
@@ -463,7 +464,7 @@ print("two cells, P(road):  mean field", Q[0].round(3), "  exact", exact_margina
 #
 # $F$ is called the **free energy**. It asks for two things at once: cheap labellings on average, and as much
 # uncertainty as the prices allow. Since KL is never negative, $F$ is never below $-\log Z$, and the difference is
-# exactly KL. (Logarithms here are natural, so all of these are in **nats**: 1 nat is 1.44 bits.) For independent cells,
+# exactly KL. For independent cells,
 # $F$ needs no sum over labellings: the entropy is the sum of the cells' entropies, and a pair disagrees with probability
 # $1 - \sum_l Q_i(l)\,Q_j(l)$. Check this, and print $F$ before and after each sweep over the cells:
 
@@ -517,6 +518,7 @@ for i in range(4):
 # The literal code above updates one cell after the other. Then $F$ can't rise, because each step chooses the best $Q_i$
 # for this cell while all others hold still. But the 2400 cells would have to wait for each other. A fast filter
 # (lecture 11) computes the sums of *all* cells at once, so all cells must update at the same moment. Is that safe?
+# (*Damped*, below, means that each cell goes only a part of the way.)
 #
 # **Predict before you run.** Two cells, price 4. Cell 1 says road with 0.7, cell 2 says car with 0.65. Both look at
 # each other at the same moment and update. What does each of them say then? And after the next update? And what is the
@@ -1022,8 +1024,7 @@ ax.legend(fontsize=9, loc="upper left", bbox_to_anchor=(1.02, 1), frameon=False)
 plt.show()
 
 # %% [markdown]
-# Blue cells were repaired, the hole at A among them; orange ones were spoilt. The printed lines count both by their true
-# class. More than half of the network's wrong cells stay wrong.
+# Blue cells were repaired, the hole at A among them; orange ones were spoilt. More than half of the network's wrong cells stay wrong.
 #
 # **What else the model assumes.** Every confusion costs the same (Potts): a border between road and sidewalk is as
 # expensive as one between road and car. The network's probabilities are taken at their word. So if a network is too
