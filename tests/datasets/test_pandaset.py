@@ -334,6 +334,19 @@ def test_a_missing_image_is_a_gap(copy):
     assert "02.jpg: expected an image" in line
 
 
+def test_an_image_and_a_scan_that_come_again_are_doubtful(copy):
+    assert PandasetScene(copy, SCENE).doubts() == []
+    for folder, name in (("camera/front_camera", "{}.jpg"), ("lidar", "{}.pkl.gz")):
+        first = (copy / SCENE / folder / name.format("00")).read_bytes()
+        for number in ("02", "04"):
+            (copy / SCENE / folder / name.format(number)).write_bytes(first)
+    *scans, image = PandasetScene(copy, SCENE).doubts()
+    assert [line.rsplit("/", 1)[1] for line in scans] == [
+        f"{number}.pkl.gz: expected scans that differ, found the same scan again" for number in ("02", "04")
+    ]
+    assert "expected images that differ, found the same image again" in image
+
+
 def test_says_which_scenes_and_cameras_there_are(root, tmp_path):
     with pytest.raises(ArgumentError, match="camera: expected one of front_camera, "):
         PandasetScene(root, SCENE, camera="rear")

@@ -148,11 +148,41 @@ def frame_doubts(
     """
     found: dict[str, str] = {}
     read, n = read or frames.__getitem__, len(frames)
-    for k in sorted({0, n // 2, max(n - 2, 0)} & set(range(n))):
+    for k in _looked_at(n):
         with suppress(DataError):
             for expected, what in _doubts_of(read, k, n):
                 found.setdefault(expected, f"{what} (frame {k})")
     return [str(DataError(place, expected, what)) for expected, what in found.items()]
+
+
+def _looked_at(n_frames: int) -> list[int]:
+    """Return the numbers of the frames that are compared with the one after them, if there is one."""
+    return sorted({0, n_frames // 2, max(n_frames - 2, 0)} & set(range(n_frames)))
+
+
+def scans_again(paths: Sequence[Path], points: Callable[[int], NDArray]) -> list[str]:
+    """Name scans that come again, where returns are kept in world coordinates.
+
+    In the vehicle's frame, which `frame_doubts` compares, they differ as soon as it moves.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        The files of a drive's scans.
+    points : callable
+        k -> the returns of scan k, (N, 3) float, as the file has them.
+
+    Returns
+    -------
+    list of str
+        One line for each scan that repeats the one before it: the second one, one in the middle and the last are looked at.
+    """
+    again = []
+    for k in _looked_at(len(paths) - 1):
+        with suppress(DataError):  # what can't be read is an error of the frame, and no doubt
+            if np.array_equal(points(k), points(k + 1)):
+                again.append(str(DataError(paths[k + 1], "scans that differ", "the same scan again")))
+    return again
 
 
 def _doubts_of(read: Callable[[int], Frame], k: int, n_frames: int) -> Iterator[tuple[str, str]]:

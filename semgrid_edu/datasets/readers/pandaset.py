@@ -18,6 +18,7 @@ from semgrid_edu.datasets.readers import pandaset_files as files
 from semgrid_edu.datasets.readers.calibration import camera_from
 from semgrid_edu.datasets.readers.cuboids import LabelledScan, put_together
 from semgrid_edu.datasets.readers.depth_points import birdseye_votes
+from semgrid_edu.datasets.readers.drive_doubts import scans_again
 from semgrid_edu.datasets.readers.frames import FrameSequence, nothing_known
 from semgrid_edu.datasets.readers.project_lidar import cells_in_view, closest_returns, unhidden
 from semgrid_edu.errors import ArgumentError, DataError, check_whole
@@ -195,11 +196,12 @@ class PandasetScene(FrameSequence):
         """List the images that are missing between others, and what is doubtful about a few of the frames."""
         expected = f"an image, since there is one every {min(np.diff(self.numbers), default=1)} frames"
         missing = [str(DataError(self.view / f"{number:02d}.jpg", expected, "none")) for number in self.gaps]
-        return [*missing, *super().doubts()]
+        scans = [self.folder / "lidar" / f"{number:02d}.pkl.gz" for number in self.numbers]
+        again = scans_again(scans, lambda k: self._scan(self.numbers[k]).points)
+        return [*missing, *again, *super().doubts()]
 
     def _frame(self, k: int) -> Frame:
-        frame = self._without_labels(k)
-        return replace(frame, labels=self._labels(k, frame.camera))
+        return replace(frame := self._without_labels(k), labels=self._labels(k, frame.camera))
 
     def _without_labels(self, k: int) -> Frame:
         scan, camera, T_world_from_lidar = self._scan(self.numbers[k]), self._camera(k), self._T_world_from_lidar(k)
