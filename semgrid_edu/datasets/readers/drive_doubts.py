@@ -175,7 +175,8 @@ def scans_again(paths: Sequence[Path], points: Callable[[int], NDArray]) -> list
     Returns
     -------
     list of str
-        One line for each scan that repeats the one before it: the second one, one in the middle and the last are looked at.
+        One line for each scan that repeats the one before it. The second one, one in the middle and the last are looked
+        at.
     """
     again = []
     for k in _looked_at(len(paths) - 1):
