@@ -839,8 +839,8 @@ for infer in (mean_field_naive, mean_field_accurate, mean_field):
 #
 # **The tenth of a second.** The printed lines give the balance on the machine that built this page: the CRF of the drive's
 # map, and of the paper's grid. The drive's map leaves most of the tenth to the other stages. The paper's grid needs about
-# all of it (another machine took 127 ms), so there the CRF leaves hardly any time for the rest. Half of the iterations
-# take half of the time.
+# all of it (another machine took 127 ms), so there the CRF leaves hardly any time for the rest. Fewer iterations save a
+# part of it; the lattice is built once for each map in any case.
 #
 # **A third way** is in the last table. `mean_field_accurate` computes the Gaussian exactly for all cells in a window of
 # four widths around each cell, without writing a matrix down. Its kernel error is far smaller. Its time is proportional
