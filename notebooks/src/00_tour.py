@@ -173,12 +173,14 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # |---|---|---|
 # | $l$, $i$ | LIDAR points (N, 4): x, y, height, reflectance; image (3, h, w) | `frame.points`, `frame.image` |
 # | $m_k^t$ | state of cell $k$ at scan $t$: FREE, STATIC, DYNAMIC, UNKNOWN (in 02 free or occupied) | `State` |
-# | $n_t$ | place on the line, in 01 only | |
+# | $n_t$ | place on the line, in 01; a plain $n$ elsewhere counts something | |
 # | $z_t$ | the scan at $t$, always with an index; $P(z_t \mid \cdot)$ is its evidence | `Evidence` |
 # | $b$ | belief: a probability for each state | `probability[:, r, c]` |
 # | $L$ | log-odds of a cell, $\log P / (1 - P)$ | `L` |
 # | $R, M$ | rates of change, 1/s; transition matrix $M = e^{R \Delta t}$ | `rates`, `transition_matrix` |
 # | $q$ | a particle, with place, velocity $v$ and weight $w$ | `Particles` |
+# | $a$; $a_j$ | probability that something arrives (03, 04); with an index, what pixel $j$ shows (from 05 on) | `arrives` |
+# | $e$ | an error that several readings share (01, 02) | |
 # | $\tau$; $T_b$ | memory of a cell (02); the time that the filter looks back | |
 # | $o$ | occupancy grid (4, H, W): the beliefs of all cells | `belief.probability` |
 # | $s$, $p$ | scores of pixels (C, h, w); scores resampled on planes (C, D, H, W) | `scores`, `planes` |
@@ -190,7 +192,7 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # | $\sigma$ | a standard deviation; its index says of what | |
 #
 # H x W are cells, h x w pixels, C = 14 classes, D = 20 planes, N points. ($v$ is a velocity in 01 to 04 and a pixel's
-# row from 05 on; the two never meet.)
+# row from 05 on; the two never meet. A letter that isn't in this table means something on its own page only.)
 #
 # ## A map with forward up
 #
@@ -651,8 +653,8 @@ assert clear[0] > 0.9 > 0.65 > clear[1]
 # %% [markdown]
 # The first scans show that *something* is there, and nothing says that it moves: STATIC is the better bet. The filter
 # changes its mind only when the thing arrives where free space was seen before. For the first car that takes most of a
-# second. For the second it takes longer, because the street in front of it is less surely free: the first car hides it,
-# and then leaves a trail there that still looks occupied. Until then, a planner that trusts this map takes a moving car
+# second. For the second it takes longer. The likely reason is that the street in front of it is less surely free: the
+# first car hides it, and then leaves a trail there that still looks occupied. Until then, a planner that trusts this map takes a moving car
 # for a parked one. What the image shows might help; that is the dashed edge from $i_t$ to $o_t$.
 #
 # **Far away everything is worse.**

@@ -143,7 +143,7 @@ print("z0 tells about n2 once n1 is known:", not d_separated(line.model, "n2", "
 # The dashed line is an edge that the filter **cuts**. A reading at step 2 also tells something about step 1, but a
 # filter never goes back. Every stage of this course cuts edges in order to be affordable. We keep a **ledger** of
 # them: which edge, and what it costs. The two numbers on the dashed line are its price: how often the most probable
-# place is the right one, exactly and with the filter. Further down we measure them.
+# place is the right one, exactly and with the filter.
 #
 # ## One reading: update
 #
@@ -242,7 +242,7 @@ plotting.probability_lines(
 plt.show()
 
 # %% [markdown]
-# See how the middle row is the upper one, one cell to the right and blunter. In the lower row cell 3 has 0.55:
+# The middle row is the upper one, one cell to the right and blunter. In the lower row cell 3 has 0.55:
 # neither reading could tell 2, 3 and 7 apart, but their order in time could. **This is why a filter needs the
 # prediction:** it carries what was seen there and then to here and now.
 #
@@ -320,8 +320,8 @@ assert favourite[7] == 6 != places[7] == 5
 # Above, the darker the surer, and circles are the truth. Below, the entropy goes up with every prediction (circles) and
 # mostly down with every update (squares). At step 3 the sensor has said *pole* twice in a row. That fits the pair at A,
 # so the filter takes the vehicle to be in cell 3. But the vehicle hasn't moved and is still in cell 2, beside the same
-# pole. One step later it is in cell 3, and the filter is right. From then on spreading and sharpening keep the balance,
-# and nothing is ever settled: at step 7 the filter has lost the vehicle again.
+# pole. One step later it is in cell 3, and the filter is right. But nothing is settled for good, because the next
+# prediction takes away most of what an update gains: at step 7 the filter has lost the vehicle again.
 #
 # Six readings are surprises: not what the favourite cell made one expect. At steps 8, 14 and 16 the sensor says
 # *nothing* where a pole was expected, and these three updates raise the entropy. At steps 2, 4 and 18 it says *pole*
@@ -343,7 +343,7 @@ assert limit > p_pole @ prior
 # %% [markdown]
 # One reading may confuse you, but on average readings make you surer, as long as they come as often as the model says,
 # here *pole* in 24 of 100 cases. If the model is wrong, even that fails: should *pole* come in more than 68 of 100
-# cases, each reading raises the entropy on average.
+# cases, a reading raises the entropy on average.
 #
 # ## Witnesses: a fork
 #
@@ -973,7 +973,7 @@ assert all(claim > truth + 0.1 for claim, truth in broken)
 
 # %% [markdown]
 # The first pair agrees. In the other three the filter claims far more than it knows, and nothing in its belief shows
-# it: it looks about as sharp as ever, or sharper. Counting twice often comes in disguise. Ten returns of one scan
+# it. Counting twice often comes in disguise. Ten returns of one scan
 # from the same bush, or the same bush in ten scans, are not ten independent witnesses: they share an error, as in the
 # right graph of the section on witnesses. That is why the package's sensor model lets only the first `max_returns`
 # returns of a cell count, and its defaults are far from a perfect sensor.
@@ -1027,6 +1027,8 @@ assert 12 < speed < 16
 # 4. A filter is exact for now and cuts the future: smoothing gets it back, and Viterbi finds the best path.
 # 5. A grid cell is filtered like a place on a road, with $M = \exp(R\,\Delta t)$. STATIC and DYNAMIC look alike to a
 #    scan. A single cell tells them apart by first sight and by its rates; the whole filter by what its neighbours send.
+#
+# **You can now** filter and smooth any chain of states in ten lines, and say which edge a filter cuts.
 #
 # ## Further reading
 #

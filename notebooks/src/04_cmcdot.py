@@ -28,6 +28,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import Markdown
 from ipywidgets import FloatSlider, SelectionSlider, interact
+from matplotlib.patheffects import withStroke
 
 from semgrid_edu import plotting
 from semgrid_edu.datasets.grid_truth import grid_truth
@@ -35,7 +36,6 @@ from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.plotting.colours import occupancy_colours
 from semgrid_edu.plotting.moving import wheel_colours
 from semgrid_edu.stage_models import cmcdot_stage, ledger, ledger_table
 from semgrid_edu.stage_models.bof import bof_beliefs
@@ -77,12 +77,6 @@ def filtered(tracker):
     return beliefs
 
 
-def two_states(p):
-    """Show P(occupied) as four states: UNKNOWN where it is near 1/2."""
-    sure = np.abs(2 * p - 1)
-    return np.stack([sure * (p < 0.5), sure * (p >= 0.5), 0 * p, 1 - sure])
-
-
 by_log_odds, by_bof, by_cmcdot = (filtered(tracker) for tracker in (LogOddsGrid(spec), Bof(spec), Cmcdot(spec)))
 
 
@@ -90,12 +84,18 @@ by_log_odds, by_bof, by_cmcdot = (filtered(tracker) for tracker in (LogOddsGrid(
 def three_filters():
     """Draw the three maps, frame after frame."""
     fig, axes = plt.subplots(1, 3, figsize=(9.4, 4.2), layout="compressed")
-    letters = [[ax.text(0, 0, name, weight="bold", ha="center", va="center") for name in "ABCD"] for ax in axes]
+    style = {
+        "weight": "bold",
+        "ha": "center",
+        "va": "center",
+        "path_effects": [withStroke(linewidth=2, foreground="w")],
+    }
+    letters = [[ax.text(0, 0, name, **style) for name in "ABCD"] for ax in axes]
     for ax in axes:
         plotting.velocity_wheel(spec, by_bof[0].probability, by_bof[0].velocity, ax=ax, legend=ax is axes[-1])
         ax.set(xlim=(15, -11), ylim=(0, 42), ylabel="x, forward [m]" if ax is axes[0] else "")
     for k in range(len(frames)):
-        pictures = [occupancy_colours(two_states(by_log_odds[k]))]
+        pictures = [plotting.occupancy_colours(plotting.binary_states(by_log_odds[k]))]
         pictures += [wheel_colours(spec, b[k].probability, b[k].velocity) for b in (by_bof, by_cmcdot)]
         b, d = 38.3 - 1.72 * k, 36.5 - 0.86 * k
         places = (0.4, 0.42 * k + 1), (4.2, b), (4.2, b + 5), (12.5, d)
@@ -219,12 +219,12 @@ plt.show()
 # </details>
 
 # %% jupyter={"outputs_hidden": true}
-model = stage.model  # x0, x1: the thing before and now; c0, c1: the cell; one1: at most one; z1: the scan
+model = stage.model  # q0, q1: the thing before and now; m0, m1: the cell; one1: at most one; z1: the scan
 print("independent?")
-print("scan and thing, given the cell:       ", d_separated(model, "z1", "x1", given=["c1", "one1"]))
-print("cell and thing, before looking:       ", d_separated(model, "c0", "x1", given=["x0"]))
-print("cell and thing, given `at most one`:  ", d_separated(model, "c0", "x1", given=["x0", "one1"]))
-assert not d_separated(model, "z1", "x1", given=["one1"])
+print("scan and thing, given the cell:       ", d_separated(model, "z1", "q1", given=["m1", "one1"]))
+print("cell and thing, before looking:       ", d_separated(model, "m0", "q1", given=["q0"]))
+print("cell and thing, given `at most one`:  ", d_separated(model, "m0", "q1", given=["q0", "one1"]))
+assert not d_separated(model, "z1", "q1", given=["one1"])
 
 # %% [markdown]
 # Now the dashed edges. Each makes the filter affordable, and each has a price, which the section *What the three cuts
@@ -317,7 +317,7 @@ plt.show()
 # 3. *The scan* (black: hit, pink: passed, white: not seen) is all one colour for whatever stands in its way. *Update*
 #    keeps the orange where there was a hit and wipes it out where beams passed.
 # 4. *Resample*: the same mass on new particles, whose weights differ much less. Before, most carried next to nothing
-#    and are pale.
+#    and are pale. (Particles have the colour of their velocity: blue drives our way.)
 #
 # Now each step by hand, on a line of six cells of one metre, listed from the vehicle outward.
 #

@@ -63,6 +63,33 @@ def occupancy_colours(probability: NDArray) -> NDArray[np.uint8]:
     return np.clip(np.rint(mixed), 0, 255).astype(np.uint8)
 
 
+def binary_states(p_occupied: NDArray) -> NDArray:
+    """Spread P(occupied) over the four states, so that a binary grid has the colours of the others.
+
+    UNKNOWN falls from 1 at P = 0.5 to 0 at 0.25 and 0.75; the rest is FREE below 0.5 and STATIC above.
+
+    Parameters
+    ----------
+    p_occupied : (H, W) float
+        P(occupied) of each cell.
+
+    Returns
+    -------
+    (4, H, W) float
+        What `occupancy_colours` takes.
+
+    Examples
+    --------
+    >>> binary_states(np.array([[0.1, 0.5, 0.7]]))[:, 0].round(1)
+    array([[1. , 0. , 0. ],
+           [0. , 0. , 0.8],
+           [0. , 0. , 0. ],
+           [0. , 1. , 0.2]])
+    """
+    free, occupied = np.clip(2 - 4 * p_occupied, 0, 1), np.clip(4 * p_occupied - 2, 0, 1)
+    return np.stack([free, occupied, np.zeros_like(free), 1 - free - occupied])
+
+
 def velocity_colours(velocity: NDArray) -> NDArray[np.uint8]:
     """Colour velocities by a wheel: the heading decides the hue, and slow motion is darker, like STATIC.
 

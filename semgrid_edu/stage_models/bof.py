@@ -98,8 +98,8 @@ def bof_stage(world: CellsInARow = STANDING_OR_DRIVING) -> StageGraph:
         The row, of which the first belief and the first scan are used.
     """
     columns = range(1, len(world.cells) + 1)
-    rows = {"one{},1": 1.5, "c{},0": 0.0, "c{},1": -1.4, "z{},1": -2.4}
-    before, now = ({f"c{k},{t}": f"$m_{{{k}}}^{{{when}}}$" for k in columns} for t, when in ((0, "t-1"), (1, "t")))
+    rows = {"one{},1": 1.5, "m{},0": 0.0, "m{},1": -1.4, "z{},1": -2.4}
+    before, now = ({f"m{k},{t}": f"$m_{{{k}}}^{{{when}}}$" for k in columns} for t, when in ((0, "t-1"), (1, "t")))
     return StageGraph(
         "BOF: a cell and its antecedents",
         row_model(world, 1),
@@ -111,7 +111,7 @@ def bof_stage(world: CellsInARow = STANDING_OR_DRIVING) -> StageGraph:
         | {f"z{k},1": f"$z_{{{k}}}^{{t}}$" for k in columns},
         equations={
             f"one{columns[-1]},1": "at most one thing",
-            f"c{columns[-1]},0": "what the cell holds",
+            f"m{columns[-1]},0": "what the cell holds",
             f"z{columns[-1]},1": "pass or hit",
         },
         cut=cut_edges("bof"),

@@ -60,7 +60,7 @@ def one_cell(
     Returns
     -------
     StageGraph
-        Variables x0; then, for t = 1 ... T, prior t (after prediction), v t, x t (after looking), z t.
+        Variables m0; then, for t = 1 ... T, prior t (after prediction), v t, m t (after looking), z t.
         `cell_given(scans)` holds what is observed.
 
     Raises
@@ -71,29 +71,29 @@ def one_cell(
     world, scans = world or WorldModel(), check_scans(scans)
     steps = range(1, len(scans) + 1)
     M, look = transition_matrix(world, dt), looking(world)
-    factors = [Factor("x0", start)]
+    factors = [Factor("m0", start)]
     for t, (occupied, free) in zip(steps, scans, strict=True):
-        prior, v, x, z = f"prior{t}", f"v{t}", f"x{t}", f"z{t}"
+        prior, v, m, z = f"prior{t}", f"v{t}", f"m{t}", f"z{t}"
         this_scan = np.array([free, occupied, occupied, free]) / max(occupied, free)
         factors += [
-            Factor((f"x{t - 1}", prior), M),
+            Factor((f"m{t - 1}", prior), M),
             binary(v, 0.5),
-            Factor((v, prior, x), look),
-            Factor((x, z), np.stack([1 - this_scan, this_scan], axis=1)),
+            Factor((v, prior, m), look),
+            Factor((m, z), np.stack([1 - this_scan, this_scan], axis=1)),
         ]
-    chain = [name for t in steps for name in (f"prior{t}", f"x{t}")]
+    chain = [name for t in steps for name in (f"prior{t}", f"m{t}")]
     above = [name for t in steps for name in (None, f"v{t}")]
     below = [name for t in steps for name in (None, f"z{t}")]
     return StageGraph(
         "One cell, four states",
         directed(factors),
         observed=tuple(name for t in steps for name in (f"v{t}", f"z{t}")),
-        positions=in_rows([None, *above], ["x0", *chain], [None, *below]),
+        positions=in_rows([None, *above], ["m0", *chain], [None, *below]),
         labels={f"prior{t}": f"$m_{{{t}}}^-$" for t in steps}
-        | {f"x{t}": f"$m_{{{t}}}$" for t in (0, *steps)}
+        | {f"m{t}": f"$m_{{{t}}}$" for t in (0, *steps)}
         | {f"v{t}": "seen?" for t in steps}
         | {"neighbour": "next cell", "front": "in front"},
-        equations={f"x{len(scans)}": "state", f"z{len(scans)}": "scan"},
+        equations={f"m{len(scans)}": "state", f"z{len(scans)}": "scan"},
         plates={"cells": tuple(dict.fromkeys(name for factor in factors for name in factor.names))},
         cut=cut_edges("cell"),
         ghosts={"neighbour": (0.8, 1.1), "front": (3.0, 1.1)},
@@ -162,9 +162,9 @@ def exact_cell(
     """
     beliefs = sum_product(one_cell(scans, dt, world, start).model, cell_given(scans))
     steps = range(1, len(check_scans(scans)) + 1)
-    predicted = [beliefs.messages[f"P(prior{t} | x{t - 1})", f"prior{t}"] for t in steps]
-    passed = [beliefs.messages[f"x{t}", f"P(prior{t + 1} | x{t})"] for t in steps[:-1]]
-    return CellBeliefs(np.array(predicted), np.array([*passed, beliefs.marginals[f"x{steps[-1]}"]]))
+    predicted = [beliefs.messages[f"P(prior{t} | m{t - 1})", f"prior{t}"] for t in steps]
+    passed = [beliefs.messages[f"m{t}", f"P(prior{t + 1} | m{t})"] for t in steps[:-1]]
+    return CellBeliefs(np.array(predicted), np.array([*passed, beliefs.marginals[f"m{steps[-1]}"]]))
 
 
 def package_cell(

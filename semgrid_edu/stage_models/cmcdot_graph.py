@@ -36,12 +36,12 @@ HERE = np.array([False, *(place == 0 for place, _ in PLACES)])
 
 
 def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGraph:
-    """Return the graph of two time slices: a cell of four states (c), and a moving thing with place and velocity (x).
+    """Return the graph of two time slices: a cell of four states (m), and a moving thing with place and velocity (q).
 
-    The edge from x1 to o1 says: the place and the velocity of a thing tell where it came from and where it goes, and it
-    may come out of a wall and go on along it (o1). The edge from o1 to one1 says: such a thing doesn't arrive in a cell
-    that is UNKNOWN, because there it says only that the wall goes on. Two rules aren't in the graph: in
-    a hidden cell that something has left, nothing stands (`update`); and a vehicle that drives glimpses what stands in
+    The edge from q1 to wall1 says: the place and the velocity of a thing tell where it came from and where it goes. So
+    it may come out of a wall and go on along it (wall1). The edge from wall1 to one1 says: such a thing doesn't arrive
+    in a cell that is UNKNOWN, because there it says only that the wall goes on. Two rules aren't in the graph: in a
+    hidden cell that something has left, nothing stands (`update`); and a vehicle that drives glimpses what stands in
     the gaps of a wall (`predict`). Here the vehicle stands.
 
     There is at most one moving thing here, so if something arrives from the left, nothing arrives from the right. The
@@ -59,7 +59,7 @@ def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGr
     Returns
     -------
     StageGraph
-        Variables x0, x1 (`ELSEWHERE`, then `PLACES`), o1 (1: comes out of a wall and goes on along it), c0, c1
+        Variables q0, q1 (`ELSEWHERE`, then `PLACES`), wall1 (1: comes out of a wall and goes on along it), m0, m1
         (`State`), one1 (1: nothing arrives where something stands, nor along a wall where no scan has seen) and z1
         (0: pass, 1: hit).
 
@@ -74,17 +74,17 @@ def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGr
         _two_slices(world, cell),
         observed=evidence,
         positions={
-            "x0": (0, 0.5),
-            "x1": (3.4, 0.5),
-            "o1": (1.7, -0.7),
+            "q0": (0, 0.5),
+            "q1": (3.4, 0.5),
+            "wall1": (1.7, -0.7),
             "one1": (1.7, -2.1),
-            "c0": (0, -3.1),
-            "c1": (3.4, -3.1),
+            "m0": (0, -3.1),
+            "m1": (3.4, -3.1),
             "z1": (3.4, -4.1),
         },
-        labels={"x0": "$q_{t-1}^{(i)}$", "x1": "$q_t^{(i)}$", "o1": "along a wall?", "one1": r"$\leq 1$"}
-        | {"c0": "$m_k^{t-1}$", "c1": "$m_k^t$", "z1": "$z_k^t$", "neighbour": "$m_{k+1}^t$"},
-        plates={"particles $i$": ("x0", "x1", "o1"), "cells $k$": ("c0", "c1", "one1", "z1")},
+        labels={"q0": "$q_{t-1}^{(i)}$", "q1": "$q_t^{(i)}$", "wall1": "along a wall?", "one1": r"$\leq 1$"}
+        | {"m0": "$m_k^{t-1}$", "m1": "$m_k^t$", "z1": "$z_k^t$", "neighbour": "$m_{k+1}^t$"},
+        plates={"particles $i$": ("q0", "q1", "wall1"), "cells $k$": ("m0", "m1", "one1", "z1")},
         cut=cut_edges("cmcdot"),
         ghosts={"neighbour": (5.7, -3.1)},
     )
@@ -96,19 +96,19 @@ def _two_slices(world: CellsInARow, cell: int) -> GraphicalModel:
     first_sight = [*world.first_sight, 0] if seen else np.eye(N_STATES)[UNKNOWN]
     read = hit_probability(world.params.world.sensor)[[Cell.FREE, Cell.STATIC, Cell.LEFT, Cell.UNKNOWN]]
     factors = [
-        Factor("x0", _first_place(world.belief, cell)),
-        Factor(("x0", "c0"), _first_cell(world.belief[cell - 1])),
-        Factor(("x0", "x1"), _flight(M[DYNAMIC, DYNAMIC])),
-        Factor(("x1", "o1"), _along_a_wall(world, cell, M)),
-        Factor(("c0", "x1", "o1", "one1"), _alone(M)),
-        Factor(("c0", "x1", "c1"), _next_cell(M) @ np.vstack([np.eye(N_STATES)[:UNKNOWN], first_sight])),
-        Factor(("c1", "z1"), read),
+        Factor("q0", _first_place(world.belief, cell)),
+        Factor(("q0", "m0"), _first_cell(world.belief[cell - 1])),
+        Factor(("q0", "q1"), _flight(M[DYNAMIC, DYNAMIC])),
+        Factor(("q1", "wall1"), _along_a_wall(world, cell, M)),
+        Factor(("m0", "q1", "wall1", "one1"), _alone(M)),
+        Factor(("m0", "q1", "m1"), _next_cell(M) @ np.vstack([np.eye(N_STATES)[:UNKNOWN], first_sight])),
+        Factor(("m1", "z1"), read),
     ]
     return directed(factors)
 
 
 def _first_place(belief: NDArray, cell: int) -> NDArray[np.float64]:
-    """P(x0): where the moving thing is, as the cell and its neighbours believe."""
+    """P(q0): where the moving thing is, as the cell and its neighbours believe."""
     around = np.pad(belief, ((1, 1), (0, 0)))[cell - 1 : cell + 2]
     moving = around[:, [Cell.LEFT, Cell.RIGHT]].ravel()
     if moving.sum() > 1:
@@ -117,14 +117,14 @@ def _first_place(belief: NDArray, cell: int) -> NDArray[np.float64]:
 
 
 def _first_cell(belief: NDArray) -> NDArray[np.float64]:
-    """P(c0 | x0): DYNAMIC where the moving thing is, else one of the other three as the cell believes."""
+    """P(m0 | q0): DYNAMIC where the moving thing is, else one of the other three as the cell believes."""
     others = belief[[Cell.FREE, Cell.STATIC, Cell.LEFT, Cell.UNKNOWN]] * (1, 1, 0, 1)
     others = others / others.sum() if others.any() else np.eye(N_STATES)[FREE]
     return np.where(HERE[:, None], np.eye(N_STATES)[DYNAMIC], others)
 
 
 def _flight(goes_on: float) -> NDArray[np.float64]:
-    """P(x1 | x0): one cell further, or ELSEWHERE when it stops moving or would be two cells away."""
+    """P(q1 | q0): one cell further, or ELSEWHERE when it stops moving or would be two cells away."""
     flight = np.zeros((1 + len(PLACES),) * 2)
     for before, (place, velocity) in enumerate(PLACES, start=1):
         after = (place + velocity, velocity)
@@ -135,7 +135,7 @@ def _flight(goes_on: float) -> NDArray[np.float64]:
 
 
 def _along_a_wall(world: CellsInARow, cell: int, M: NDArray) -> NDArray[np.float64]:
-    """P(o1 | x1): it came from where something stands, `clearing_time` ago, and will be where that may stand, too."""
+    """P(wall1 | q1): it came from where something stands, `clearing_time` ago, and will be where that may, too."""
     by_now, last = world.belief @ np.eye(N_STATES)[list(STATE_OF)] @ M, len(world.belief) - 1
     steps, doubt = round(world.clearing_time / DT), np.zeros(len(HERE))
     for state, (place, velocity) in enumerate(PLACES, start=1):
@@ -147,13 +147,13 @@ def _along_a_wall(world: CellsInARow, cell: int, M: NDArray) -> NDArray[np.float
 
 
 def _alone(M: NDArray) -> NDArray[np.float64]:
-    """P(one1 | c0, x1, o1): 0 where a thing arrives and the cell is STATIC by now, or UNKNOWN while o1 = 1."""
+    """P(one1 | m0, q1, wall1): 0 where a thing arrives and the cell is STATIC by now, or UNKNOWN while wall1 = 1."""
     meets = np.stack([M[:, STATIC], M[:, STATIC] + M[:, UNKNOWN]], axis=-1)[:, None] * HERE[:, None]
     return np.stack([meets, 1 - meets], axis=-1)
 
 
 def _next_cell(M: NDArray) -> NDArray[np.float64]:
-    """P(c1 | c0, x1), before the scan: DYNAMIC where the thing arrives, FREE where it has left, else by the matrix."""
+    """P(m1 | m0, q1), before the scan: DYNAMIC where the thing arrives, FREE where it has left, else by the matrix."""
     following = np.repeat(M[:, None], len(HERE), axis=1)
     following[DYNAMIC] = np.eye(N_STATES)[FREE]
     if M[DYNAMIC, DYNAMIC] < 1:

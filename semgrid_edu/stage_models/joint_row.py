@@ -32,11 +32,11 @@ def row_model(world: CellsInARow, steps: int | None = None) -> GraphicalModel:
     Returns
     -------
     GraphicalModel
-        A directed model. Cell k at step t has the variables "ck,t" (states as in `Cell`; t from 0) and, from step 1 on,
-        "mk,t" (if anything changes), "onek,t" (0: several things, 1: at most one) and "zk,t" (0: pass, 1: hit).
+        A directed model. Cell k at step t has the variables "mk,t" (states as in `Cell`; t from 0) and, from step 1 on,
+        "mixedk,t" (if anything changes), "onek,t" (0: several things, 1: at most one) and "zk,t" (0: pass, 1: hit).
     """
     steps = len(world.scans) if steps is None else steps
-    factors = [Factor(f"c{k},0", belief) for k, belief in enumerate(world.belief, start=1)]
+    factors = [Factor(f"m{k},0", belief) for k, belief in enumerate(world.belief, start=1)]
     for step in range(1, steps + 1):
         for k in range(1, len(world.cells) + 1):
             factors += _slice(world, k, step)
@@ -75,9 +75,9 @@ def joint_belief(world: CellsInARow, step: int) -> Factor:
     Returns
     -------
     Factor
-        A normalised table over "c1,t" ... "cK,t", of 5^K entries.
+        A normalised table over "m1,t" ... "mK,t", of 5^K entries.
     """
-    names = [f"c{k},{step}" for k in range(1, len(world.cells) + 1)]
+    names = [f"m{k},{step}" for k in range(1, len(world.cells) + 1)]
     return eliminate(row_model(world, step), names, row_evidence(world, step)).normalised()
 
 
@@ -150,13 +150,13 @@ def _slice(world: CellsInARow, k: int, step: int) -> list[Factor]:
     # Beyond both ends of the row everything is FREE.
     inside = tuple(slice(None) if 1 <= j <= last else Cell.FREE for j in (k - 1, k, k + 1))
     changes = any(map(any, world.rates))
-    before = [f"m{j},{step}" if changes else f"c{j},{step - 1}" for j in (k - 1, k, k + 1) if 1 <= j <= last]
-    mixed = [Factor((f"c{k},{step - 1}", f"m{k},{step}"), world.mixing)] if changes else []
+    before = [f"mixed{j},{step}" if changes else f"m{j},{step - 1}" for j in (k - 1, k, k + 1) if 1 <= j <= last]
+    mixed = [Factor((f"m{k},{step - 1}", f"mixed{k},{step}"), world.mixing)] if changes else []
     return [
         *mixed,
-        Factor((*before, f"c{k},{step}"), (following @ first_sight)[inside]),
+        Factor((*before, f"m{k},{step}"), (following @ first_sight)[inside]),
         Factor((*before, f"one{k},{step}"), alone[inside]),
-        Factor((f"c{k},{step}", f"z{k},{step}"), hit_probability(world.params.world.sensor)),
+        Factor((f"m{k},{step}", f"z{k},{step}"), hit_probability(world.params.world.sensor)),
     ]
 
 

@@ -107,7 +107,7 @@ def out_of_a_wall() -> Price:
     """Lecture 04: whether a thing arrives that leaves a cell in which something may stand."""
     unseen = {"unknown": 1.0}
     world = CellsInARow(({"static": 0.3, "right": 0.5}, unseen, unseen), ("???",), clearing_time=DT)
-    found = eliminate(cmcdot_stage(world).model, "c1", {"one1": 1}).normalised().table
+    found = eliminate(cmcdot_stage(world).model, "m1", {"one1": 1}).normalised().table
     return Price(exact_beliefs(world)[0, 1, Cell.RIGHT], found[State.DYNAMIC], "P(DYNAMIC) beside its origin")
 
 

@@ -451,7 +451,7 @@ def fm_iou(confusion):
             task="fmiou",
             code="""
 def fm_iou(confusion):
-    cells, claimed, right = confusion.sum(axis=1), confusion.sum(axis=0), confusion.diagonal()
+    cells, claimed, right = confusion.sum(axis=1), confusion[:, :-1].sum(axis=0), confusion.diagonal()
     return np.average(right / np.maximum(cells + claimed - right, 1), weights=cells)""",
         ),
         mistake(
@@ -462,7 +462,7 @@ def fm_iou(confusion):
             code="""
 def fm_iou(confusion):
     right = confusion.diagonal()
-    union = confusion.sum(axis=0) + confusion.sum(axis=1) - right
+    union = confusion[:, :-1].sum(axis=0) + confusion.sum(axis=1) - right
     return (right / np.maximum(union, 1))[union > 0].mean()""",
         ),
         mistake(
@@ -482,17 +482,17 @@ def fm_iou(confusion):
             says="you count the right cells twice",
             code="""
 def fm_iou(confusion):
-    cells, claimed = confusion.sum(axis=1), confusion.sum(axis=0)
+    cells, claimed = confusion.sum(axis=1), confusion[:, :-1].sum(axis=0)
     return (cells / cells.sum() * confusion.diagonal() / np.maximum(cells + claimed, 1)).sum()""",
         ),
         mistake(
             "divided by what is claimed",
             task="fmiou",
             loses=3,
-            says="cells that are claimed only",
+            says="claimed cells only",
             code="""
 def fm_iou(confusion):
-    cells, claimed = confusion.sum(axis=1), confusion.sum(axis=0)
+    cells, claimed = confusion.sum(axis=1), confusion[:, :-1].sum(axis=0)
     return (cells / cells.sum() * confusion.diagonal() / np.maximum(claimed, 1)).sum()""",
         ),
         mistake(
@@ -503,7 +503,7 @@ def fm_iou(confusion):
             code="""
 def fm_iou(confusion):
     cells, right = confusion.sum(axis=1), confusion.diagonal()
-    return (cells / cells.sum() * right / (cells + confusion.sum(axis=0) - right)).sum()""",
+    return (cells / cells.sum() * right / (cells + confusion[:, :-1].sum(axis=0) - right)).sum()""",
         ),
         mistake(
             "weighted by what is claimed",
@@ -512,7 +512,7 @@ def fm_iou(confusion):
             says="weight each by how frequent the class is in the truth",
             code="""
 def fm_iou(confusion):
-    cells, claimed, right = confusion.sum(axis=1), confusion.sum(axis=0), confusion.diagonal()
+    cells, claimed, right = confusion.sum(axis=1), confusion[:, :-1].sum(axis=0), confusion.diagonal()
     return np.average(right / np.maximum(cells + claimed - right, 1), weights=claimed)""",
         ),
         mistake(
@@ -520,7 +520,7 @@ def fm_iou(confusion):
             task="fmiou",
             loses=3,
             says="on inputs you haven't seen: wrong FmIoU",
-            code="def fm_iou(confusion):\n    return 0.625",
+            code="def fm_iou(confusion):\n    return 7 / 12",
         ),
         mistake(
             "the argument changed",
@@ -531,9 +531,32 @@ def fm_iou(confusion):
 def fm_iou(confusion):
     right = confusion.diagonal().copy()
     cells = confusion.sum(axis=1)
-    union = np.maximum(cells + confusion.sum(axis=0) - right, 1)
+    union = np.maximum(cells + confusion[:, :-1].sum(axis=0) - right, 1)
     confusion *= 0
     return (cells / cells.sum() * right / union).sum()""",
+        ),
+        mistake(
+            "cells without a claim left out",
+            task="fmiou",
+            loses=3,
+            says="leave out the cells without a claim",
+            code="""
+def fm_iou(confusion):
+    confusion = confusion[:, :-1]
+    cells, right = confusion.sum(axis=1), confusion.diagonal()
+    return (cells / cells.sum() * right / np.maximum(cells + confusion.sum(axis=0) - right, 1)).sum()""",
+        ),
+        mistake(
+            "the package's function, as the lecture calls it",
+            task="fmiou",
+            loses=3,
+            says="a square matrix",
+            code="""
+from semgrid_edu.metrics import frequency_weighted_iou
+
+
+def fm_iou(confusion):
+    return frequency_weighted_iou(confusion)""",
         ),
         # ---- task 6
         right(

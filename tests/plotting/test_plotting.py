@@ -109,6 +109,16 @@ def test_occupancy_mixes_state_colours_by_probability():
     np.testing.assert_allclose(painted[0, 1], mean, atol=0.5)
 
 
+def test_a_binary_grid_has_the_colours_of_the_states():
+    p = np.linspace(0, 1, 101)[None]
+    states = plotting.binary_states(p)
+    assert states.min() >= 0
+    np.testing.assert_allclose(states.sum(axis=0), 1)
+    np.testing.assert_allclose(states[[State.FREE, State.STATIC]][:, :, ::-1], states[[State.STATIC, State.FREE]])
+    painted = plotting.occupancy_colours(plotting.binary_states(np.array([[0.0, 0.5, 1.0]])))[0]
+    assert (painted == [plotting.STATE_COLOURS[s] for s in (State.FREE, State.UNKNOWN, State.STATIC)]).all()
+
+
 def test_maps_have_forward_up_and_left_on_the_left_without_flipping_the_array():
     labels = np.arange(8).reshape(4, 2)
     ax = plotting.grid_labels(SPEC, labels, KITTI_14)

@@ -97,13 +97,15 @@ def check_fm_iou(fm_iou: Callable) -> None:
     """Random confusion: classes without truth, one of them claimed, one never found, and one that never occurs."""
     rng = generator(6)
     for _ in range(5):
-        confusion = rng.integers(0, 50, size=(14, 14))
+        confusion = rng.integers(0, 50, size=(14, 15))
         confusion[[2, 7, 13]] = 0
         confusion[:, 7] = 0
         confusion[4, 4] = 0
         given = confusion.copy()
         found = answer_array(fm_iou(given))
-        assert close(found, frequency_weighted_iou(confusion)), "wrong FmIoU (some classes have no truth)"
+        square = np.zeros((15, 15), int)  # no claim as a class that no cell is of
+        square[:14] = confusion
+        assert close(found, frequency_weighted_iou(square)), "wrong FmIoU (some classes have no truth)"
         assert np.array_equal(given, confusion), "the argument is changed"
 
 

@@ -44,8 +44,7 @@ L_min, L_max = log_odds([params.lowest, params.highest])
 # %% jupyter={"source_hidden": true}
 def draw(spec, p, ax, title, mark=None, legend=""):
     """Draw P(occupied): free light, occupied dark, unknown (0.5) mid-grey; marked cells red."""
-    free, occupied = np.clip(2 - 4 * p, 0, 1), np.clip(4 * p - 2, 0, 1)
-    colours = plotting.occupancy_colours(np.stack([free, occupied, np.zeros_like(p), 1 - free - occupied]))
+    colours = plotting.occupancy_colours(plotting.binary_states(p))
     if mark is not None:
         colours[mark] = RED
     plotting.grids.draw_map(spec, colours, ax).set_title(title, fontsize=10)

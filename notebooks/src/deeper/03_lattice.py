@@ -82,25 +82,25 @@ for hit in (True, True, False, True, False):
 #
 # <details><summary>Answer</summary>
 #
-# With probability q up and q down the variance is 2 q · 2² = 8 q = 0.12, so q = 0.015. A rare jump takes the place of a
+# With probability $\eta$ up and $\eta$ down the variance is 2 $\eta$ · 2² = 8 $\eta$ = 0.12, so $\eta$ = 0.015. A rare jump takes the place of a
 # small change at every step; over many steps the two have the same variance.
 #
 # </details>
 #
-# $$ 2 q\, (\Delta v)^2 = \frac{(\alpha\,\Delta t)^2}{3} \quad\Rightarrow\quad
-#    q = \frac{(\alpha\,\Delta t)^2}{6\, (\Delta v)^2} $$
+# $$ 2 \eta\, (\Delta v)^2 = \frac{(\alpha\,\Delta t)^2}{3} \quad\Rightarrow\quad
+#    \eta = \frac{(\alpha\,\Delta t)^2}{6\, (\Delta v)^2} $$
 
 
 # %% tags=["bof-acceleration"] jupyter={"outputs_hidden": true}
-def accelerate(joint, velocities, spacing, q):
-    """Return P(m = v), (V,), after a share q of each moving bin has gone to each of its neighbours."""
+def accelerate(joint, velocities, spacing, jump):
+    """Return P(m = v), (V,), after a share `jump` of each moving bin has gone to each of its neighbours."""
     index = {tuple(v): k for k, v in enumerate(velocities.tolist())}
     changed = joint.copy()
     for k, (vx, vy) in enumerate(velocities.tolist()):
         for side in ((vx + spacing, vy), (vx - spacing, vy), (vx, vy + spacing), (vx, vy - spacing)):
             if (vx, vy) != (0, 0) and side != (0, 0) and side in index:
-                changed[k] -= q * joint[k]
-                changed[index[side]] += q * joint[k]
+                changed[k] -= jump * joint[k]
+                changed[index[side]] += jump * joint[k]
     return changed
 
 
@@ -108,7 +108,7 @@ at_4 = coarse.velocities.tolist().index([4, 0])
 square = GridSpec(x_min=0, x_max=11, y_min=0, y_max=11, cell=1)
 occupied = np.zeros((len(coarse), 11, 11), np.float32)
 occupied[at_4, 5, 5] = 0.5
-changed = accelerate(occupied[:, 5, 5], coarse.velocities, spacing=2, q=(6 * 0.1) ** 2 / (6 * 2**2))
+changed = accelerate(occupied[:, 5, 5], coarse.velocities, spacing=2, jump=(6 * 0.1) ** 2 / (6 * 2**2))
 hurried = BofParams(coarse, WorldModel(rates=NO_CHANGE, stop_rate=0, max_acceleration=6))
 for package in (bof_predict, bof_predict_literal):
     predicted = package(state_of(occupied, coarse), square, hurried, dt=0.1)

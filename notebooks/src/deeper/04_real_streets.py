@@ -260,15 +260,15 @@ Markdown(markdown_table(rows))
 # 3.3 : 1.</details>
 #
 # $$ \frac{P(\text{flies} \mid n \text{ cells hit})}{P(\text{stands} \mid n \text{ cells hit})}
-#    = \frac{p_0}{1 - p_0} \left(\frac{1}{q}\right)^n,
-#    \qquad q = P(\text{STATIC at first sight}) $$
+#    = \frac{p_0}{1 - p_0} \left(\frac{1}{p_S}\right)^n,
+#    \qquad p_S = P(\text{STATIC at first sight}) $$
 #
 # Does the package's filter really do this? We put the wall on a line, let its own `predict` and `update` work, and
 # compare with the formula:
 
 # %%
 line = GridSpec(x_min=0, x_max=16, y_min=0, y_max=1, cell=1)
-P0, Q = 0.001, 0.067
+P0, P_STATIC = 0.001, 0.067
 
 
 def wall_and_particle():
@@ -284,7 +284,7 @@ def wall_and_particle():
 def uncover(cells, clearing_time):
     """Uncover a wall cell by cell while one particle flies along with its edge; return P(DYNAMIC) of each new cell."""
     calm = {"rates": ((0.0,) * 4,) * 4, "stop_rate": 0.0, "max_acceleration": 0.0}
-    world = CmcdotParams(first_sight=(1 - Q, Q, 0.0), clearing_time=clearing_time, **calm)
+    world = CmcdotParams(first_sight=(1 - P_STATIC, P_STATIC, 0.0), clearing_time=clearing_time, **calm)
     state, found = wall_and_particle(), []
     for row in range(9, 9 - cells, -1):
         occupied = np.full(line.shape, 0.5, np.float32)
@@ -299,7 +299,7 @@ def uncover(cells, clearing_time):
 
 # %%
 n = np.arange(1, 7)
-odds = P0 / (1 - P0) / Q**n
+odds = P0 / (1 - P0) / P_STATIC**n
 as_it_was = uncover(6, clearing_time=0.0)
 np.testing.assert_allclose(as_it_was, odds / (1 + odds), atol=1e-4)
 
@@ -354,7 +354,7 @@ assert beside_a_wall > 5 * alone
 # ### As a graph
 #
 # The filter's assumption is an edge that isn't there. In the graphs below, $f$ says whether something flies along with
-# the edge of the shadow, $c_0$ is the last cell that is known to stand, and $c_1, c_2, \ldots$ come into view one after
+# the edge of the shadow, $m_0$ is the last cell that is known to stand, and $m_1, m_2, \ldots$ come into view one after
 # the other. The left graph is the filter: what is in a cell depends on $f$ alone. In the right graph each cell also
 # depends on the one before, because walls go on.
 
@@ -364,10 +364,10 @@ WALL, NEXT = 1, min(0.99, round(float(beside_a_wall), 3))
 
 def street(n, edge):
     """Return a model of n cells that come into view; with `edge`, each depends on its neighbour as measured."""
-    factors, parents = [Factor("f", [1 - P0, P0]), Factor("c0", [1 - Q, Q])], {}
+    factors, parents = [Factor("f", [1 - P0, P0]), Factor("m0", [1 - P_STATIC, P_STATIC])], {}
     for k in range(1, n + 1):
-        here, before = f"c{k}", f"c{k - 1}"
-        after_free, after_wall = [1 - Q, Q], [1 - NEXT, NEXT] if edge else [1 - Q, Q]
+        here, before = f"m{k}", f"m{k - 1}"
+        after_free, after_wall = [1 - P_STATIC, P_STATIC], [1 - NEXT, NEXT] if edge else [1 - P_STATIC, P_STATIC]
         if_stands = np.array([after_free, after_wall])  # rows: the neighbour is free, stands
         if_flies = np.tile([0.0, 1.0], (2, 1))
         table = np.stack([if_stands, if_flies])  # f, neighbour, here
@@ -380,17 +380,17 @@ def street(n, edge):
     return GraphicalModel(factors, parents)
 
 
-# %% jupyter={"source_hidden": true} alt="two graphs with a node f above a row of cells c0, c1, c2, c3, all cells shaded; left, arrows run from f to c1, c2 and c3 only; right, arrows run also from each cell to the next"
-places = {"f": (2.0, 1.1)} | {f"c{k}": (float(k), 0.0) for k in range(4)}
+# %% jupyter={"source_hidden": true} alt="two graphs with a node f above a row of cells m0, m1, m2, m3, all cells shaded; left, arrows run from f to m1, m2 and m3 only; right, arrows run also from each cell to the next"
+places = {"f": (2.0, 1.1)} | {f"m{k}": (float(k), 0.0) for k in range(4)}
 fig, axes = plt.subplots(1, 2, figsize=(9, 2.4), layout="constrained")
 for ax, edge, title in zip(axes, (False, True), ("what the filter assumed", "walls go on"), strict=True):
-    draw(street(3, edge), ax, observed=[f"c{k}" for k in range(4)], highlight="f", positions=places)
+    draw(street(3, edge), ax, observed=[f"m{k}" for k in range(4)], highlight="f", positions=places)
     ax.set_title(title, fontsize=10)
 plt.show()
 
 # %% jupyter={"source_hidden": true}
 for edge in (False, True):
-    print(f"with the edge: {edge!s:<6} c1 and c2 independent, given f: {d_separated(street(3, edge), 'c1', 'c2', 'f')}")
+    print(f"with the edge: {edge!s:<6} m1 and m2 independent, given f: {d_separated(street(3, edge), 'm1', 'm2', 'f')}")
 
 # %% [markdown]
 # **Predict before you run.** Six cells have come into view, and all of them are occupied. With the measured probability
@@ -403,7 +403,7 @@ for edge in (False, True):
 # %%
 def belief_in_flight(n, edge):
     """Return P(something flies | all n cells are occupied), by exact elimination."""
-    seen = {f"c{k}": WALL for k in range(n + 1)}
+    seen = {f"m{k}": WALL for k in range(n + 1)}
     return eliminate(street(n, edge), "f", given=seen).normalised().table[1]
 
 
@@ -456,7 +456,7 @@ plt.show()
 # As in lecture 04, "something arrives" and what the cell holds are taken as independent, all combinations are written
 # down, and the impossible ones are struck out. By hand: a particle arrives with $a = 0.6$, at its origin something
 # stands with probability 0.9, and nobody has seen the place ahead, so it is surely UNKNOWN.
-# So $b = 0.6 \cdot 0.9 \cdot (0 + 1) = 0.54$ is doubtful. The cell is UNKNOWN with 0.8 and FREE with 0.2.
+# So the part $a_w = 0.6 \cdot 0.9 \cdot (0 + 1) = 0.54$ of $a$ is doubtful. The cell is UNKNOWN with 0.8 and FREE with 0.2.
 #
 # | | cell: UNKNOWN 0.8 | cell: FREE 0.2 |
 # |---|---|---|
@@ -471,34 +471,33 @@ plt.show()
 # <details><summary>Answer</summary>0.6, as without it: nothing is struck out there. That matters for a person who sets
 # off into the open, because they come out of the very place where the filter knew them to stand.</details>
 #
-# $$ P(\text{DYNAMIC}) = \frac{a\,(1 - s) - b\,u + (1 - a)\,d}{1 - a\,s - b\,u}, \qquad
-#    P(\text{other}) = \frac{(1 - a)\,P(\text{other})}{1 - a\,s - b\,u} $$
+# $$ b'_D = \frac{a\,(1 - b_S) - a_w b_H + (1 - a)\, b_D}{1 - a\, b_S - a_w b_H}, \qquad
+#    b'_{F,S,U} = \frac{(1 - a)\, b_{F,S,U}}{1 - a\, b_S - a_w b_H} $$
 #
-# Here $s$ and $d$ are what the cell itself holds of STATIC and DYNAMIC, and $u$ is what hasn't been seen to be free:
-# UNKNOWN, and what has moved out of the cell in this very step. (That leaves FREE behind, but so far nobody has looked.
-# Otherwise a phantom would find free cells wherever it has run itself.) The term $a\,s$ is that of what stands; $b\,u$
-# is new.
+# This is lecture 04's formula with one new term, $a_w b_H$. Here $b_H$ is what hasn't been seen to be free: $b_U$, and
+# what has moved out of the cell in this very step. (That leaves FREE behind, but so far nobody has looked. Otherwise a
+# phantom would find free cells wherever it has run itself.)
 
 
 # %% tags=["doubtful"]
-def collide_literal(cell, a, b):
+def collide_literal(cell, a, along_wall):
     """Strike out "arrives where something stands" and "goes along a wall, where nobody has looked"."""
-    free, s, d, u = cell
-    left = 1 - a * s - b * u
-    dynamic = (a * (1 - s) - b * u + (1 - a) * d) / left
-    return np.array([(1 - a) * free / left, (1 - a) * s / left, dynamic, (1 - a) * u / left])
+    free, static, dynamic, unknown = cell
+    left = 1 - a * static - along_wall * unknown
+    moves = (a * (1 - static) - along_wall * unknown + (1 - a) * dynamic) / left
+    return np.array([(1 - a) * free / left, (1 - a) * static / left, moves, (1 - a) * unknown / left])
 
 
-def meet_of_package(cell, a, b):
+def collide_of_package(cell, a, along_wall):
     """Ask the package's compiled rule, which works on whole maps."""
     mixed = np.array(cell, np.float32).reshape(4, 1, 1)
-    zero, arrives, doubtful = (np.full((1, 1), x, np.float32) for x in (0, a, b))
+    zero, arrives, doubtful = (np.full((1, 1), x, np.float32) for x in (0, a, along_wall))
     return collide(mixed, mixed[DYNAMIC], zero, zero, arrives, doubtful)[0][:, 0, 0]
 
 
 for cell in ((0.2, 0, 0, 0.8), (1.0, 0, 0, 0), (0.1, 0.3, 0.2, 0.4)):
-    by_hand = collide_literal(cell, a=0.6, b=0.54)
-    np.testing.assert_allclose(meet_of_package(cell, 0.6, 0.54), by_hand, atol=1e-6)
+    by_hand = collide_literal(cell, a=0.6, along_wall=0.54)
+    np.testing.assert_allclose(collide_of_package(cell, 0.6, 0.54), by_hand, atol=1e-6)
     np.testing.assert_allclose(by_hand.sum(), 1)
 
 # %% jupyter={"outputs_hidden": true}
@@ -522,16 +521,16 @@ assert now.max() < 0.01
 # The same thought works in the other direction. A car was taken for a standing one at first sight, and then it drove
 # off. Behind it lies a piece of STATIC that nobody can see, because the car itself hides it. The next car of a convoy
 # would get stuck in it. But one thing can't be in two places: if what was here a time $T_b$ ago has left with
-# probability $a$, it doesn't stand here. By hand, for a hidden cell with $s = 0.8$ and $a = 0.5$: of the four
+# probability $\lambda$, it doesn't stand here. By hand, for a hidden cell with $b_S = 0.8$ and $\lambda = 0.5$: of the four
 # combinations, "has left" and "stands", 0.4, is struck out, and STATIC keeps 0.4 / 0.6 = 0.67.
 #
-# $$ s' = \frac{(1 - a)\,s}{1 - a\,s} \qquad \text{in cells of which the scan says nothing} $$
+# $$ b'_S = \frac{(1 - \lambda)\, b_S}{1 - \lambda\, b_S} \qquad \text{in cells of which the scan says nothing} $$
 
 
 # %% tags=["wakes"]
-def clear_wake_literal(s, a):
+def clear_wake_literal(static, has_left):
     """Strike out that one thing has left and stands here all the same; FREE gets the rest."""
-    return (1 - a) * s / (1 - a * s)
+    return (1 - has_left) * static / (1 - has_left * static)
 
 
 cell = np.array([0.1, 0.8, 0, 0.1], np.float32).reshape(4, 1, 1)
@@ -778,8 +777,8 @@ plt.show()
 # 1. The filter took each newly seen cell as independent of its neighbour; beside a wall, that is far from true.
 # 2. So each uncovered cell of a wall raised the odds of a particle that runs along with the edge by 15.
 # 3. Switching suspects off one at a time found the moving edge of shadows; transparency and poses had been wrong bets.
-# 4. What comes out of a wall and goes on along it can't claim unseen cells, least of all if it keeps pace with us; and
-#    what has left doesn't stand where it was.
+# 4. A particle that comes out of a wall and goes on along it isn't believed in cells that nobody has seen, least of all
+#    if it keeps pace with us. And a thing that has left a place doesn't stand there any more.
 # 5. What remains: cells that were held for free, walls without a past, and people who set off are found later.
 #
 # ## Further reading

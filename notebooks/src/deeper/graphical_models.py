@@ -782,7 +782,7 @@ PASSED = read_scans("#.")
 STAGES = {
     "line": (bayes_on_a_line(), "01"),
     "cell": (one_log_odds_cell(PASSED), "02"),
-    "chain": (one_cell(PASSED), "04"),
+    "chain": (one_cell(PASSED), "01 and 04"),
     "beam": (beam_over_cells(), "02"),
     "error": (scan_with_pose_error(), "02"),
     "BOF": (bof_stage(), "03"),
@@ -798,7 +798,7 @@ def show_stages(names, size):
     _, axes = plt.subplots(len(names) // 2, 2, figsize=size, layout="constrained")
     for ax, name in zip(np.ravel(axes), names, strict=True):
         stage, lecture = STAGES[name]
-        stage.draw(ax).set_title(f"lecture {lecture}: {stage.title}", fontsize=10)
+        stage.draw(ax).set_title(f"lecture{'s' * (len(lecture) > 2)} {lecture}: {stage.title}", fontsize=10)
     plt.show()
 
 
@@ -812,8 +812,9 @@ show_stages(("CRF", "system"), (13, 5.6))
 
 # %% [markdown]
 # Look at the CRF on the left: its model cuts nothing between pairs. What is cut is *every* pair in mean field's answer,
-# and one dashed edge stands for all of them. Lectures 05 to 08 cut edges too; in the system's graph they are the dashed
-# ones around $s$, $p$ and $g$.
+# and one dashed edge stands for all of them. Lectures 05 to 08 and 14 cut edges too, and draw
+# graphs of their own. In *One cell, four states* a raised minus marks a state before its scan, after the prediction, and
+# *seen?* says whether the scan looked at the cell at all.
 #
 # ## Where this breaks
 #

@@ -106,11 +106,11 @@ plt.show()
 # </details>
 
 # %% jupyter={"outputs_hidden": true}
-before = [f"c{k},0" for k in (1, 2, 3, 4)]
-assert not d_separated(stage.model, "c1,1", "c2,1")
-assert d_separated(stage.model, "c1,1", "c2,1", given=before)
-print("cells 1 and 2 independent:", d_separated(stage.model, "c1,1", "c2,1"))
-print("given the slice before:   ", d_separated(stage.model, "c1,1", "c2,1", given=before))
+before = [f"m{k},0" for k in (1, 2, 3, 4)]
+assert not d_separated(stage.model, "m1,1", "m2,1")
+assert d_separated(stage.model, "m1,1", "m2,1", given=before)
+print("cells 1 and 2 independent:", d_separated(stage.model, "m1,1", "m2,1"))
+print("given the slice before:   ", d_separated(stage.model, "m1,1", "m2,1", given=before))
 
 # %% [markdown]
 # This is the whole difficulty. Each *slice* is cheap, because given the slice before its cells are independent. But the

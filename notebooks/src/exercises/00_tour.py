@@ -10,7 +10,7 @@
 # | 2 | Bayes' rule in every cell | 3 |
 # | 3 | from a point to its pixel, equation (1) | 2 + 1 |
 # | 4 | two accuracies that disagree | 3 |
-# | 5 | FmIoU, which also charges for wrong claims | 3 |
+# | 5 | FmIoU, which also charges for wrong claims, of a map with gaps | 3 |
 # | 6 | the price of a cut edge | 3 |
 # | 7 | in your own words | 2 |
 #
@@ -252,18 +252,21 @@ _test()
 # The *intersection over union* (IoU) of a class is the number of cells that are right, divided by the number of cells that truly are of
 # this class **or** are called so. FmIoU is the mean of the classes' IoU, weighted by the share of each class in the *truth*.
 #
-# Complete `fm_iou` for the confusion matrix of task 4: it returns one number between 0 and 1. A class that neither occurs nor is ever
-# claimed has no IoU; it must not spoil the sum. Do the example by hand first: two classes, three cells of road of which one is called
-# car, and one car that is found.
+# The map of this task has gaps: in some cells it makes no claim at all. So `confusion`, (C, C + 1), has one **column** more than in task 4,
+# the last one, for cells without a claim. Such a cell truly is of its class, and the map misses it.
+#
+# Complete `fm_iou`: it returns one number between 0 and 1. A class that neither occurs nor is ever claimed has no IoU; it must not spoil the
+# sum. Do the example by hand first: two classes; five cells of road, of which one is called car and one gets no claim; and one car that is
+# found.
 
 
 # %% nbgrader={"grade": false, "grade_id": "fmiou", "locked": false, "schema_version": 3, "solution": true, "task": false}
 def fm_iou(confusion):
-    """Return the frequency-weighted mean intersection over union."""
+    """Return the FmIoU of a confusion matrix (C, C + 1), whose last column counts cells without a claim."""
     ### BEGIN SOLUTION
     right = np.diag(confusion)
     cells = confusion.sum(axis=1)
-    union = cells + confusion.sum(axis=0) - right
+    union = cells + confusion[:, :-1].sum(axis=0) - right
     occurs = cells > 0
     return (cells[occurs] / cells.sum() * right[occurs] / union[occurs]).sum()
     ### END SOLUTION
@@ -271,22 +274,25 @@ def fm_iou(confusion):
 
 # %% nbgrader={"grade": true, "grade_id": "fmiou-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    confusion = np.array([[2, 1, 0], [0, 1, 0], [0, 0, 0]])  # road, car, and a class that never occurs
+    confusion = np.array([[3, 1, 0, 1], [0, 1, 0, 0], [0, 0, 0, 0]])  # road, car, and a class that never occurs
     before = confusion.copy()
     got = answer_array(fm_iou(confusion), "fm_iou")
     assert got.shape == (), f"return one number, got {got}"
     assert np.array_equal(confusion, before), "fm_iou changed its argument `confusion`: make new arrays"
     assert not np.isnan(got), "class 2 neither occurs nor is claimed: 0 / 0 is not a share, leave it out"
     slips = {
-        7 / 12: "that is the plain mean of the two IoUs: weight each by how frequent the class is in the truth",
-        7 / 18: "that is the plain mean over all classes: weight each IoU by how frequent the class is in the truth",
-        3 / 4: "that is the pixel accuracy: divide by truth or claimed, not by truth alone",
-        23 / 60: "you count the right cells twice: the union is truth plus claimed minus right",
-        7 / 8: "you divide by the cells that are claimed only, a column: the union also has the cells that were missed",
+        11 / 20: "that is the plain mean of the two IoUs: weight each by how frequent the class is in the truth",
+        11 / 30: "that is the plain mean over all classes: weight each IoU by how frequent the class is in the truth",
+        14 / 25: "you weight by the claims: weight each by how frequent the class is in the truth",
+        2 / 3: "that is the pixel accuracy: divide by truth or claimed, not by truth alone",
+        53 / 144: "you count the right cells twice: the union is truth plus claimed minus right",
+        11 / 12: "you divide by the claimed cells only, a column: the union also has the cells that were missed",
+        7 / 10: "you leave out the cells without a claim: each belongs to the truth of its class, and is missed",
     }
     for slip, hint in slips.items():
         assert not np.isclose(got, slip, atol=1e-6), f"got {got:.3f}: {hint}"
-    assert np.isclose(got, 0.625), f"road 2 of 3, car 1 of 2: 3/4 of 0.667 and 1/4 of 0.5 are 0.625, got {got:.3f}"
+    by_hand = "road 3 of 5, car 1 of 2: 5/6 of 0.6 and 1/6 of 0.5 are 0.583"
+    assert np.isclose(got, 7 / 12, atol=1e-5), f"{by_hand}, got {got:.3f}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import tour
 

@@ -67,7 +67,7 @@ def test_joint_inference_is_pyagrums(world):
     wanted, probability = posteriors(row_model(world), row_evidence(world, T))
     assert probability > 0
     for k in range(len(world.cells)):
-        np.testing.assert_allclose(exact_beliefs(world)[-1, k], wanted[f"c{k + 1},{T}"], atol=1e-9)
+        np.testing.assert_allclose(exact_beliefs(world)[-1, k], wanted[f"m{k + 1},{T}"], atol=1e-9)
 
 
 def test_bof_is_exact_where_cells_stay_independent_and_arrivals_exclude_each_other():
@@ -105,7 +105,7 @@ def test_a_thing_that_stands_or_drives_is_believed_in_both_places():
 def test_before_the_scan_only_the_joint_distribution_tells_the_two_worlds_apart():
     unseen = CellsInARow(STANDING_OR_DRIVING.cells, ("????",))
     assert bof_errors(unseen).max() < 1e-9
-    joint = joint_belief(unseen, 1).sum("c3,1", "c4,1").table
+    joint = joint_belief(unseen, 1).sum("m3,1", "m4,1").table
     assert joint[Cell.STATIC, Cell.RIGHT] == 0
     assert joint[Cell.STATIC, Cell.FREE] == pytest.approx(0.5)
     assert joint[Cell.FREE, Cell.RIGHT] == pytest.approx(0.5)
@@ -145,7 +145,7 @@ JUST_STARTED = CellsInARow(({"static": 0.9}, {}, {}, {}, {"right": 1.0}, {}, {})
 
 
 def exactly(world, cell, step):
-    return eliminate(row_model(world, step), f"c{cell},{step}", row_evidence(world, step)).normalised().table
+    return eliminate(row_model(world, step), f"m{cell},{step}", row_evidence(world, step)).normalised().table
 
 
 def test_what_has_been_seen_to_move_for_half_a_second_stands_nowhere_in_its_shadow():
@@ -188,20 +188,20 @@ def test_a_scan_is_as_informative_as_the_sensor_model_says():
 
 def test_the_graph_says_which_cells_depend_on_each_other():
     stage = bof_stage()
-    before = [f"c{k},0" for k in range(1, 5)]
-    assert why_dependent(stage.model, "c1,1", "c2,1") == ("c1,1", "c1,0", "c2,1")
-    assert d_separated(stage.model, "c1,1", "c2,1", given=before)
-    assert d_separated(stage.model, "c1,0", "c3,0")
-    assert why_dependent(stage.model, "c1,0", "c3,0", given="one2,1") == ("c1,0", "one2,1", "c3,0")
-    assert d_separated(stage.model, "c1,0", "c4,0", given=stage.observed) is False
-    assert d_separated(stage.model, "c1,1", "c4,1")
+    before = [f"m{k},0" for k in range(1, 5)]
+    assert why_dependent(stage.model, "m1,1", "m2,1") == ("m1,1", "m1,0", "m2,1")
+    assert d_separated(stage.model, "m1,1", "m2,1", given=before)
+    assert d_separated(stage.model, "m1,0", "m3,0")
+    assert why_dependent(stage.model, "m1,0", "m3,0", given="one2,1") == ("m1,0", "one2,1", "m3,0")
+    assert d_separated(stage.model, "m1,0", "m4,0", given=stage.observed) is False
+    assert d_separated(stage.model, "m1,1", "m4,1")
 
 
 def test_the_drawing_shows_four_columns_and_shades_what_is_known():
     stage = bof_stage()
     assert set(stage.observed) == {f"{name}{k},1" for name in ("one", "z") for k in range(1, 5)}
     assert set(stage.positions) == set(stage.model.names)
-    ax = stage.draw(highlight=["c2,1"])
+    ax = stage.draw(highlight=["m2,1"])
     assert len(stage.cut) == 3
     plt.close(ax.figure)
 

@@ -49,9 +49,9 @@ def test_the_last_filtered_belief_is_the_posterior():
     scans = read_scans(". #")
     stage, known = one_cell(scans), cell_given(scans)
     last = exact_cell(scans).updated[-1]
-    np.testing.assert_allclose(eliminate(stage.model, "x3", known).normalised().table, last, atol=1e-12)
+    np.testing.assert_allclose(eliminate(stage.model, "m3", known).normalised().table, last, atol=1e-12)
     np.testing.assert_allclose(
-        enumerate_marginals(one_cell(scans[:2]).model, "x2", cell_given(scans[:2])).normalised().table,
+        enumerate_marginals(one_cell(scans[:2]).model, "m2", cell_given(scans[:2])).normalised().table,
         exact_cell(scans).updated[1],
         atol=1e-12,
     )
@@ -72,10 +72,10 @@ def test_unknown_survives_only_where_nobody_looks():
 
 def test_the_state_screens_the_past_off():
     model = one_cell(read_scans("..#")).model
-    assert d_separated(model, "z1", "z3", given="x2")
+    assert d_separated(model, "z1", "z3", given="m2")
     assert not d_separated(model, "z1", "z3")
-    assert d_separated(model, "v3", "x2")
-    assert not d_separated(model, "v3", "x2", given="z3")
+    assert d_separated(model, "v3", "m2")
+    assert not d_separated(model, "v3", "m2", given="z3")
 
 
 def test_pyagrum_agrees():

@@ -22,7 +22,7 @@ def cell_2(world):
     """Return the distribution of cell 2 after the first scan, by exact inference in the graph."""
     seen = world.scans[0][1]
     given = {"one1": 1} | ({"z1": int(seen == HIT)} if seen != NOT_SEEN else {})
-    return eliminate(cmcdot_stage(world).model, "c1", given).normalised().table
+    return eliminate(cmcdot_stage(world).model, "m1", given).normalised().table
 
 
 def test_where_bof_is_exact_particles_tend_to_the_exact_answer():
@@ -110,16 +110,16 @@ def test_inference_in_the_graph_is_pyagrums():
 
 def test_the_graph_separates_the_scan_from_the_past():
     stage = cmcdot_stage()
-    assert d_separated(stage.model, "z1", ["c0", "x0", "x1"], given="c1")
-    assert d_separated(stage.model, "c0", "x1", given="x0")
-    assert why_dependent(stage.model, "c0", "x1", given=["x0", "one1"]) == ("c0", "one1", "x1")
-    assert why_dependent(stage.model, "c0", "o1", given=["x1", "one1"]) == ("c0", "one1", "o1")
+    assert d_separated(stage.model, "z1", ["m0", "q0", "q1"], given="m1")
+    assert d_separated(stage.model, "m0", "q1", given="q0")
+    assert why_dependent(stage.model, "m0", "q1", given=["q0", "one1"]) == ("m0", "one1", "q1")
+    assert why_dependent(stage.model, "m0", "wall1", given=["q1", "one1"]) == ("m0", "one1", "wall1")
 
 
 def test_the_drawing_has_a_plate_for_particles_and_one_for_cells():
     stage = cmcdot_stage()
     assert sorted(name for plate in stage.plates.values() for name in plate) == sorted(stage.model.names)
-    plt.close(stage.draw(highlight="x1").figure)
+    plt.close(stage.draw(highlight="q1").figure)
 
 
 def test_more_than_one_thing_on_the_move_is_refused():
