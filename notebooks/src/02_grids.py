@@ -479,12 +479,8 @@ def thickening():
             style = {"color": colour, "hatch": hatch, "edgecolor": "white", "label": name}
             ax.bar(np.arange(8) + 0.3 * (k - 1), beliefs[n], width=0.28, **style)
         ax.axhline(0.5, color="0.6", linewidth=1)
-        ax.set(
-            ylim=(0, 1.05),
-            xlabel="cell; the wall is in cell 4",
-            ylabel="P(occupied)",
-            title=f"after {n + 1} scan" + "s" * (n > 0),
-        )
+        ax.set(ylim=(0, 1.05), xlabel="cell; the wall is in cell 4", ylabel="P(occupied)")
+        ax.set_title(f"after {n + 1} scan" + "s" * (n > 0))
         ax.legend(loc="upper left", fontsize=9, frameon=False)
         yield fig
 

@@ -84,12 +84,8 @@ by_log_odds, by_bof, by_cmcdot = (filtered(tracker) for tracker in (LogOddsGrid(
 def three_filters():
     """Draw the three maps, frame after frame."""
     fig, axes = plt.subplots(1, 3, figsize=(9.4, 4.2), layout="compressed")
-    style = {
-        "weight": "bold",
-        "ha": "center",
-        "va": "center",
-        "path_effects": [withStroke(linewidth=2, foreground="w")],
-    }
+    style = {"weight": "bold", "ha": "center", "va": "center"}
+    style["path_effects"] = [withStroke(linewidth=2, foreground="w")]
     letters = [[ax.text(0, 0, name, **style) for name in "ABCD"] for ax in axes]
     for ax in axes:
         plotting.velocity_wheel(spec, by_bof[0].probability, by_bof[0].velocity, ax=ax, legend=ax is axes[-1])
