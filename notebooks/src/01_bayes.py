@@ -330,7 +330,7 @@ assert favourite[7] == 6 != places[7] == 5
 # *Mostly* down can be made exact. Take two cells, one without a pole (belief 0.8), one with (0.2). Here *pole* is a
 # surprise that raises the entropy. How often may that happen before the average goes up?
 
-# %%
+# %% jupyter={"source_hidden": true}
 prior, p_pole = np.array([0.8, 0.2]), np.array([0.1, 0.8])
 after = [entropy(update(likelihood, prior)) for likelihood in (1 - p_pole, p_pole)]
 print(f"before {entropy(prior):.2f} bits; after 'nothing' {after[0]:.2f}, after 'pole' {after[1]:.2f}")

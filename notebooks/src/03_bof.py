@@ -284,7 +284,7 @@ def assumed_density(row):
     return np.array(beliefs)
 
 
-# %% jupyter={"outputs_hidden": true}
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 answers = {"joint": exact_beliefs(shadow), "assumed density": assumed_density(shadow), "BOF": bof_beliefs(shadow)}
 print("P(STATIC) of cell 1, scan by scan                                things in the row")
 for name, belief in answers.items():

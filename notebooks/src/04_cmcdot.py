@@ -776,7 +776,7 @@ plt.show()
 # itself, and there the beam has merely passed, which lowers 1/2 somewhat. Exact inference over all cells together, as
 # in lecture 03, against the two filters:
 
-# %%
+# %% jupyter={"source_hidden": true}
 exact, bof = (answer(LEFT_OR_RIGHT)[0] for answer in (exact_beliefs, bof_beliefs))  # after one scan: cells x states
 sampled = np.mean([particle_beliefs(LEFT_OR_RIGHT, 1600, seed)[0] for seed in range(10)], axis=0)
 for name, belief in (("exact", exact), ("BOF", bof), ("CMCDOT", sampled)):
@@ -806,7 +806,7 @@ assert sampled[0, Cell.LEFT] > 4 * exact[0, Cell.LEFT]
 #
 # </details>
 
-# %% jupyter={"outputs_hidden": true}
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 error = sampling_error(LEFT_OR_RIGHT, [25, 100, 400, 1600, 6400], seeds=range(20))
 print("particles      ", *(f"{n:6d}" for n in error.numbers), "  bias")
 print("sampling error ", *(f"{e:6.3f}" for e in error.to_bof), f"{0:6.0f}")

@@ -83,9 +83,34 @@ def test_figures_in_the_text_count_too():
 
 
 def test_each_kind_of_work_has_its_price():
-    everything = ReadingTime(words=130, equations=1, figures=1, predictions=1, lines=10)
-    assert everything.parts == {"prose": 1, "equations": 2, "figures": 0.5, "predictions": 1.5, "code": 1}
-    assert (everything + everything).minutes == 12
+    everything = ReadingTime(words=130, equations=1, figures=1, predictions=1, lines=10, numbers=200)
+    assert everything.parts == {
+        "prose": 1,
+        "equations": 2,
+        "figures": 0.5,
+        "predictions": 1.5,
+        "code": 1,
+        "numbers": 1,
+    }
+    assert (everything + everything).minutes == 14
+
+
+@pytest.mark.parametrize(
+    ("printed", "numbers"),
+    [
+        ("P(car): [0.06 0.91 .23 -1e-3]", 4),
+        ("x1 and y_2 are names; 27,445 cells, +16 points (+8 to +24)", 4),
+        ("no number", 0),
+    ],
+)
+def test_printed_numbers_count_wherever_they_are_printed(printed, numbers):
+    def of(*outputs):
+        return reading_time(new_notebook(cells=[new_code_cell("", outputs=list(outputs))])).numbers
+
+    assert of(new_output("stream", text=printed)) == numbers
+    assert of(new_output("display_data", data={"text/markdown": printed, "text/plain": "<Markdown 7>"})) == numbers
+    assert of(new_output("execute_result", data={"text/plain": printed})) == numbers
+    assert of(new_output("display_data", data={"image/png": png(), "text/plain": "<Figure size 7x3>"})) == 0
 
 
 def test_the_table_of_one_notebook_has_its_sections(tmp_path):

@@ -14,7 +14,7 @@
 #
 # **Prerequisites.** Conditional probability; Bayes' rule as in lecture [01](../01_bayes.ipynb); numpy.
 #
-# **Time.** 75 minutes, of which the computer needs a few seconds.
+# **Time.** 76 minutes, of which the computer needs a few seconds.
 
 # %% jupyter={"source_hidden": true}
 from functools import reduce

@@ -25,6 +25,7 @@ IN_LINE = re.compile(r"`[^`]+`|\$[^$]+\$")
 LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
 TAG = re.compile(r"<[A-Za-z/!][^>]*>")
 WORD = re.compile(r"\S*[^\W_]\S*")
+NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d[\d,]*(?:\.\d+)?|\.\d+)(?:e[-+]?\d+)?")
 SECTION = re.compile(r"^(?=## )", re.MULTILINE)
 
 
@@ -36,7 +37,7 @@ class ReadingTime:
     ----------
     words : int
         Words of text, headings, tables and folded answers. A formula or a piece of code within a line is one word. The
-        targets of links, blocks of code in the text and everything that cells print don't count.
+        targets of links, blocks of code in the text and the words that cells print don't count.
     equations : int
         Displayed equations: `$$...$$`, `\[...\]` or an `align`, `equation`, `gather` or `multline` without dollars.
     figures : int
@@ -45,6 +46,8 @@ class ReadingTime:
         How often the words `PREDICTION` occur.
     lines : int
         Lines of code that isn't collapsed; comments count, blank lines don't.
+    numbers : int
+        Numbers that cells print, in text and in tables.
 
     Examples
     --------
@@ -57,6 +60,7 @@ class ReadingTime:
     figures: int = 0
     predictions: int = 0
     lines: int = 0
+    numbers: int = 0
 
     @property
     def parts(self) -> dict[str, float]:
@@ -67,6 +71,7 @@ class ReadingTime:
             "figures": 0.5 * self.figures,
             "predictions": 1.5 * self.predictions,
             "code": self.lines / 10,
+            "numbers": self.numbers / 200,
         }
 
     @property
@@ -173,10 +178,19 @@ def minutes_table(sources: list[Path]) -> str:
 
 
 def _time_of_code(cell: NotebookNode) -> ReadingTime:
-    """Return the reading time of a code cell and of the figures below it."""
+    """Return the reading time of a code cell, and of the figures and numbers below it."""
     hidden = cell.metadata.get("jupyter", {}).get("source_hidden", False)
     lines = 0 if hidden else sum(bool(line.strip()) for line in cell.source.splitlines())
-    return ReadingTime(lines=lines, figures=len(list(figures(cell))))
+    numbers = sum(len(NUMBER.findall(text)) for text in map(_printed, cell.get("outputs", [])))
+    return ReadingTime(lines=lines, figures=len(list(figures(cell))), numbers=numbers)
+
+
+def _printed(output: NotebookNode) -> str:
+    """Return what an output shows as text: a stream, a table in Markdown, or a value that has no picture."""
+    data = output.get("data", {})
+    if "image/png" in data:
+        return ""
+    return output.get("text") or data.get("text/markdown") or data.get("text/plain", "")
 
 
 def _built(source: Path) -> NotebookNode:
