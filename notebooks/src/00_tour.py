@@ -681,7 +681,7 @@ print("height of a cell in the network's image:", ", ".join(f"{h:.2f} pixels at 
 # Near the vehicle most semantic cells are right, beyond 45 m far fewer. At 45 m more than a dozen cells share one row
 # of the network's pixels, and the LIDAR's rings lie metres apart.
 #
-# **Small things are lost.** Of all cells that truly hold a class, how many does the map call so?
+# **Small things are lost.** Of all cells that truly hold a class, how many does the map call by this name?
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 for name in ("road", "sidewalk", "car", "pedestrian", "bicycle"):

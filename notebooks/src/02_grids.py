@@ -32,6 +32,7 @@ from scipy import ndimage
 
 from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.frame import blocks
 from semgrid_edu.graphical import d_separated, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -46,6 +47,8 @@ from semgrid_edu.stage_models import scan_with_pose_error, thick_walls
 from semgrid_edu.stage_models.beam import range_state
 from semgrid_edu.stage_models.thick_walls import same_sensor
 from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.things.materials import class_of_kind
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 GHOST = (225, 20, 30)  # occupied in the map, although the road there is empty
@@ -733,7 +736,8 @@ assert [next(k for k in range(15, 40) if p[k] < 0.5) - 14 for p in cells] == [5,
 #
 # <details><summary>Answer</summary>
 #
-# In 92.5 % of cells after one, and in 92.5 % after two. The second return makes the claim surer, and no truer.
+# In 92.5 % of cells after one, and in 92.5 % after two. On this drive the second return makes the claim surer, and no
+# truer.
 #
 # </details>
 
@@ -752,9 +756,29 @@ assert abs(right["two or more"] - right["one return"]) < 0.02
 assert right["two or more"] < 0.95
 assert kept < 75
 
+# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
+classes, others = class_of_kind(KITTI_14), []
+for seed in range(1, 6):
+    drive, found = SimulatedDrive(seed, n_frames=16), []
+    for k in range(0, 16, 3):
+        evidence = scan_evidence(drive.scan(k).points_grid, spec, sensor)
+        fine = blocks(classes[drive.birdseye(k / 10)[0]], spec)
+        truth_now = KITTI_14.most_voted(np.stack([(fine == c).sum(axis=-1) for c in range(14)]), otherwise=255)
+        found.append((evidence.occupied / (evidence.occupied + evidence.free), truth_now))
+    p, there = (np.stack(maps) for maps in zip(*found, strict=True))
+    is_there, counts = ~np.isin(there, (ROAD, SIDEWALK)), there != VEGETATION
+    shares = [is_there[counts & (p > low) & (p < high)].mean() for low, high in ((0.9, 0.96), (0.99, 1))]
+    others.append(shares)
+    print("another simulated drive: right after one return {:.1%}, after two or more {:.1%}".format(*shares))
+one_return, more_returns = np.transpose(others)
+assert more_returns.max() < 0.995
+assert (more_returns - one_return).max() > 0.05 > -0.05 > (more_returns - one_return).min()
+assert sum(more_returns > one_return + 0.05) == 3
+
 # %% [markdown]
-# Why does a second return not help? Look at the cells that were hit although they are empty. How far are their
-# returns from the nearest thing that stands there?
+# On five other simulated drives (the lines above) the second return makes the claim truer on three, and less true on one.
+# No drive keeps the promise of 0.996. Why does it help so little here? Look at the cells that were hit although they are
+# empty. How far are their returns from the nearest thing that stands there?
 
 # %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
 wrong, fine, away = (claim > 0.5) & known & ~stands, GridSpec(x_min=0, x_max=71, y_min=-15.5, y_max=15.5, cell=0.1), []
@@ -851,7 +875,7 @@ Markdown(ledger_table(lines))
 #    map able to change its mind.
 # 3. The collider: a range couples the cells along its beam. One number per cell forgets that, and a cell behind a wall
 #    got 0.57 instead of 0.34.
-# 4. The shared error: two returns of one scan are wrong together, so the second makes the map surer and no truer.
+# 4. The shared error: two returns of one scan can be wrong together, so the second makes the map surer than it should.
 # 5. A grid without time leaves a smear behind whatever moves, 4 passes long where you see it and without end where
 #    you don't.
 #
