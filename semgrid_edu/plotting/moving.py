@@ -134,6 +134,7 @@ def animate_occupancy(
             ax.images[-1].set_data(picture)
             ax.set_title(f"{time:.1f} s")
             yield ax.figure
+            ax.figure.set_layout_engine("none")  # nothing else moves, and laying out takes longer than drawing
 
     return animate(frames(), np.diff(times).mean() if len(times) > 1 else 1.0, alt)
 

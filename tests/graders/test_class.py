@@ -1,10 +1,9 @@
-"""A class of thirty, from handing in to the exported grades: each grade is what it should be."""
+"""A class, from handing in to the exported grades: each grade is what it should be."""
 
 import csv
 import subprocess
 import sys
 from dataclasses import replace
-from itertools import combinations
 
 import pytest
 import test_fair as fair
@@ -35,21 +34,22 @@ def changed(change):
     return notebook, 15
 
 
-def class_of_thirty():
-    """Return each student's notebook and the points that it should earn."""
-    entries = catalogue.TestBayes.entries
-    rights = {task: [e for e in entries if e.task == task and not e.loses] for task in POINTS}
-    wrongs = {task: [e for e in entries if e.task == task and e.loses and "timeout" not in e.says] for task in POINTS}
+def students_of_each_kind():
+    """Return each student's notebook and the points that it should earn: each kind, and each task right and wrong.
+
+    More of each kind are `test_fair`, `test_sound` and the catalogue.
+    """
+    entries, tasks = catalogue.TestBayes.entries, list(POINTS)
+    rights = {task: [e for e in entries if e.task == task and not e.loses] for task in tasks}
+    wrongs = {task: [e for e in entries if e.task == task and e.loses and "timeout" not in e.says] for task in tasks}
     found = {"right-0": (handed_in(), 15), "untouched-0": (handed_in({}), 0)}
     found |= {f"right-{k}": with_entries([ways[k - 1] for ways in rights.values()]) for k in (1, 2)}
-    for k, without in enumerate(list(combinations(POINTS, 2))[:10]):
+    for without in zip(tasks[::2], tasks[1::2], strict=True):
         answers = {task: code for task, code in REFERENCE.items() if task not in without}
-        found[f"partly-{k}"] = handed_in(answers), 15 - sum(POINTS[task] for task in without)
-    found |= {f"wrong-{k}": with_entries([ways[k % len(ways)] for ways in wrongs.values()]) for k in range(5)}
-    happened = (fair.split, fair.duplicate, fair.delete_setup, fair.import_in_setup, fair.scratch)
-    found |= {f"unlucky-{change.__name__}": changed(change) for change in happened}
-    found["unlucky-exit"] = handed_in(inside("predict", "exit()")), 12
-    hostile = ("transformer", "fake-module", "patched-numpy", "frames", "subclass")
+        found[f"without-{'-'.join(without)}"] = handed_in(answers), 15 - sum(POINTS[task] for task in without)
+    found |= {f"wrong-{k}": with_entries([ways[k % len(ways)] for ways in wrongs.values()]) for k in range(3)}
+    found |= {"unlucky-split": changed(fair.split), "unlucky-exit": (handed_in(inside("predict", "exit()")), 12)}
+    hostile = ("transformer", "fake-module")
     found |= {f"hostile-{k}": (handed_in(sound.EASIER, sound.EASY + sound.ATTACKS[k]), 0) for k in hostile}
     return found
 
@@ -58,11 +58,11 @@ def class_of_thirty():
 def graded(new_course):
     """Grade the class; return the course, the right points, and the table of scores."""
     course = new_course()
-    students = class_of_thirty()
+    students = students_of_each_kind()
     for student, (notebook, _) in students.items():
         write_notebook(notebook, place(course, "submitted", student, NAME))
     seen = list(grade_course(course, PATIENT, workers=2))
-    assert len(seen) == len(students) == 30
+    assert len(seen) == len(students)
     with write_graded(course).open(newline="") as file:
         table = {row["student"]: row for row in csv.DictReader(file)}
     return course, {student: points for student, (_, points) in students.items()}, table
