@@ -114,6 +114,20 @@ def test_a_figure_that_is_held_is_drawn_once(monkeypatch):
     assert sum(decoded(held.png)[1]) == 12 * 200
 
 
+def test_the_rarest_colour_of_a_large_animation_is_kept():
+    frames = np.full((3, 400, 500, 3), 200, np.uint8)
+    frames[1, 30, 70] = (220, 30, 30)
+    np.testing.assert_array_equal(decoded(plotting.animate(frames, 0.1, "a pixel flashes").png)[0], frames)
+
+
+def test_many_colours_become_the_nearest_few():
+    ramp = np.arange(60_000).reshape(200, 300)
+    frames = np.stack([np.stack([(ramp + k) % 256, ramp // 300, ramp % 3], axis=-1) for k in range(3)]).astype(np.uint8)
+    shown = decoded(plotting.animate(frames, 0.1, "ramps of colours").png)[0].astype(int)
+    assert len(np.unique(shown.reshape(-1, 3), axis=0)) <= 256
+    assert np.abs(shown - frames).mean() < 5  # one colour in the middle of each of 16 x 16 squares is 4 off
+
+
 def test_the_same_frames_give_the_same_bytes():
     first, second = (plotting.animate(drawings(), 0.2, "a point moves to the right") for _ in range(2))
     assert first.png == second.png

@@ -170,6 +170,13 @@ def decoded(png):
     return np.stack(cv2.imdecodeanimation(np.frombuffer(png, np.uint8))[1].frames)[..., 2::-1]
 
 
+def test_nothing_but_the_time_changes_while_the_belief_stays():
+    ax = plt.subplots(figsize=(3, 4), layout="constrained")[1]
+    frames = decoded(plotting.animate_occupancy(SPEC, [scene()] * 3, [0, 1, 2], "nothing moves", ax).png)
+    changed = (frames != frames[0]).any(axis=(0, 2, 3)).nonzero()[0]
+    assert 0 < len(changed) < 20, "rows of pixels, those of the title"
+
+
 def test_an_animation_of_one_belief_stands_still():
     with Image.open(io.BytesIO(plotting.animate_occupancy(SPEC, [scene()], [0.0], "one belief").png)) as image:
         assert getattr(image, "n_frames", 1) == 1
