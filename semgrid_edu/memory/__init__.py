@@ -4,7 +4,7 @@ The paper's semantic grid knows only the last image. Here class beliefs are kept
 by whole cells, as the occupancy filter's does. `stage_models.class_memory` is the exact model that this approximates.
 """
 
-from semgrid_edu.memory.class_map import ClassMap, View, remember_drive
+from semgrid_edu.memory.class_map import ClassMap, View, remember_drive, smooth_drive
 from semgrid_edu.memory.literal import carry_classes_literal, learn_classes_literal, recall_classes_literal
 from semgrid_edu.memory.state import ClassMemory, Look, MemoryParams
 from semgrid_edu.memory.steps import carry_classes, learn_classes, look_at, recall_classes
@@ -23,4 +23,5 @@ __all__ = [
     "recall_classes",
     "recall_classes_literal",
     "remember_drive",
+    "smooth_drive",
 ]

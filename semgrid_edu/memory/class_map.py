@@ -1,6 +1,7 @@
 """Class beliefs over a drive, in a map that scrolls under the vehicle by whole cells (section 3.2, step 1)."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -61,6 +62,7 @@ class ClassMap:
         self.spec, self.params = spec, params or MemoryParams()
         self.map_spec = map_around(spec, MAX_YAW)
         self.memory, self.pose = ClassMemory.empty(n_semantic, self.map_spec), PlanarMotion()
+        self._before, self._here = self.memory, _places(self.map_spec, spec, self.pose)
 
     def step(self, grid: NDArray, belief: Belief, motion: PlanarMotion, dt: float) -> NDArray[np.float32]:
         """Take in one frame: move, carry, recall, learn.
@@ -89,11 +91,16 @@ class ClassMap:
         x, y = pose.to_now(np.zeros(2))
         back = PlanarMotion(float(x), float(y), -pose.dyaw)
         memory = carry_classes(self._moved(shift), *self._movers(belief, pose, back), self.spec.cell, dt, self.params)
-        here = _places(self.map_spec, self.spec, pose)
+        here = self._here = _places(self.map_spec, self.spec, pose)
         recalled = recall_classes(memory, here, belief.probability, look, self.params)
+        self._before = memory
         self.memory = learn_classes(memory, _places(self.spec, self.map_spec, back), look, self.params)
         self.pose = pose
         return recalled
+
+    def before(self) -> ClassMemory:
+        """Return what was remembered of the vehicle's cells, (H, W), before the last frame was taken in."""
+        return ClassMemory(self._before.planes.reshape(len(self._before.planes), -1)[:, self._here])
 
     def _moved(self, shift: PlanarMotion) -> ClassMemory:
         """Return the memory in the map's new frame; nothing is known of what enters."""
@@ -134,12 +141,60 @@ def remember_drive(
     (C, H, W) float32
         The semantic grid with memory, after each frame.
     """
+    for _, grid in _steps(views, spec, params):
+        yield grid
+
+
+def smooth_drive(
+    views: Sequence[View], spec: GridSpec, params: MemoryParams | None = None
+) -> Iterator[NDArray[np.float32]]:
+    """Say what each cell is with the whole drive at hand: a memory of what came before, and one of what comes after.
+
+    This is forward-backward: a second memory runs through the drive from its end, where everything moves the other way,
+    and each frame is joined with both. `smoothed_classes` is the exact algorithm on the chain of one cell.
+
+    Parameters
+    ----------
+    views : sequence of View
+        What the earlier stages made of each frame, in the order of time.
+    spec : GridSpec
+        The grid, (H, W) cells.
+    params : MemoryParams, optional
+        What the memories assume; the defaults when left out.
+
+    Yields
+    ------
+    (C, H, W) float32
+        The semantic grid of each frame: probabilities that sum to 1 in each cell.
+    """
+    params, same = params or MemoryParams(), np.arange(np.prod(spec.shape), dtype=np.int32).reshape(spec.shape)
+    back = [one._replace(belief=replace(one.belief, velocity=-one.belief.velocity)) for one in reversed(views)]
+    later = [class_map.before() for class_map, _ in _steps(back, spec, params)]
+    for view, (class_map, _) in zip(views, _steps(views, spec, params), strict=True):
+        both, o = _joined(class_map.before(), later.pop(), params), view.belief.probability
+        yield recall_classes(both, same, o, look_at(view.grid, o, spec, params), params)
+
+
+def _steps(
+    views: Iterable[View], spec: GridSpec, params: MemoryParams | None
+) -> Iterator[tuple[ClassMap, NDArray[np.float32]]]:
+    """Yield the map after each frame, and what it returned."""
     class_map, before = None, None
     for view in views:
         class_map = class_map or ClassMap(spec, len(view.grid) - N_STATES, params)
         motion, dt = PlanarMotion(), LIDAR_PERIOD
         if before is not None:
             motion = PlanarMotion.from_poses(before.T_world_from_lidar, view.frame.T_world_from_lidar)
-            dt = view.frame.time - before.time
-        yield class_map.step(view.grid, view.belief, motion, dt)
+            dt = abs(view.frame.time - before.time)
+        yield class_map, class_map.step(view.grid, view.belief, motion, dt)
         before = view.frame
+
+
+def _joined(past: ClassMemory, future: ClassMemory, params: MemoryParams) -> ClassMemory:
+    """Weigh two memories of the same cells by what each is worth."""
+    joined, weight = ClassMemory(past.planes.copy()), past.weight + future.weight
+    part = (future.weight / np.maximum(weight, 1e-12))[:, None]
+    joined.evidence[:] += part * (future.evidence - past.evidence)
+    joined.weight[:] = np.minimum(weight, params.most)
+    joined.seen[:] = 1 - (1 - past.seen) * (1 - future.seen)
+    return joined

@@ -182,6 +182,33 @@ def factored_classes(
     return belief @ CLASS_OF
 
 
+def smoothed_classes(
+    world: MemoryWorld, named: Sequence[int], stopped: Sequence[int], exponent: float = 1.0
+) -> NDArray[np.float64]:
+    """Return P(class at each frame | all frames) by forward-backward on the chain of contents, (T, 4).
+
+    Forward, the frames before predict a frame's content; backward, the frames after say how probable they are given it.
+
+    Parameters
+    ----------
+    world : MemoryWorld
+        The cell and its sensors.
+    named, stopped : sequence of int
+        What is observed at each of T frames.
+    exponent : float
+        What one frame is worth beside the others, as for `factored_classes`.
+    """
+    says = np.einsum("e,mek->km", world.errors(), world.named())
+    likelihood = world.returned().T[list(stopped)] * says[list(named)] ** exponent
+    change, forward, backward = world.street.change(), [np.array(STREET)], [np.ones(len(STREET))]
+    for now in likelihood[:-1]:
+        forward.append((forward[-1] * now) @ change)
+    for later in likelihood[:0:-1]:
+        backward.append(change @ (later * backward[-1]))
+    belief = np.array(forward) * likelihood * np.array(backward[::-1])
+    return belief / belief.sum(axis=1, keepdims=True) @ CLASS_OF
+
+
 class MemoryPrice(NamedTuple):
     """Mean of -log P(true class) at the last frame, in nats, from the least information to the most.
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.memory import ClassMap, MemoryParams
+from semgrid_edu.memory import ClassMap, MemoryParams, View, remember_drive, smooth_drive
 from semgrid_edu.occupancy import Belief, PlanarMotion
 
 SPEC, S = GridSpec(0, 20, -5, 5, 0.5), 3
@@ -69,6 +70,23 @@ def test_a_standing_vehicle_forgets_what_it_no_longer_sees_at_the_rate_of_change
         remembered = class_map.step(blind, all_free(), PlanarMotion(), 0.5)
     np.testing.assert_allclose(remembered[:S].sum(axis=0), np.exp(-rate * 10), rtol=1e-4)
     np.testing.assert_allclose(remembered[:S].max(axis=0) / remembered[:S].sum(axis=0), 0.8, atol=1e-4)
+
+
+def test_with_the_whole_drive_a_cell_that_is_seen_later_is_known_before():
+    """The vehicle drives backwards: what lies right ahead comes into view only later; smoothing knows it at once."""
+    views, tiles = [], []
+    for k in range(16):
+        g, tile = street(PlanarMotion(-0.5 * k, 0.0, 0.0))
+        pose = np.eye(4)
+        pose[0, 3] = -0.5 * k
+        views.append(View(Frame(None, np.empty((0, 4)), None, pose, 0.1 * k), all_free(), g))
+        tiles.append(tile)
+    filtered, smoothed = (list(of(views, SPEC, KEEPS)) for of in (remember_drive, smooth_drive))
+    later = (SPEC.centers()[..., 0] > 4) & (SPEC.centers()[..., 0] < 9)
+    assert (filtered[0].argmax(axis=0)[later] == S).all()  # unknown-free
+    np.testing.assert_array_equal(smoothed[0][:, later].argmax(axis=0), tiles[0][later])
+    np.testing.assert_allclose(smoothed[-1], filtered[-1], atol=1e-6)
+    np.testing.assert_allclose(smoothed[0].sum(axis=0), 1, atol=1e-5)
 
 
 def test_another_number_of_classes_is_refused():

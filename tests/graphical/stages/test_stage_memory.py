@@ -14,6 +14,7 @@ from semgrid_edu.stage_models.class_memory import (
     frames_worth,
     memory_price,
     readings,
+    smoothed_classes,
 )
 from semgrid_edu.stage_models.system_world import CLASS_OF, SystemWorld
 
@@ -39,6 +40,18 @@ def test_with_independent_frames_the_factored_filter_is_exact():
     assert price.weighted == pytest.approx(price.exact, abs=1e-9)
     assert price.exponent == pytest.approx(1, abs=1e-3)
     assert price.exact < price.forgotten
+
+
+def test_forward_backward_is_the_sum_over_everything():
+    """With independent frames, each frame given all of them; and the last one is what the filter says."""
+    world = MemoryWorld(steps=4, repeats=0.0)
+    model, named, stopped = class_over_time(world).model, [2, 2, 0, 1], [1, 0, 0, 1]
+    smoothed = smoothed_classes(world, named, stopped)
+    for t, belief in enumerate(smoothed):
+        summed = enumerate_marginals(model, f"m{t}", readings(named, stopped)).normalised().table @ CLASS_OF
+        np.testing.assert_allclose(belief, summed, atol=1e-12)
+    weighed = smoothed_classes(world, named, stopped, exponent=0.4)[-1]
+    np.testing.assert_allclose(weighed, factored_classes(world, named, stopped, exponent=0.4), atol=1e-12)
 
 
 def test_one_frame_is_the_whole_systems_image():
