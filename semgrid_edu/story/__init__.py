@@ -4,7 +4,15 @@
 does the costliest part for all cells at once, and `what_if` says what cells would be called with other inputs.
 """
 
-from semgrid_edu.story.cell_evidence import CellScan, ScanMaps, cell_scan, place_history, scan_maps
+from semgrid_edu.story.cell_evidence import (
+    CellMemory,
+    CellScan,
+    ScanMaps,
+    cell_scan,
+    last_sight,
+    place_history,
+    scan_maps,
+)
 from semgrid_edu.story.cell_story import CellStory, cell_story
 from semgrid_edu.story.contributions import ContributionMaps, Contributions, cell_contributions, contribution_maps
 from semgrid_edu.story.crf_messages import (
@@ -18,6 +26,7 @@ from semgrid_edu.story.what_if import what_if
 from semgrid_edu.story.words import story_text
 
 __all__ = [
+    "CellMemory",
     "CellScan",
     "CellStory",
     "ContributionMaps",
@@ -28,6 +37,7 @@ __all__ = [
     "cell_scan",
     "cell_story",
     "contribution_maps",
+    "last_sight",
     "neighbour_messages",
     "neighbour_pull",
     "place_history",

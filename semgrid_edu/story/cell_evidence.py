@@ -1,13 +1,16 @@
-"""What a scan says of cells, and what was believed of one place while the vehicle drove on (paper, section 3.2)."""
+"""What a scan says of cells, and what was believed and seen of a place while the vehicle drove on (section 3.2)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion, SensorModel
+from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.occupancy.polar import beams_of
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
 from semgrid_edu.pipeline import FrameResult
@@ -156,3 +159,91 @@ def place_history(
         (row,), (col,), (inside,) = spec.cells(motion.to_previous(spec.centers()[cell])[None])
         states.append(result.belief.probability[:, row, col] if inside else NOTHING_KNOWN)
     return np.array([result.frame.time for result in results]), np.stack(states, axis=1)
+
+
+class Sight(NamedTuple):
+    """When a frame by itself last gave the place of each cell a semantic class, and which.
+
+    Parameters
+    ----------
+    back : (H, W) int64
+        How many frames ago: 0 for the last frame itself, -1 if none of the frames did.
+    label : (H, W) int64
+        The class; where there was none, what the last frame says.
+    """
+
+    back: NDArray[np.int64]
+    label: NDArray[np.int64]
+
+
+def last_sight(frames: Sequence[Frame], labels: Sequence[NDArray], spec: GridSpec, n_semantic: int) -> Sight:
+    """Look up the place of each cell of the last frame in the earlier ones, the newest first.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        In the order of time, with their poses.
+    labels : sequence of (H, W) int
+        The most probable class of each cell, of each frame by itself.
+    spec : GridSpec
+        The grid of all of them.
+    n_semantic : int
+        Number of semantic classes, which come first.
+    """
+    back, label = np.full(spec.shape, -1), np.array(labels[-1], np.int64)
+    for ago, (frame, then) in enumerate(zip(reversed(frames), reversed(labels), strict=True)):
+        motion = PlanarMotion.from_poses(frame.T_world_from_lidar, frames[-1].T_world_from_lidar)
+        there = look_up(np.float32(then)[None], np.float32([n_semantic]), spec, spec, motion)[0]
+        found = (back < 0) & (there < n_semantic)
+        back[found], label[found] = ago, there[found]
+    return Sight(back, label)
+
+
+class CellMemory(NamedTuple):
+    """What a cell is called with memory, and when a frame by itself last named its place.
+
+    Parameters
+    ----------
+    label, sure : int, float
+        The class with memory, and its probability.
+    back, then : int
+        The cell's numbers in `Sight`.
+    seconds : float
+        How long ago that was; 0 if no frame did.
+    earlier : int
+        Number of earlier frames that were looked through.
+    """
+
+    label: int
+    sure: float
+    back: int
+    then: int
+    seconds: float
+    earlier: int
+
+
+def cell_memory(
+    results: Sequence[FrameResult], spec: GridSpec, cell: tuple[int, int], n_semantic: int
+) -> CellMemory | None:
+    """Say where the class of a cell of the last frame comes from; None if it was made without memory.
+
+    Parameters
+    ----------
+    results : sequence of FrameResult
+        The results of the frames in the order of time.
+    spec : GridSpec
+        The grid of all of them.
+    cell : (int, int)
+        Row and column of the cell in the last frame.
+    n_semantic : int
+        Number of semantic classes.
+    """
+    if (remembered := results[-1].remembered) is None:
+        return None
+    frames, label = [result.frame for result in results], int(remembered[:, *cell].argmax())
+    sight = last_sight(frames, [result.grid.argmax(axis=0) for result in results], spec, n_semantic)
+    back = int(sight.back[cell])
+    seconds = frames[-1].time - frames[-1 - max(back, 0)].time
+    return CellMemory(
+        label, float(remembered[label, *cell]), back, int(sight.label[cell]), float(seconds), len(results) - 1
+    )

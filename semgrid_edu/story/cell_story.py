@@ -16,7 +16,7 @@ from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.pipeline import FrameResult, Stages
 from semgrid_edu.planes import plane_pixels
-from semgrid_edu.story.cell_evidence import CellScan, cell_scan, place_history
+from semgrid_edu.story.cell_evidence import CellMemory, CellScan, cell_memory, cell_scan, place_history
 from semgrid_edu.story.contributions import Contributions, cell_contributions
 from semgrid_edu.story.crf_messages import NeighbourPull, neighbour_pull
 from semgrid_edu.story.pixel_classes import classes_at
@@ -68,6 +68,8 @@ class CellStory:
         What the cell is called before the CRF when an input is true or gone, see `what_if`.
     names : tuple of str
         The names of the classes.
+    memory : CellMemory or None
+        What it is called with memory, if the result has one, and when a frame last named its place.
 
     Examples
     --------
@@ -96,6 +98,7 @@ class CellStory:
     truth: int | None
     otherwise: dict[str, int]
     names: tuple[str, ...]
+    memory: CellMemory | None = None
 
     @property
     def refined(self) -> int:
@@ -133,7 +136,8 @@ def cell_story(
     net : SemanticGridNet
         The network that made the result, in evaluation mode.
     past : sequence of FrameResult
-        The results of earlier frames in the order of time; the history shows the last nine of them.
+        The results of earlier frames in the order of time; the history shows the last nine of them, and what is said
+        of the memory looks through all.
     sensor : SensorModel, optional
         The filter's sensor model, when it wasn't the default one.
     crf : CrfParams, optional
@@ -157,7 +161,7 @@ def cell_story(
     >>> why.planes.sum() + why.occupancy.sum() + why.rest == why.score                      # doctest: +SKIP
     """
     architecture = net.need_architecture()
-    spec = architecture.grid
+    spec, label_set = architecture.grid, LABEL_SETS[architecture.label_set]
     cell, o = _checked(cell, spec), result.belief.probability
     _check_net(Stages.of(net), result)
     truth = _truth(result, spec, cell)
@@ -186,7 +190,8 @@ def cell_story(
         pull=neighbour_pull(result.grid, result.refined, o, cell, params),
         truth=truth,
         otherwise={change: int(classes[cell]) for change, classes in what_if(result, net).items()},
-        names=LABEL_SETS[architecture.label_set].names,
+        names=label_set.names,
+        memory=cell_memory([*past, result], spec, cell, label_set.n_semantic),
     )
 
 

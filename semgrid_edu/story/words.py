@@ -70,7 +70,8 @@ def story_text(story: Any) -> str:
     story : CellStory
         The story; `str(story)` is the same. (Typed as anything: the class imports this module.)
     """
-    lines = [_place(story), _called(story), _fault(story), _image(story), _scan(story), _otherwise(story)]
+    lines = [_place(story), _called(story), _fault(story), _image(story), _memory(story), _scan(story)]
+    lines.append(_otherwise(story))
     return "\n".join(line for line in [*lines, _numbers(story)] if line)
 
 
@@ -129,6 +130,16 @@ def _image(story: Any) -> str:
     says, shows = (counted(c[story.visible], story.names) for c in (story.pixel_classes, story.pixel_truth))
     said = words["some"].format(seen=int(story.visible.sum()), says=says, **points)
     return f"{said} {words['shown'].format(shows=shows)}" if shows else said
+
+
+def _memory(story: Any) -> str:
+    if (memory := story.memory) is None:
+        return ""
+    case = "never" if memory.back < 0 else "before" if memory.back else "now"
+    classes = {"kept": story.names[memory.label], "then": story.names[memory.then], "label": story.names[story.label]}
+    numbers = {"sure": round(100 * memory.sure), "seconds": f"{memory.seconds:.1f}", "back": memory.back}
+    said = SENTENCES["memory"][case].format(earlier=memory.earlier, **classes, **numbers)
+    return f"{said} {SENTENCES['memory']['moves']}" if story.steps["shown"][State.DYNAMIC] > 0.5 else said
 
 
 def _scan(story: Any) -> str:

@@ -43,7 +43,7 @@ def drive(tmp_path_factory):
 def out(drive, tmp_path_factory):
     folder = tmp_path_factory.mktemp("out")
     save_net(build_net(Architecture(), drive.camera, seed=3), folder / "net.safetensors")
-    write_demo(drive, folder / "net.safetensors", folder)
+    write_demo(drive, folder / "net.safetensors", folder, memory=True)
     return folder
 
 
@@ -55,7 +55,7 @@ def page(out):
 @pytest.fixture(scope="module")
 def stories(drive, out):
     net = load_net(out / "net.safetensors", drive.camera)
-    results = list(run_pipeline(drive, Stages.of(net, keep_steps=True)))
+    results = list(run_pipeline(drive, Stages.of(net, keep_steps=True, memory=True)))
     return results, [cell_story(results[-1], cell, net, past=results[:-1]) for cell in CELLS]
 
 

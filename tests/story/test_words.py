@@ -1,6 +1,7 @@
 """A story in words: what it claims is what comes out when the stages are run again."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.story import cell_story, what_if
+from semgrid_edu.story.cell_evidence import cell_memory
 from semgrid_edu.story.what_if import right_occupancy, right_scores
 from semgrid_edu.story.words import FAULTS, faults
 
@@ -122,3 +124,29 @@ def test_a_story_says_what_it_holds(net_and_result):
         image = next(line for line in str(story).splitlines() if line.startswith("Image"))
         seen = image.split(" In truth")[0].count("(")
         assert seen == len(set(story.pixel_classes[story.visible]))
+
+
+def made(ahead: float, called: np.ndarray, kept: int) -> SimpleNamespace:
+    """A result by hand: the vehicle's place, what the frame calls the cells, and what memory calls all of them."""
+    pose = np.eye(4)
+    pose[0, 3] = ahead
+    frame = SimpleNamespace(T_world_from_lidar=pose, time=0.1 * ahead)
+    grid = np.eye(14, dtype=np.float32)[called].transpose(2, 0, 1)
+    return SimpleNamespace(
+        frame=frame, grid=grid, remembered=np.full(grid.shape, 0.02) + 0.5 * np.eye(14)[kept][:, None, None]
+    )
+
+
+def test_the_memory_says_when_a_frame_last_named_the_place():
+    """The vehicle drives a cell of 1 m in each frame; the camera sees row 0 alone, and calls it road, then a car."""
+    spec, nothing = GridSpec(0, 4, 0, 1, 1), KITTI_14.index("unknown-free")
+    called = [np.array([[c], [nothing], [nothing], [nothing]]) for c in (ROAD, CAR, FENCE)]
+    results = [made(k, one, kept=SIDEWALK) for k, one in enumerate(called)]
+    found = [cell_memory(results, spec, (row, 0), KITTI_14.n_semantic) for row in range(4)]
+    assert [one.back for one in found] == [0, 1, 2, -1]
+    assert [one.then for one in found] == [FENCE, CAR, ROAD, nothing]
+    assert [one.seconds for one in found] == pytest.approx([0, 0.1, 0.2, 0])
+    assert {(one.label, one.earlier) for one in found} == {(SIDEWALK, 2)}
+    assert found[0].sure == pytest.approx(0.52)
+    results[-1].remembered = None
+    assert cell_memory(results, spec, (0, 0), KITTI_14.n_semantic) is None

@@ -2,6 +2,7 @@
 
 import base64
 import zlib
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import NamedTuple
 
@@ -10,14 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.crf import CrfParams
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LABEL_SETS
-from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.networks import Architecture, SemanticGridNet
 from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.plotting import STATE_COLOURS
-from semgrid_edu.story import ContributionMaps, contribution_maps, scan_maps, what_if
+from semgrid_edu.story import ContributionMaps, contribution_maps, last_sight, scan_maps, what_if
 from semgrid_edu.story.cell_evidence import VERDICTS
 from semgrid_edu.story.cell_story import label_and_rival
 from semgrid_edu.story.crf_messages import beliefs_before_last_update, neighbour_messages, strongest_neighbours
@@ -75,7 +77,12 @@ class StoryMaps(NamedTuple):
         return places
 
 
-def frame_details(result: FrameResult, net: SemanticGridNet, truth: NDArray | None) -> StoryMaps:
+def frame_details(
+    result: FrameResult,
+    net: SemanticGridNet,
+    truth: NDArray | None,
+    past: Sequence[tuple[Frame, NDArray]] = (),
+) -> StoryMaps:
     """Collect what the page tells of the cells of a frame.
 
     Parameters
@@ -86,6 +93,8 @@ def frame_details(result: FrameResult, net: SemanticGridNet, truth: NDArray | No
         The network that made it.
     truth : (H, W) uint8 or None
         The true classes, where they are known.
+    past : sequence of (Frame, (H, W) int)
+        The earlier frames, and what each by itself called the cells: for a result with memory.
 
     Returns
     -------
@@ -108,6 +117,7 @@ def frame_details(result: FrameResult, net: SemanticGridNet, truth: NDArray | No
         **_words(result, net, named, known),
         "after": _bytes(255 * after),
         "strongest": _bytes(np.concatenate([rows + 128, cols + 128, pull / STEPS["message"]])),
+        **_memory(result, [*past, (result.frame, named[0])], net.need_architecture()),
     }
     smooth = {
         "before": _bytes(255 * before),
@@ -130,6 +140,18 @@ def _words(result: FrameResult, net: SemanticGridNet, named: NDArray, truth: NDA
         "fault": faults(label, refined, truth, otherwise)[None],
     }
     return {name: values.astype(np.uint8) for name, values in maps.items()}
+
+
+def _memory(result: FrameResult, seen: Sequence[tuple[Frame, NDArray]], architecture: Architecture) -> Maps:
+    """Return the numbers of `CellMemory` in its order, per cent and tenths of a second; nothing without memory."""
+    if result.remembered is None:
+        return {}
+    frames, labels = zip(*seen, strict=True)
+    sight = last_sight(frames, labels, architecture.grid, LABEL_SETS[architecture.label_set].n_semantic)
+    ago = np.array([10 * (result.frame.time - frame.time) for frame in frames[::-1]])[np.maximum(sight.back, 0)]
+    sure, label = 100 * result.remembered.max(axis=0), result.remembered.argmax(axis=0)
+    earlier = np.full(label.shape, len(seen) - 1)
+    return {"memory": _wide(np.rint(np.stack([label, sure, sight.back + 1, sight.label, ago, earlier])))}
 
 
 def states_bytes(probability: NDArray) -> NDArray[np.uint8]:

@@ -1,11 +1,12 @@
 """What the demo records while a drive runs: encoded frames, confusion matrices and times."""
 
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.datasets.grid_truth import grid_truth
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.metrics import METRICS, confusion_matrix, semantic_cells
@@ -113,6 +114,7 @@ class Record:
         self.liveliest: tuple[FrameResult, FrameResult | None] | None = None
         self._number = shown[0] if shown else 0
         self._first_pose: NDArray | None = None
+        self._past: list[tuple[Frame, NDArray]] = []
         self._pictures = {"": pictures_of(memory), YOURS: comparison.changed if comparison else ()}
         self._rows = _rows(comparison, self._pictures[""])
         self._confusion = {name: np.zeros((len(label_set),) * 2, np.int64) for name in self._rows.values()}
@@ -144,6 +146,8 @@ class Record:
                 confusion += confusion_matrix(maps["truth"], maps[name], len(self.label_set))
         if self.shown is None or self._number in self.shown:
             self._show(runs, maps)
+        if package.remembered is not None:
+            self._past.append((replace(package.frame, image=None, points=package.frame.points[:0]), maps["grid"]))
         self._number += 1
 
     def milliseconds(self, prefix: str = "") -> dict[str, float]:
@@ -205,7 +209,7 @@ class Record:
         """Return what the stories of the frame's cells are told from, if the page tells them."""
         if self.net is None or len(self.views) % self.stories:
             return ""
-        maps = frame_details(package, self.net, truth)
+        maps = frame_details(package, self.net, truth, self._past)
         self.layout = maps.layout()
         return maps.packed()
 

@@ -57,8 +57,17 @@ function sentences(story, read, cell) {
   return [
     filled(said.fault[story.faults[read("fault", cell)[0]]], { ...names, ...weights, all_true: otherwise["both true"] }),
     seen.length && shows ? `${image} ${filled(said.image.shown, { shows })}` : image,
+    story.layout.memory ? memory(story, read, cell) : "",
     filled(said.otherwise.removed, { no_image: otherwise["no image"], no_occupancy: otherwise["no occupancy"] }),
   ].filter((sentence) => sentence);
+}
+
+// Where the class with memory comes from: `_memory` of words.py.
+function memory(story, read, cell) {
+  const [kept, sure, known, then, tenths, earlier] = wide(read, "memory", cell), said = story.sentences.memory, back = known - 1;
+  const values = { kept: story.names[kept], sure, then: story.names[then], label: story.names[read("classes", cell)[0]], seconds: (tenths / 10).toFixed(1), back, earlier };
+  const told = filled(said[back < 0 ? "never" : back ? "before" : "now"], values);
+  return states(story, read, "shown", cell)[2] > 0.5 ? `${told} ${said.moves}` : told;
 }
 
 // What the neighbours add for label, rival and refined class.
