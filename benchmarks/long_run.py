@@ -1,4 +1,4 @@
-"""Run the filter for hours of a made-up drive, twice: `python benchmarks/long_run.py [--steps 10000] [--out FILE]`.
+"""Run filter and memory of classes along a made-up drive, twice: `python benchmarks/long_run.py [--steps 10000]`.
 
 Prints what each stretch found: cells that don't sum to 1, memory, and whether the second run gave the same bits.
 """
@@ -12,11 +12,13 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.memory import ClassMap, MemoryParams
 from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, PlanarMotion
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
@@ -45,17 +47,23 @@ class Checkpoint:
         Largest distance of a cell's four probabilities from summing to 1; NaN if a cell held one.
     lowest : float
         Smallest probability of all.
+    worst_class_sum : float
+        Largest distance of a cell's class probabilities, with memory, from summing to 1.
+    class_milliseconds : float
+        Mean processor time of a step of the memory of classes.
     velocities : int
         Cells that had a velocity in the last step.
     memory : float
         Resident memory of the process, MB; NaN where the system doesn't tell.
     digest : str
-        SHA-256 of all beliefs since the start.
+        SHA-256 of all beliefs and remembered classes since the start.
     """
 
     step: int
     worst_sum: float
     lowest: float
+    worst_class_sum: float
+    class_milliseconds: float
     velocities: int
     memory: float
     digest: str
@@ -91,7 +99,9 @@ def long_run(
     if min(steps, every) < 1:
         raise ArgumentError("steps, every", "at least one", f"{steps}, {every}")
     tracker, rng, digest = Cmcdot(spec, params, seed), np.random.default_rng(seed), hashlib.sha256()
-    time, before, worst_sum, lowest = 0.0, pose_at(0.0), 0.0, 1.0
+    classes = ClassMap(spec, 2, MemoryParams(movable=(1,)))
+    time, before, worst_sum, lowest, worst_class_sum, spent = 0.0, pose_at(0.0), 0.0, 1.0, 0.0, 0.0
+    done = 0
     for step in range(1, steps + 1):
         dt = 0.1 + rng.uniform(-0.004, 0.004)
         time += dt
@@ -103,11 +113,39 @@ def long_run(
         belief, before = tracker.step(points, motion, dt), pose
         worst_sum = np.maximum(worst_sum, np.abs(belief.probability.sum(axis=0, dtype=np.float64) - 1).max())
         lowest = np.minimum(lowest, belief.probability.min())
-        _add(digest, belief)
+        began = process_time()
+        remembered = classes.step(seen_ahead(belief, spec), belief, motion, dt)
+        spent += process_time() - began
+        worst_class_sum = np.maximum(worst_class_sum, np.abs(remembered.sum(axis=0, dtype=np.float64) - 1).max())
+        _add(digest, belief, remembered)
         if step % every == 0 or step == steps:
             known = int(np.isfinite(belief.velocity[0]).sum())
-            yield Checkpoint(step, float(worst_sum), float(lowest), known, resident_memory(), digest.hexdigest())
-            worst_sum, lowest = 0.0, 1.0
+            milliseconds = 1e3 * spent / (step - done)
+            sums = float(worst_sum), float(lowest), float(worst_class_sum), milliseconds
+            yield Checkpoint(step, *sums, known, resident_memory(), digest.hexdigest())
+            worst_sum, lowest, worst_class_sum, spent, done = 0.0, 1.0, 0.0, 0.0, step
+
+
+def seen_ahead(belief: Belief, spec: GridSpec) -> np.ndarray:
+    """Return a semantic grid as a camera might make it: ground and things where it looks, unknown elsewhere.
+
+    Parameters
+    ----------
+    belief : Belief
+        What the filter believes.
+    spec : GridSpec
+        The grid, (H, W).
+
+    Returns
+    -------
+    (6, H, W) float32
+        Ground, things, and the four unknown classes.
+    """
+    free, static, dynamic, _ = belief.probability
+    x, y = np.moveaxis(spec.centers(), -1, 0)
+    looks = (x > 5) & (np.abs(y) < 0.8 * x)
+    seen = looks * np.stack([free, static + dynamic])
+    return np.concatenate([seen, belief.probability * (1 - seen.sum(axis=0))])
 
 
 def pose_at(time: float) -> PlanarMotion:
@@ -155,9 +193,9 @@ def resident_memory() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def _add(digest, belief: Belief) -> None:
-    """Add the bits of a belief to what has been digested."""
-    for field in (belief.probability, belief.velocity, belief.velocity_covariance):
+def _add(digest, belief: Belief, remembered: np.ndarray) -> None:
+    """Add the bits of a belief and of what is remembered to what has been digested."""
+    for field in (belief.probability, belief.velocity, belief.velocity_covariance, remembered):
         digest.update(np.ascontiguousarray(field))
 
 
@@ -188,12 +226,13 @@ def main() -> None:
 
 def run(steps: int, grid: str, seed: int) -> list[Checkpoint]:
     """Run once and print a row for each tenth."""
-    print("   steps  worst |sum - 1|  lowest P  cells with velocity  memory (MB)  s    digest")
+    print("   steps  worst |sum - 1|  lowest P  of classes  ms a step  cells with velocity  memory (MB)  s    digest")
     began, checkpoints = time.perf_counter(), []
     for found in long_run(steps, max(1, steps // 10), getattr(GridSpec, grid)(), seed=seed):
         checkpoints.append(found)
         print(
-            f"{found.step:8,}  {found.worst_sum:15.1e}  {found.lowest:8.0e}  {found.velocities:19,}"
+            f"{found.step:8,}  {found.worst_sum:15.1e}  {found.lowest:8.0e}  {found.worst_class_sum:10.1e}"
+            f"  {found.class_milliseconds:9.1f}  {found.velocities:19,}"
             f"  {found.memory:11.1f}  {time.perf_counter() - began:4.0f}  {found.digest[:12]}"
         )
     return checkpoints

@@ -30,6 +30,7 @@ def test_two_hundred_steps_keep_distributions_bits_and_memory():
     again, other = (list(long_run(50, 50, SPEC, PARAMS, seed)) for seed in (0, 1))
     for found in first:
         assert found.worst_sum < 1e-5
+        assert found.worst_class_sum < 1e-4
         assert found.lowest >= 0
         assert found.velocities > 0
     assert first[0].digest == again[0].digest != other[0].digest

@@ -1,5 +1,7 @@
 """The class of one cell: the factored filter is exact without repeated errors, and costs what its cut edge says."""
 
+from itertools import pairwise, product
+
 import numpy as np
 import pytest
 from pyagrum_oracle import assert_oracle_agrees
@@ -16,7 +18,7 @@ from semgrid_edu.stage_models.class_memory import (
     readings,
     smoothed_classes,
 )
-from semgrid_edu.stage_models.system_world import CLASS_OF, SystemWorld
+from semgrid_edu.stage_models.system_world import CLASS_OF, STREET, SystemWorld
 
 SEEN = [2, 2, 0], [1, 0, 0]
 
@@ -42,14 +44,17 @@ def test_with_independent_frames_the_factored_filter_is_exact():
     assert price.exact < price.forgotten
 
 
-def test_forward_backward_is_the_sum_over_everything():
-    """With independent frames, each frame given all of them; and the last one is what the filter says."""
-    world = MemoryWorld(steps=4, repeats=0.0)
-    model, named, stopped = class_over_time(world).model, [2, 2, 0, 1], [1, 0, 0, 1]
+def test_forward_backward_is_the_sum_over_all_contents():
+    """With independent frames: five contents at each of five frames, term by term; the last one is the filter's."""
+    world, named, stopped = MemoryWorld(steps=5, repeats=0.0), [2, 2, 0, 1, 3], [1, 0, 0, 1, 1]
+    says = CLASS_OF @ SystemWorld().confusion()
+    joint = np.zeros((5, 5))
+    for contents in product(range(5), repeat=5):
+        p = STREET[contents[0]] * np.prod([world.street.change()[step] for step in pairwise(contents)])
+        p *= np.prod(says[contents, named] * world.returned()[contents, stopped])
+        joint[range(5), contents] += p
     smoothed = smoothed_classes(world, named, stopped)
-    for t, belief in enumerate(smoothed):
-        summed = enumerate_marginals(model, f"m{t}", readings(named, stopped)).normalised().table @ CLASS_OF
-        np.testing.assert_allclose(belief, summed, atol=1e-12)
+    np.testing.assert_allclose(smoothed, joint / joint.sum(axis=1, keepdims=True) @ CLASS_OF, atol=1e-12)
     weighed = smoothed_classes(world, named, stopped, exponent=0.4)[-1]
     np.testing.assert_allclose(weighed, factored_classes(world, named, stopped, exponent=0.4), atol=1e-12)
 
