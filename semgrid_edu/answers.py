@@ -68,7 +68,7 @@ def answer_arrays(result: Any, n_arrays: int, name: str = "it") -> list[NDArray]
     """
     assert result is not None, f"{name} returned nothing: did you forget `return`?"
     found = len(result) if isinstance(result, tuple | list) else 1
-    assert found == n_arrays, f"{name} must return {n_arrays} arrays, separated by commas; got {found}"
+    assert found == n_arrays, f"{name} must return {n_arrays} arrays, separated by commas"
     return [answer_array(part, name) for part in result]
 
 
@@ -93,7 +93,8 @@ def answer_number(result: Any, name: str = "it") -> float:
         When the result is None, no number, or more than one.
     """
     numbers = answer_array(result, name)
-    assert numbers.size == 1, f"{name} returned {numbers.size} numbers instead of one"
+    # How many might tell a hidden input: this sentence is also that of hidden tests.
+    assert numbers.size == 1, f"{name} returned {'several numbers' if numbers.size else 'nothing'} instead of one"
     return numbers.item()
 
 

@@ -27,6 +27,9 @@ PICTURE = "data:image/png;base64,iVBORw0KGgo="
         ('<form action="http://elsewhere.example"><button>x</button></form>', "<form"),
         ('<meta http-equiv="refresh" content="0;url=http://elsewhere.example">', "<meta"),
         ('<base href="http://elsewhere.example">', "<base"),
+        (r"<p>$\href{javascript:alert(1)}{x}$</p>", r"\href"),
+        (r"<p>$\let\a\style \a{position:fixed}{x}$</p>", r"\style"),
+        (r"<p>$\require{HTML}$</p>", r"\require"),
         ("<svg><script>alert(1)</script></svg>", "<script"),
         ("<math><mtext><table><mglyph><style><img src=x onerror=alert(1)>", "<img src"),
     ],
@@ -39,6 +42,7 @@ def test_what_could_act_in_a_browser_is_gone(html, gone):
     "html",
     [
         "<p><strong>bold</strong> $a$ <em>b</em> <code>c</code></p>",
+        r"<p>$\hat{x} = \frac{a}{b}, \text{data}, \classes$</p>",
         '<a href="https://example.org/?a=b#c" title="there">x</a>',
         f'<img alt="drawn" src="{PICTURE}">',
         '<div class="highlight hl-python"><pre><span class="nn">numpy</span></pre></div>',

@@ -1,10 +1,13 @@
 """Submissions as platforms, editors and students leave them: none is merged with another, none lost without a word."""
 
+import os
 import re
 import subprocess
 import sys
+import time
 import zipfile
 
+import nbformat
 import pytest
 from nbconvert import HTMLExporter
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
@@ -15,6 +18,7 @@ from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.course.nbgrader.autograde import (
     GradeSettings,
+    UnfitError,
     place,
     reference_answers,
     student_variant,
@@ -23,6 +27,7 @@ from semgrid_edu.workshop.course.nbgrader.autograde import (
 from semgrid_edu.workshop.course.nbgrader.build import MARKER, build_course
 from semgrid_edu.workshop.course.nbgrader.cleaning import without_scripts
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
+from semgrid_edu.workshop.course.nbgrader.gradebook import check_file
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, write_notebook
 
 TINY = "00_tiny"
@@ -105,7 +110,7 @@ def test_thousands_of_cells_are_left_to_a_person(course, right):
     right.cells += [new_markdown_cell("more") for _ in range(1000)]
     result = graded(course, "cells", right)
     assert result.score == 0
-    assert "expected at most 1000 cells, found 10" in result.note
+    assert "it has more than 1000 cells" in result.note
 
 
 def test_thousands_of_files_are_left_to_a_person(course, right):
@@ -115,7 +120,47 @@ def test_thousands_of_files_are_left_to_a_person(course, right):
         (folder / f"{number}.txt").touch()
     result = graded(course, "files", right)
     assert result.score == 0
-    assert "expected at most 1000 files and folders with it, found 1002" in result.note
+    assert "it comes with more than 1000 files and folders" in result.note
+
+
+OFFICIAL = "full points granted by the dean"
+UNFIT = {
+    "link": lambda path: (path.parent / OFFICIAL).symlink_to(path),
+    "pipe": lambda path: os.mkfifo(path.parent / OFFICIAL),
+    "no JSON": lambda path: path.write_text(OFFICIAL),
+    "no notebook": lambda path: path.write_text(f'{{"cells": "{OFFICIAL}", "metadata": {{}}, "nbformat": 4}}'),
+    "not UTF-8": lambda path: path.write_bytes(OFFICIAL.encode() + b"\xff\xfe"),
+    "format 2": lambda path: path.write_text(f'{{"nbformat": 2, "worksheets": ["{OFFICIAL}"]}}'),
+    "nested": lambda path: path.write_text(f'"{OFFICIAL}"' + "[" * 100_000),
+    "a cell of no kind": lambda path: path.write_text(path.read_text().replace('"code"', f'"{OFFICIAL}"')),
+    "no text": lambda path: path.write_text(path.read_text().replace("Since 2 is 2", "\\ud800" + OFFICIAL)),
+}
+"""Files that can't be graded, and say what the grader might."""
+
+
+@pytest.mark.parametrize("kind", UNFIT)
+def test_no_note_quotes_what_a_student_wrote(course, right, kind):
+    path = place(course, "submitted", re.sub(r"\W", "-", kind), TINY)
+    write_notebook(right, path)
+    UNFIT[kind](path)
+    began = time.monotonic()
+    with pytest.raises(UnfitError) as told:
+        check_file(path)
+    assert OFFICIAL not in str(told.value)
+    assert time.monotonic() - began < 10
+
+
+def test_what_an_answer_prints_in_a_test_is_called_its_own(course, right):
+    cell = next(cell for cell in right.cells if cell.metadata.get("nbgrader", {}).get("grade_id") == "twice")
+    cell.source = f"def twice(x):\n    print('Crashed: {OFFICIAL}')\n    return 2 * x"
+    result = graded(course, "prints", right)
+    assert (result.score, result.note) == (2, "")
+    printed = [o.text for c in read(course, "prints").cells for o in c.get("outputs", []) if o.output_type == "stream"]
+    assert printed == [f"your code printed:\nCrashed: {OFFICIAL}\n"]
+
+
+def read(course, student):
+    return nbformat.read(place(course, "autograded", student, TINY), as_version=4)
 
 
 def test_a_raw_cell_is_shown_as_text_is_which_fetches_nothing(course, right):

@@ -32,7 +32,7 @@ def answer():
     ("error", "sentence"),
     [
         (AssertionError("values are wrong"), "values are wrong"),
-        (IndexError("7"), "it raises IndexError: 7"),
+        (IndexError("7"), "it raises an error"),
         (AnswerTimeoutError("no reply"), "it does not come to an end"),
     ],
 )
@@ -105,6 +105,8 @@ def test_hidden_tests_compare_by_the_helper_alone(tmp_path):
         "np.isclose(a, b)",
         "np.testing.assert_allclose(a, b)",
         "assert_almost_equal(a, b)",
+        'assert right, f"{got.size} numbers"',
+        'assert right, f"wrong with {x}"',
     ):
         (tmp_path / "grids.py").write_text(f"x = 1\n    {line}\n")
         (problem,) = instructor_problems(tmp_path)

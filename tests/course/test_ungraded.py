@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from nbconvert.writers import FilesWriter
 from nbgrader.api import Gradebook, InvalidEntry
+from sqlalchemy.exc import PendingRollbackError
 from tiny_course import tiny_notebooks
 from typer.testing import CliRunner
 
@@ -109,7 +110,17 @@ def test_a_gradebook_in_which_another_process_was_first_is_tried_again(course, h
     assert is_graded_next_time(course, handed_in)
 
 
-@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), MemoryError()], ids=repr)
+FAILURES = [
+    OSError(errno.ENOSPC, "No space left on device"),
+    MemoryError(),
+    PendingRollbackError("the session's transaction was rolled back: database is locked"),
+    RuntimeError("an error of the grader's own"),
+    ValueError("another"),
+]
+"""What isn't a file's fault, whatever the file."""
+
+
+@pytest.mark.parametrize("error", FAILURES, ids=lambda error: type(error).__name__)
 def test_a_machine_without_room(course, handed_in, monkeypatch, error):
     def write(*arguments, **named):
         raise error
@@ -195,7 +206,7 @@ def test_a_text_that_cannot_be_written_is_the_files(course, right):
     path.write_text(path.read_text().replace("Since 2 is 2", "\\ud800"))
     result = grade_one(course, TINY, "surrogate", GradeSettings())
     assert (result.score, result.points) == (0, 3)
-    assert "the file can't be graded: UnicodeEncodeError" in result.note
+    assert "the file can't be graded: it is no notebook (UnicodeEncodeError)" in result.note
     assert is_graded(course, TINY, "surrogate")
 
 

@@ -3,9 +3,11 @@
 import copy
 
 import pytest
-from class_of import NAME, REFERENCE, cell_of, graded, handed_in, inside
+import tries
+from class_of import NAME, REFERENCE, SOURCE, cell_of, graded, handed_in, inside
 from nbformat.v4 import new_code_cell
 from nbgrader.api import Gradebook
+from warm import grade_notebook
 
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place
 from semgrid_edu.workshop.course.nbgrader.build import course_api
@@ -114,6 +116,26 @@ def test_lists_are_as_good_as_arrays(forked):
     }
     answers = {n: f"{code}{as_lists}\n{functions[n]} = as_lists({functions[n]})" for n, code in REFERENCE.items()}
     assert graded(forked, "lists", handed_in(answers)).score == 15
+
+
+FUNCTIONS = ("locate", "predict", "follow", "transition", "fuse", "build_map")
+
+
+@pytest.mark.parametrize("first", [0, 6])
+def test_right_results_in_other_forms_earn_all_points(start, first):
+    forms = [*tries.WRAPPED.values()][first : first + 6]
+    lines = [f"{name} = wrapped({name}, lambda x: {form})" for name, form in zip(FUNCTIONS, forms, strict=True)]
+    answers = {n: f"{tries.WRAPPING}\n{code}\n{line}" for (n, code), line in zip(REFERENCE.items(), lines, strict=True)}
+    cells = grade_notebook(SOURCE, handed_in(answers), start, 60)
+    assert {name: cell.message for name, cell in cells.items() if cell.score not in (cell.points, None)} == {}
+
+
+def test_cells_that_students_write_beside_cost_nothing(start):
+    notebook = handed_in()
+    place = cell_of(notebook, "setup") + 1
+    notebook.cells[place:place] = [new_code_cell(code, id=f"c{k}") for k, code in enumerate(tries.UNUSUAL)]
+    cells = grade_notebook(SOURCE, notebook, start, 60)
+    assert {name: cell.message for name, cell in cells.items() if cell.score not in (cell.points, None)} == {}
 
 
 ENDS = {

@@ -692,7 +692,7 @@ def follow(belief, likelihoods, M, lag=0):
             "the message never normalised",
             task="follow",
             loses=2,
-            says="on inputs you haven't seen: NaN with a lag of 100",
+            says="on inputs you haven't seen: NaN with a long lag",
             code="""
 def _forward(belief, likelihoods, M):
     rows = []
@@ -716,7 +716,7 @@ def follow(belief, likelihoods, M, lag=0):
             "the last rows left alone",
             task="follow",
             loses=2,
-            says="on inputs you haven't seen: wrong at scan",
+            says="on inputs you haven't seen: wrong with a lag",
             code="""
 def _forward(belief, likelihoods, M):
     rows = []
@@ -743,7 +743,7 @@ def follow(belief, likelihoods, M, lag=0):
             "a lag of one written in",
             task="follow",
             loses=2,
-            says="on inputs you haven't seen: wrong at scan",
+            says="on inputs you haven't seen: wrong with a lag",
             code="""
 def _forward(belief, likelihoods, M):
     rows = []

@@ -408,7 +408,7 @@ def max_pool(maps, kernel, stride):
             "3 and 2 written in",
             task="pool",
             loses=2,
-            says="on inputs you haven't seen: wrong shape of the maxima, kernel 2, stride 2",
+            says="on inputs you haven't seen: wrong shape of the maxima",
             code=pool().replace(
                 "max_pool(maps, kernel, stride):", "max_pool(maps, kernel, stride):\n    kernel, stride = 3, 2"
             ),
@@ -472,7 +472,7 @@ def max_pool(maps, kernel, stride):
             "stride of 2 in the index",
             task="pool",
             loses=1,
-            says="on inputs you haven't seen: wrong indices, kernel 3, stride 1",
+            says="on inputs you haven't seen: wrong indices",
             code=pool("(2 * v + n) * w + 2 * u + m"),
         ),
         mistake(
@@ -784,7 +784,7 @@ def atrous(maps, kernels, bias, stride, rate):
             "two channels written in",
             task="atrous",
             loses=1,
-            says="on inputs you haven't seen: wrong with 3 inputs",
+            says="on inputs you haven't seen: wrong with other numbers of channels",
             code=ATROUS.replace("for c in range(C)", "for c in range(2) if c < C"),
         ),
         mistake(
@@ -865,7 +865,7 @@ def atrous(maps, kernels, bias, stride, rate):
             "rate 2 written in",
             task="atrous",
             loses=1,
-            says="on inputs you haven't seen: wrong with 1 inputs, 1 outputs, N 3, stride 1, rate 1",
+            says="on inputs you haven't seen: wrong with other kernels and rates",
             code=ATROUS.replace("rate *", "2 *"),
         ),
         mistake(
@@ -939,7 +939,7 @@ def atrous(maps, kernels, bias, stride, rate):
             "padded by 1 and the size of a larger kernel forgotten",
             task="atrous",
             loses=1,
-            says="on inputs you haven't seen: wrong shape with 1 inputs, 1 outputs, N 5, stride 1, rate 1",
+            says="on inputs you haven't seen: wrong shape with other kernels and rates",
             code="""
 def atrous(maps, kernels, bias, stride, rate):
     N = kernels.shape[-1]

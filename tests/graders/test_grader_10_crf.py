@@ -498,7 +498,7 @@ def marginals(phi, k, known):
             "the first known cell only",
             task="marginals",
             loses=3,
-            says="on inputs you haven't seen: wrong with 4 cells, 2 of them known",
+            says="on inputs you haven't seen: wrong with some cells known",
             code=summed(fits="all(x[i] == label for i, label in list(known.items())[:1])"),
         ),
         mistake(
@@ -799,7 +799,7 @@ def free_energy(Q, phi, k, mu):
             "one price for all borders",
             task="free-energy",
             loses=2,
-            says="on inputs you haven't seen: wrong with 4 cells and 3 classes, other borders",
+            says="on inputs you haven't seen: wrong with other numbers of cells and classes, other borders",
             code=free(pairs="mu.max() * np.triu(k * (1 - Q.T @ Q), 1).sum()"),
         ),
         mistake(
@@ -893,7 +893,7 @@ def weight_for(K, total):
             "the upper of two middle cells",
             task="weight-for",
             loses=1,
-            says="on inputs you haven't seen: the median of 8 cells",
+            says="on inputs you haven't seen: the median cell",
             code=weighed(typical="np.sort(sums)[len(sums) // 2]"),
         ),
         mistake(
@@ -1061,7 +1061,7 @@ def update(Q, phi, k, mu):
             "prices above 10 cut off",
             task="update",
             loses=3,
-            says="on inputs you haven't seen: wrong with 6 cells",
+            says="on inputs you haven't seen: wrong with other numbers of cells",
             code=updated(price="np.minimum(phi, 10) + mu @ Q @ others"),
         ),
         right(

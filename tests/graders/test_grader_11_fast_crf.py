@@ -600,7 +600,7 @@ def lattice_filter(simplices, values):
             "three directions whatever d is",
             task="lattice-filter",
             loses=3,
-            says="on inputs you haven't seen: wrong in 3 dimensions",
+            says="on inputs you haven't seen: wrong in another number of dimensions",
             code=lattice(directions="range(min(size, 3))"),
         ),
         # ---- task 4

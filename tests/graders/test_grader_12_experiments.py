@@ -503,7 +503,7 @@ def paired_interval(a, b, metric, level=0.95):
             "1.96",
             task="paired",
             loses=2,
-            says="expected 0.0132",
+            says="expected 0.01317",
             code=paired(half="1.96 * np.sqrt((V - 1) / V * ((w - w.mean()) ** 2).sum())"),
         ),
         mistake(
@@ -542,7 +542,7 @@ def calibration_error(probability, truth, bins=10):
             "the gaps",
             task="calibration",
             loses=3,
-            says="calibration_error returned 3 numbers instead of one",
+            says="calibration_error returned several numbers instead of one",
             code=ece(total="gaps"),
         ),
         mistake(

@@ -4,8 +4,10 @@ import hashlib
 import time
 
 import pytest
+import tries
 from class_of import NAME, REFERENCE, SETTINGS, SOURCE, cell_of, graded, handed_in, inside
 from nbformat.v4 import new_code_cell, new_markdown_cell
+from warm import grade_notebook
 
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place
 from semgrid_edu.workshop.course.nbgrader.build import course_api
@@ -139,6 +141,35 @@ EASIER = dict.fromkeys(REFERENCE, "pass")
 """Answer cells that leave to the first cell what they should define."""
 
 
+FUNCTIONS = ("locate", "predict", "follow", "transition", "fuse", "build_map")
+"""The first function of each task."""
+
+
+@pytest.mark.parametrize("first", range(0, len(tries.RETURNED), len(FUNCTIONS)))
+def test_what_is_no_answer_earns_nothing_in_any_task(start, first):
+    kinds = [*tries.RETURNED.values()][first : first + len(FUNCTIONS)]
+    code = "\n".join(f"{attack}\n{name} = attack" for name, attack in zip(FUNCTIONS, kinds, strict=True))
+    assert scores(handed_in(EASIER, first=f"{EASY}\n{code}"), start) == {}
+
+
+@pytest.mark.parametrize("kind", tries.IN_THE_WAY)
+def test_what_stands_in_the_way_of_the_wire_earns_nothing(start, kind):
+    assert scores(handed_in(EASIER, first=f"{EASY}\n{tries.IN_THE_WAY[kind]}"), start) == {}
+
+
+@pytest.mark.parametrize("first", range(0, len(tries.STOPS), 3))
+def test_what_stops_an_answer_costs_its_task_alone(start, first):
+    lines = [*tries.STOPS.values()][first : first + 3]
+    answers = [inside(name, line)[name] for name, line in zip(FUNCTIONS, lines, strict=False)]
+    notebook = handed_in(REFERENCE | dict(zip(FUNCTIONS, answers, strict=False)))
+    assert scores(notebook, start) == {"transition-test": 2, "half-life-test": 1, "fuse-test": 2, "build-map-test": 2}
+
+
+def scores(notebook, start):
+    """What each test cell has given, if anything."""
+    return {name: cell.score for name, cell in grade_notebook(SOURCE, notebook, start, 3).items() if cell.score}
+
+
 def pass_tests(notebook):
     for cell in notebook.cells:
         if cell.metadata.get("nbgrader", {}).get("grade"):
@@ -266,14 +297,21 @@ display({"image/svg+xml": "<svg onload=" + "'alert(3)'/>", "image/png": '"><scri
     notebook = handed_in(first=show)
     text = "**bold** $a < b$\n\n<script>alert(5)</script><img src=x onerror='alert(6)'>"
     notebook.cells.append(new_markdown_cell(text))
+    notebook.cells.append(
+        new_code_cell("print('<script>alert(9)</script>')\nraise type('<script>alert(10)', (Exception,), {})")
+    )
+    notebook.cells[-2]["attachments"] = {"a": {"image/png": '"><script>alert(11)</script>'}}
+    notebook.cells[-2].source += "![a](attachment:a) $\\href{javascript:alert(12)}{x}$"
+    notebook.metadata["language_info"] = {"name": "python", "pygments_lexer": "<script>alert(13)</script>"}
     notebook.metadata["title"] = "<script>alert(7)</script>"
     notebook.metadata["widgets"] = {"application/vnd.jupyter.widget-state+json": {"x": "<script>alert(8)</script>"}}
     assert graded(forked, "scripts", notebook).score == 15
     with course_api(forked) as api:
         assert api.generate_feedback(NAME, "scripts")["success"]
     page = place(forked, "feedback", "scripts", NAME).with_suffix(".html").read_text()
-    for number in range(1, 9):
+    for number in range(1, 14):
         assert f"<script>alert({number})" not in page
+    assert "\\href" not in page
     assert "onerror" not in page
     assert "<svg onload=" not in page
     assert "<strong>bold</strong>" in page

@@ -26,8 +26,9 @@ from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import cell_name, run_submission
-from semgrid_edu.workshop.course.sandbox.process import PREPARED, StudentProcess, keep_compiled, worker_environment
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.session import Session
+from semgrid_edu.workshop.course.sandbox.surroundings import PREPARED, keep_compiled, worker_environment
 
 SERVER = Path(__file__).with_name("warm_server.py")
 
@@ -38,7 +39,12 @@ def grade_warm(source, answers, start, timeout, unseen=None):
     `unseen` gives other answers, by the text of the usual ones, for the inputs of hidden tests: as if a student knew
     the others.
     """
-    trusted, notebook = _trusted(source), submission(source, answers)
+    return grade_notebook(source, submission(source, answers), start, timeout, unseen)
+
+
+def grade_notebook(source, notebook, start, timeout, unseen=None):
+    """Run a notebook that was handed in, with all cells of the exercise; `grade_warm` says what comes back."""
+    trusted = _trusted(source)
     for cell in notebook.cells:
         if is_grade(cell) and not is_solution(cell):
             cell.source = trusted[cell_name(cell)]  # with its hidden tests, as nbgrader's OverwriteCells does

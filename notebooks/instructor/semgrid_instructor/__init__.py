@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from semgrid_edu.workshop.course.sandbox.session import AnswerTimeoutError
+from semgrid_edu.workshop.course.sandbox.session import AnswerEndedError, AnswerTimeoutError
 
 _variant: list[int] = []
 
@@ -60,19 +60,30 @@ def keeping(check: Callable[..., None]) -> Callable[..., None]:
 
 
 def hidden(check: Callable[..., None]) -> Callable[..., str]:
-    """Turn a check that raises into one that returns a short complaint about the first answer, "" when all is well."""
+    """Turn a check that raises into one that returns a short complaint about the first answer, "" when all is well.
+
+    Of an answer that works in another process, the check waits until nothing more of that process is shown.
+    """
 
     @functools.wraps(check)
-    def complaint(answer: Callable, *others: Callable) -> str:
-        try:
-            check(*(getattr(one, "unseen", one) for one in (answer, *others)))
-        except AssertionError as error:
-            return f"{answer.__name__}, on inputs you haven't seen: {error}"
-        except AnswerTimeoutError:
-            return f"{answer.__name__}, on inputs you haven't seen: it does not come to an end"
-        except Exception as error:
-            says = getattr(error, "secret", f"{type(error).__name__}: {error}")
-            return f"{answer.__name__}, on inputs you haven't seen: it raises {says}"
-        return ""
+    def complaint(*answers: Callable) -> str:
+        later = next((one.judge_later for one in answers if hasattr(one, "judge_later")), lambda judge: judge())
+        return later(lambda: _complaint(check, *answers))
 
     return complaint
+
+
+def _complaint(check: Callable[..., None], answer: Callable, *others: Callable) -> str:
+    """Check answers where nobody sees them; return one sentence, without the inputs and what came of them."""
+    about = f"{answer.__name__}, on inputs you haven't seen:"
+    try:
+        check(*(getattr(one, "unseen", one) for one in (answer, *others)))
+    except AssertionError as error:
+        return f"{about} {error}"
+    except AnswerTimeoutError:
+        return f"{about} it does not come to an end"
+    except AnswerEndedError:
+        return f"{about} it ends Python itself"
+    except Exception as error:
+        return f"{about} it raises {getattr(error, 'secret', 'an error')}"
+    return ""

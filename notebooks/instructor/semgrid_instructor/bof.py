@@ -37,9 +37,9 @@ def check_shift(shift: Callable) -> None:
         got = answer_array(shift(mass.copy(), down, right))
         how = "a way of 0" if 0 in (down, right) else "another direction"
         how = "a way longer than the map" if max(abs(down), abs(right)) > 4 else how
-        assert got.shape == mass.shape, f"wrong shape for {how}"
+        assert got.shape == mass.shape, "wrong shape for " + how
         expected = ndimage.shift(mass, (down, right), order=0, cval=0.0)
-        assert close(got, expected), f"wrong for {how}"
+        assert close(got, expected), "wrong for " + how
 
 
 @hidden

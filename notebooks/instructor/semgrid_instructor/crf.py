@@ -59,14 +59,14 @@ def check_tipping_prices(tipping_prices: Callable) -> None:
     drawn = np.column_stack([rng.uniform(0.8, 0.95, 3), rng.uniform(0.25, 0.48, 3)])
     for p, q in ((0.95, 0.3), (0.7, 0.45), (0.99, 0.02), *drawn):
         got = answer_array(tipping_prices(p, q))
-        assert got.shape == (2,), f"shape {got.shape} instead of (2,)"
+        assert got.shape == (2,), "another shape"
         for n, what in enumerate(("the most likely labelling", "cell 2")):
             for price, is_road in ((got[n] - 0.001, False), (got[n] + 0.001, True)):
                 phi = -np.log([[p, q], [1 - p, 1 - q]])
                 P = {x: np.exp(-_energy(x, phi, np.full((2, 2), price))) for x in product((0, 1), repeat=2)}
                 by_itself = (P[0, 0] + P[1, 0]) / sum(P.values()) > 0.5
                 says_road = (max(P, key=P.get) == (0, 0), by_itself)[n]
-                assert says_road == is_road, f"{what} doesn't turn to road at your price, with p = {p:.2f}, q = {q:.2f}"
+                assert says_road == is_road, what + " doesn't turn to road at your price"
 
 
 @hidden
@@ -81,7 +81,7 @@ def check_energy_change(energy_change: Callable) -> None:
             after[i] = label
             wanted = _energy(after, phi, k) - _energy(labels, phi, k)
             got = answer_number(energy_change(labels.copy(), i, label, phi.copy(), k.copy()))
-            assert close(got, wanted), f"wrong with {size[1]} cells and {size[0]} classes"
+            assert close(got, wanted), "wrong with other numbers of cells and classes"
 
 
 @hidden
@@ -95,15 +95,15 @@ def check_marginals(marginals: Callable) -> None:
             cells = rng.permutation(size[1])[:n_known]
             known = {int(cell): int(rng.integers(size[0])) for cell in cells}
             got = answer_array(marginals(phi.copy(), k.copy(), dict(known)))
-            assert got.shape == size, f"shape {got.shape} instead of {size}"
+            assert got.shape == size, "another shape"
             labellings = [
                 x for x in product(range(size[0]), repeat=size[1]) if all(x[i] == label for i, label in known.items())
             ]
             P = np.exp([-_energy(x, phi, k) for x in labellings])
             for label, i in np.ndindex(size):
                 wanted = P[[x[i] == label for x in labellings]].sum() / P.sum()
-                assert close(got[label, i], wanted), (
-                    f"wrong with {size[1]} cells, {n_known} of them known, and {size[0]} classes"
+                assert close(got[label, i], wanted), "wrong with " + (
+                    "some cells known" if n_known else "no cell known"
                 )
 
 
@@ -127,9 +127,9 @@ def check_update(update: Callable) -> None:
         Q = softmax(generator(seed).normal(size=phi.shape), axis=0)
         for kind, mu in (("Potts", _potts(size[0])), ("other borders", _borders(size[0], 140 + seed))):
             got = answer_array(update(Q.copy(), phi.copy(), k.copy(), mu.copy()))
-            assert got.shape == Q.shape, f"shape {got.shape} instead of {Q.shape}"
+            assert got.shape == Q.shape, "another shape"
             right = close(got, _updated(Q, phi, k, mu))
-            assert right, f"wrong with {phi.shape[1]} cells and {len(phi)} classes, {kind}"
+            assert right, "wrong with other numbers of cells and classes, " + kind
 
 
 @hidden
@@ -160,7 +160,7 @@ def check_free_energy(free_energy: Callable) -> None:
         for kind, mu in (("Potts", _potts(size[0])), ("other borders", _borders(size[0], 150 + seed))):
             got = answer_number(free_energy(Q.copy(), phi.copy(), k.copy(), mu.copy()))
             right = close(got, _free_energy(Q, phi, k, mu))
-            assert right, f"wrong with {phi.shape[1]} cells and {len(phi)} classes, {kind}"
+            assert right, "wrong with other numbers of cells and classes, " + kind
 
 
 @hidden
@@ -191,7 +191,7 @@ def check_weight_for(weight_for: Callable) -> None:
         w = answer_number(weight_for(K.copy(), total))
         paid = sorted(sum(w * K[i, j] for j in range(size) if j != i) for i in range(size))
         median = (paid[(size - 1) // 2] + paid[size // 2]) / 2
-        assert close(median, total), f"the median of {size} cells pays {median:.3f} in place of {total}"
+        assert close(median, total), "the median cell doesn't pay the total (of odd and of even numbers of cells)"
 
 
 def _refined(log_g: NDArray, o: NDArray) -> NDArray:
@@ -221,6 +221,6 @@ def check_refine(refine: Callable) -> None:
         o = np.moveaxis(rng.dirichlet(np.full(4, 0.3), shape[1:]), -1, 0).astype(dtype)
         log_g = np.log(g)
         got = answer_array(refine(log_g.copy(), o.copy()))
-        assert got.shape == shape, f"shape {got.shape} instead of {shape}"
+        assert got.shape == shape, "another shape"
         wanted = _refined(log_g.astype(float), o.astype(float))
-        assert close(got, wanted, atol=2e-3), f"wrong on a map of {shape[1]} x {shape[2]} cells"
+        assert close(got, wanted, atol=2e-3), "wrong on a map of another size"

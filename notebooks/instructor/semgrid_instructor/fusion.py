@@ -45,7 +45,9 @@ def check_name_cells(name_cells: Callable) -> None:
         columns, truth = _columns(seed, n_rows, n_cells)
         new = columns[:, truth != 255][:, :25]
         got = answer_array(name_cells(columns, truth, new)).ravel()
-        assert close(got, _named(columns, truth, new)), f"wrong classes with {n_rows} rows"
+        assert close(got, _named(columns, truth, new)), "wrong classes with " + (
+            "one row" if n_rows == 1 else "several rows"
+        )
 
 
 @hidden
@@ -204,7 +206,7 @@ def check_loss_back(loss_back: Callable) -> None:
     for seed in range(106, 109):
         logits, truth, alpha = _random_cells(seed)
         got = answer_array(loss_back(logits, truth, alpha))
-        assert got.shape == logits.shape, f"shape {got.shape} instead of {logits.shape}"
+        assert got.shape == logits.shape, "another shape"
         wanted = np.zeros(logits.shape)
         for place in np.ndindex(logits.shape):
             nudge = np.zeros(logits.shape)
@@ -248,7 +250,7 @@ def check_rate_and_momentum(rate_and_momentum: Callable) -> None:
     ):
         path, gradients = _trained(112 + seed, np.full(steps, eta), kappa, n)
         got = answer_array(rate_and_momentum(path, gradients)).ravel()
-        assert close(got, [eta, kappa], rtol=1e-4, atol=1e-5), f"wrong after {steps} steps of {n} parameters"
+        assert close(got, [eta, kappa], rtol=1e-4, atol=1e-5), "wrong for another path"
 
 
 @hidden

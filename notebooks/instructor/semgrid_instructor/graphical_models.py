@@ -26,16 +26,16 @@ def _check_quotients(divide: Callable, pairs: tuple[tuple[str, str], ...], seed:
             g[1][(0,) * len(other)] = 0
         product = (Factor(*quotient) * Factor(*g)).ordered(*one)
         possible = (Factor(*quotient) * Factor(g[0], np.sign(g[1]))).ordered(*one)
-        f, about = (product.names, product.table), f"factors over ({', '.join(one)}) and ({', '.join(other)})"
+        f = product.names, product.table
         arguments = (f[0], np.array(f[1])), (g[0], np.array(g[1]))
         names, table = divide(*arguments)
         changed = any(not np.array_equal(now[1], old[1]) for now, old in zip(arguments, (f, g), strict=True))
-        assert not changed, f"it changed a table that it was given, for {about}: make a new one"
+        assert not changed, "it changed a table that it was given: make a new one"
         table = answer_array(table)
-        assert np.isfinite(table).all(), f"0 / 0 must be 0, for {about}"
-        assert sorted(names) == sorted(one), f"wrong names for {about}"
-        assert table.shape == tuple(shapes[name] for name in names), f"names and table don't fit for {about}"
-        assert close(table, possible.ordered(*names).table), f"wrong entries for {about}"
+        assert np.isfinite(table).all(), "0 / 0 must be 0"
+        assert sorted(names) == sorted(one), "wrong names"
+        assert table.shape == tuple(shapes[name] for name in names), "names and table don't fit"
+        assert close(table, possible.ordered(*names).table), "wrong entries"
 
 
 @hidden
@@ -67,10 +67,8 @@ def check_posterior(posterior: Callable) -> None:
     ):
         got = answer_array(posterior(joint, wanted, dict(given)))
         expected = enumerate_marginals(model, wanted, given).normalised().table
-        assert got.shape == expected.shape, (
-            f"shape {got.shape} instead of {expected.shape} with {len(given)} of four given"
-        )
-        assert close(got, expected), f"wrong with {len(given)} of four variables given"
+        assert got.shape == expected.shape, "another shape"
+        assert close(got, expected), "wrong with " + ("some variables given" if given else "nothing given")
 
 
 @hidden
@@ -128,7 +126,7 @@ def _check_question(separated: Callable, parents: dict, a: str, b: str, given: t
     assert np.shape(got) == (), "neither True nor False"
     assert got in (True, False), "neither True nor False"
     what = "open although every path is blocked" if right else "separated although a path is open"
-    assert got == right, f"{what}, in a graph of {len(parents)} variables with {len(given)} known"
+    assert got == right, what
 
 
 def _linked(parents: dict, a: str, b: str) -> bool:
@@ -192,13 +190,13 @@ def check_eliminate(eliminate: Callable) -> None:
         result = eliminate(list(factors), list(order), dict(seen))
         result = result[0] if isinstance(result, tuple | list) else result
         left = [name for name in STATES if name not in order and name not in seen]
-        assert sorted(result.names) == sorted(left), f"wrong variables are left, where {len(left)} should be"
+        assert sorted(result.names) == sorted(left), "wrong variables are left"
         got, expected = result.ordered(*left).table, eliminate_exactly(GraphicalModel(factors), left, seen).table
         same_shares = close(got / got.sum(), expected / expected.sum())
         assert close(got.sum(), expected.sum()) or not same_shares, (
             "right up to a factor: don't normalise, and keep the number that a variable without neighbours leaves"
         )
-        assert close(got, expected), f"wrong result where {len(left)} variables are left"
+        assert close(got, expected), "wrong result"
 
 
 @hidden
@@ -260,7 +258,7 @@ def _in_logarithms(start: np.ndarray, M: np.ndarray, likelihoods: np.ndarray) ->
 
 def _check_long(got: np.ndarray, expected: np.ndarray) -> None:
     """Compare every row of a long chain."""
-    assert got.shape == expected.shape, f"shape {got.shape} instead of {expected.shape}"
+    assert got.shape == expected.shape, "another shape"
     assert np.isfinite(got).all(), "NaN after hundreds of scans: normalise the message on the way"
     assert close(got, expected), "wrong after hundreds of scans: normalise the message on the way"
 
@@ -271,10 +269,10 @@ def check_filtered(filtered: Callable) -> None:
     for length, n_states in ((1, 3), (6, 4)):
         chain = _chain(26, length, n_states)
         got = answer_array(filtered(*(array.copy() for array in chain)))
-        assert got.shape == (length, n_states), f"shape {got.shape} instead of {(length, n_states)}"
+        assert got.shape == (length, n_states), "another shape"
         for t in range(length):
             expected = _exact(chain[0], chain[1], chain[2][: t + 1], t)
-            assert close(got[t], expected), f"wrong at scan {t}, with {n_states} states"
+            assert close(got[t], expected), "wrong with another number of states"
     chain = _long_chain(27)
     got = answer_array(filtered(*(array.copy() for array in chain)))
     _check_long(got, _in_logarithms(*chain)[0])
@@ -298,10 +296,9 @@ def check_smoothed(smoothed: Callable, filtered: Callable) -> None:
     for chain in (_chain(28, 1, 3), _chain(28, 6, 4), _long_chain(29)):
         got = answer_array(smoothed(*(array.copy() for array in chain)))
         forward, later = _in_logarithms(*chain)
-        assert got.shape == forward.shape, f"shape {got.shape} instead of {forward.shape}"
+        assert got.shape == forward.shape, "another shape"
         if not close(got, _smoothed_by(forward, later)):
             yours = answer_array(filtered(*(array.copy() for array in chain)))
             fault = "wrong" if np.isfinite(got).all() else "NaN"
             advice = " after hundreds of scans: normalise the message on the way" if len(got) == LONG else ""
-            about = advice or f" with {len(got)} scans and {len(chain[0])} states"
-            assert _follows(got, yours, later), fault + about
+            assert _follows(got, yours, later), fault + (advice or " with few scans")

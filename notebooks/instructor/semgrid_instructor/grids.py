@@ -42,7 +42,7 @@ def check_posterior(beam_posterior: Callable) -> None:
         seen[k % 4] *= k % 2
         got = answer_array(beam_posterior(prior.copy(), reflect.copy(), seen.copy()))
         expected = _posterior(prior, reflect, seen)
-        assert got.shape == expected.shape, f"shape {got.shape} instead of (2, 2, 2)"
+        assert got.shape == expected.shape, "another shape"
         assert close(got.sum(), 1.0), "the eight probabilities don't sum to 1"
         assert close(got, expected), "wrong probabilities of the maps"
 
@@ -56,7 +56,7 @@ def check_nothing_back(beam_posterior: Callable) -> None:
         prior, reflect, _ = _world(rng)
         reflect[0] = clutter
         got = answer_array(beam_posterior(prior.copy(), reflect.copy(), np.array([0.0, 0.0, 0.0, 0.5])))
-        assert got.shape == (2, 2, 2), f"shape {got.shape} instead of (2, 2, 2)"
+        assert got.shape == (2, 2, 2), "another shape"
         assert (got > 0).all(), "every map lets some beams pass"
         expected = np.prod((1 - reflect[1]) / (1 - clutter) * prior / (1 - prior))
         assert close(got[1, 1, 1] / got[0, 0, 0], expected), "wrong when nothing came back"
@@ -92,7 +92,7 @@ def check_update(update: Callable) -> None:
     silent = occupied == free
     for dt, tau in ((0.1, 0.5), (0.2, 1.5), (0.4, 0.3)):
         got = answer_array(update(L.copy(), occupied.copy(), free.copy(), dt, tau, -50.0, 50.0))
-        assert got.shape == L.shape, f"shape {got.shape} instead of {L.shape}"
+        assert got.shape == L.shape, "another shape"
         expected = np.where(silent, L * np.exp(-dt / tau), L + np.log(occupied) - np.log(free))
         within = (expected > -2) & (expected < 3.5)
         assert close(got[silent & within], expected[silent & within]), (
@@ -124,11 +124,11 @@ def check_fuse(fuse: Callable) -> None:
         posteriors = rng.uniform(0.05, 0.95, size=(n_scans, 3, 4))
         posteriors[:, 0, 0] = prior
         got = answer_array(fuse(prior, posteriors.copy()))
-        how_many = "one scan" if n_scans == 1 else f"{n_scans} scans"
-        assert got.shape == (3, 4), f"shape {got.shape} instead of (3, 4)"
-        assert close(got[0, 0], prior), f"{how_many} said nothing of a cell, and its prior has changed"
+        how_many = "one scan" if n_scans == 1 else "several scans"
+        assert got.shape == (3, 4), "another shape"
+        assert close(got[0, 0], prior), how_many + " said nothing of a cell, and its prior has changed"
         evidence = logit(posteriors) - logit(prior)
-        assert close(got, expit(logit(prior) + evidence.sum(axis=0))), f"wrong with {how_many}"
+        assert close(got, expit(logit(prior) + evidence.sum(axis=0))), "wrong with " + how_many
 
 
 @hidden
@@ -169,7 +169,7 @@ def check_as_belief(as_belief: Callable) -> None:
     L = generator(31).normal(0, 2, size=(4, 5))
     L[0, :2] = 1000, -1000
     got = answer_array(as_belief(L.copy()))
-    assert got.shape == (4, 4, 5), f"shape {got.shape} instead of (4, 4, 5)"
+    assert got.shape == (4, 4, 5), "another shape"
     assert np.isfinite(got).all(), "log-odds of 1000 give no number: e^1000 overflows"
     P = expit(L)
     expected = np.stack([np.maximum(1 - 2 * P, 0), np.maximum(2 * P - 1, 0), 0 * P, 1 - np.abs(2 * P - 1)])
@@ -195,7 +195,7 @@ def _judge_passes(got: NDArray, inside: NDArray, spec: GridSpec) -> None:
 def _judge_beam(beam_evidence: Callable, spec: GridSpec, x: float, y: float) -> None:
     """Compare one beam with a return in the grid, cell by cell, with the package's walk along the ray."""
     got = answer_array(beam_evidence(x, y, spec, 1.5, -0.4))
-    assert got.shape == spec.shape, f"shape {got.shape} instead of {spec.shape}"
+    assert got.shape == spec.shape, "another shape"
     (row,), (col,), _ = spec.cells(np.array([[x, y]]))
     assert close(got[row, col], 1.5), "the cell of the return isn't hit (cells need not be 1 m, nor the grid symmetric)"
     inside = _crossed(spec, x, y)
@@ -206,7 +206,7 @@ def _judge_beam(beam_evidence: Callable, spec: GridSpec, x: float, y: float) -> 
 def _judge_beam_beyond(beam_evidence: Callable, spec: GridSpec, x: float, y: float) -> None:
     """Judge a beam with a return outside the grid; where beams within the grid are wrong, half of the cells will do."""
     got = answer_array(beam_evidence(x, y, spec, 1.5, -0.4))
-    assert got.shape == spec.shape, f"shape {got.shape} instead of {spec.shape}"
+    assert got.shape == spec.shape, "another shape"
     inside = _crossed(spec, x, y)
     assert (got < 0).sum() < 3 * (inside > 0).sum() + 9, "the beam says something of cells that it doesn't cross"
     to_border = 0.999 * inside.sum() / np.hypot(x, y)

@@ -37,8 +37,8 @@ def check_combine(combine: Callable) -> None:
         score = w @ np.log(np.maximum(p, 1e-4))
         wanted = np.exp(score - score.max())
         got = answer_array(combine(p, w))
-        assert np.isfinite(got).all(), f"not a number, for {frames} frames: add logarithms"
-        assert close(got, wanted / wanted.sum(), atol=1e-4), f"another belief, for {frames} frames of {classes} classes"
+        assert np.isfinite(got).all(), "not a number, for many frames: add logarithms"
+        assert close(got, wanted / wanted.sum(), atol=1e-4), "another belief, for other numbers of frames and classes"
 
 
 @hidden
@@ -54,8 +54,8 @@ def check_errors_last(errors_last: Callable) -> None:
         x, y = wrong[:, :-1].ravel() - wrong[:, :-1].mean(), wrong[:, 1:].ravel() - wrong[:, 1:].mean()
         r = (x * y).mean() / np.sqrt((x**2).mean() * (y**2).mean())
         got = answer_array(errors_last(wrong))
-        assert got.shape == (2,), f"two numbers are asked for, got shape {got.shape}"
-        assert close(got[:1], [r], atol=1e-3), f"another r, for {places} places and {frames} frames"
+        assert got.shape == (2,), "not two numbers"
+        assert close(got[:1], [r], atol=1e-3), "another r, for other numbers of places and frames"
         assert close(got[1:], [1 + (frames - 1) * (1 - r) / (1 + r)], rtol=1e-3, atol=1e-3), (
             "r is right, its worth isn't"
         )
@@ -72,7 +72,9 @@ def check_moved(moved: Callable) -> None:
         for r, c in np.ndindex(6, 8):
             inside = 0 <= r - ahead < 6 and 0 <= c - left < 8
             wanted[:, r, c] = grid[:, r - ahead, c - left] if inside else fill
-        assert close(answer_array(moved(grid, ahead, left, fill)), wanted), f"{ahead} ahead and {left} to the left"
+        assert close(answer_array(moved(grid, ahead, left, fill)), wanted), (
+            "a motion in another direction, or beyond the map"
+        )
 
 
 @hidden
@@ -89,7 +91,9 @@ def check_listen(listen: Callable) -> None:
         heard[standing] *= 1 - o[State.FREE]
         total = heard.sum(axis=0)
         wanted = np.where(total > 0, heard / np.where(total > 0, total, 1), 0.2)
-        assert close(answer_array(listen(p, o, standing)), wanted, atol=1e-4), f"another map, with standing {standing}"
+        assert close(answer_array(listen(p, o, standing)), wanted, atol=1e-4), (
+            "another map, with other classes that stand"
+        )
 
 
 @cache
@@ -109,11 +113,9 @@ def check_remember(maps: Callable) -> None:
     """Ten frames of the simulated drive, against one frame: nothing lost in view, much gained in cells seen before."""
     frames, (occupancy, grids, truth, since), spec = _driven()
     got = answer_array(maps(frames, occupancy, grids, spec))
-    assert got.shape == truth.shape, f"maps of shape {got.shape} for {len(frames)} frames"
+    assert got.shape == truth.shape, "maps of another shape, or for another number of frames"
     one = grids.argmax(axis=1)
     for name, cells, least in (("in view", since == 0, -0.5), ("seen before", since > 0, LEAST_GAIN)):
         counted = cells & (truth != IGNORE)
         gain = 100 * ((got == truth)[counted].mean() - (one == truth)[counted].mean())
-        assert gain > least, (
-            f"{name} {gain:+.1f} points against one frame on a drive that moves, {least:+g} are asked for"
-        )
+        assert gain > least, name + ": too few points against one frame, on a drive that moves"

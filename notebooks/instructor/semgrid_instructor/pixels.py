@@ -37,7 +37,7 @@ def check_scales(what_was_done: Callable) -> None:
     for _ in range(6):
         K, K_new, done = _cut_and_resized(rng)
         got = answer_array(what_was_done(K, K_new)).ravel()
-        assert got.shape == (4,), f"{got.size} numbers instead of four"
+        assert got.shape == (4,), "not four numbers"
         assert close(got[2:], done[2:]), "wrong scales (images can grow, too)"
 
 
@@ -48,7 +48,7 @@ def check_cut(what_was_done: Callable) -> None:
     for _ in range(10):
         K, K_new, done = _cut_and_resized(rng)
         got = answer_array(what_was_done(K.copy(), K_new.copy())).ravel()
-        assert got.shape == (4,), f"{got.size} numbers instead of four"
+        assert got.shape == (4,), "not four numbers"
         assert close(got[:2], done[:2], atol=1e-4), (
             "wrong cut (a negative one adds a border; cuts need not be whole pixels)"
         )
@@ -61,7 +61,7 @@ def check_now_from_before(now_from_before: Callable) -> None:
     for _ in range(5):
         now, before = (rigid_transform(Rotation.random(rng=rng).as_matrix(), rng.uniform(-50, 50, 3)) for _ in range(2))
         got = answer_array(now_from_before(now.copy(), before.copy()))
-        assert got.shape == (4, 4), f"shape {got.shape} instead of (4, 4)"
+        assert got.shape == (4, 4), "another shape"
         wanted = invert_rigid(now) @ before
         assert close(got[:3, :3], wanted[:3, :3]), "wrong rotation (a car also pitches and rolls)"
         assert close(got, wanted), "wrong shift"
@@ -103,9 +103,11 @@ def check_shown(shown: Callable) -> None:
             continue
         judged += 1
         got = answer_array(shown(x, top, z_cam, delta))
-        assert got.shape == (len(x),), f"shape {got.shape} instead of {(len(x),)}"
+        assert got.shape == (len(x),), "another shape"
         which = "above" if delta > z_cam else "below"
-        assert np.array_equal(got, wanted), f"a wrong wall, on a plane {which} the camera (walls may be higher than it)"
+        assert np.array_equal(got, wanted), (
+            "a wrong wall, on a plane " + which + " the camera (walls may be higher than it)"
+        )
 
 
 @hidden
@@ -121,7 +123,7 @@ def check_best_plane(best_plane: Callable) -> None:
             continue
         judged += 1
         got = answer_array(best_plane(x, top, z_cam, heights)).ravel()
-        assert got.shape == (1,), f"{got.size} numbers instead of one"
+        assert got.shape == (1,), "not one number"
         assert got[0] in range(10), "it isn't the number of a plane"
         assert in_place[int(got[0])] == max(in_place), "another plane shows more cells in place"
         assert got[0] == np.argmax(in_place), "an earlier plane is as good"
@@ -137,7 +139,7 @@ def check_heights_of(heights_of: Callable) -> None:
         delta = z_cam * rng.uniform(low, high)
         x, x_drawn = rng.uniform(3, 50, size=(2, n))
         z = answer_array(heights_of(x, x_drawn, z_cam, delta))
-        assert z.shape == (n,), f"shape {z.shape} instead of {(n,)}"
+        assert z.shape == (n,), "another shape"
         camera = Camera(_intrinsics(rng), rigid_transform(AXES, np.zeros(3)), (100, 300), lidar_height=z_cam)
         there = np.stack([np.stack([a, 0 * a, b], axis=1) for a, b in ((x, z), (x_drawn, np.full(n, delta)))])
         seen, drawn = project(transform_points(camera.T_camera_from_grid, there), camera)[0]
@@ -152,7 +154,7 @@ def check_impossible(heights_of: Callable) -> None:
     for n in (1, 9):
         x, x_drawn = rng.uniform(3, 50, size=(2, n))
         alone = answer_array(heights_of(x, x_drawn, 1.5, 0.3))
-        assert alone.shape == (n,), f"shape {alone.shape} instead of {(n,)}"
+        assert alone.shape == (n,), "another shape"
         assert np.isfinite(alone).all(), "NaN where a height is possible"
         assert n == 1 or np.ptp(alone) > 0, "all have the same height"
         never = np.concatenate([x_drawn, [np.nan, 0.0, -1e-3, -40.0]])
@@ -161,11 +163,11 @@ def check_impossible(heights_of: Callable) -> None:
         assert np.isnan(got[n:]).all(), "a height for what is drawn nowhere, at the camera or behind it"
 
 
-def _faults(rng: np.random.Generator) -> list[tuple[tuple, int, float]]:
-    """Return what is given, the fault and the amount: each fault twice, with pixels a tenth of a pixel wrong."""
+def _faults(rng: np.random.Generator, least: float, noise: float) -> list[tuple[tuple, int, float]]:
+    """Return what is given, the fault and the amount, at least so large: each fault twice, pixels with noise."""
     cases = []
     for fault in (0, 1, 2, 3) * 2:
-        camera, amount = _camera(rng), rng.choice([-1, 1]) * rng.uniform(0.4, 1.8)
+        camera, amount = _camera(rng), rng.choice([-1, 1]) * round(rng.uniform(least, 1.8), 2)
         x = rng.uniform(5, 30, 200)
         points = np.stack([x, x * rng.uniform(-0.7, 0.7, 200), rng.uniform(-1.7, 2.0, 200)], axis=1)
         K, T = camera.K, camera.T_camera_from_lidar
@@ -173,7 +175,7 @@ def _faults(rng: np.random.Generator) -> list[tuple[tuple, int, float]]:
         K_true = K - amount * np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]]) if fault == 0 else K
         T_true = rigid_transform(turn, np.zeros(3)) @ T if fault in (1, 2) else T
         seen = transform_points(T_true, points) @ K_true.T
-        pixels = seen[:, :2] / seen[:, 2:] + rng.normal(0, 0.1, (200, 2))
+        pixels = seen[:, :2] / seen[:, 2:] + rng.normal(0, noise, (200, 2))
         cases.append(((points, pixels, K, invert_rigid(T) if fault == 3 else T), fault, 0.0 if fault == 3 else amount))
     return cases
 
@@ -182,20 +184,21 @@ def _faults(rng: np.random.Generator) -> list[tuple[tuple, int, float]]:
 @keeping
 def check_fault(find_fault: Callable) -> None:
     """Judge the kind of fault, with pixels that are not quite right."""
-    for given, fault, _ in _faults(generator(58)):
+    for given, fault, _ in _faults(generator(58), least=0.4, noise=0.1):
         got = answer_array(find_fault(*given)).ravel()
-        assert got.shape == (2,), f"{got.size} numbers instead of two"
+        assert got.shape == (2,), "not two numbers"
         assert got[0] == fault, "the wrong fault (clicks are a tenth of a pixel wrong; a yaw looks nearly like a shift)"
 
 
 @hidden
 @keeping
 def check_amount(find_fault: Callable) -> None:
-    """Judge the amount of the fault."""
-    for given, _, amount in _faults(generator(59)):
-        got = answer_array(find_fault(*given)).ravel()
-        assert got.shape == (2,), f"{got.size} numbers instead of two"
-        assert close(got[1], amount, rtol=0, atol=0.05), "the wrong amount"
+    """Judge the amount of the fault: where clicks are exact, one per cent off is three times what is allowed."""
+    for least, noise, allowed in ((0.4, 0.1, 0.05), (1.2, 0, 0.004)):
+        for given, _, amount in _faults(generator(59), least, noise):
+            got = answer_array(find_fault(*given)).ravel()
+            assert got.shape == (2,), "not two numbers"
+            assert close(got[1], amount, rtol=0, atol=allowed), "the wrong amount"
 
 
 @hidden
@@ -208,16 +211,16 @@ def check_repaired(repaired: Callable) -> None:
         in_view = project(transform_points(frame.camera.T_camera_from_lidar, frame.points[:, :3]), frame.camera)[1]
         points = rng.permutation(np.asarray(frame.points[in_view, :3], float))[:400]
         for fault in range(4):
-            amount = rng.choice([-1, 1]) * rng.uniform(0.4, 1.8)
+            amount = rng.choice([-1, 1]) * round(rng.uniform(1.2, 1.8), 2)
             K_true, T_true = frame.camera.K, frame.camera.T_camera_from_lidar
             pixels = _pixels(points, K_true, T_true)
             K, T = _with_fault(K_true, T_true, fault, amount)
             got = repaired(points[:70], pixels[:70], K, T, lambda *_, told=(fault, amount): told)
-            assert len(got) == 2, f"{len(got)} results instead of two"
+            assert len(got) == 2, "not two numbers"
             K_got, T_got = (answer_array(one) for one in got)
             assert (K_got.shape, T_got.shape) == ((3, 3), (4, 4)), "wrong shapes"
             off = np.abs(_pixels(points[70:], K_got, T_got) - pixels[70:]).max()
-            assert off < 1, "a return that nobody clicked is seen more than a pixel from where it is"
+            assert off < 0.004, "a return that nobody clicked is seen 0.004 pixels or more from where it is"
 
 
 def _pixels(points: NDArray, K: NDArray, T: NDArray) -> NDArray:

@@ -79,7 +79,7 @@ def check_maxima(max_pool: Callable) -> None:
         got = max_pool(maps.copy(), kernel, stride)
         pooled = answer_array(got if isinstance(got, np.ndarray) and got.ndim == 3 else got[0])
         expected = _pool(maps, kernel, stride)[0]
-        assert pooled.shape == expected.shape, f"wrong shape of the maxima, kernel {kernel}, stride {stride}"
+        assert pooled.shape == expected.shape, "wrong shape of the maxima, with other kernels and strides"
         assert close(pooled, expected), "wrong maxima (a map may be negative everywhere)"
 
 
@@ -88,9 +88,7 @@ def check_indices(max_pool: Callable) -> None:
     """Other maps, kernels and strides."""
     for maps, kernel, stride in _maps_to_pool(74):
         indices = answer_array(max_pool(maps.copy(), kernel, stride)[1])
-        assert np.array_equal(indices, _pool(maps, kernel, stride)[1]), (
-            f"wrong indices, kernel {kernel}, stride {stride}"
-        )
+        assert np.array_equal(indices, _pool(maps, kernel, stride)[1]), "wrong indices, with other kernels and strides"
 
 
 @hidden
@@ -106,6 +104,10 @@ def check_unpool(unpool: Callable) -> None:
         pairs = zip(indices.reshape(len(maps), -1), values.reshape(len(maps), -1), strict=True)
         expected = [np.bincount(places, weights, maps[0].size) for places, weights in pairs]
         assert close(got, np.reshape(expected, maps.shape)), "a value isn't where its index says, or isn't what it was"
+
+
+OF_LAYERS = {"middle": "other numbers of channels", "plain": "other kernels and rates"}
+"""What differs in the cases of `_check_layer`, by their kind."""
 
 
 def _layer(maps: NDArray, kernels: NDArray, bias: NDArray, stride: int, rate: int) -> NDArray:
@@ -129,9 +131,8 @@ def _check_layer(atrous: Callable, seed: int, cases: tuple, kind: str) -> None:
         got = answer_array(atrous(maps.copy(), kernels.copy(), bias.copy(), stride, rate))
         if kind == "plain" and got.shape[-2:] == expected.shape[-2:] and got.size == expected.size:
             got = got.reshape(expected.shape)
-        which = f"{shape[0]} inputs, {n_outputs} outputs, N {size}, stride {stride}, rate {rate}"
-        assert got.shape == expected.shape, f"wrong shape with {which}"
-        assert close(got, expected), f"wrong with {which}"
+        assert got.shape == expected.shape, "wrong shape with " + OF_LAYERS[kind]
+        assert close(got, expected), "wrong with " + OF_LAYERS[kind]
 
 
 @hidden
@@ -157,8 +158,8 @@ def check_stride(atrous: Callable) -> None:
         full, got = (answer_array(atrous(maps.copy(), kernels.copy(), np.zeros(1), s, rate)) for s in (1, stride))
         wanted = full[..., ::stride, ::stride]
         assert full.size == 1 or np.ptp(full) > 0, "all outputs are the same"
-        assert got.shape == wanted.shape, f"wrong shape with stride {stride}, N {size}, rate {rate}"
-        assert close(got, wanted), f"not every output number {stride} of stride 1, with N {size}, rate {rate}"
+        assert got.shape == wanted.shape, "wrong shape with another stride"
+        assert close(got, wanted), "not the outputs of stride 1 at every step of the stride"
 
 
 def _pooling(kind: int, depth: int, weight: float) -> Callable:

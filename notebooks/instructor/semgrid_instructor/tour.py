@@ -34,7 +34,7 @@ def check_bayes_update(bayes_update: Callable) -> None:
     belief[:, 3, 6] = [0, 1, 0, 0]
     likelihood = rng.uniform(0.05, 1, size=belief.shape)
     got = answer_array(bayes_update(belief.copy(), likelihood.copy()))
-    assert got.shape == belief.shape, f"shape {got.shape} instead of {belief.shape}"
+    assert got.shape == belief.shape, "another shape"
     assert close(got.sum(axis=0), 1), "the states of some cells don't sum to 1"
     assert close(got[:, 3, 6], belief[:, 3, 6]), "a cell that is certain must stay certain"
     product = belief * likelihood
@@ -60,7 +60,7 @@ def check_pixel_of(pixel_of: Callable) -> None:
     expected, _ = project(transform_points(T_camera_from_grid, points), camera)
     got = np.array([answer_array(pixel_of(point, K, T_camera_from_grid)) for point in points])
     assert got.shape == expected.shape, "return two numbers, u and v"
-    assert close(got, expected, atol=1e-3), f"off by up to {np.abs(got - expected).max():.2g} pixels"
+    assert close(got, expected, atol=1e-3), "other pixels"
 
 
 @hidden

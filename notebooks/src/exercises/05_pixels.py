@@ -356,7 +356,8 @@ _test()
 # | `YAW` | the transform is `turned(T_camera_from_lidar, "y", amount)` | degrees, -2 to 2 |
 # | `INVERSE` | the transform is the inverse of `T_camera_from_lidar` | 0 |
 #
-# Complete `find_fault`: it returns two numbers, the fault and its amount. The fault is worth two points, the amount two (to 0.05 pixels or degrees). A yaw
+# Complete `find_fault`: it returns two numbers, the fault and its amount. The fault is worth two points, the amount two. It is a multiple of 0.01 and must be right to 0.001
+# pixels or degrees where the clicks are exact; where they are a tenth of a pixel wrong, to 0.05. A yaw
 # moves nearly all pixels by the same amount, like a shift: so don't look at the mean alone. Try each fault, and see which one leaves the smallest error.
 # `project_points` and `turned` below are yours to use.
 
@@ -444,13 +445,13 @@ def _test():
     for given, (fault, amount) in zip(*_faulty(), strict=True):
         got = answer_array(find_fault(*(a.copy() for a in given)), "find_fault").ravel()
         assert got.shape == (2,), f"return two numbers, the fault and its amount; got {got}"
-        assert amount == 0 or not np.isclose(got[1], -amount, atol=0.05), (
+        assert amount == 0 or not np.isclose(got[1], -amount, rtol=0.1), (
             f"fault {fault}, amount {got[1]:g}: the sign is turned. The table says what is TRUE, and the calibration is wrong"
         )
         radians = amount != 0 and fault != SHIFT and np.isclose(got[1], np.radians(amount), rtol=0.1)
         assert not radians, f"fault {fault}, amount {got[1]:g}: the amount is asked for in degrees"
-        assert np.isclose(got[1], amount, atol=0.05), (
-            f"fault {fault}: the amount is {amount:g}, and you find {got[1]:g}"
+        assert np.isclose(got[1], amount, rtol=0, atol=0.0015), (
+            f"fault {fault}: the amount is {amount:g}, and you find {got[1]:.3f}"
         )
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import pixels
@@ -469,7 +470,7 @@ _test()
 # the true `T_camera_from_lidar`, `(4, 4)`. Let `find` tell you the fault and its amount; it is your `find_fault` unless something else is handed over, as the tests do, which
 # know the fault. Undo it; the table of task 5 says what is true. Leave the arguments as they are.
 #
-# The tests take LIDAR returns of the simulated street and of the real one, and ask that your camera sees each within a pixel of where it is.
+# The tests take LIDAR returns of the simulated street and of the real one, and ask that your camera sees each within 0.004 pixels of where it is.
 
 
 # %% nbgrader={"grade": false, "grade_id": "repaired", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -525,8 +526,8 @@ def _test():
         assert after < before or fault == 3, (
             f"fault {name}: it has grown, from {before:.1f} to {after:.1f} pixels. The table says what is TRUE: turn by the amount"
         )
-        assert after < 1, (
-            f"fault {name}: a return is seen up to {after:.1f} pixels from where it is; before, {before:.1f}"
+        assert after < 0.004, (
+            f"fault {name}: a return is seen up to {after:.3f} pixels from where it is; before, {before:.1f}"
         )
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import pixels

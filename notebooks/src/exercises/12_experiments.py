@@ -290,16 +290,17 @@ def _test():
     a = _of_cells((90, 140, 40, 60), (100, 200, 50, 100))  # 330 of 450
     b = _of_cells((88, 134, 39, 58), (100, 200, 50, 100))  # 319 of 450: the difference is 11/450 = 0.0244
     got = _three(paired_interval(a.copy(), b.copy(), pixel_accuracy), "paired_interval")
-    wanted = [0.01127, 0.02444, 0.03762]
-    if not np.allclose(got, wanted, atol=2e-4):
+    # By deviations from their mean, or from the score of all drives.
+    wanted = [[0.011275, 0.024444, 0.037614], [0.011145, 0.024444, 0.037744]]
+    if not any(np.allclose(got, one, rtol=0, atol=4e-5) for one in wanted):
         # What is wrong in your task 3 has cost its points there, and costs none here.
         own = _by_own_jackknife(town_interval, a, b)
         if not np.allclose(got, own) or got[0] == got[2]:
             _explain_paired(*got)
-            right, half = np.isclose(got[1], 0.02444, atol=2e-4), (got[2] - got[0]) / 2
+            right, half = np.isclose(got[1], 0.02444, atol=4e-5), (got[2] - got[0]) / 2
             assert right, f"the difference is {got[1]:.4f}; by hand 11/450 = 0.0244"
-            assert np.isclose(half, 0.01317, atol=2e-4), f"it reaches {half:.4f} to each side; expected 0.0132"
-            assert np.allclose(got, wanted, atol=2e-4), "the interval isn't symmetric around the difference"
+            assert np.isclose(half, 0.01317, rtol=0, atol=4e-5), f"it reaches {half:.5f} to each side; expected 0.01317"
+            assert np.allclose(got, wanted[0], rtol=0, atol=4e-5), "the interval isn't symmetric around the difference"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import experiments
 

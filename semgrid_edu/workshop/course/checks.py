@@ -45,6 +45,7 @@ COMPANION_RULES = {name: rule for name, rule in RULES.items() if name != "length
 MACHINE = re.compile(r"(?<![\w.:/<])(?:/(?:home|root|tmp|work|usr|opt|mnt|srv|private|Users)/|[A-Z]:\\\\)\S*")
 ADDRESS = re.compile(r"\bat 0x[0-9a-f]{6,}\b")
 BARE = re.compile(r"(allclose|isclose|almost_equal|approx_equal)\(")
+QUOTES = re.compile(r"""(?<!["\w])f"[^"]* """)
 LINK = re.compile(r"\]\((?!https?:|#|mailto:)([^)#\s]+)[^)]*\)")
 
 
@@ -93,7 +94,9 @@ def exercise_problems(source: Path) -> list[str]:
 
 
 def instructor_problems(folder: Path) -> list[str]:
-    """List the lines of hidden tests that compare by numpy's `allclose`, which finds nothing wrong with an empty array.
+    """List the lines of hidden tests that numpy's `allclose` lets pass with an empty array, or that quote values.
+
+    A sentence that quotes a result may quote an input, since an answer can return one.
 
     Parameters
     ----------
@@ -103,8 +106,16 @@ def instructor_problems(folder: Path) -> list[str]:
     lines = [
         (path.name, line) for path in sorted(folder.glob("[!_]*.py")) for line in path.read_text("utf-8").splitlines()
     ]
-    says = "compare by `close` of semgrid_instructor, which demands equal shapes that aren't empty"
-    return [f"instructor/{name}: `{line.strip()}`: {says}" for name, line in lines if BARE.search(line)]
+    rules = {
+        BARE: "compare by `close` of semgrid_instructor, which demands equal shapes that aren't empty",
+        QUOTES: "a sentence of a hidden test quotes no values",
+    }
+    return [
+        f"instructor/{name}: `{line.strip()}`: {says}"
+        for name, line in lines
+        for rule, says in rules.items()
+        if rule.search(line)
+    ]
 
 
 def course_problems(folder: Path = NOTEBOOKS) -> list[str]:

@@ -19,7 +19,7 @@ from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 from semgrid_edu.workshop.course.sandbox import linux, taken
 from semgrid_edu.workshop.course.sandbox.limits import PARTS, Limits, _all_but
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
-from semgrid_edu.workshop.course.sandbox.taken import namespace_of
+from semgrid_edu.workshop.course.sandbox.taken import namespace_of, processes_in
 
 needs_landlock = pytest.mark.skipif(not linux.landlock_version(), reason="this system has no Landlock")
 
@@ -167,6 +167,76 @@ def test_all_files_together_have_an_end(session, code):
     assert session.run(f"{code}\nimport time; time.sleep(60)")["error"]["kind"] == "AnswerEndedError"
 
 
+TOGETHER = {
+    "deleted files": """
+kept = []
+for k in range(20):
+    kept.append(open(f"{k}", "wb"))
+    os.remove(f"{k}")
+    kept[-1].write(bytes(2_000_000))
+    kept[-1].flush()
+""",
+    "deleted files, mapped": """
+kept = []
+for k in range(5):
+    with open(f"{k}", "w+b") as file:
+        file.write(bytes(9_000_000))
+        kept.append(mmap.mmap(file.fileno(), 4096))
+    os.remove(f"{k}")
+""",
+    "memory of children": """
+for _ in range(4):
+    if os.fork() == 0:
+        kept = bytearray(b"1" * 300_000_000)
+        time.sleep(60)
+""",
+    "shared memory": "kept = [mmap.mmap(-1, 300_000_000) for _ in range(2)]\n"
+    "for _ in range(5):\n    if os.fork() == 0:\n        mine = mmap.mmap(-1, 300_000_000)\n"
+    "        mine[:] = bytes(300_000_000)\n        time.sleep(60)",
+}
+"""What a process takes with its children, each of them within its limits: 30 MB of files, 1000 MB of memory."""
+
+
+@pytest.mark.parametrize("kind", TOGETHER)
+def test_what_all_its_processes_take_has_an_end(session, kind):
+    session.run("import mmap, os, time")
+    if not session.process.namespace:
+        pytest.skip("this system can't tell a student's processes from others")
+    session.timeout = 60
+    assert session.run(f"{TOGETHER[kind]}\ntime.sleep(60)")["error"]["kind"] == "AnswerEndedError"
+
+
+def test_children_within_the_limits_live_on(session):
+    code = "import os, time\nif os.fork() == 0:\n    kept = bytearray(b'1' * 10**8)\n    time.sleep(3)\n    os._exit(0)"
+    assert "error" not in session.run(f"{code}\nos.wait()")
+
+
+HIDES_PROCESSES = {
+    "a namespace": "libc.syscall({clone}, 0x10000000 | 17, 0, 0, 0, 0)",
+    "a namespace by another call": "libc.syscall(435, ctypes.create_string_buffer(88), 88)",
+    "not dumped": "libc.prctl(4, 0, 0, 0, 0)",
+}
+
+
+@pytest.mark.parametrize("kind", HIDES_PROCESSES)
+def test_no_process_can_hide_from_those_who_count(limited, kind):
+    refused_if = linux.PROCESSORS.get(platform.machine(), {}).get("refused_if")
+    clone = refused_if["namespaces"]["call"] if refused_if else 0
+    call = HIDES_PROCESSES[kind].format(clone=clone)
+    got = limited(f"(ctypes := __import__('ctypes'), libc := ctypes.CDLL(None), {call})[-1]", "network")
+    assert got == ("value", -1)
+
+
+def test_the_last_process_has_ended_when_it_is_stopped(session):
+    session.run(
+        "import subprocess\nmany = [subprocess.Popen(['sleep', '60'], start_new_session=True) for _ in range(20)]"
+    )
+    process = session.process
+    assert not process.namespace or len(processes_in(process.namespace)) >= 21
+    session.stop()
+    assert processes_in(process.namespace) == []
+
+
 def test_a_folder_that_cannot_be_listed_is_gone_afterwards(session):
     session.run(
         "import os\nfor k in range(1500):\n    os.mkdir('d')\n    os.chdir('d')\nos.chdir(os.environ['HOME'])\n"
@@ -210,7 +280,7 @@ ENDS_FIRST = """
 import os, sys, tempfile, threading
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
-from semgrid_edu.workshop.course.sandbox.taken import namespace_of
+from semgrid_edu.workshop.course.sandbox.taken import namespace_of, processes_in
 tempfile.tempdir = sys.argv[1]
 process = StudentProcess(Limits())
 threading.Timer(2, os._exit, [9]).start()

@@ -1,10 +1,14 @@
 """A test cell, run here, of answers that work elsewhere: what it may look up, and what belongs below it."""
 
 import pytest
+from nbformat.v4 import new_code_cell, new_notebook
 
 from semgrid_edu.workshop.course.nbgrader.preprocessors import use_instructor
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
-from semgrid_edu.workshop.course.sandbox.notebook import TestCells
+from semgrid_edu.workshop.course.sandbox.limits import Limits
+from semgrid_edu.workshop.course.sandbox.notebook import TestCells, run_submission
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess
+from semgrid_edu.workshop.course.sandbox.session import NoProcessError
 
 
 @pytest.fixture
@@ -43,10 +47,59 @@ def test_an_error_shows_its_line_and_a_hidden_one_does_not(tests):
 def test_what_an_answer_printed_is_shown_and_what_a_test_prints_is_not(session, tests):
     session.run("def f():\n    print('mine')")
     (output,) = tests.test("print('secret')\nf()", "one")
-    assert output.text == "mine\n"
+    assert output.text == "your code printed:\nmine\n"
 
 
 def test_names_of_the_student_never_stand_for_those_of_the_instructor(session, tests):
     session.run("def len(x):\n    return 0\nlimit = 1")
     tests.prepare("limit = 7")
     assert tests.test("assert len('ab') == 2 and limit == 7", "one") == []
+
+
+WAITS = """
+import semgrid_instructor
+heard = []
+@semgrid_instructor.hidden
+def check(answer):
+    heard.append(answer(98765))
+    assert heard[-1] != 98765, "wrong"
+"""
+
+
+def test_a_hidden_part_waits_until_the_seen_process_has_ended(prepared):
+    use_instructor(NOTEBOOKS / "instructor")
+    started = []
+
+    def start():
+        started.append(StudentProcess(Limits(memory=1000), prepared))
+        return started[-1]
+
+    alive = []
+    cells = {"helpers": WAITS, "test": "complaint = check(f)\nassert not complaint, complaint"}
+    marked = {"solution": False, "locked": True, "schema_version": 3, "task": False}
+    notebook = new_notebook(cells=[new_code_cell("def f(x):\n    return x")])
+    for name, source in cells.items():
+        about = marked | {"grade_id": name, "grade": name == "test"}
+        notebook.cells.append(new_code_cell(source, metadata={"nbgrader": about}))
+    notebook.cells.append(new_code_cell("def f(x):\n    return x + 1"))
+    seen = StudentProcess.ask
+
+    def ask(process, message, deadline, callbacks=None):
+        if 98765 in message.get("arguments", ()):
+            alive.extend(one for one in started if one is not process and one.process.poll() is None)
+        return seen(process, message, deadline, callbacks)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(StudentProcess, "ask", ask)
+        run_submission(notebook, cells, start, 10)
+    (output,) = notebook.cells[2].outputs
+    assert output.evalue == "f, on inputs you haven't seen: wrong", "by the cells above the test, not the last one"
+    assert (len(started), alive) == (2, [])
+
+
+def test_no_hidden_part_reaches_the_process_that_the_student_sees(session):
+    session.run("def f(x):\n    return x")
+    f = session.names(["f"], session)["f"]
+    session.close()
+    with pytest.raises(NoProcessError):
+        f(1)

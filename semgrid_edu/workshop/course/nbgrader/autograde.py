@@ -10,7 +10,7 @@ from pathlib import Path
 from nbformat import NotebookNode
 from nbgrader.api import InvalidEntry
 from nbgrader.utils import is_solution
-from sqlalchemy.exc import DatabaseError, SAWarning
+from sqlalchemy.exc import SAWarning
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.reading import read_json
@@ -21,12 +21,13 @@ from semgrid_edu.workshop.course.notebooks.build import read_percent
 PATIENCE = 10
 """How often a submission is tried when another process keeps its grades from being written."""
 
-NOT_THE_FILE = (DataError, DatabaseError, InvalidEntry, KeyboardInterrupt, MemoryError, OSError)
-"""Errors of the machine, the gradebook, the reference answers and whoever interrupts: no submission causes them."""
+
+class UnfitError(Exception):
+    """A file can't be graded, whatever is in its answers. The text is shown to the student, so it quotes nothing."""
 
 
 class UngradedError(Exception):
-    """Grading failed for a reason that isn't the submission's: it has no grade, and can be graded another time."""
+    """Grading failed, and not as a file makes it fail: the submission has no grade, and can be graded another time."""
 
 
 @dataclass(frozen=True)
@@ -104,10 +105,10 @@ def autograde_one(
 
     Raises
     ------
-    DataError
-        When nbgrader could not grade this file completely: the 0 in its gradebook is then not a score.
+    UnfitError
+        When this file can't be graded: the 0 in its gradebook is then not a score.
     UngradedError
-        When it could not for a reason that isn't the file's, such as a full disk or a gradebook that stays locked.
+        When nbgrader failed in any other way, such as a full disk or a gradebook that stays locked.
     """
     with build.course_api(course) as api, warnings.catch_warnings():
         # nbgrader 0.9.6 builds a submission outside its database session.
@@ -120,10 +121,9 @@ def autograde_one(
             if result["success"] or not any(map(_may_pass, errors)):
                 break
     if not result["success"]:
-        reason = build.failure_reason(result, errors)
-        if not errors or isinstance(errors[-1], NOT_THE_FILE):
-            raise UngradedError(reason)
-        raise DataError(place(course, submitted, student, assignment), "a notebook that can be graded", reason)
+        if errors and isinstance(errors[-1], UnfitError):
+            raise errors[-1]
+        raise UngradedError(build.failure_reason(result, errors))
 
 
 def _may_pass(error: BaseException) -> bool:

@@ -280,6 +280,7 @@ def one_line(error: BaseException) -> str:
     error : BaseException
         The error.
     """
-    says = [*str(error).splitlines(), ""][0][:300]
+    # What a student has written may stand in it, and terminals obey some characters.
+    says = "".join(one if one.isprintable() else "?" for one in [*str(error).splitlines(), ""][0][:300])
     ours = type(error).__module__.startswith("semgrid_edu.")
     return says if ours else f"{type(error).__name__}: {says}".removesuffix(": ")

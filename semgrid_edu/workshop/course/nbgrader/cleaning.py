@@ -14,6 +14,9 @@ SHOWN_TAGS = (*bleach.ALLOWED_TAGS, *table_beside(__file__)["tags"])
 SHOWN_ATTRIBUTES: dict[str, str] = table_beside(__file__)["attributes"]
 """The pattern of an attribute's value, by its name, or by tag and name."""
 
+MACROS = re.compile(rf"\\({'|'.join(table_beside(__file__)['macros'])})\b")
+"""The macros of formulas that aren't shown, with their backslash."""
+
 MOST_TAGS = 1500
 """A text with more tags is shown as it was written: to clean it may take the square of their number."""
 
@@ -27,7 +30,7 @@ def without_scripts(html: str) -> str:
         What nbconvert made of Markdown. This function stands in for its filter `strip_files_prefix`, the last that
         nbgrader applies.
     """
-    html = strip_files_prefix(html)
+    html = MACROS.sub(r"\1", strip_files_prefix(html))
     if html.count("<") > MOST_TAGS:
         return f"<pre>{escape(html)}</pre>"
     protocols = {*bleach.ALLOWED_PROTOCOLS, "data"}

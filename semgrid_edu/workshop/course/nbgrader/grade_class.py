@@ -13,9 +13,14 @@ import nbformat
 from nbformat.v4 import new_markdown_cell
 from tqdm import tqdm
 
-from semgrid_edu.errors import DataError
 from semgrid_edu.workshop.course.nbgrader import gradebook as book
-from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError, autograde_one, place
+from semgrid_edu.workshop.course.nbgrader.autograde import (
+    GradeSettings,
+    UnfitError,
+    UngradedError,
+    autograde_one,
+    place,
+)
 from semgrid_edu.workshop.course.nbgrader.build import one_line
 from semgrid_edu.workshop.course.nbgrader.gradebook import Graded, submissions
 from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED, prepare, starter
@@ -184,14 +189,14 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
 
 
 def _graded_or_fault(course: Path, assignment: str, student: str, settings: GradeSettings) -> str:
-    """Grade a submission; return what is wrong with its file, "" when it has been graded."""
+    """Grade a submission; return what is wrong with its file, quoting nothing, "" when it has been graded."""
     path = place(course, "submitted", student, assignment)
     book.check_time(path)
     try:
         book.check_file(path)
         autograde_one(course, assignment, student, settings)
-    except DataError as error:
-        return error.args[2] if error.path == path else one_line(error)
+    except UnfitError as error:
+        return str(error)
     return ""
 
 

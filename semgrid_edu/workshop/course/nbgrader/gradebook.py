@@ -14,8 +14,8 @@ from nbgrader.utils import parse_utc
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
-from semgrid_edu.workshop.course.nbgrader.autograde import place
-from semgrid_edu.workshop.course.nbgrader.build import MARKER, one_line
+from semgrid_edu.workshop.course.nbgrader.autograde import UnfitError, place
+from semgrid_edu.workshop.course.nbgrader.build import MARKER
 from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED
 
 LARGEST = 100_000_000
@@ -104,27 +104,30 @@ def check_file(path: Path) -> None:
 
     Raises
     ------
-    DataError
+    UnfitError
         When it is no notebook, has thousands of cells or files, is huge with the files beside it, or comes with links,
-        which nbgrader would follow to other people's files.
+        which nbgrader would follow to other people's files, or with pipes and the like, on which it would wait.
     """
     folder = path.parent
-    if links := [one for one in (folder.parent, folder, *folder.rglob("*")) if one.is_symlink()]:
-        raise DataError(links[0].name, "a file or folder", "a link")
     files = [*folder.rglob("*")]
+    if any(one.is_symlink() for one in (folder.parent, folder, *files)):
+        raise UnfitError("it comes with a link in place of a file or folder")
+    if not all(one.is_file() or one.is_dir() for one in files) or not path.is_file():
+        raise UnfitError("it comes with a pipe, a device or a folder in place of a file")
     if len(files) > MOST:
-        raise DataError(path.name, f"at most {MOST} files and folders with it", len(files))
-    if (size := sum(one.lstat().st_size for one in files)) > LARGEST:
-        raise DataError(path.name, f"at most {LARGEST} bytes with all files beside it", size)
+        raise UnfitError(f"it comes with more than {MOST} files and folders")
+    if sum(one.lstat().st_size for one in files) > LARGEST:
+        raise UnfitError(f"it has more than {LARGEST} bytes with all files beside it")
     try:
         notebook = nbformat.read(path, as_version=4)
         nbformat.validate(notebook)
-    except OSError:
+        nbformat.writes(notebook).encode()
+    except (OSError, MemoryError):
         raise
     except Exception as error:
-        raise DataError(path.name, "a notebook", one_line(error)) from error
+        raise UnfitError(f"it is no notebook ({type(error).__name__})") from error
     if len(notebook.cells) > MOST:
-        raise DataError(path.name, f"at most {MOST} cells", len(notebook.cells))
+        raise UnfitError(f"it has more than {MOST} cells")
 
 
 def check_time(path: Path) -> None:

@@ -19,7 +19,7 @@ from traitlets import List as ListTrait
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.compiled import takes_files, user_cache
-from semgrid_edu.workshop.course.nbgrader.autograde import student_variant
+from semgrid_edu.workshop.course.nbgrader.autograde import UnfitError, student_variant
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import INSTRUCTOR, cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
@@ -27,8 +27,8 @@ from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 CRASHED = "Crashed: "
 """How a comment begins that says what ended Python."""
 
-KEPT = ("kernelspec", "language_info")
-"""What is kept of a notebook's metadata."""
+KEPT = ("kernelspec",)
+"""What is kept of a notebook's metadata; nbgrader replaces it by the exercise's."""
 
 CRASHES = "crashes"
 """The name under which `ExecuteApart` leaves for `NoteCrashes` what ended a student's process."""
@@ -99,7 +99,7 @@ def _recognise(cells: list[NotebookNode], answers: list[NotebookNode]) -> None:
             alike[-1].metadata["nbgrader"] = NotebookNode(grade_id=cell_name(answer))
             found += 1
     if not found:
-        raise ValueError("no cell of this exercise was recognised, so a person must read it")
+        raise UnfitError("no cell of this exercise was recognised, so a person must read it")
 
 
 def _defined(source: str) -> set[str]:

@@ -36,8 +36,11 @@ PROCESSORS = table_beside(__file__)
 NEWER = 467
 """From this number on calls are refused as by a system that doesn't know them: x86_64 has all once more from 2^30."""
 
-LOAD, EQUAL, AT_LEAST, RETURN = 0x20, 0x15, 0x35, 0x06
-"""The four instructions of the filter: load a word, compare it in two ways, and end."""
+LOAD, EQUAL, AT_LEAST, ANY_BIT, RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
+"""The five instructions of the filter: load a word, compare it in three ways, and end."""
+
+NUMBER, ARCHITECTURE, FIRST = 0, 4, 16
+"""Where the number of a call stands, its processor, and the low word of its first argument: struct seccomp_data."""
 
 ALLOW, IDLE, REFUSE, UNKNOWN = 0x7FFF0000, 0x00050000, 0x00050000 | errno.EPERM, 0x00050000 | errno.ENOSYS
 """The filter's verdicts: do it, do nothing and report success, or fail."""
@@ -131,10 +134,15 @@ def give_up_calls() -> bool:
     return library.prctl(SET_SECCOMP, FILTER, described, 0, 0) == 0
 
 
-def _filter(audit: int, refused: dict[str, int], idle: dict[str, int]) -> bytes:
+def _filter(audit: int, refused: dict[str, int], unknown: dict, idle: dict, refused_if: dict) -> bytes:
     """Return the filter's instructions: each has a code, how many to skip if it holds and if not, and a number."""
-    lines = [(LOAD, 0, 0, 4), (EQUAL, 1, 0, audit), (RETURN, 0, 0, REFUSE), (LOAD, 0, 0, 0)]
+    lines = [(LOAD, 0, 0, ARCHITECTURE), (EQUAL, 1, 0, audit), (RETURN, 0, 0, REFUSE), (LOAD, 0, 0, NUMBER)]
     lines += [(AT_LEAST, 0, 1, NEWER), (RETURN, 0, 0, UNKNOWN)]
-    for number, verdict in [*((n, REFUSE) for n in refused.values()), *((n, IDLE) for n in idle.values())]:
-        lines += [(EQUAL, 0, 1, number), (RETURN, 0, 0, verdict)]
+    for calls, verdict in ((refused, REFUSE), (unknown, UNKNOWN), (idle, IDLE)):
+        for number in calls.values():
+            lines += [(EQUAL, 0, 1, number), (RETURN, 0, 0, verdict)]
+    for call in refused_if.values():
+        compare = ANY_BIT if "bits" in call else EQUAL
+        lines += [(EQUAL, 0, 4, call["call"]), (LOAD, 0, 0, FIRST), (compare, 0, 1, call.get("bits") or call["value"])]
+        lines += [(RETURN, 0, 0, REFUSE), (LOAD, 0, 0, NUMBER)]
     return b"".join(struct.pack("HBBI", *line) for line in [*lines, (RETURN, 0, 0, ALLOW)])

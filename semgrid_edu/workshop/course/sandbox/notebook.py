@@ -28,8 +28,14 @@ INSTRUCTOR = "semgrid_instructor"
 MOST_PRINTED = 2000
 """Characters that are kept of what an answer printed while a test ran."""
 
+PRINTED = "your code printed:\n"
+"""What stands before that, so that it can't pass for the grader's words."""
+
 MOST_OUTPUT = 30_000_000
 """Characters that are kept of all outputs of a notebook."""
+
+STREAMS = "stdout", "stderr"
+"""The streams of a cell."""
 
 PICTURES, BASE64 = ("image/png", "image/jpeg"), re.compile(r"[A-Za-z0-9+/=\s]*")
 """The pictures that are kept, and how their data must look."""
@@ -72,15 +78,12 @@ def run_submission(
     """
     seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
     tests = TestCells(seen, unseen, variant)
-    room, ended = MOST_OUTPUT, {}
     try:
         _prepare(notebook, trusted, tests)
-        for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
-            cell.execution_count, seen.ended = number, ""
-            cell.outputs, room = _shortened(_outputs(cell, trusted, tests), room)
-            # A student's own error may have any name; what ended her process is told by the grader's side alone.
-            if seen.ended:
-                ended[cell_name(cell)] = seen.ended
+        ended = _run_seen(notebook, trusted, tests)
+        # Whatever the student is shown has been said, and nobody listens any more when the hidden inputs come.
+        seen.close()
+        _run_unseen(notebook, tests)
         return ended
     except NoProcessError as error:
         raise ChildProcessError(str(error)) from error
@@ -119,6 +122,7 @@ class TestCells:
         self.seen, self.unseen, self.variant = seen, unseen, variant
         self.names: dict[str, Any] = {"__name__": "__main__"}
         self.used: set[str] = set()
+        self.postponed: dict[str, list[Callable[[], str]]] = {}
 
     def prepare(self, source: str) -> None:
         """Run one of the instructor's cells that isn't a test, for what it imports and defines.
@@ -130,10 +134,12 @@ class TestCells:
         """
         code = compile(source, "<prepared>", "exec")
         self.used |= _global_names(code)
-        _run(code, self.names)
+        _run(lambda: exec(code, self.names))
 
     def test(self, source: str, name: str) -> list[NotebookNode]:
         """Run a test cell; return what belongs below it: what the answer printed, and the error that makes it fail.
+
+        Its hidden part waits for `judge`.
 
         Parameters
         ----------
@@ -149,20 +155,35 @@ class TestCells:
             answers = self._answers(self.used | _global_names(code))
         except ENDS as error:
             return [_as_output(error, file)]
-        import_module(INSTRUCTOR).choose_variant(*self.variant)
-        self.seen.printed = ""
-        for session in (self.seen, self.unseen):
-            session.begin()
+        self.seen.printed, self.seen.postponed = "", []
+        self.seen.begin()
         error = self._run_among(code, answers)
+        self.postponed[name] = self.seen.postponed if error is None else []
         printed = self.seen.printed[:MOST_PRINTED]
-        outputs = [new_output("stream", name="stdout", text=printed)] if printed else []
+        outputs = [new_output("stream", name="stdout", text=PRINTED + printed)] if printed else []
         return outputs + ([] if error is None else [_as_output(error, file)])
+
+    def judge(self, name: str) -> list[NotebookNode]:
+        """Run the hidden part of a test cell; return the sentence that makes it fail, as it belongs below the cell.
+
+        Parameters
+        ----------
+        name : str
+            The cell's grade_id.
+        """
+        import_module(INSTRUCTOR).choose_variant(*self.variant)
+        self.unseen.begin()
+        complaints: list[str] = []
+        error = _run(lambda: complaints.extend(check() for check in self.postponed.pop(name, [])))
+        if error is not None:
+            return [_as_output(error, "")]
+        return [_error("AssertionError", says) for says in complaints[:] if says][:1]
 
     def _run_among(self, code: CodeType, answers: dict[str, Any]) -> Exception | None:
         """Run a test in the namespace of the instructor's functions, which call answers too; then restore it."""
         before = dict(self.names)
         self.names.update(answers)
-        error = _run(code, self.names)
+        error = _run(lambda: exec(code, self.names))
         self.names.clear()
         self.names.update(before)
         return error
@@ -174,11 +195,11 @@ class TestCells:
         return self.seen.names(wanted, self.unseen)
 
 
-def _run(code: CodeType, names: dict[str, Any]) -> Exception | None:
-    """Run code quietly; return the error that ended it."""
+def _run(work: Callable[[], object]) -> Exception | None:
+    """Do something quietly; return the error that ended it."""
     with warnings.catch_warnings(), np.errstate(), redirect_stderr(io.StringIO()), redirect_stdout(io.StringIO()):
         try:
-            exec(code, names)
+            work()
         except Exception as error:
             return error
     return None
@@ -199,6 +220,27 @@ def _as_output(error: Exception, file: str) -> NotebookNode:
     return _error(kind, str(error), [*shown, *getattr(error, "__notes__", []), f"{kind}: {error}"])
 
 
+def _run_seen(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -> dict[str, str]:
+    """Run each cell, of tests what students can read; return what ended the student's process, by grade_id."""
+    room, ended = MOST_OUTPUT, {}
+    for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
+        cell.execution_count, tests.seen.ended = number, ""
+        cell.outputs, room = _shortened(_outputs(cell, trusted, tests), room)
+        # A student's own error may have any name; what ended her process is told by the grader's side alone.
+        if tests.seen.ended:
+            ended[cell_name(cell)] = tests.seen.ended
+    return ended
+
+
+def _run_unseen(notebook: NotebookNode, tests: TestCells) -> None:
+    """Run the hidden parts of tests in their order, each after the cells that stand above it."""
+    for cell in (c for c in notebook.cells if c.cell_type == "code"):
+        if is_grade(cell) and not is_solution(cell):
+            cell.outputs += tests.judge(cell_name(cell))
+        else:
+            tests.unseen.run_later(cell.source)
+
+
 def _prepare(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -> None:
     """Run the instructor's cells that aren't tests, in the course's order, whatever order the student gave them."""
     cells = {cell_name(cell): cell for cell in notebook.cells if cell.cell_type == "code"}
@@ -214,18 +256,19 @@ def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -
             return tests.test(cell.source, cell_name(cell))
         # Without an error nbgrader would give all points.
         return [_error("ValueError", "not the course's test")]
-    tests.unseen.run_later(cell.source)
     return _as_outputs(tests.seen.run(cell.source))
 
 
 def _as_outputs(reply: dict) -> list[NotebookNode]:
     """Return what a cell put out as a notebook holds it."""
-    streams = [new_output("stream", name=name, text=text) for name, text in reply["streams"].items() if text]
-    shown = [new_output("display_data", data=data) for data in map(_harmless, reply["shown"]) if data]
+    streams = [
+        new_output("stream", name=k, text=reply["streams"][k]) for k in STREAMS if reply.get("streams", {}).get(k)
+    ]
+    shown = [new_output("display_data", data=data) for data in map(_harmless, reply.get("shown", [])) if data]
     error = reply.get("error")
     if error is None:
         return streams + shown
-    return [*streams, *shown, _error(error["kind"], error["says"], error["traceback"])]
+    return [*streams, *shown, _error(error.get("kind", ""), error.get("says", ""), error.get("traceback", []))]
 
 
 def _harmless(shown: dict[str, str]) -> dict[str, str]:

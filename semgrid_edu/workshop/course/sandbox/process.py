@@ -17,20 +17,28 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.storage.files import atomic_path, table_beside
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.course.sandbox.limits import MEGABYTE, PARTS, Limits
+from semgrid_edu.workshop.course.sandbox.surroundings import (
+    PREPARED,
+    files_beside,
+    keep_compiled,
+    worker_environment,
+)
 from semgrid_edu.workshop.course.sandbox.taken import (
+    Sampled,
     count_tasks,
     delete_folder,
+    deleted_bytes,
+    memory_held,
     memory_of,
     namespace_of,
+    processes_below,
+    processes_in,
     takes_too_much,
 )
-from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES, MOST_INPUT, Wire, decode, encode
+from semgrid_edu.workshop.course.sandbox.values import MOST_INPUT, Wire, check_reply, decode, encode
 
 WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
 """What Python is started with."""
@@ -38,17 +46,14 @@ WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
 ALONE: tuple[str, ...] = table_beside(__file__)["alone"]
 """Starts a program that sees no network and no processes but its own, and ends with this one (util-linux)."""
 
-INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
-"""What a student's process inherits of the environment."""
-
-PREPARED = ".prepared"
-"""The folder of what is compiled already, in the folder of a process; no file that is handed in gets there."""
-
 WATCHED = 0.5
 """Seconds from one look at the files of a process to the next."""
 
 STARTED = 60.0
 """Seconds that a process may take to start."""
+
+ENDING = 5.0
+"""Seconds that the system may take to end a process."""
 
 
 class ProcessEndedError(Exception):
@@ -91,7 +96,7 @@ class StudentProcess:
         container: tuple[str, ...] = (),
         beside: Path | None = None,
     ) -> None:
-        self.prepared, self.keeps, self.contained = prepared, keeps, bool(container)
+        self.prepared, self.keeps, self.contained, self.namespace = prepared, keeps, bool(container), ""
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
         if prepared is not None:
             shutil.copytree(prepared, self.folder / PREPARED)
@@ -105,8 +110,9 @@ class StudentProcess:
         self.speaker.start()
         self.unlimited = self._greeted(limits, alone, container)
         if beside is not None:
-            self.ask({"do": "beside", "files": _files(beside)}, time.monotonic() + STARTED)
-        threading.Thread(target=self._watch, args=(limits, namespace_of(self.process.pid)), daemon=True).start()
+            self.ask({"do": "beside", "files": files_beside(beside)}, time.monotonic() + STARTED)
+        self.namespace = namespace_of(self.process.pid)
+        threading.Thread(target=self._watch, args=(limits,), daemon=True).start()
 
     def _started(self, command: Sequence[str]) -> subprocess.Popen:
         """Start the worker in a session of its own, with a pipe in each direction."""
@@ -151,22 +157,33 @@ class StudentProcess:
             except (OSError, ValueError, MemoryError):
                 self.received.put(None)  # the process is no more
 
-    def _watch(self, limits: Limits, namespace: str) -> None:
-        """End the process when it has too many processes, or when its files together become too large, or too many."""
-
-        def is_its_own(tasks: Path) -> bool:
-            return str((tasks.parent / "ns" / "pid").readlink()) == namespace
-
+    def _watch(self, limits: Limits) -> None:
+        """End the process when it, and what it has started, take too much together."""
+        most = memory_held(processes_in(self.namespace)) + limits.memory * MEGABYTE
         while self.process.poll() is None:
-            running = count_tasks(is_its_own) if namespace else 0  # else they can't be told from others
-            if running > limits.processes or takes_too_much(self.folder, 3 * limits.written * MEGABYTE):
+            try:
+                too_much = self._takes_more(limits, most)
+            except Exception:
+                too_much = True  # what can't be watched isn't let go on
+            if too_much:
                 self._kill()
             time.sleep(WATCHED)
 
+    def _takes_more(self, limits: Limits, memory: int) -> bool:
+        """Return whether there are too many processes, or their memory or files together are too large, or too many."""
+        running = processes_in(self.namespace)
+        if count_tasks(lambda tasks: tasks.parent in running) > limits.processes or memory_held(running) > memory:
+            return True
+        each = limits.written * MEGABYTE
+        return takes_too_much(self.folder, 3 * each - deleted_bytes(running, each))
+
     def _kill(self) -> None:
-        """End the process and those in its session."""
+        """End the process, those in its session, and those in its namespace, which may be in sessions of their own."""
         with suppress(OSError):
             os.killpg(self.process.pid, signal.SIGKILL) if hasattr(os, "killpg") else self.process.kill()
+        for place in processes_in(self.namespace):
+            with suppress(OSError):
+                os.kill(int(place.name), signal.SIGKILL)
 
     def ask(self, message: dict, deadline: float, callbacks: list[Callable] | None = None) -> dict[str, Any]:
         """Send a message and return the reply.
@@ -204,7 +221,9 @@ class StudentProcess:
             self.stop()
             raise TimeoutError from None
         try:
-            return dict(decode(received or b"", callbacks.__getitem__))
+            reply = dict(decode(received or b"", callbacks.__getitem__))
+            check_reply(reply)
+            return reply
         except (ArgumentError, TypeError, ValueError):
             self.stop()
             raise ProcessEndedError from None
@@ -214,25 +233,32 @@ class StudentProcess:
         try:
             outer = self.process.pid
             # In namespaces of its own the worker is the only child of the program that made them.
-            alone = namespace_of(outer)
-            self.inner = int(Path(f"/proc/{outer}/task/{outer}/children").read_text()) if alone else outer
+            self.inner = int(Path(f"/proc/{outer}/task/{outer}/children").read_text()) if self.namespace else outer
             Path(f"/proc/{self.inner}/clear_refs").write_text("5")
-            self.held = memory_of(self.inner)["RssAnon"]
+            self.held = memory_of(self.inner)["VmRSS"]
         except (OSError, ValueError, KeyError):
             return False
+        self.family = Sampled(self._with_children, memory_held([Path(f"/proc/{self.inner}")]) / MEGABYTE)
         return not self.contained
 
+    def _with_children(self) -> float:
+        """Return the megabytes that the process holds together with those that it has started, 0 without any."""
+        below = processes_below(self.inner)
+        return memory_held([Path(f"/proc/{self.inner}"), *below]) / MEGABYTE if below else 0
+
     def megabytes(self) -> float:
-        """Return the most memory that the process has held since `begin_measuring`, beyond what it held then."""
-        now = memory_of(self.inner)
-        # What is read of libraries meanwhile is nobody's array.
-        return (now["VmHWM"] - now["RssFile"] - now["RssShmem"] - self.held) / 1000
+        """Return the most memory that the process has held since `begin_measuring`, beyond what it held then.
+
+        What it maps of files counts, and what processes hold that it has started.
+        """
+        return max((memory_of(self.inner)["VmHWM"] - self.held) / 1000, self.family.growth())
 
     def stop(self) -> None:
         """End the process with all that it has started, and delete its folder."""
         self.sent.put(None)
         self._kill()
         self.process.wait()
+        self._wait_for_the_last()
         self.speaker.join(timeout=1)
         if not self.speaker.is_alive():
             for pipe in (self.process.stdin, self.process.stdout):
@@ -242,38 +268,11 @@ class StudentProcess:
             keep_compiled(self.folder / PREPARED, self.prepared)
         delete_folder(self.folder)
 
-
-def worker_environment(folder: Path) -> dict[str, str]:
-    """Return the environment of a worker: one thread for each library, and all caches in its own folder.
-
-    Parameters
-    ----------
-    folder : Path
-        The fresh folder of the process.
-    """
-    here = {name: str(folder / PREPARED) for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
-    here |= {name: str(folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
-    threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
-    # What is freed goes back at once, or else a measurement wouldn't see it taken again.
-    freed = dict.fromkeys(("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"), "1000000")
-    inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
-    return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | freed | inline
-
-
-def keep_compiled(source: Path, target: Path) -> None:
-    """Copy what was compiled to where others find it; nobody who reads an old file meanwhile gets half of a new one.
-
-    Parameters
-    ----------
-    source, target : Path
-        The two folders.
-    """
-
-    def replace_file(source: str, target: str) -> None:
-        with atomic_path(target) as path:
-            shutil.copyfile(source, path)
-
-    shutil.copytree(source, target, copy_function=replace_file, dirs_exist_ok=True)
+    def _wait_for_the_last(self) -> None:
+        """Wait until the system has ended all that the process has started, at most some seconds."""
+        until = time.monotonic() + ENDING
+        while processes_in(self.namespace) and time.monotonic() < until:
+            time.sleep(0.01)
 
 
 def _called(callbacks: list[Callable], reply: dict) -> dict[str, Any]:
@@ -288,13 +287,3 @@ def _called(callbacks: list[Callable], reply: dict) -> dict[str, Any]:
 def _can_be_alone() -> bool:
     """Return whether this system lets a program have namespaces of its own."""
     return bool(shutil.which(ALONE[0])) and not subprocess.run([*ALONE, "true"], capture_output=True).returncode
-
-
-def _files(folder: Path) -> dict[str, NDArray]:
-    """Return the files that lie beside a notebook: their bytes by their paths, as far as a message may hold them."""
-    found, room = {}, MOST_BYTES
-    for path in sorted(one for one in folder.rglob("*") if one.is_file() and not one.is_symlink()):
-        if path.suffix != ".ipynb" and PREPARED not in path.relative_to(folder).parts and path.stat().st_size <= room:
-            found[path.relative_to(folder).as_posix()] = np.fromfile(path, np.uint8)
-            room -= path.stat().st_size
-    return found

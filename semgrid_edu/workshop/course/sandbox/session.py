@@ -54,6 +54,8 @@ class Session:
         What the student's functions have printed since it was last emptied.
     ended : str
         What ended the process since the time of this cell began; "" when nothing did.
+    postponed : list of callable
+        Checks, () -> str, of what was asked to be judged later.
     """
 
     def __init__(self, start: Callable[[], StudentProcess], timeout: float, secret: bool = False) -> None:
@@ -62,6 +64,8 @@ class Session:
         self.cells: list[str] = []
         self.waiting: list[str] = []
         self.printed = ""
+        self.postponed: list[Callable[[], str]] = []
+        self.closed = False
         self.left_in_all = ALL * timeout
         self.begin()
 
@@ -192,6 +196,8 @@ class Session:
 
     def _alive(self) -> StudentProcess:
         """Return a process; without one, start it, and run in it the cells that ran before."""
+        if self.closed:
+            raise NoProcessError("a hidden test calls an answer whose output the student sees")
         if self.process is None:
             self._start_again()
         return self.process
@@ -214,6 +220,11 @@ class Session:
         if self.process is not None:
             self.process.stop()
             self.process = None
+
+    def close(self) -> None:
+        """End the process for good."""
+        self.stop()
+        self.closed = True
 
 
 class RemoteFunction:
@@ -241,6 +252,22 @@ class RemoteFunction:
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         """Call the function; parameters and result are those of `Session.call`."""
         return self.session.call(self.__name__, arguments, named, measured=False)[0]
+
+    def judge_later(self, check: Callable[[], str]) -> str:
+        """Keep a check of this answer until nothing more of its process is shown to the student.
+
+        Parameters
+        ----------
+        check : callable
+            () -> str, a complaint.
+
+        Returns
+        -------
+        str
+            "", no complaint so far.
+        """
+        self.session.postponed.append(check)
+        return ""
 
     def peak_megabytes(self, *arguments: Any) -> tuple[Any, float]:
         """Call the function, and return its result and how much memory it held, as `Session.call` does.

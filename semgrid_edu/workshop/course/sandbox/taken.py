@@ -4,12 +4,17 @@ import os
 import shutil
 import stat
 import subprocess
+import threading
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 MOST_FILES = 20_000
 """How many files and folders a process may have."""
+
+SAMPLED, LONGEST_SAMPLED = 0.01, 600.0
+"""Seconds between two looks at the memory of what a process has started, and the longest time of looking."""
 
 
 def namespace_of(pid: int) -> str:
@@ -58,6 +63,72 @@ def count_tasks(counts: Callable[[Path], bool]) -> int:
     return found
 
 
+def processes_in(namespace: str) -> list[Path]:
+    """Return `/proc/PID` of each process in a namespace.
+
+    Parameters
+    ----------
+    namespace : str
+        What `namespace_of` returned; without a name there are none, since they can't be told from others.
+    """
+    return [place for place in Path("/proc").glob("[0-9]*") if namespace and _link(place / "ns" / "pid") == namespace]
+
+
+def processes_below(pid: int) -> list[Path]:
+    """Return `/proc/PID` of each process that a process has started, and of those that these have.
+
+    Parameters
+    ----------
+    pid : int
+        The process.
+    """
+    found: list[Path] = []
+    for tasks in Path(f"/proc/{pid}/task").glob("[0-9]*"):
+        with suppress(OSError):
+            for child in map(int, (tasks / "children").read_text().split()):
+                found += [Path(f"/proc/{child}"), *processes_below(child)]
+    return found
+
+
+def memory_held(processes: list[Path]) -> int:
+    """Return the bytes of memory that some processes hold together, what they share counted once; not their files.
+
+    Parameters
+    ----------
+    processes : list of Path
+        `/proc/PID` of each.
+    """
+    kinds, held = ("Pss_Anon:", "Pss_Shmem:", "SwapPss:"), 0
+    for place in processes:
+        with suppress(OSError):
+            lines = map(str.split, (place / "smaps_rollup").read_text().splitlines())
+            held += sum(int(line[1]) for line in lines if line[0] in kinds)
+    return 1024 * held
+
+
+def deleted_bytes(processes: list[Path], each: int) -> int:
+    """Return the bytes on disk of files that were deleted, while some processes still have them open or mapped.
+
+    Parameters
+    ----------
+    processes : list of Path
+        `/proc/PID` of each.
+    each : int
+        What counts for a file of which the system doesn't tell the size.
+    """
+    sizes: dict[int, int] = {}
+    for place in processes:
+        with suppress(OSError):
+            mapped = [line.split(maxsplit=5) for line in (place / "maps").read_text(errors="replace").splitlines()]
+            sizes |= {int(line[4]): each for line in mapped if line[-1].endswith("(deleted)") and line[4] != "0"}
+            for opened in (place / "fd").iterdir():
+                with suppress(OSError):
+                    found = opened.stat()
+                    if stat.S_ISREG(found.st_mode) and not found.st_nlink:
+                        sizes[found.st_ino] = found.st_blocks * 512
+    return sum(sizes.values())
+
+
 def takes_too_much(folder: Path, most: int) -> bool:
     """Return whether the files in a folder take more bytes, are too many, or lie where nobody can look.
 
@@ -100,3 +171,31 @@ def delete_folder(folder: Path) -> None:
             subprocess.run([*command, "--", folder], capture_output=True, check=False)
     else:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+class Sampled:
+    """Looks at a number again and again, until somebody asks how far it has grown.
+
+    Parameters
+    ----------
+    look : callable
+        () -> float.
+    first : float
+        The number before.
+    """
+
+    def __init__(self, look: Callable[[], float], first: float) -> None:
+        self.look, self.first, self.most, self.ended = look, first, first, threading.Event()
+        self.thread = threading.Thread(target=self._sample, daemon=True)
+        self.thread.start()
+
+    def _sample(self) -> None:
+        until = time.monotonic() + LONGEST_SAMPLED
+        while not self.ended.wait(SAMPLED) and time.monotonic() < until:
+            self.most = max(self.most, self.look())
+
+    def growth(self) -> float:
+        """Return by how much the largest number exceeds the first, and stop."""
+        self.ended.set()
+        self.thread.join()
+        return max(self.most, self.look()) - self.first

@@ -35,6 +35,15 @@ MOST_JSON = 10_000_000
 MOST_KEYS = 20_000
 """Entries of a set or dict: keys that were chosen to collide take the square of their number to put in."""
 
+REPLIES: dict[str, type | tuple[type, ...]] = {
+    **dict.fromkeys(("result", "changed", "arguments", "named"), object),
+    **dict.fromkeys(("streams", "error", "values"), dict),
+    **dict.fromkeys(("done", "functions", "shown", "traceback"), list),
+    **dict.fromkeys(("callback", "number"), int),
+    "megabytes": float,
+}
+"""What the parts of a reply must be, by their names; all others are texts."""
+
 LONGEST = 25_000_000
 """Bytes of a message that the grader still reads."""
 
@@ -93,6 +102,27 @@ def decode(data: bytes, callback: Callable[[int], Callable] | None = None) -> An
         return _value(message["value"], arrays, callback)
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
         raise ArgumentError("data", "a message of plain values", f"{type(error).__name__}: {error}") from error
+
+
+def check_reply(reply: dict) -> None:
+    """Raise when a reply isn't made as `Worker` makes it: a student's code may have sent it.
+
+    Parameters
+    ----------
+    reply : dict
+        The reply.
+
+    Raises
+    ------
+    TypeError
+        When a part of it is of another type.
+    """
+    parts = [*reply.items(), *dict(reply.get("error", {})).items(), *dict(reply.get("streams", {})).items()]
+    shown = [one for data in list(reply.get("shown", [])) for one in dict(data).items()]
+    texts = [*shown, *(("", one) for name in ("functions", "traceback") for one in dict(parts).get(name, []))]
+    for name, value in [*parts, *texts]:
+        if not isinstance(value, REPLIES.get(name, str)):
+            raise TypeError(f"{name} of a reply is a {type(value).__name__}")
 
 
 def _tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | None) -> Any:

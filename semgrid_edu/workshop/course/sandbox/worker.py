@@ -27,6 +27,9 @@ MOST_TEXT = 20_000
 FORBIDDEN = "not allowed where answers are graded: pools of processes, the network, files outside the notebook's folder"
 """What is added to the error of a system that refuses."""
 
+MOST_OUTPUTS = 1000
+"""How many of the things that a cell displays are kept."""
+
 MOST_SHOWN = 5_000_000
 """Characters of all that a cell displays, pictures among it, that are kept."""
 
@@ -209,7 +212,7 @@ def _text(text: str) -> str:
 def _shown(outputs: list[RichOutput]) -> list[dict[str, str]]:
     """Return what was displayed, as far as it is text or a picture in text, and not too much."""
     kept, size = [], 0
-    for output in outputs:
+    for output in outputs[:MOST_OUTPUTS]:
         data = {kind: data for kind, data in output.data.items() if isinstance(data, str)}
         size += sum(map(len, data.values()))
         if size > MOST_SHOWN:

@@ -1,0 +1,66 @@
+"""What a student's process finds around it: environment, compiled functions, and files that were handed in."""
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.storage.files import atomic_path
+from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES
+
+INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
+"""What a student's process inherits of the environment."""
+
+PREPARED = ".prepared"
+"""The folder of what is compiled already, in the folder of a process; no file that is handed in gets there."""
+
+
+def worker_environment(folder: Path) -> dict[str, str]:
+    """Return the environment of a worker: one thread for each library, and all caches in its own folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The fresh folder of the process.
+    """
+    here = {name: str(folder / PREPARED) for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
+    here |= {name: str(folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
+    threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+    # What is freed goes back at once, or else a measurement wouldn't see it taken again.
+    freed = dict.fromkeys(("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"), "1000000")
+    inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
+    return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | freed | inline
+
+
+def keep_compiled(source: Path, target: Path) -> None:
+    """Copy what was compiled to where others find it; nobody who reads an old file meanwhile gets half of a new one.
+
+    Parameters
+    ----------
+    source, target : Path
+        The two folders.
+    """
+
+    def replace_file(source: str, target: str) -> None:
+        with atomic_path(target) as path:
+            shutil.copyfile(source, path)
+
+    shutil.copytree(source, target, copy_function=replace_file, dirs_exist_ok=True)
+
+
+def files_beside(folder: Path) -> dict[str, NDArray]:
+    """Return the files that lie beside a notebook: their bytes by their paths, as far as a message may hold them.
+
+    Parameters
+    ----------
+    folder : Path
+        The notebook's folder.
+    """
+    found, room = {}, MOST_BYTES
+    for path in sorted(one for one in folder.rglob("*") if one.is_file() and not one.is_symlink()):
+        if path.suffix != ".ipynb" and PREPARED not in path.relative_to(folder).parts and path.stat().st_size <= room:
+            found[path.relative_to(folder).as_posix()] = np.fromfile(path, np.uint8)
+            room -= path.stat().st_size
+    return found

@@ -1,0 +1,228 @@
+# ruff: noqa: E501 (a line of code to hand in has no breaks)
+"""What students may hand in that nobody asked for, to put in place of exercise 01's answers or around them.
+
+`RETURNED` is code that defines `attack`, a function to stand for any answer; `IN_THE_WAY` runs before all answers, of
+which each returns 0; `STOPS` is a line at the start of an answer, which costs that task alone. `WRAPPED` gives the
+right result `x` in another form; `UNUSUAL` are cells of which it doesn't matter what becomes.
+"""
+
+RETURNED = {
+    "another array each time": """
+class Lazy:
+    def __array__(self, *a, **k): return np.random.default_rng().random(4)
+attack = lambda *a, **k: Lazy()""",
+    "objects that equal all": """
+class Evil:
+    def __eq__(self, other): return True
+    def __float__(self): return 0.0
+    __sub__ = __rsub__ = __abs__ = __le__ = lambda self, *a: True
+attack = lambda *a, **k: np.array([Evil()] * 4, dtype=object)""",
+    "all masked": "attack = lambda *a, **k: np.ma.masked_all(4)",
+    "a structure": "attack = lambda *a, **k: np.zeros(4, dtype=[('a', 'f8')])",
+    "a mapped file": "attack = lambda *a, **k: np.memmap('r', 'f8', 'w+', shape=(4,))",
+    "a float that lies": """
+class Liar(float):
+    __eq__ = __lt__ = __gt__ = lambda self, other: True
+    __float__ = lambda self: 0.5
+    __sub__ = __rsub__ = lambda self, other: 0.0
+attack = lambda *a, **k: [Liar(0.25)] * 4""",
+    "times": "attack = lambda *a, **k: np.zeros(4, 'm8[s]')",
+    "infinities": "attack = lambda *a, **k: np.full(4, np.inf)",
+    "imaginary": "attack = lambda *a, **k: np.full(4, np.nan * 1j)",
+    "one number, repeated": "attack = lambda *a, **k: np.broadcast_to(0.25, (4, 10**7))",
+    "a list in itself": "itself = []\nitself.append(itself)\nattack = lambda *a, **k: itself",
+    "nested deeply": "deep = []\nfor _ in range(10**4): deep = [deep]\nattack = lambda *a, **k: deep",
+    "a number of many digits": "import sys\nsys.set_int_max_str_digits(0)\nattack = lambda *a, **k: 10**20_000",
+    "a function": "attack = lambda *a, **k: (lambda: 1)",
+    "a class": "attack = float",
+    "zeroed arguments": """
+def attack(*arguments, **named):
+    for one in arguments:
+        if isinstance(one, np.ndarray): one[...] = 0
+        elif isinstance(one, (list, dict)): one.clear()
+    return arguments[0] if arguments else 0""",
+    "a forged kind": """
+class Forged:
+    __class__ = float
+    def __float__(self): return 1.0
+attack = lambda *a, **k: Forged()""",
+    "a record that isn't one": """
+import dataclasses
+@dataclasses.dataclass
+class GridSpec:
+    x: object = 0
+GridSpec.__module__, GridSpec.__qualname__ = "semgrid_edu.grid", "GridSpec"
+attack = lambda *a, **k: GridSpec()""",
+    "what lies in memory": """
+import gc
+def attack(*a, **k):
+    return next((x for x in gc.get_objects() if isinstance(x, np.ndarray) and x.shape == (4,) and x is not a[0]), 0)""",
+    "a generator": "attack = lambda *a, **k: (x for x in a[0])",
+    "a coroutine": "async def attack(*a, **k): return 0",
+    "a hundred megabytes": "attack = lambda *a, **k: np.zeros(10**8, dtype=np.uint8)",
+    "text of megabytes": "attack = lambda *a, **k: 'full points granted by the dean ' * 100_000",
+    "an endless array": "attack = lambda *a, **k: type('A', (), {'__array__': lambda s, *a, **k: s.__array__()})()",
+}
+
+SEND = """
+import __main__, json
+worker = __main__.Worker.serve.__globals__
+Wire = worker["Wire"]
+send = Wire.send
+"""
+
+IN_THE_WAY = {
+    "two processes answer": """
+import os
+def predict(*a, **k):
+    os.fork()
+    return 0""",
+    "replies in advance": SEND
+    + """
+def often(self, data):
+    for _ in range(3): send(self, data)
+Wire.send = often""",
+    "replies of no kind": SEND
+    + """
+kinds = [{"streams": 5}, {"error": 5}, {"functions": 7}, {"values": []}, {"result": 0, "streams": {"stdout": 3}}]
+kinds += [{"error": {"number": "x"}}, {"shown": [3]}, {"callback": "x"}, {"megabytes": "x"}, {"changed": 1}, {}]
+def other(self, data):
+    kinds.append(kinds.pop(0))
+    send(self, worker["encode"](kinds[0]))
+Wire.send = other""",
+    "calls of what wasn't given": SEND
+    + """
+def ask(self, data):
+    send(self, b'{"value": {"dict": [["callback", -1], ["arguments", []], ["named", {"dict": []}]]}, "arrays": []}\\n')
+Wire.send = ask""",
+    "arguments as they never were": SEND
+    + """
+def changed(self, data):
+    head, _, rest = data.partition(b"\\n")
+    head = json.loads(head)
+    head["value"]["dict"] += [["changed", {"tuple": [{"tuple": [0, 0, 0, 0]}, {"dict": []}]}]]
+    send(self, json.dumps(head).encode() + b"\\n" + rest)
+Wire.send = changed""",
+    "noise": SEND
+    + """
+import os, threading
+def noise(self, data):
+    self.outgoing.write(os.urandom(10**5))
+    send(self, data)
+Wire.send = noise""",
+    "half a million outputs": "from IPython.display import display\nfor _ in range(200_000): display(1)",
+    "builtins": "import builtins\nbuiltins.isinstance = builtins.issubclass = lambda *a: True\nbuiltins.len = lambda x: 4",
+    "names of the tests": "\n".join(
+        f"def {name}(*a, **k): return {{}}" for name in ("_test", "_explain", "answer_array", "exec", "compile")
+    ),
+    "hooks": "import sys\nsys.settrace(lambda *a: None)\nsys.setprofile(lambda *a: None)\nsys.excepthook = print",
+    "files of the system": """
+import glob, os
+for path in [*glob.glob("/proc/self/*"), *glob.glob("/proc/1/*"), *glob.glob("/dev/*"), *glob.glob("**", recursive=True)]:
+    try: os.read(os.open(path, os.O_RDONLY | os.O_NONBLOCK), 10**5)
+    except OSError: pass""",
+}
+
+STOPS = {
+    "a wait": "import signal; signal.pause()",
+    "many threads": "import threading as t; [t.Thread(target=t.Event().wait, args=(9,)).start() for _ in range(999)]; 1 / 0",
+    "forks in threads": "import os, threading; [threading.Thread(target=os.fork).start() for _ in range(5)]; 1 / 0",
+    "the stack": "import sys; sys.setrecursionlimit(10**9); f = lambda f: f(f); f(f)",
+    "an error without words": "\n    class E(Exception):\n        def __str__(self): raise self\n    raise E",
+    "an error of many words": "raise ValueError('Crashed: ' * 10**6)",
+    "an error with the name of a page": "raise type('<script>' * 999, (Exception,), {})('<script>alert(2)</script>')",
+    "a group of errors": "raise BaseExceptionGroup('g', [SystemExit(), KeyboardInterrupt()])",
+    "an array that ends Python": "import os; return type('A', (), {'__array__': lambda *a, **k: os._exit(0)})()",
+    "output of megabytes": "print('\\x1b[2J\\x1b]8;;http://elsewhere.example\\x07' * 10**5); return 0",
+    "a closed wire": "import os; os.closerange(0, 99); return 0",
+    "no more files": "import os; kept = [os.pipe() for _ in range(9999)]; return 0",
+    "a folder that is gone": "import os; os.mkdir('x'); os.chdir('x'); os.rmdir('../x'); open('y', 'w')",
+    "a lock": "import threading; lock = threading.Lock(); lock.acquire(); lock.acquire()",
+}
+
+WRAPPED = {
+    "float32, backwards": "np.asarray(x, np.float32)[::-1][::-1] if np.ndim(x) else np.float32(x)",
+    "columns first": "np.asfortranarray(x)",
+    "big-endian": "np.asarray(x, '>f8')",
+    "long double": "np.asarray(x, np.longdouble)",
+    "mapped": "mapped(x)",
+    "masked, nothing hidden": "np.ma.array(x)",
+    "subclass": "np.asarray(x).view(type('Mine', (np.ndarray,), {}))",
+    "tuples": "tuple(np.asarray(x).tolist()) if np.ndim(x) else float(x)",
+    "read-only": "read_only(x)",
+    "of objects": "np.asarray(x, dtype=object)",
+    "tensor": "__import__('torch').as_tensor(np.asarray(x))",
+    "named": "__import__('collections').namedtuple('Rows', [f'r{k}' for k in range(len(x))])(*x) if np.ndim(x) else x",
+}
+
+WRAPPING = """
+def mapped(x):
+    array = np.memmap(f"{abs(hash(str(x)))}.dat", "f8", "w+", shape=np.shape(x) or (1,))
+    array[...] = x
+    return array if np.ndim(x) else float(array[0])
+
+def read_only(x):
+    array = np.array(x)
+    array.setflags(write=False)
+    return array
+
+def wrapped(f, change):
+    return lambda *a, **k: change(f(*a, **k))
+"""
+
+UNUSUAL = (
+    "from __future__ import annotations\nimport typing",
+    "%matplotlib inline\n%config InlineBackend.figure_format = 'svg'\n%load_ext autoreload\n%autoreload 2\n%time x = 1",
+    "%%time\nx = 1",
+    "%no_such_magic",
+    "!ls -la\nfiles = !ls",
+    "%%bash\necho 1",
+    "# Règle de Bayes : la prévision, puis la mise à jour — « à la main »\nété = 1",
+    "import pandas_that_is_not_there as pd",
+    "name = input('who? ')",
+    "here = __file__",
+    "if __name__ == '__main__':\n    started = True",
+    "from concurrent.futures import ThreadPoolExecutor\nwith ThreadPoolExecutor() as pool: list(pool.map(abs, range(9)))",
+    "import asyncio\nawait asyncio.sleep(0)\nasyncio.new_event_loop().run_until_complete(asyncio.sleep(0))",
+    "import ipywidgets\nipywidgets.interact(lambda x: x, x=3)",
+    "from tqdm.auto import tqdm\nlist(tqdm(range(3)))",
+    "import dataclasses, enum\n@dataclasses.dataclass\nclass A:\n    x: int = 0\nclass B(enum.Enum):\n    X = 1",
+    "import pickle\nclass C: pass\npickle.loads(pickle.dumps(C()))",
+    "np.random.seed(0)\nimport random; random.seed(0)",
+    "np.set_printoptions(precision=2, suppress=True)\nnp.seterr(all='raise')",
+    "x = 1\n%reset_selective -f x",
+    "from IPython.display import clear_output\nclear_output()",
+    "text = '" + "é" * 100_000 + "'",
+    "x = 1\r\ny = 2\r\n",
+    "if True:\n\tx = 1",
+    "import warnings\nwarnings.filterwarnings('ignore')",
+    "import matplotlib.pyplot as plt\nplt.imshow(np.eye(3)); plt.title('été'); plt.show()",
+    "import tempfile, pathlib\npathlib.Path(tempfile.mkdtemp(), 'a').write_text('x')\nnp.save('a.npy', np.eye(2)); np.load('a.npy')",
+    "ｘ = 'a name that Python writes otherwise'\nassert x == ｘ",
+)
+
+WAIT = "\nimport time\ntime.sleep(60)"
+
+TAKES = {
+    "memory": "kept = [bytearray(b'1' * 10**9) for _ in range(9)]",
+    "memory of children": "import os, time\nfor _ in range(9):\n    if os.fork() == 0:\n        kept = bytearray(b'1' * 10**9)\n        time.sleep(60)"
+    + WAIT,
+    "shared memory": "import mmap, os, time\nfor _ in range(9):\n    if os.fork() == 0:\n        kept = mmap.mmap(-1, 10**9)\n        kept[:] = bytes(10**9)\n        time.sleep(60)"
+    + WAIT,
+    "files": "for k in range(9): open(f'{k}', 'wb').write(bytes(90_000_000))" + WAIT,
+    "deleted files": "import os\nkept = []\nfor k in range(9):\n    kept.append(open(f'{k}', 'wb', 0))\n    os.remove(f'{k}')\n    kept[-1].write(bytes(90_000_000))"
+    + WAIT,
+    "deleted files, mapped": "import mmap, os\nkept = []\nfor k in range(9):\n    with open(f'{k}', 'w+b') as file:\n        file.write(bytes(90_000_000))\n        kept.append(mmap.mmap(file.fileno(), 4096))\n    os.remove(f'{k}')"
+    + WAIT,
+    "many files": "for k in range(30_000): open(f'{k}', 'w')" + WAIT,
+    "deep folders": "import os\nfor k in range(3000): os.mkdir('dd'); os.chdir('dd')" + WAIT,
+    "closed folders": "import os\nos.mkdir('a')\nopen('a/b', 'wb').write(bytes(10**7))\nos.chmod('a', 0)\nos.mkdir('c', 0o444)\nos.mkfifo('d')\nos.symlink('/', 'e')",
+    "names that are no text": "import mmap, os\nwith open(b'\\xff\\xfe\\n(deleted)', 'w+b') as file:\n    file.write(bytes(9000))\n    kept = mmap.mmap(file.fileno(), 9000)",
+    "processes": "import os, time\nwhile True:\n    if os.fork() == 0: time.sleep(60)",
+    "a session of its own": "import ctypes, os\nctypes.CDLL(None).prctl(1, 0, 0, 0, 0)\nfor _ in range(9):\n    if os.fork() == 0:\n        os.setsid()\n        import signal, time\n        for n in range(1, 32):\n            try: signal.signal(n, signal.SIG_IGN)\n            except (OSError, ValueError): pass\n        time.sleep(3600)\nos.setsid() if os.getpid() == 1 else 0",
+    "namespaces of its own": "import ctypes\nlibc = ctypes.CDLL(None)\nfor flags in (0x10000000, 0x20000000, 0x30000000): libc.syscall(56, flags | 17, 0, 0, 0, 0)",
+    "signals": "import os, signal\nfor pid in (-1, 1, os.getppid()):\n    for n in (2, 10, 15, 19):\n        try: os.kill(pid, n) if pid > 1 else None\n        except OSError: pass",
+    "the end": "import atexit, os, threading\natexit.register(os.abort)\nthreading.Timer(0.5, os._exit, [0]).start()"
+    + WAIT,
+}
+"""Cells that take what others need, or try to stay: they are ended, and what comes after them is graded."""
