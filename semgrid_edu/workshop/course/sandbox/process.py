@@ -37,6 +37,7 @@ from semgrid_edu.workshop.course.sandbox.taken import (
     processes_below,
     processes_in,
     takes_too_much,
+    threads_of,
 )
 from semgrid_edu.workshop.course.sandbox.values import MOST_INPUT, Wire, check_reply, decode, encode
 
@@ -172,7 +173,7 @@ class StudentProcess:
     def _takes_more(self, limits: Limits, memory: int) -> bool:
         """Return whether there are too many processes, or their memory or files together are too large, or too many."""
         running = processes_in(self.namespace)
-        if count_tasks(lambda tasks: tasks.parent in running) > limits.processes or memory_held(running) > memory:
+        if threads_of(running) > limits.processes or memory_held(running) > memory:
             return True
         each = limits.written * MEGABYTE
         return takes_too_much(self.folder, 3 * each - deleted_bytes(running, each))

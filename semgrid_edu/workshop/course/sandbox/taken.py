@@ -71,7 +71,9 @@ def processes_in(namespace: str) -> list[Path]:
     namespace : str
         What `namespace_of` returned; without a name there are none, since they can't be told from others.
     """
-    return [place for place in Path("/proc").glob("[0-9]*") if namespace and _link(place / "ns" / "pid") == namespace]
+    if not namespace:
+        return []
+    return [place for place in Path("/proc").glob("[0-9]*") if _link(place / "ns" / "pid") == namespace]
 
 
 def processes_below(pid: int) -> list[Path]:
@@ -87,6 +89,21 @@ def processes_below(pid: int) -> list[Path]:
         with suppress(OSError):
             for child in map(int, (tasks / "children").read_text().split()):
                 found += [Path(f"/proc/{child}"), *processes_below(child)]
+    return found
+
+
+def threads_of(processes: list[Path]) -> int:
+    """Return how many threads some processes have.
+
+    Parameters
+    ----------
+    processes : list of Path
+        `/proc/PID` of each.
+    """
+    found = 0
+    for place in processes:
+        with suppress(OSError):
+            found += sum(1 for _ in (place / "task").iterdir())
     return found
 
 
