@@ -138,6 +138,7 @@ STOPS = {
     "no more files": "import os; kept = [os.pipe() for _ in range(9999)]; return 0",
     "a folder that is gone": "import os; os.mkdir('x'); os.chdir('x'); os.rmdir('../x'); open('y', 'w')",
     "a lock": "import threading; lock = threading.Lock(); lock.acquire(); lock.acquire()",
+    "no streams": "import sys; sys.stdout = sys.stderr = sys.__stdout__ = None; print(1); return 0",
 }
 
 WRAPPED = {
