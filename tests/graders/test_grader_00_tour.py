@@ -337,7 +337,7 @@ def pixel_of(point, K, T_camera_from_grid):
             "pixels rounded",
             task="pixel-of",
             loses=2,
-            says="on inputs you haven't seen: off by",
+            says="on inputs you haven't seen: other pixels",
             code="""
 def pixel_of(point, K, T_camera_from_grid):
     X, Y, Z, _ = T_camera_from_grid @ np.append(point, 1)
