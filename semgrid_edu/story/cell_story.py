@@ -66,8 +66,8 @@ class CellStory:
         The true class, where it is known.
     otherwise : dict of str to int
         What the cell is called before the CRF when an input is true or gone, see `what_if`.
-    names : tuple of str
-        The names of the classes.
+    names, flat : tuple of str
+        The names of the classes, and of those that lie on the ground.
     memory : CellMemory or None
         What it is called with memory, if the result has one, and when a frame last named its place.
 
@@ -76,7 +76,7 @@ class CellStory:
     >>> print(story)                                                                        # doctest: +SKIP
     Cell (101, 31), 20.2 m ahead and 0.2 m to the left.
     Called road (71 %), but it is car.
-    The image network went wrong: with the true class at every pixel, and nothing else changed, it would be called car.
+    The mistake comes from the occupancy filter: it takes this cell for FREE. With the true state in every cell, ...
     """
 
     cell: tuple[int, int]
@@ -98,6 +98,7 @@ class CellStory:
     truth: int | None
     otherwise: dict[str, int]
     names: tuple[str, ...]
+    flat: tuple[str, ...]
     memory: CellMemory | None = None
 
     @property
@@ -191,6 +192,7 @@ def cell_story(
         truth=truth,
         otherwise={change: int(classes[cell]) for change, classes in what_if(result, net).items()},
         names=label_set.names,
+        flat=label_set.flat,
         memory=cell_memory([*past, result], spec, cell, label_set.n_semantic),
     )
 

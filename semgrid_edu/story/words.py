@@ -119,7 +119,27 @@ def _fault(story: Any) -> str:
         numbers["for_truth"] = f"{adds[story.truth]:.1f}"
     if TRUE_BOTH in story.otherwise:
         numbers["all_true"] = story.names[story.otherwise[TRUE_BOTH]]
+        numbers |= {"image_here": _image_here(story), "occupancy_here": _occupancy_here(story)}
     return SENTENCES["fault"][story.fault].format(**numbers, **_classes(story))
+
+
+def _image_here(story: Any) -> str:
+    """Say whether the image network is right at the pixels above the cell."""
+    labelled = story.pixel_truth < len(story.names)
+    wrong = int((story.pixel_classes != story.pixel_truth)[labelled].sum())
+    case = "wrong" if wrong else "right" if labelled.any() else "unknown"
+    return SENTENCES["image_here"][case].format(wrong=wrong, labelled=int(labelled.sum()))
+
+
+def _occupancy_here(story: Any) -> str:
+    """Say whether the filter is right about the cell: what lies on the ground is FREE, what stands there isn't."""
+    state = State(int(story.steps["shown"].argmax()))
+    if state == State.UNKNOWN:
+        return SENTENCES["occupancy_here"]["unknown"]
+    free = story.names[story.truth] in story.flat
+    semantic = not story.names[story.truth].startswith("unknown")
+    case = "wrong" if semantic and free != (state == State.FREE) else "right"
+    return SENTENCES["occupancy_here"][case].format(state=state.name)
 
 
 def _image(story: Any) -> str:
@@ -129,7 +149,8 @@ def _image(story: Any) -> str:
         return words["none"].format(**points)
     says, shows = (counted(c[story.visible], story.names) for c in (story.pixel_classes, story.pixel_truth))
     said = words["some"].format(seen=int(story.visible.sum()), says=says, **points)
-    return f"{said} {words['shown'].format(shows=shows)}" if shows else said
+    partly = (story.pixel_truth[story.visible] >= len(story.names)).any()
+    return f"{said} {words['partly' if partly else 'shown'].format(shows=shows)}" if shows else said
 
 
 def _memory(story: Any) -> str:
