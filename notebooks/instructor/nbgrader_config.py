@@ -16,6 +16,7 @@ from nbgrader.preprocessors import (
 )
 
 from semgrid_edu.workshop.course.nbgrader.preprocessors import ExecuteApart, MakeWhole, NoteCrashes
+from semgrid_edu.workshop.course.nbgrader.rubric import ShowRubric
 
 c = get_config()  # noqa: F821 (nbgrader defines it)
 course = Path(__file__).resolve().parent
@@ -39,12 +40,13 @@ c.Autograde.autograde_preprocessors = [
     NoteCrashes,
     AssignLatePenalties,
     CheckCellMetadata,
+    ShowRubric,
 ]
 
 # The formgrader and feedback show a submission's text without the scripts that it may hold.
 c.HTMLExporter.filters = {"strip_files_prefix": "semgrid_edu.workshop.course.nbgrader.cleaning.without_scripts"}
 
-c.ExecuteApart.course = str(course)
+c.ExecuteApart.course = c.ShowRubric.course = str(course)
 
 # Seconds for one cell. An endless loop costs its own points and this long.
 c.ExecuteApart.timeout = 30

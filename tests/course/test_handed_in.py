@@ -11,6 +11,7 @@ import nbformat
 import pytest
 from nbconvert import HTMLExporter
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
+from nbgrader.utils import is_grade
 from tiny_course import tiny_notebooks
 
 from semgrid_edu.errors import DataError
@@ -24,11 +25,12 @@ from semgrid_edu.workshop.course.nbgrader.autograde import (
     student_variant,
     submission,
 )
-from semgrid_edu.workshop.course.nbgrader.build import MARKER, build_course
+from semgrid_edu.workshop.course.nbgrader.build import MARKER, build_course, exercise_sources
 from semgrid_edu.workshop.course.nbgrader.cleaning import without_scripts
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
 from semgrid_edu.workshop.course.nbgrader.gradebook import check_file
-from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, write_notebook
+from semgrid_edu.workshop.course.nbgrader.rubric import rubrics
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent, write_notebook
 
 TINY = "00_tiny"
 GUIDE = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")
@@ -232,3 +234,16 @@ def test_variants_are_known_to_nobody_without_the_courses_salt(notebooks, tmp_pa
     write_json(tmp_path / "one" / MARKER, {**read_json(tmp_path / "one" / MARKER), "salt": ""})
     with pytest.raises(DataError, match="course build"):
         student_variant(tmp_path / "one", "ada")
+
+
+def test_the_rubric_stands_below_the_written_answer(course, right):
+    graded(course, "rubric", right)
+    cells = nbformat.read(place(course, "autograded", "rubric", TINY), as_version=4).cells
+    (answer,) = (k for k, cell in enumerate(cells) if cell.source == "Since 2 is 2.")
+    assert cells[answer + 1].source == "> **Rubric.** One point for the reason."
+
+
+def test_every_written_question_has_a_rubric():
+    for source in exercise_sources():
+        written = [c for c in read_percent(source).cells if c.cell_type == "markdown" and is_grade(c)]
+        assert len(written) == len(rubrics(read_percent(source))) == 1, source

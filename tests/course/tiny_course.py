@@ -26,7 +26,8 @@ assert not complaint, complaint
 ### END HIDDEN TESTS
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "why", "locked": false, "points": 1, "schema_version": 3, "solution": true, "task": false}
-# Because two is two.
+# Because two is two. One point for the
+# reason.
 """
 
 HIDDEN = '''\

@@ -391,4 +391,5 @@ _test()
 # must be trained with at least three seeds, the same for both, and the difference paired. (3) The best of eight on the test drives is partly luck: choose on validation drives and test the
 # chosen one once, or correct the level for eight comparisons. (4) An interval from -2 to 2 doesn't show that nothing changed, only that up to two points couldn't be seen: state beforehand
 # how large a loss is acceptable, and ask whether the interval lies above that. (Also welcome: a class in few drives may decide class accuracy; which drives were left out of training;
-# the rule should have been written before the numbers.) Half a point for each of four.
+# the rule should have been written before the numbers.)
+# Half a point for each of four, with what to do in its place: drives instead of frames, more seeds, the best of eight, no difference seen.
