@@ -149,11 +149,12 @@ class TestChosenCells:
         assert page.locator(".mark").count() == 0
         assert page.locator("#slider").input_value() == "3"
 
-    def test_without_an_address_it_begins_with_a_mistake_and_escape_leaves_it(self, shipped):
+    def test_without_an_address_it_begins_with_a_mistake_where_most_moves_and_escape_leaves_it(self, shipped):
         page = shipped("")
-        page.locator("#telling", has_text="went wrong").wait_for()
+        assert page.locator("#slider").input_value() == str(page.evaluate("story.start"))
+        page.locator("#telling", has_text="The mistake comes from").wait_for()
         assert page.locator("svg[data-grid=grid] .mark").count() == 1
-        page.locator("svg[data-grid=grid]").focus()
+        page.evaluate("document.activeElement.blur()")
         page.keyboard.press("Escape")
         page.locator("#telling", has_text="No cell is chosen").wait_for()
         assert page.locator(".mark").count() == 0
@@ -293,6 +294,45 @@ def test_while_the_drive_plays_the_neighbours_wait_until_it_is_paused(shipped):
     page.locator("#telling ol").wait_for()
 
 
+def in_sight(page, locator) -> bool:
+    """Whether all of an element lies inside the window."""
+    box, size = locator.bounding_box(), page.viewport_size
+    inside = box["x"] >= 0 and box["x"] + box["width"] <= size["width"]
+    return inside and box["y"] >= 0 and box["y"] + box["height"] <= size["height"]
+
+
+class TestTogether:
+    """A click and what it changes are in sight together."""
+
+    CELL = (100, 24)
+
+    @pytest.mark.parametrize("grid", GRIDS)
+    def test_the_points_in_the_images_and_the_first_sentences(self, shipped, grid):
+        page = shipped(f"#{FRAME}")
+        page.locator(f"svg[data-grid={grid}]").evaluate("(svg) => svg.scrollIntoView({ block: 'start' })")
+        page.mouse.click(*centre(cell_box(page, grid, self.CELL)))
+        told(page, self.CELL)
+        seen = [page.locator("#brief"), page.locator(f"[data-marks={grid}] .mark"), *page.locator(".stack").all()]
+        assert all(in_sight(page, one) for one in seen)
+        assert page.locator("#brief p").first.inner_text() == page.locator("#telling > p").first.inner_text()
+
+    def test_cells_have_four_pixels_and_the_panel_no_scroller(self, shipped):
+        page = shipped(f"#{FRAME}/100/24")
+        told(page, self.CELL)
+        assert min(cell_box(page, grid, self.CELL)["width"] for grid in GRIDS) >= 4
+        assert page.locator(".story").evaluate("(one) => one.scrollHeight <= one.clientHeight + 1")
+
+    def test_a_phone_shows_the_points_in_an_inset(self, shipped):
+        page = shipped(f"#{FRAME}/100/24", viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True)
+        told(page, self.CELL)
+        page.locator("svg[data-grid=refined]").scroll_into_view_if_needed()
+        inset = page.locator("#inset")
+        assert in_sight(page, inset)
+        points = page.locator("[data-column]").first.locator("circle").count()
+        assert inset.locator("circle").count() == points > 0
+        assert all(in_sight(page, one) for one in inset.locator("circle").all())
+
+
 class TestErrors:
     def test_red_where_the_class_is_not_the_truth(self, shipped, shipped_frames):
         page = shipped(f"#{FRAME}")
@@ -351,7 +391,27 @@ class TestZoom:
         svg = page.locator("svg[data-grid=grid]").bounding_box()
         assert svg["x"] < centre(box)[0] < svg["x"] + svg["width"]
         assert svg["y"] < centre(box)[1] < svg["y"] + svg["height"]
-        assert page.locator("svg[data-grid=grid] .tick").first.is_hidden()
+
+    def test_the_numbers_of_the_axes_stand_at_their_cells(self, shipped, factor):
+        page = shipped(f"#{FRAME}/{self.CELL[0]}/{self.CELL[1]}")
+        told(page, self.CELL)
+        page.locator("#zoom").select_option(str(factor))
+        page.locator("svg[data-grid=grid]").evaluate("(svg) => svg.scrollIntoView({ block: 'center' })")
+        raster = cell_box(page, "grid", (0, 0))
+        numbers = page.locator("svg[data-grid=grid] text.x")
+        assert numbers.count() > 4
+        for one in numbers.all():
+            ahead = (SPEC.x_max - float(one.text_content())) / SPEC.cell
+            assert centre(one.bounding_box())[1] == pytest.approx(raster["y"] + ahead * raster["height"], abs=4)
+
+    def test_the_pointer_finds_the_name_of_its_cell(self, shipped, shipped_frames, factor):
+        page = shipped(f"#{FRAME}/{self.CELL[0]}/{self.CELL[1]}")
+        told(page, self.CELL)
+        page.locator("#zoom").select_option(str(factor))
+        for cell in (self.CELL, (self.CELL[0] + 4, self.CELL[1] - 3), (self.CELL[0] - 5, self.CELL[1] + 2)):
+            page.mouse.move(*point_at(page, "grid", cell))
+            label = KITTI_14.names[classes(shipped_frames[FRAME], "grid")[cell]]
+            page.locator("#hover", has_text=re.compile(f"^{label}$")).wait_for()
 
     def test_a_click_finds_its_cell(self, shipped, factor):
         page = shipped(f"#{FRAME}/{self.CELL[0]}/{self.CELL[1]}")

@@ -1,9 +1,14 @@
 """How the demo's page looks in a browser: on a phone, in the dark, and to those who need contrast."""
 
+import re
+
+import numpy as np
 import pytest
+from read_page import decode
 from tiny_drive import DATE, write_tiny_drive
 
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.workshop import demo
 from semgrid_edu.workshop.demo import example_stages, run
@@ -165,6 +170,66 @@ class TestColours:
         contrast = page.locator(f":is({parts}):visible").evaluate_all(CONTRAST)
         assert len(contrast) > 100
         assert min(contrast) >= 4.5
+
+
+def contrast(a, b) -> float:
+    """The contrast of two colours by the definition of WCAG 2, from 1 to 21."""
+    linear = np.where(
+        np.divide((a, b), 255) <= 0.04045, np.divide((a, b), 3294.6), ((np.divide((a, b), 255) + 0.055) / 1.055) ** 2.4
+    )
+    dark, light = sorted(linear @ (0.2126, 0.7152, 0.0722))
+    return (light + 0.05) / (dark + 0.05)
+
+
+def test_a_mark_shows_on_every_class(shipped):
+    page = shipped(CELL)
+    page.locator("#telling h3").first.wait_for()
+    strokes = [
+        [
+            int(part)
+            for part in re.findall(
+                r"\d+",
+                page.locator(f"[data-marks=grid] .{one}").first.evaluate("(one) => getComputedStyle(one).stroke"),
+            )
+        ]
+        for one in ("mark", "halo")
+    ]
+    assert min(max(contrast(stroke[:3], rgb) for stroke in strokes) for rgb in KITTI_14.rgb) >= 3
+
+
+def test_bars_of_different_times_differ_in_length(shipped):
+    rows = (
+        shipped("#0")
+        .locator("tr.stage")
+        .evaluate_all(
+            "(all) => all.map((row) => "
+            "[row.cells[2].innerText, row.querySelector('.share span').getBoundingClientRect().width])"
+        )
+    )
+    longest = max(rows, key=lambda row: float(row[0]))
+    for time, width in rows:
+        assert width == pytest.approx(longest[1] * float(time) / float(longest[0]), abs=1.5)
+
+
+def test_forced_colours_keep_the_swatches(shipped):
+    page = shipped("#0", forced_colors="active")
+    drawn = page.locator(".legend span[data-texture]").evaluate_all(
+        "(all) => all.map((one) => [one.innerText, getComputedStyle(one, '::before').backgroundColor])"
+    )
+    found = {name: colour for name, colour in drawn if name in KITTI_14.names}
+    assert found == {name: f"rgb{tuple(KITTI_14.rgb[KITTI_14.index(name)])}" for name in found}
+    assert len(found) > 5
+
+
+def test_car_and_bicycle_have_textures(shipped, shipped_frames):
+    page = shipped("#5")
+    layer = page.locator("image[data-textures=truth][href]")
+    layer.wait_for(state="attached")
+    truth = np.array(decode(shipped_frames[5]["images"]["truth"]))
+    painted = page.evaluate("async (uri) => [...(await decode(uri)).data]", layer.get_attribute("href"))
+    dots = np.reshape(painted, (4 * truth.shape[0], 4 * truth.shape[1], 4))[..., 3] > 0
+    dots = dots.reshape(truth.shape[0], 4, truth.shape[1], 4).any(axis=(1, 3))
+    np.testing.assert_array_equal(dots, np.isin(truth, [KITTI_14.index("car"), KITTI_14.index("bicycle")]))
 
 
 def test_a_frame_without_a_scan_says_so(open_page, tiny_page):

@@ -264,6 +264,7 @@ def story_data(net: SemanticGridNet, camera: Camera, frame_layout: dict[str, lis
         "width": camera.size[1],
         "heights": list(architecture.heights),
         "names": label_set.names,
+        "flat": label_set.flat,
         "colours": {"classes": label_set.rgb, "states": STATE_COLOURS},
         "verdicts": VERDICTS,
         "sentences": SENTENCES,

@@ -108,6 +108,7 @@ def page_html(
         script="\n".join(map(_resource, ("page.js", "story.js", "panel.js") if story else ("page.js",))),
         panel=_filled("panel.html", whose=whose) if story else "",
         switches=_resource("switches.html") if story else "",
+        brief=_filled("brief.html", photo=first.images["photo"]) if story else "",
         column=_column_svg(camera),
         story=_json(story),
         lead=_lead(record, title, choice),
@@ -216,24 +217,28 @@ def _times(record: Record) -> str:
     if comparison:
         runs, replaced = [*runs, record.milliseconds(YOURS)], comparison.stages
         heads = ["the package's, ms", f"{_breakable(comparison.file)}, ms"]
+    totals = [{"all": sum(run.values())} for run in runs]
+    full = max(SCAN_MILLISECONDS, *(total["all"] for total in totals))
     rows = [
-        _time_row(symbols, f"{words}; replaced by <b>{stage}</b>" if stage in replaced else words, runs, stage)
+        _time_row(symbols, f"{words}; replaced by <b>{stage}</b>" if stage in replaced else words, runs, stage, full)
         for stage, (symbols, words) in ((stage, STAGE_WORDS[stage]) for stage in record.stages)
     ]
-    totals = [{"all": sum(run.values())} for run in runs]
     return _filled(
         "times.html",
+        full=f"{full:.0f}",
         period=f"{SCAN_MILLISECONDS:g}",
         upper=" The upper bar is the package's." if comparison else "",
         heads="".join(f"<th>{head}</th>" for head in heads),
-        rows="".join(rows) + _time_row("", "all stages", totals, "all", kind="total"),
+        rows="".join(rows) + _time_row("", "all stages", totals, "all", full, kind="total"),
     )
 
 
-def _time_row(symbols: str, words: str, runs: list[dict[str, float]], stage: str, kind: str = "stage") -> str:
+def _time_row(
+    symbols: str, words: str, runs: list[dict[str, float]], stage: str, full: float, kind: str = "stage"
+) -> str:
     values = [run[stage] for run in runs]
     numbers = "".join(f"<td>{value:.1f}</td>" for value in values)
-    bars = "".join(f'<span style="width:{min(100.0, 100 * v / SCAN_MILLISECONDS):.1f}%"></span>' for v in values)
+    bars = "".join(f'<span style="width:{100 * v / full:.1f}%"></span>' for v in values)
     return f'<tr class="{kind}"><th><i>{symbols}</i></th><th>{words}</th>{numbers}<td class="share">{bars}</td></tr>'
 
 
@@ -248,7 +253,9 @@ def _json(data: object) -> str:
 
 
 def _swatches(colours: Iterable[tuple[str, tuple[int, int, int]]]) -> str:
-    return "".join(f'<span style="--swatch:rgb{tuple(rgb)}">{escape(name)}</span>' for name, rgb in colours)
+    return "".join(
+        f'<span style="--swatch:rgb{tuple(rgb)}" data-texture="{name}">{escape(name)}</span>' for name, rgb in colours
+    )
 
 
 def _filled(name: str, **words: object) -> str:

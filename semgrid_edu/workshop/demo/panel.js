@@ -5,6 +5,8 @@ const where = document.getElementById("where");
 const zoom = document.getElementById("zoom");
 const errors = document.getElementById("errors");
 const hover = document.getElementById("hover");
+const brief = document.getElementById("brief");
+const inset = document.getElementById("inset");
 const grids = [...document.querySelectorAll("svg[data-grid]")];
 const stateNames = ["free", "static", "dynamic", "unknown"];
 const SVG = document.querySelector("svg").namespaceURI;
@@ -37,7 +39,7 @@ function clear() {
   anchor = null;
   turn++;
   places.then((everywhere) => mark(-1, everywhere, null));
-  where.textContent = "No cell is chosen.";
+  where.textContent = brief.textContent = "No cell is chosen.";
   telling.innerHTML = "<p>No cell is chosen. Click one, or move to a grid with the Tab key and use the arrow keys.</p>";
 }
 
@@ -57,7 +59,7 @@ async function tell(k) {
     const [near] = frames.filter((frame) => frame.details).sort((a, b) => away(a) - away(b));
     const reason = cell < 0 ? "The place has left the grid." : `To stay small, the page leaves out what this frame's stories need. The nearest frame that has it: ${near.clock}.`;
     where.textContent = "";
-    telling.innerHTML = `<p>${escaped(reason)}</p>`;
+    telling.innerHTML = brief.innerHTML = `<p>${escaped(reason)}</p>`;
     return;
   }
   const past = [];
@@ -73,6 +75,7 @@ async function tell(k) {
   const said = frames[k].scanned ? scanStory(cell, read, everywhere) : "<p>This frame has no scan, so the filter only predicts.</p>";
   telling.innerHTML = [heading(cell, read), said, stateStory(cell, read, past), partStory(cell, read, label, rival), crfStory(cell, read, pulls, [label, rival, refined])].join("");
   telling.querySelector("details").open = unfolded;
+  brief.innerHTML = [...telling.querySelectorAll(":scope > p")].slice(0, 2).map((one) => one.outerHTML).join("");
   if (pulls) drawPulls(cell, pulls);
 }
 
@@ -82,7 +85,7 @@ function heading(cell, read) {
   return `<p><b>${place(centre(story.grid, cell))}</b> (row ${row}, column ${cell % story.grid.cols}): the refined grid says ${swatch(refined)}. ${known}</p>${sentences(story, read, cell).map((sentence) => `<p>${escaped(sentence)}</p>`).join("")}`;
 }
 
-function swatch(label) { return `<span class="class" style="--swatch:${rgb(story.colours.classes[label])}">${escaped(story.names[label])}</span>`; }
+function swatch(label) { return `<span class="class" data-texture="${story.names[label]}" style="--swatch:${rgb(story.colours.classes[label])}">${escaped(story.names[label])}</span>`; }
 
 function scanStory(cell, read, everywhere) {
   const [obstacles] = read("obstacles", cell), [ground] = read("ground", cell), [reach] = read("reach", cell);
@@ -151,19 +154,33 @@ function mark(cell, everywhere, called) {
   const { grid } = story, [x, y] = cell < 0 ? [0, 0] : centre(grid, cell);
   for (const group of document.querySelectorAll("[data-marks]")) {
     group.replaceChildren();
-    if (cell >= 0) group.append(shape("rect", { class: "mark", x: -y - grid.cell / 2, y: -x - grid.cell / 2, width: grid.cell, height: grid.cell }), shape("circle", { class: "ring", cx: -y, cy: -x, r: 0.4 + 1.2 / Number(zoom.value) }));
+    for (const [square, circle] of cell < 0 ? [] : [["halo", "halo"], ["mark", "ring"]])
+      group.append(shape("rect", { class: square, x: -y - grid.cell / 2, y: -x - grid.cell / 2, width: grid.cell, height: grid.cell }), shape("circle", { class: circle, cx: -y, cy: -x, r: 0.4 + 1.2 / Number(zoom.value) }));
   }
-  for (const layer of document.querySelectorAll("[data-column]")) {
-    const seen = cell < 0 ? [] : pixels(story, everywhere, cell).flatMap((point, i) => (point ? [[...point, called ? rgb(story.colours.classes[called[i]]) : ""]] : []));
-    layer.replaceChildren(...seen.map(([u, v, fill], i) => shape("circle", { cx: u, cy: v, r: story.width / (i ? 260 : 160), class: i ? "point" : "point lowest", style: fill && `fill:${fill}` })));
-  }
+  const seen = cell < 0 ? [] : pixels(story, everywhere, cell).flatMap((point, i) => (point ? [[...point, called ? rgb(story.colours.classes[called[i]]) : ""]] : []));
+  const points = (size) => seen.map(([u, v, fill], i) => shape("circle", { cx: u, cy: v, r: size / (i ? 190 : 120), class: i ? "point" : "point lowest", style: fill && `fill:${fill}` }));
+  for (const layer of document.querySelectorAll("[data-column]")) layer.replaceChildren(...points(story.width));
+  showInset(seen, points);
   zoomGrids();
+}
+
+// A phone's small picture of the points, since the images are out of sight there.
+function showInset(seen, points) {
+  const rows = seen.map(([, v]) => v), high = Math.max(...rows) - Math.min(...rows), h = Math.max(story.width / 12, 1.1 * high), w = (h * 2) / 3;
+  inset.toggleAttribute("hidden", seen.length === 0);
+  if (seen.length === 0) return;
+  const [[u]] = seen, middle = (Math.max(...rows) + Math.min(...rows)) / 2;
+  inset.setAttribute("viewBox", [u - w / 2, middle - h / 2, w, h].join(" "));
+  inset.querySelector("image").setAttribute("x", -0.5);
+  inset.querySelector("image").setAttribute("y", -0.5);
+  inset.querySelector("image").setAttribute("width", story.width);
+  inset.querySelector("g").replaceChildren(...points(4 * h));
 }
 
 function drawPulls(cell, neighbours) {
   const [x, y] = centre(story.grid, cell);
   for (const group of document.querySelectorAll('[data-marks="refined"]'))
-    for (const { cell: j } of neighbours) { const [a, b] = centre(story.grid, j); group.append(shape("path", { class: "pull", d: `M${-b} ${-a}L${-y} ${-x}` })); }
+    for (const { cell: j } of neighbours) { const [a, b] = centre(story.grid, j); for (const kind of ["pull", "halo"]) group.prepend(shape("path", { class: kind, d: `M${-b} ${-a}L${-y} ${-x}` })); }
 }
 
 function shape(kind, attributes) {
@@ -172,18 +189,29 @@ function shape(kind, attributes) {
   return element;
 }
 
-// Zoom: every grid shows the surroundings of the cell that was chosen, or of the road ahead.
+// Zoom: every grid shows the surroundings of the cell that was chosen, or of the road ahead, and its axes say so.
 function zoomGrids() {
-  const factor = Number(zoom.value), { x_min, x_max, y_min, y_max } = story.grid;
+  const factor = Number(zoom.value), { x_min, x_max, y_min, y_max } = story.grid, [w, h] = [(y_max - y_min) / factor, (x_max - x_min) / factor];
   const chosen = cellIn(shown()), [x, y] = centre(story.grid, chosen < 0 ? cellAhead() : chosen);
   const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
+  const left = clamp(-y - w / 2, -y_max, -y_min - w), top = clamp(-x - h / 2, -x_max, -x_min - h);
   for (const svg of grids) {
-    svg.dataset.whole ??= svg.getAttribute("viewBox");
-    const [w, h] = svg.dataset.whole.split(" ").slice(2).map((side) => Number(side) / factor);
-    const near = [clamp(-y - w / 2, -y_max, -y_min - w), clamp(-x - h / 2, -x_max, -x_min - h), w, h];
-    svg.setAttribute("viewBox", factor === 1 ? svg.dataset.whole : near.join(" "));
+    svg.querySelector("svg").setAttribute("viewBox", [left, top, w, h].join(" "));
     svg.classList.toggle("near", factor > 1);
+    svg.querySelector("[data-axes]").replaceChildren(...axes(left, top, w, h));
   }
+}
+
+// Marks and numbers of both axes for the part of the map that is shown; `_axes` in Python draws the same for the whole.
+function axes(left, top, w, h) {
+  const { x_min, x_max, y_min, y_max } = story.grid, step = Math.max(1, Math.round((10 * h) / (x_max - x_min)));
+  const multiples = (low, high) => Array.from({ length: Math.floor(high / step) - Math.ceil(low / step) + 1 }, (_, i) => (Math.ceil(low / step) + i) * step);
+  const across = (y) => -y_max + ((-y - left) * (y_max - y_min)) / w, down = (x) => -x_max + ((-x - top) * (x_max - x_min)) / h;
+  const drawn = (kind, attributes, text) => Object.assign(shape(kind, attributes), text === undefined ? {} : { textContent: text });
+  return [
+    ...multiples(-top - h, -top).flatMap((x) => [drawn("path", { class: "tick", d: `M${-y_max} ${down(x)}h-.7` }), drawn("text", { class: "x", x: -y_max - 1.1, y: down(x) + 0.7 }, x)]),
+    ...multiples(-left - w, -left).flatMap((y) => [drawn("path", { class: "tick", d: `M${across(y)} ${-x_min}v.7` }), drawn("text", { class: "y", x: across(y), y: -x_min + 2.8 }, y)]),
+  ];
 }
 
 // Errors: cells of a grid whose class isn't the truth's, painted red; the right ones fade. Read from the pictures themselves.
@@ -226,6 +254,27 @@ async function paintErrors(k) {
   }
 }
 
+// Textures: a dot on every car cell, a stripe on every bicycle cell, so that hue alone tells no two classes apart.
+const textures = { car: [[1, 1], [1, 2], [2, 1], [2, 2]], bicycle: [[0, 3], [1, 2], [2, 1], [3, 0]] };
+async function paintTextures(k) {
+  for (const layer of document.querySelectorAll("[data-textures]")) {
+    const uri = frames[k].images[layer.dataset.textures];
+    if (!uri) { layer.removeAttribute("href"); continue; }
+    const { data, width, height } = await colours(uri);
+    if (k !== shown()) return;
+    const canvas = document.createElement("canvas"), pen = canvas.getContext("2d");
+    [canvas.width, canvas.height] = [4 * width, 4 * height];
+    pen.fillStyle = "#fff";
+    for (const [name, dots] of Object.entries(textures)) {
+      const [red, green, blue] = story.colours.classes[story.names.indexOf(name)] ?? [-1];
+      for (let i = 0; i < width * height; i++)
+        if (data[4 * i] === red && data[4 * i + 1] === green && data[4 * i + 2] === blue)
+          for (const [row, col] of dots) pen.fillRect(4 * (i % width) + col, 4 * Math.floor(i / width) + row, 1, 1);
+    }
+    layer.setAttribute("href", canvas.toDataURL());
+  }
+}
+
 // Hover: the class or the states of the cell below the pointer.
 async function nameAt(name, cell) {
   const k = shown();
@@ -240,12 +289,11 @@ async function nameAt(name, cell) {
 
 // The cell below the pointer: the inverse of what the browser did to draw the grid in metres.
 function cellBelow(svg, event) {
-  const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+  const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.querySelector("[data-marks]").getScreenCTM().inverse());
   return cellAt(story.grid, -y, -x);
 }
 
 function stepCell(event) {
-  if (event.key === "Escape") return clear();
   const step = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0] }[event.key];
   if (!step || event.altKey || event.ctrlKey || event.metaKey) return;
   event.preventDefault();
@@ -273,13 +321,14 @@ for (const svg of grids) {
 zoom.addEventListener("change", () => (anchor === null ? zoomGrids() : tell(shown())));
 errors.addEventListener("click", () => { errors.setAttribute("aria-pressed", String(!errorsOn())); paintErrors(shown()); });
 errors.hidden = !frames.some((frame) => frame.images.truth);
-watchers.push(() => decoded.clear(), tell, paintErrors);
+document.addEventListener("keydown", (event) => { if (event.key === "Escape") clear(); });
+watchers.push(() => decoded.clear(), tell, paintTextures, paintErrors);
 // index.html#12/93/30 opens frame 12 and tells the story of row 93, column 30.
 function followCell() {
   const { rows, cols } = story.grid, [, row, col] = location.hash.slice(1).split("/").map((part) => parseInt(part, 10));
   if (row >= 0 && row < rows && col >= 0 && col < cols) choose(row * cols + col);
 }
-// Without a cell in the address, begin with the nearest one, from 5 m on, in which a stage went wrong and the camera sees all points.
+// Without an address, begin with the frame in which most moves, and in it with the nearest cell, from 5 m on, in which a stage went wrong and the camera sees all points.
 async function begin() {
   const read = await readerOf(shown());
   if (read === null || anchor !== null) return;
@@ -290,4 +339,6 @@ async function begin() {
 }
 window.addEventListener("hashchange", followCell);
 followCell();
+if (location.hash === "") go(story.start);
+else paintTextures(shown());
 if (location.hash === "") begin();

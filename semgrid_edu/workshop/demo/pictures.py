@@ -148,13 +148,14 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, 
     box = f'x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}"'
     href = f'href="{raster}"' if raster else ""
     compared = name.endswith(("grid", "refined", "remembered"))
-    errors = f'<image data-errors="{name}" {box} preserveAspectRatio="none"/>' if compared else ""
+    layers = ["textures"] * (not name.endswith("occupancy")) + ["errors"] * compared
+    over = "".join(f'<image data-{layer}="{name}" {box} preserveAspectRatio="none"/>' for layer in layers)
     paths = f'<path class="arrows" data-arrows="{name}" d=""/>' if arrows else ""
     return (
         f'<svg viewBox="{left - 6.8:g} {top - 1:g} {width + 7.8:g} {height + 7:g}" role="img" '
         f'data-text="{name}" data-grid="{name}" aria-label="{text}">{_axes(spec)}'
         f'<svg {box} viewBox="{left:g} {top:g} {width:g} {height:g}">'
-        f'<image data-image="{name}" {href} {box} preserveAspectRatio="none"/>{errors}'
+        f'<image data-image="{name}" {href} {box} preserveAspectRatio="none"/>{over}'
         f'<path class="sight" d="{_sight(camera, spec)}"/>{paths}<g data-marks="{name}"></g></svg>'
         f'<rect class="frame" {box}/><path class="vehicle" d="M0-1.6.9.7-.9.7z"/></svg>'
     )
@@ -199,11 +200,12 @@ def _axes(spec: GridSpec) -> str:
         for x in _ticks(spec.x_min, spec.x_max)
     ]
     marks += [
-        f'<path class="tick" d="M{-y} {bottom:g}v.7"/><text x="{-y}" y="{bottom + 2.8:g}">{y}</text>'
+        f'<path class="tick" d="M{-y} {bottom:g}v.7"/><text class="y" x="{-y}" y="{bottom + 2.8:g}">{y}</text>'
         for y in _ticks(spec.y_min, spec.y_max)
     ]
     middle_x, middle_y = -(spec.x_min + spec.x_max) / 2, -(spec.y_min + spec.y_max) / 2
-    marks += [
+    marks = [
+        f"<g data-axes>{''.join(marks)}</g>",
         f'<text transform="translate({left - 4.8:g} {middle_x:g})rotate(-90)">x, forward [m]</text>',
         f'<text x="{middle_y:g}" y="{bottom + 5.3:g}">y, to the left [m]</text>',
     ]

@@ -113,6 +113,7 @@ class Record:
         self.labelled = 0
         self.liveliest: tuple[FrameResult, FrameResult | None] | None = None
         self._number = shown[0] if shown else 0
+        self._moving: list[int] = []
         self._first_pose: NDArray | None = None
         self._past: list[tuple[Frame, NDArray]] = []
         self._pictures = {"": pictures_of(memory), YOURS: comparison.changed if comparison else ()}
@@ -177,13 +178,20 @@ class Record:
         return [entry for number, entry in entries.items() if self._occurs[number]]
 
     @property
+    def start(self) -> int:
+        """The number of the view with which the page begins: the one in which most moves, of those with stories."""
+        told = [k for k, view in enumerate(self.views) if view.details] or [0]
+        return max(told, key=self._moving.__getitem__)
+
+    @property
     def gaps(self) -> bool:
         """Whether the truth leaves cells out."""
         return bool(self._occurs[IGNORE])
 
     def _show(self, runs: dict[str, FrameResult], maps: dict[str, NDArray]) -> None:
         package = runs[""]
-        if self.liveliest is None or _moving(package) > _moving(self.liveliest[0]):
+        self._moving.append(_moving(package))
+        if self.liveliest is None or self._moving[-1] > _moving(self.liveliest[0]):
             self.liveliest = package, runs.get(YOURS)
         view = self._view(package, self._details(package, maps.get("truth")))
         for prefix, result in runs.items():

@@ -193,7 +193,7 @@ def write_demo(
         broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
     words = {"expected": known or ("" if record.labelled else POOR), "credit": drive.credit}
     save_overview(record, picture, " ".join(filter(None, words.values())))
-    story = story_data(net, drive.camera, record.layout)
+    story = story_data(net, drive.camera, record.layout) | {"start": record.start}
     words |= {"choice": chosen.told(len(drive)), "broken": str(broken or ""), "switch": switch}
     html = page_html(record, drive.folder.name, drive.camera, net.architecture.image_size, story, **words)
     write_text(page, html)

@@ -53,10 +53,11 @@ function sentences(story, read, cell) {
   const called = read("called", cell), seen = called.filter((c) => c !== 255), shows = counted(read("shown", cell), story.names);
   const heights = [story.heights[0], story.heights.at(-1)].map((height) => height.toFixed(1));
   const points = { points: called.length, lowest: heights[0], highest: heights[1], seen: seen.length, says: counted(seen, story.names) };
-  const image = filled(seen.length ? said.image.some : said.image.none, points);
+  const image = filled(seen.length ? said.image.some : said.image.none, points), partly = read("shown", cell).some((c, i) => called[i] !== 255 && c >= story.names.length);
+  const here = { image_here: imageHere(story, called, read("shown", cell)), occupancy_here: truth === 255 ? "" : occupancyHere(story, states(story, read, "shown", cell), story.names[truth]) };
   return [
-    filled(said.fault[story.faults[read("fault", cell)[0]]], { ...names, ...weights, all_true: otherwise["both true"] }),
-    seen.length && shows ? `${image} ${filled(said.image.shown, { shows })}` : image,
+    filled(said.fault[story.faults[read("fault", cell)[0]]], { ...names, ...weights, ...here, all_true: otherwise["both true"] }),
+    seen.length && shows ? `${image} ${filled(partly ? said.image.partly : said.image.shown, { shows })}` : image,
     story.layout.memory ? memory(story, read, cell) : "",
     filled(said.otherwise.removed, { no_image: otherwise["no image"], no_occupancy: otherwise["no occupancy"] }),
   ].filter((sentence) => sentence);
@@ -68,6 +69,19 @@ function memory(story, read, cell) {
   const values = { kept: story.names[kept], sure, then: story.names[then], label: story.names[read("classes", cell)[0]], seconds: (tenths / 10).toFixed(1), back, earlier };
   const told = filled(said[back < 0 ? "never" : back ? "before" : "now"], values);
   return states(story, read, "shown", cell)[2] > 0.5 ? `${told} ${said.moves}` : told;
+}
+
+// Whether the image network is right at the pixels above a cell, and the filter about the cell: `_image_here` and `_occupancy_here` of words.py.
+function imageHere(story, called, shown) {
+  const labelled = shown.map((c, i) => [c, called[i]]).filter(([c]) => c < story.names.length), wrong = labelled.filter(([a, b]) => a !== b).length;
+  return filled(story.sentences.image_here[wrong ? "wrong" : labelled.length ? "right" : "unknown"], { wrong, labelled: labelled.length });
+}
+
+function occupancyHere(story, probabilities, truth) {
+  const state = probabilities.indexOf(Math.max(...probabilities)), said = story.sentences.occupancy_here;
+  if (state === 3) return said.unknown;
+  const wrong = !truth.startsWith("unknown") && story.flat.includes(truth) !== (state === 0);
+  return filled(wrong ? said.wrong : said.right, { state: ["FREE", "STATIC", "DYNAMIC"][state] });
 }
 
 // What the neighbours add for label, rival and refined class.
