@@ -1,10 +1,15 @@
 """The course site: what is laid out for Sphinx, and what its check finds."""
 
+import json
+
+import ipywidgets
 import nbformat
 import pytest
 from check import problems
+from glossary import definition, glossary_page
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
-from stage import CLONE, relinked, translated
+from stage import CLONE, relinked, translated, with_moving_widget
+from widgets import MOST_BYTES, RECORDED, notebooks, values_of
 
 
 @pytest.mark.parametrize(
@@ -72,3 +77,53 @@ def test_the_check_finds_what_is_dead_or_foreign(tmp_path):
         "c.html: leads to a.html#gone",
         "c.html: leads to gone.html",
     ]
+
+
+def test_the_glossary_quotes_the_sentence_with_the_term():
+    text = "A **prior** is what you believed. It is *updated*, see eq. (1) there. Then\nit is a *posterior*."
+    text += "\n\n- **Skip.** It goes on."
+    assert definition([text], "prior") == "A **prior** is what you believed."
+    assert definition([text], "updated", -1) == "A **prior** is what you believed. It is *updated*, see eq. (1) there."
+    assert definition([text], "updated", 2).endswith("it is a *posterior*.")
+    assert definition([text], "Skip") == "**Skip.** It goes on."
+    with pytest.raises(ValueError, match="nowhere emphasised"):
+        definition([text], "believed")
+
+
+def test_every_term_is_in_its_lecture_and_symbols_come_from_lecture_00():
+    page = glossary_page()
+    assert page.count("](notebooks/") > 60
+    assert "| $o$ | occupancy grid" in page
+
+
+@pytest.mark.parametrize(
+    "folder", sorted(file.parent for file in RECORDED.glob("*/controls.json")), ids=lambda folder: folder.name
+)
+def test_recorded_widgets_are_of_the_present_notebook_and_small(folder):
+    (path,) = notebooks([folder.name])
+    cells = with_moving_widget(nbformat.read(path, as_version=4), path).cells
+    (moving,) = (cell for cell in cells if 'class="moving"' in cell.source)
+    assert sum(file.stat().st_size for file in folder.iterdir()) <= MOST_BYTES
+    pictures = len(list(folder.glob("*.webp")))
+    known = json.loads((folder / "controls.json").read_text(encoding="utf-8"))
+    assert sum(len(control["values"]) for control in known["controls"]) == pictures > 5
+    assert moving.source.count('type="range"') == len(known["controls"])
+
+
+@pytest.mark.parametrize(
+    ("control", "expected"),
+    [
+        (ipywidgets.IntSlider(value=2, min=1, max=4), [1, 2, 3, 4]),
+        (ipywidgets.Dropdown(options=["a", "b"]), ["a", "b"]),
+        (ipywidgets.FloatLogSlider(value=1, min=-1, max=1, step=1), [0.1, 1, 10]),
+    ],
+)
+def test_a_control_goes_through_its_values(control, expected):
+    assert values_of(control) == expected
+
+
+def test_a_long_slider_keeps_its_ends_and_where_it_begins():
+    values = values_of(ipywidgets.FloatSlider(value=0.07, min=0, max=1, step=0.01))
+    assert (values[0], values[-1]) == (0, 1)
+    assert 0.07 in values
+    assert len(values) <= 14

@@ -26,7 +26,7 @@ html_title = "semgrid_edu"
 html_theme = "pydata_sphinx_theme"
 html_theme_options = {
     "show_prev_next": True,
-    "header_links_before_dropdown": 8,
+    "header_links_before_dropdown": 9,
     "navigation_with_keys": False,
     "navbar_align": "left",
     "navbar_end": ["theme-switcher"],
@@ -34,10 +34,11 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
-html_sidebars = {"index": [], "graphs": [], "gallery": []}
+html_sidebars = {"index": [], "graphs": [], "gallery": [], "glossary": []}
 html_static_path = ["static"]
 html_extra_path = ["extra"]
 html_css_files = ["site.css"]
+html_js_files = [("moving.js", {"defer": "defer"})]
 # Summaries would be fetched, which a browser refuses for files.
 html_show_search_summary = False
 html_show_sourcelink = html_copy_source = False

@@ -12,8 +12,10 @@ from pathlib import Path
 
 import matplotlib
 import nbformat
+from glossary import glossary_page
 from matplotlib import pyplot as plt
 from nbformat import NotebookNode
+from widgets import RECORDED, stand_in, widget_cell
 
 from semgrid_edu.stage_models import ledger, ledger_table, read_scans
 from semgrid_edu.workshop.course.registers import STAGES, equation_table, find_code, notebook_link, stage_table
@@ -33,6 +35,8 @@ PAGES = (
     "notebooks/exercises/*.ipynb",
 )
 """What becomes a page, at the same place as in the clone."""
+SECTIONS = ("lectures", "companions", "exercises", "graphs", "glossary", "results", "api", "gallery", "guides")
+"""The pages of the site's bar."""
 MODULES = (
     *("answers", "camera", "crf", "datasets", "errors", "frame", "graphical", "grid", "labels", "memory", "metrics"),
     *("networks", "occupancy", "pipeline", "planes", "plotting", "stage_models", "storage", "story", "training"),
@@ -57,10 +61,12 @@ def stage(folder: Path) -> None:
         target = folder / source.relative_to(CLONE)
         target.parent.mkdir(parents=True, exist_ok=True)
         if source.suffix == ".ipynb":
-            nbformat.write(translated(nbformat.read(source, as_version=4), source.parent, folder), target)
+            notebook = with_moving_widget(nbformat.read(source, as_version=4), source)
+            nbformat.write(translated(notebook, source.parent, folder), target)
         else:
             target.write_text(relinked(source.read_text(encoding="utf-8"), source.parent, folder), encoding="utf-8")
-    contents = "\n".join(["lectures", "companions", "exercises", "graphs", "results", "api", "gallery", "guides"])
+    (folder / "glossary.md").write_text(glossary_page(), encoding="utf-8")
+    contents = "\n".join(SECTIONS)
     index = (folder / "README.md").rename(folder / "index.md")
     index.write_text(
         f"{index.read_text(encoding='utf-8')}\n```{{toctree}}\n:hidden:\n{contents}\n```\n", encoding="utf-8"
@@ -68,8 +74,9 @@ def stage(folder: Path) -> None:
     shutil.copytree(HERE / "pages", folder, dirs_exist_ok=True)
     shutil.copy(HERE / "conf.py", folder)
     (folder / "static").mkdir()
-    for name in ("site.css", "tex-svg.js"):
+    for name in ("site.css", "moving.js", "tex-svg.js"):
         shutil.copy(HERE / name, folder / "static")
+    shutil.copytree(RECORDED, folder / "extra" / "widgets", ignore=shutil.ignore_patterns("*.json"))
     write_graphs(folder)
     write_reference(folder)
     write_gallery(folder)
@@ -80,6 +87,23 @@ def stage(folder: Path) -> None:
 def pages() -> tuple[Path, ...]:
     """Return the files of the clone that become pages."""
     return tuple(path for pattern in PAGES for path in sorted(CLONE.glob(pattern)))
+
+
+def with_moving_widget(notebook: NotebookNode, source: Path) -> NotebookNode:
+    """Put what stands in for a notebook's widget below its cell, where its pictures have been recorded.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        A notebook; it is changed.
+    source : Path
+        Where it lies in the clone.
+    """
+    if (RECORDED / source.stem / "controls.json").exists():
+        cell = widget_cell(notebook)
+        way = "../" * (len(source.relative_to(CLONE).parts) - 1)
+        notebook.cells.insert(notebook.cells.index(cell) + 1, stand_in(notebook, source.stem, way))
+    return notebook
 
 
 def translated(notebook: NotebookNode, place: Path, folder: Path) -> NotebookNode:

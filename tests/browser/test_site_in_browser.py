@@ -1,5 +1,8 @@
 """The course site in a real browser, where `make site` has built it; no page fetches from elsewhere (`open_page`)."""
 
+from pathlib import Path
+from urllib.parse import urlsplit
+
 import pytest
 from stage import CLONE
 
@@ -39,6 +42,7 @@ def test_no_page_is_wider_than_the_window(open_page, width):
         "index",
         "graphs",
         "gallery",
+        "glossary",
         "notebooks/10_crf",
         "notebooks/exercises/01_bayes",
         "api/occupancy",
@@ -54,3 +58,23 @@ def test_every_page_opens_and_stays_at_home(open_page):
         if not {"_static", "_modules", "demo"} & {*file.parts}:
             page.goto(file.as_uri(), wait_until="domcontentloaded")
             assert page.title()
+
+
+def test_a_widget_moves_without_a_kernel(open_page):
+    page = open_page(SITE / "notebooks" / "05_pixels.html")
+    picture, slider = page.locator(".moving img"), page.locator(".moving input")
+    before = picture.get_attribute("alt"), picture.evaluate("(one) => one.src")
+    slider.focus()
+    page.keyboard.press("ArrowRight")
+    assert (picture.get_attribute("alt"), picture.evaluate("(one) => one.src")) != before
+    page.wait_for_function(
+        "() => { const one = document.querySelector('.moving img'); return one.complete && one.naturalWidth > 100; }"
+    )
+    assert page.locator(".moving output").inner_text() in picture.get_attribute("alt")
+
+
+def test_animations_play(open_page):
+    page = open_page(SITE / "notebooks" / "00_tour.html")
+    files = page.locator("article img").evaluate_all("(all) => all.map((one) => one.src)")
+    moving = [one for one in files if one.endswith(".png") and b"acTL" in Path(urlsplit(one).path).read_bytes()[:200]]
+    assert moving
