@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
+from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -23,7 +24,28 @@ from semgrid_edu.workshop.demo.record import Record
 REACH = 50.0
 """How far ahead the picture shows the grids, metres: few cells are seen beyond."""
 
+MOST_IN_A_ROW = 6
+"""Grids side by side; more begin a second row."""
+
 STYLE = {"font.size": 9, "axes.titlesize": 11, "axes.titlelocation": "left"}
+
+
+class GridPicture(NamedTuple):
+    """A bird's-eye picture.
+
+    Parameters
+    ----------
+    title : str
+        What stands above it.
+    result : FrameResult
+        Whose it is.
+    labels : (H, W) int or None
+        A map of classes; None for the occupancy grid.
+    """
+
+    title: str
+    result: FrameResult
+    labels: NDArray | None
 
 
 def save_overview(record: Record, path: str | Path, words: str = "") -> None:
@@ -32,8 +54,7 @@ def save_overview(record: Record, path: str | Path, words: str = "") -> None:
     Parameters
     ----------
     record : Record
-        What was recorded of the drive. In a comparison, each grid that the student's stages can change is followed,
-        below it, by the student's own grid.
+        What was recorded of the drive. In a comparison, the student's own grids follow, as far as they can differ.
     path : path-like
         The file to write; its folder is made when missing.
     words : str
@@ -47,27 +68,53 @@ def save_overview(record: Record, path: str | Path, words: str = "") -> None:
 
 
 def _draw(record: Record, lines: list[str]) -> Figure:
-    """Draw (l, i), s, o, g, refined g and, where it is known, the truth; below it some lines of text."""
+    """Draw (l, i), s, o, g, refined g and, where it is known, the truth; a student's grids follow; then some lines."""
     package, yours = record.liveliest
-    maps = {"semantic grid g": package.grid.argmax(axis=0), "g refined by the CRF": package.refined.argmax(axis=0)}
-    if package.remembered is not None:
-        maps["g with memory"] = package.remembered.argmax(axis=0)
-    if package.frame.labels is not None:
-        maps["truth"] = grid_truth(package.frame.labels, package.belief.probability, record.spec)
-    rows = 1 if yours is None else 2
+    panels = _panels(package, record)
+    if yours is not None:
+        panels += _panels(yours, record, f"\n{record.comparison.file}", record.comparison.changed)
+    rows = -(-len(panels) // MOST_IN_A_ROW)
     heights = [2.3, 5.4 * rows, 0.6, *[0.2 * len(lines) + 0.1] * bool(lines)]
     figure = plt.figure(figsize=(13, sum(heights)), layout="constrained")
     photos, grids, legend, *below = figure.subfigures(len(heights), 1, height_ratios=heights)
     for part in below:
         part.text(0.01, 0.5, "\n".join(lines), va="center", linespacing=1.3)
     _draw_photos(photos, record)
-    axes = grids.subplots(rows, 1 + len(maps), sharey=True, squeeze=False)
-    _draw_grids(axes[0], package, maps, record)
-    shown = [*maps.values()]
-    if yours is not None:
-        shown += _draw_yours(axes[1], yours, record)
+    axes = grids.subplots(rows, -(-len(panels) // rows), sharey=True, squeeze=False).ravel()
+    for ax, panel in zip(axes, panels, strict=False):
+        _draw_panel(ax, panel, record)
+    for ax in axes[len(panels) :]:
+        ax.set_visible(False)
+    shown = [panel.labels for panel in panels if panel.labels is not None]
     _draw_legend(legend, np.unique(np.stack(shown)), record.label_set)
     return figure
+
+
+def _panels(result: FrameResult, record: Record, whose: str = "", of: Sequence[str] | None = None) -> list[GridPicture]:
+    """Return the grids of a result; with `of`, those among these pictures alone."""
+    maps = {"grid": ("semantic grid g", result.grid), "refined": ("g refined by the CRF", result.refined)}
+    if result.remembered is not None:
+        maps["remembered"] = "g with memory", result.remembered
+    panels = {"occupancy": GridPicture(f"occupancy grid o{whose}", result, None)}
+    panels |= {name: GridPicture(f"{title}{whose}", result, g.argmax(axis=0)) for name, (title, g) in maps.items()}
+    if result.frame.labels is not None and of is None:
+        truth = grid_truth(result.frame.labels, result.belief.probability, record.spec)
+        panels["truth"] = GridPicture("truth", result, truth)
+    return [panel for name, panel in panels.items() if of is None or name in of]
+
+
+def _draw_panel(ax: Axes, panel: GridPicture, record: Record) -> None:
+    """Draw the occupancy grid with velocities, or a map of classes."""
+    spec, belief = record.spec, panel.result.belief
+    if panel.labels is None:
+        plotting.occupancy(spec, belief.probability, ax, legend=False)
+        plotting.velocity(spec, belief.probability, belief.velocity, ax)
+    else:
+        plotting.grid_labels(spec, panel.labels, record.label_set, ax, legend=False)
+    ax.set_title(panel.title)
+    ax.set_ylim(spec.x_min, min(spec.x_max, spec.x_min + REACH))
+    if not ax.get_subplotspec().is_first_col():
+        ax.set_ylabel("")
 
 
 def _draw_photos(figure: SubFigure, record: Record) -> None:
@@ -90,31 +137,6 @@ def _draw_scores(ax: Axes, result: FrameResult, label_set: LabelSet) -> None:
     height, width = result.frame.image.shape[:2]
     ax.imshow(scores_layer(result.scores, label_set), extent=(-0.5, width - 0.5, height - 0.5, -0.5))
     ax.set_title("image scores s, the best class of each pixel")
-
-
-def _draw_grids(axes: Sequence[Axes], result: FrameResult, maps: dict[str, NDArray], record: Record) -> None:
-    """Draw the occupancy grid, and maps of classes under their titles."""
-    (first, *others), spec = axes, record.spec
-    plotting.occupancy(spec, result.belief.probability, first, legend=False).set_title("occupancy grid o")
-    plotting.velocity(spec, result.belief.probability, result.belief.velocity, first)
-    for ax, (title, labels) in zip(others, maps.items(), strict=False):
-        plotting.grid_labels(spec, labels, record.label_set, ax, legend=False).set(title=title, ylabel="")
-    first.set_ylim(spec.x_min, min(spec.x_max, spec.x_min + REACH))
-
-
-def _draw_yours(axes: Sequence[Axes], yours: FrameResult, record: Record) -> list[NDArray]:
-    """Draw a student's grids, except those that can't differ from the package's, and return the maps of classes."""
-    maps = {"semantic grid g": yours.grid.argmax(axis=0), "refined g": yours.refined.argmax(axis=0)}
-    if yours.remembered is not None:
-        maps["g with memory"] = yours.remembered.argmax(axis=0)
-    _draw_grids(axes, yours, maps, record)
-    for ax, picture in zip(axes, ("occupancy", "grid", "refined", "remembered", "truth"), strict=False):
-        ax.set_visible(picture in record.comparison.changed)
-        ax.set_title(f"{ax.get_title(loc='left')}\n{record.comparison.file}")
-    leftmost = next(ax for ax in axes if ax.get_visible())
-    leftmost.tick_params(labelleft=True)
-    leftmost.set_ylabel(axes[0].get_ylabel())
-    return [*maps.values()]
 
 
 def _draw_legend(figure: Figure, classes: NDArray, label_set: LabelSet) -> None:
