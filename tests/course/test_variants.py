@@ -1,5 +1,7 @@
 """Hidden tests draw other inputs for each variant: reference solutions must pass with all of them."""
 
+import re
+import shutil
 import sys
 
 import pytest
@@ -29,3 +31,47 @@ def test_reference_passes_whatever_the_variant(source, choose_variant):
         choose_variant(variant)
         for cell in filter(is_grade, cells):
             exec(cell.source, names)
+
+
+def changed(text, diff):
+    """Carry out a diff of the guide: each line that begins with a minus goes, for those with a plus behind it."""
+    for block in re.findall(r"((?:^-.*\n)+)((?:^\+.*\n)+)", diff, re.MULTILINE):
+        old, new = ("".join(line[1:] for line in part.splitlines(keepends=True)) for part in block)
+        assert text.count(old) >= 1, old
+        text = text.replace(old, new)
+    return text
+
+
+def passes(cells, names, task):
+    """Whether the tests of a task pass with the answers among these names."""
+    for cell in cells:
+        if is_grade(cell) and cell.metadata.nbgrader.grade_id.startswith(task):
+            try:
+                exec(cell.source, names)
+            except AssertionError:
+                return False
+    return True
+
+
+def test_the_guide_s_private_variant_passes_with_its_own_answer_and_not_with_the_public_one(tmp_path, monkeypatch):
+    guide = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")
+    exercise, hidden = re.findall(r"```diff\n(.*?)```", guide, re.DOTALL)
+    shutil.copytree(NOTEBOOKS / "instructor" / "semgrid_instructor", tmp_path / "semgrid_instructor")
+    checks = tmp_path / "semgrid_instructor" / "bayes.py"
+    checks.write_text(changed(checks.read_text(encoding="utf-8"), hidden), encoding="utf-8")
+    for name in [name for name in sys.modules if name.split(".")[0] == "semgrid_instructor"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    source = NOTEBOOKS / "src" / "exercises" / "01_bayes.py"
+    private = tmp_path / "01_bayes.py"
+    private.write_text(changed(source.read_text(encoding="utf-8"), exercise), encoding="utf-8")
+    public_cells, cells = ([c for c in read_percent(one).cells if c.cell_type == "code"] for one in (source, private))
+    answers = [cell for cell in cells if not is_grade(cell)]
+    names, public = {"__name__": "__main__"}, {"__name__": "__main__"}
+    for cell in answers:
+        exec(cell.source, names)
+    for cell in (cell for cell in public_cells if not is_grade(cell)):
+        exec(cell.source, public)
+    assert passes(cells, names, "")
+    assert not passes(cells, public, "locate-test")
+    assert passes(cells, public, "locate-nothing-test")  # the guide says so
