@@ -1,6 +1,7 @@
 """The course site: what is laid out for Sphinx, and what its check finds."""
 
 import json
+import re
 
 import ipywidgets
 import nbformat
@@ -8,6 +9,7 @@ import pytest
 from check import problems
 from glossary import definition, glossary_page
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from PIL import Image
 from stage import CLONE, relinked, translated, with_moving_widget
 from widgets import MOST_BYTES, RECORDED, notebooks, values_of
 
@@ -127,3 +129,10 @@ def test_a_long_slider_keeps_its_ends_and_where_it_begins():
     assert (values[0], values[-1]) == (0, 1)
     assert 0.07 in values
     assert len(values) <= 14
+
+
+def test_the_animation_of_the_readme_moves_is_small_and_has_words():
+    with Image.open(CLONE / "docs" / "street.png") as moving:
+        assert moving.n_frames == 10
+    assert (CLONE / "docs" / "street.png").stat().st_size <= 600_000
+    assert re.search(r"!\[[^\]]{40,}\]\(docs/street\.png\)", (CLONE / "README.md").read_text(encoding="utf-8"))
