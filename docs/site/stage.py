@@ -99,8 +99,8 @@ def with_moving_widget(notebook: NotebookNode, source: Path) -> NotebookNode:
     source : Path
         Where it lies in the clone.
     """
-    if (RECORDED / source.stem / "controls.json").exists():
-        cell = widget_cell(notebook)
+    cell = widget_cell(notebook)
+    if cell is not None and (RECORDED / source.stem / "controls.json").exists():
         way = "../" * (len(source.relative_to(CLONE).parts) - 1)
         notebook.cells.insert(notebook.cells.index(cell) + 1, stand_in(notebook, source.stem, way))
     return notebook
