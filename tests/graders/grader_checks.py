@@ -88,9 +88,15 @@ class GraderChecks:
 
     @pytest.fixture(scope="class")
     @classmethod
-    def students(cls, source):
+    def reference(cls, source):
+        """The right answers, by task."""
+        return reference_answers(source)
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def students(cls, reference):
         """Answers to each task, by student: the reference, the stub, and all entries packed."""
-        reference, packed = reference_answers(source), pack(cls.entries)
+        packed = pack(cls.entries)
         codes = [{task: entry.code for task, entry in answers.items()} for answers in packed]
         return {"reference": reference, "stub": {}} | {f"student-{n}": reference | own for n, own in enumerate(codes)}
 
@@ -168,19 +174,17 @@ class GraderChecks:
                 assert task in answers or score == points, f"student-{number}, {task}: {message}"
 
     @pytest.mark.parametrize("kind", POINTLESS)
-    def test_known_inputs_alone_earn_nothing(self, source, start, kind):
-        answers = reference_answers(source)
-        unseen = {code: code + disguise(code, POINTLESS[kind], pointless=True) for code in coded(source, answers)}
-        scores = self.by_task(source, grade_warm(source, answers, start, TIMEOUT["answer"], unseen))
+    def test_known_inputs_alone_earn_nothing(self, source, reference, start, kind):
+        unseen = {code: code + disguise(code, POINTLESS[kind], pointless=True) for code in coded(source, reference)}
+        scores = self.by_task(source, grade_warm(source, reference, start, TIMEOUT["answer"], unseen))
         assert {task: score for task, (score, _, _) in scores.items() if score} == {}
 
     @pytest.mark.parametrize("kind", HONEST)
-    def test_other_types_of_numbers_cost_nothing(self, source, start, kind):
-        answers = reference_answers(source)
-        answers |= {
+    def test_other_types_of_numbers_cost_nothing(self, source, reference, start, kind):
+        answers = reference | {
             task: code + disguise(code, HONEST[kind], pointless=False)
-            for task, code in answers.items()
-            if code in coded(source, answers)
+            for task, code in reference.items()
+            if code in coded(source, reference)
         }
         scores = self.by_task(source, grade_warm(source, answers, start, TIMEOUT["answer"]))
         assert {task: message for task, (score, points, message) in scores.items() if score < points} == {}
