@@ -5,14 +5,12 @@ that run backward carry what later readings say about earlier places.
 """
 
 from collections.abc import Sequence
-from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical.exact import eliminate, max_product
+from semgrid_edu.graphical.exact import max_product
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.graphical.messages import sum_product
@@ -109,43 +107,7 @@ def most_likely_path(stage: StageGraph, readings: Sequence[int]) -> list[int]:
     return [best[f"n{t}"] for t in range(len(readings))]
 
 
-class FutureGain(NamedTuple):
-    """How uncertain the places are, on average over all sequences of readings.
-
-    Parameters
-    ----------
-    filtered, smoothed : (T,) float64
-        Mean entropy of P(n_t | readings up to t), and of P(n_t | all readings), bits.
-    """
-
-    filtered: NDArray[np.float64]
-    smoothed: NDArray[np.float64]
-
-
-def future_gain(stage: StageGraph) -> FutureGain:
-    """Measure what backward messages add: mean entropy of each place with and without later readings.
-
-    With the defaults of `bayes_on_a_line`, the first of four places has an entropy of 2.97 bits when filtered and 2.51
-    bits when smoothed. The last place has no later readings, so it has 2.51 bits either way.
-
-    Parameters
-    ----------
-    stage : StageGraph
-        A graph from `bayes_on_a_line` with T steps: all 2^T sequences of readings are enumerated.
-    """
-    total = np.zeros((2, len(stage.observed)))
-    for readings in product((0, 1), repeat=len(stage.observed)):
-        weight = eliminate(stage.model, (), _given(stage, readings)).table
-        total += weight * np.array([_bits(filtered(stage, readings)), _bits(smoothed(stage, readings))])
-    return FutureGain(*total)
-
-
 def _given(stage: StageGraph, readings: Sequence[int]) -> dict[str, int]:
     if len(readings) != len(stage.observed):
         raise ArgumentError("readings", f"one per step, {len(stage.observed)}", len(readings))
     return {name: int(says) for name, says in zip(stage.observed, readings, strict=True)}
-
-
-def _bits(beliefs: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the entropy of each row in bits, with 0 log 0 = 0."""
-    return -(beliefs * np.log2(np.where(beliefs > 0, beliefs, 1))).sum(axis=1)

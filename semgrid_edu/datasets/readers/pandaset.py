@@ -197,11 +197,11 @@ class PandasetScene(FrameSequence):
         expected = f"an image, since there is one every {min(np.diff(self.numbers), default=1)} frames"
         missing = [str(DataError(self.view / f"{number:02d}.jpg", expected, "none")) for number in self.gaps]
         scans = [self.folder / "lidar" / f"{number:02d}.pkl.gz" for number in self.numbers]
-        again = scans_again(scans, lambda k: self._scan(self.numbers[k]).points)
-        return [*missing, *again, *super().doubts()]
+        return [*missing, *scans_again(scans, lambda k: self._scan(self.numbers[k]).points), *super().doubts()]
 
     def _frame(self, k: int) -> Frame:
-        return replace(frame := self._without_labels(k), labels=self._labels(k, frame.camera))
+        frame = self._without_labels(k)
+        return replace(frame, labels=self._labels(k, frame.camera))
 
     def _without_labels(self, k: int) -> Frame:
         scan, camera, T_world_from_lidar = self._scan(self.numbers[k]), self._camera(k), self._T_world_from_lidar(k)

@@ -11,7 +11,7 @@ from pyagrum_oracle import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, sum_product, why_dependent
-from semgrid_edu.stage_models.line import bayes_on_a_line, filtered, future_gain, most_likely_path, smoothed
+from semgrid_edu.stage_models.line import bayes_on_a_line, filtered, most_likely_path, smoothed
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 MOVED = np.array([0.1, 0.8, 0.1])
@@ -114,19 +114,6 @@ def test_the_present_place_screens_the_past_off():
     model = bayes_on_a_line(4).model
     assert d_separated(model, ("n0", "z0"), ("n2", "z3"), given="n1")
     assert why_dependent(model, "z0", "z2", given="z1") == ("z0", "n0", "n1", "n2", "z2")
-
-
-def test_the_future_adds_what_the_docstring_says():
-    gain = future_gain(bayes_on_a_line())
-    np.testing.assert_allclose(gain.filtered[[0, -1]], [2.97, 2.51], atol=0.005)
-    np.testing.assert_allclose(gain.smoothed[[0, -1]], [2.51, 2.51], atol=0.005)
-    assert (gain.smoothed <= gain.filtered + 1e-12).all()
-    assert gain.smoothed[-1] == pytest.approx(gain.filtered[-1], abs=1e-12)
-
-
-def test_a_sensor_that_says_nothing_gains_nothing():
-    gain = future_gain(bayes_on_a_line(3, hit=0.1))
-    np.testing.assert_allclose(np.array(gain), np.log2(10), atol=1e-12)
 
 
 def test_pyagrum_agrees():
