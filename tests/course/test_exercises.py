@@ -15,6 +15,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.course.nbgrader.autograde import (
     GradeSettings,
+    UngradedError,
     autograde_one,
     place,
     reference_answers,
@@ -133,7 +134,7 @@ def test_tests_that_a_student_deletes_or_edits_come_back(course, source):
 def test_notebook_that_nbgrader_cannot_read_is_an_error_not_a_zero(course):
     path = place(course, "submitted", "breaker", "00_tiny")
     write_text(path, "{")
-    with pytest.raises(DataError, match="breaker"):
+    with pytest.raises(UngradedError, match="NotJSONError"):
         autograde_one(course, "00_tiny", "breaker", GradeSettings())
 
 

@@ -121,13 +121,19 @@ def test_lists_are_as_good_as_arrays(forked):
 FUNCTIONS = ("locate", "predict", "follow", "transition", "fuse", "build_map")
 
 
+def lost(cells):
+    """What cells say that cost points, but for the written answer, which nobody gives here."""
+    coded = {name: cell for name, cell in cells.items() if name != "parked"}
+    return {name: cell.message for name, cell in coded.items() if cell.score not in (cell.points, None)}
+
+
 @pytest.mark.parametrize("first", [0, 6])
 def test_right_results_in_other_forms_earn_all_points(start, first):
     forms = [*tries.WRAPPED.values()][first : first + 6]
     lines = [f"{name} = wrapped({name}, lambda x: {form})" for name, form in zip(FUNCTIONS, forms, strict=True)]
     answers = {n: f"{tries.WRAPPING}\n{code}\n{line}" for (n, code), line in zip(REFERENCE.items(), lines, strict=True)}
     cells = grade_notebook(SOURCE, handed_in(answers), start, 60)
-    assert {name: cell.message for name, cell in cells.items() if cell.score not in (cell.points, None)} == {}
+    assert lost(cells) == {}
 
 
 def test_cells_that_students_write_beside_cost_nothing(start):
@@ -135,7 +141,7 @@ def test_cells_that_students_write_beside_cost_nothing(start):
     place = cell_of(notebook, "setup") + 1
     notebook.cells[place:place] = [new_code_cell(code, id=f"c{k}") for k, code in enumerate(tries.UNUSUAL)]
     cells = grade_notebook(SOURCE, notebook, start, 60)
-    assert {name: cell.message for name, cell in cells.items() if cell.score not in (cell.points, None)} == {}
+    assert lost(cells) == {}
 
 
 ENDS = {

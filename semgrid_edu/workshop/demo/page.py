@@ -254,7 +254,8 @@ def _json(data: object) -> str:
 
 def _swatches(colours: Iterable[tuple[str, tuple[int, int, int]]]) -> str:
     return "".join(
-        f'<span style="--swatch:rgb{tuple(rgb)}" data-texture="{name}">{escape(name)}</span>' for name, rgb in colours
+        f'<span style="--swatch:rgb{tuple(rgb)}" data-texture="{name}">{name}</span>'
+        for name, rgb in ((escape(name), rgb) for name, rgb in colours)
     )
 
 

@@ -85,7 +85,7 @@ function heading(cell, read) {
   return `<p><b>${place(centre(story.grid, cell))}</b> (row ${row}, column ${cell % story.grid.cols}): the refined grid says ${swatch(refined)}. ${known}</p>${sentences(story, read, cell).map((sentence) => `<p>${escaped(sentence)}</p>`).join("")}`;
 }
 
-function swatch(label) { return `<span class="class" data-texture="${story.names[label]}" style="--swatch:${rgb(story.colours.classes[label])}">${escaped(story.names[label])}</span>`; }
+function swatch(label) { const name = escaped(story.names[label]); return `<span class="class" data-texture="${name}" style="--swatch:${rgb(story.colours.classes[label])}">${name}</span>`; }
 
 function scanStory(cell, read, everywhere) {
   const [obstacles] = read("obstacles", cell), [ground] = read("ground", cell), [reach] = read("reach", cell);

@@ -190,9 +190,14 @@ for _ in range(4):
         kept = bytearray(b"1" * 300_000_000)
         time.sleep(60)
 """,
-    "shared memory": "kept = [mmap.mmap(-1, 300_000_000) for _ in range(2)]\n"
-    "for _ in range(5):\n    if os.fork() == 0:\n        mine = mmap.mmap(-1, 300_000_000)\n"
-    "        mine[:] = bytes(300_000_000)\n        time.sleep(60)",
+    "shared memory": """
+for _ in range(8):
+    if os.fork() == 0:
+        mine = mmap.mmap(-1, 200_000_000)
+        for _ in range(20):
+            mine.write(bytes(10_000_000))
+        time.sleep(60)
+""",
 }
 """What a process takes with its children, each of them within its limits: 30 MB of files, 1000 MB of memory."""
 
