@@ -78,7 +78,7 @@ def estimate(runs: list[Run], root: str | Path) -> dict[Run, float]:
     left = left_to_do(runs, root)
     paces: dict[str, list[float]] = {}
     for run in runs:
-        if run.has_ended(root):
+        if run.is_recorded(root):
             paces.setdefault(run.pace, []).append(run.record(root)["seconds"] / run.steps)
     for run in left:
         if run.pace not in paces:

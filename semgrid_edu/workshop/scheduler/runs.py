@@ -74,6 +74,10 @@ class Run(ABC):
 
         A run that others read large files of, such as weights, hasn't ended when these were deleted.
         """
+        return self.is_recorded(root)
+
+    def is_recorded(self, root: str | Path) -> bool:
+        """Return whether it has ended once, so that `record` says when. Parameters are those of `Run.folder`."""
         return (self.folder(root) / ENDED).exists()
 
     def record(self, root: str | Path) -> dict:
