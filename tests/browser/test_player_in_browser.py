@@ -134,7 +134,7 @@ def test_the_address_is_followed(shipped):
 
 class TestPlay:
     def test_each_frame_comes_at_its_time_and_the_last_one_stays(self, shipped, shipped_frames):
-        page = shipped(by_hand=True)
+        page = shipped("#0", by_hand=True)
         page.locator("#play").click()
         passed = 0
         for k, view in enumerate(shipped_frames):
@@ -157,7 +157,7 @@ class TestPlay:
 
     @pytest.mark.parametrize(("speed", "milliseconds"), [("2", 500), ("1", 1000), ("0.5", 2000), ("0.25", 4000)])
     def test_speed_divides_the_time(self, shipped, speed, milliseconds):
-        page = shipped(by_hand=True)
+        page = shipped("#0", by_hand=True)
         page.locator("#speed").select_option(speed)
         page.locator("#play").click()
         page.clock.run_for(milliseconds - 10)
@@ -166,7 +166,7 @@ class TestPlay:
         assert frame(page) == 10
 
     def test_pause_holds_the_frame(self, shipped):
-        page = shipped(by_hand=True)
+        page = shipped("#0", by_hand=True)
         page.locator("#play").click()
         page.clock.run_for(330)
         page.locator("#play").click()
