@@ -174,7 +174,7 @@ class TestPlay:
         assert frame(page) == 3
 
     def test_it_runs_by_the_clock_on_the_wall(self, shipped):
-        page = shipped()
+        page = shipped("#0")
         seconds = page.evaluate(
             """() => new Promise((done) => {
                  const start = performance.now();
