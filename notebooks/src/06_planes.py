@@ -32,7 +32,7 @@ from semgrid_edu import plotting
 from semgrid_edu.camera import transform_points
 from semgrid_edu.datasets.readers.frames import resize_labels
 from semgrid_edu.datasets.training_arrays import resize_image
-from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -189,9 +189,11 @@ for n in (1, 2, 4, 10):
     print(f"{n:>2} cells say car: exact {exact:.2f}, as if independent {independent:.3f}")
 assert not d_separated(stage.model, "x1", "x2", given=("m",))
 assert d_separated(stage.model, "x1", "x2", given=("a",))
-for near, far in ((6, 20), (20, 40), (40, 71)):
-    read_by = pixels[0][visible[0] & (x_cells >= near) & (x_cells < far)].round()
-    print(f"on the drive, {near} to {far} m ahead: {len(read_by) / len(np.unique(read_by, axis=0)):.1f} cells a pixel")
+on_street = plane_pixels(spec, heights, real_drive().camera.resized(camera.size))
+for name, (at, seen) in {"drive": (pixels, visible), "real street": on_street}.items():
+    bands = [at[0][seen[0] & (x_cells >= a) & (x_cells < b)].round() for a, b in ((6, 20), (20, 40), (40, 71))]
+    shares = ", ".join(f"{len(read_by) / len(np.unique(read_by, axis=0)):.1f}" for read_by in bands)
+    print(f"on the {name}, cells a pixel from 6 m, from 20 m and from 40 m on: {shares}")
 
 # %% [markdown]
 # The cut edge is the pixel's shared error. A network that looks at neighbouring cells can learn to allow for it; a rule
