@@ -1,8 +1,9 @@
 # %% [markdown]
 # # 05 · From grid to pixel: equation (1)
 #
-# **In one sentence.** A pixel does not know how far away its thing is, but a point in space has one pixel, or none when it
-# is out of view; so we lay planes over the grid, at several heights, and look up the pixel of every point of every plane.
+# **In one sentence.** A pixel doesn't tell how far away the thing is that it shows, but a point in space has one
+# pixel, or none when it is out of view; so we lay planes over the grid, at several heights, and look up the pixel of
+# every point of every plane.
 #
 # **You will be able to**
 # - find the pixel of a point by similar triangles, and say what $K$ does to it;
@@ -120,12 +121,13 @@ plotting.animate(
 )
 
 # %% [markdown]
-# A: each dot is the centre of a cell, drawn at its pixel; nearer cells are lighter. B: the same from the side, with the
-# pixels of the red car where they really are. The black square is the camera. C: the map of classes that the plane
-# reads. Red are the cells that read the red car, black is its true place. At 0 m the car is thrown over the map like a
-# shadow. At 0.8 m, in the middle of its bodywork, the smear is shorter and lies on both sides of the true place. At the camera's own
-# height the sheet becomes a line, and above it the map shows what is high: trees, houses. **No height is right for
-# everything.** The lecture says how these pictures come about, and what it costs that a pixel doesn't tell its height.
+# A: each dot is the centre of a cell, drawn at its pixel; nearer cells are lighter. B: the same from the side, with
+# the pixels of the red car where they really are. The black square is the camera. C: the map of classes that the
+# plane reads. Bright red are the cells that read the red car (*pedestrian* is darker), black is its true place. At
+# 0 m the car is thrown over the map like a shadow. At 0.8 m, in the middle of its bodywork, the smear is shorter and
+# lies on both sides of the true place. At the camera's own height the sheet becomes a line, and above it the map
+# shows what is high: trees, houses. **No height is right for everything.** The lecture says how these pictures come
+# about, and what it costs that a pixel doesn't tell its height.
 #
 # ### The graph
 #
@@ -162,10 +164,11 @@ assert d_separated(stage.model, "m1", "m3")
 assert not d_separated(stage.model, "m1", "m3", given=("a3",))
 
 # %% [markdown]
-# The cut edges are all slanted arrows, $m_i \to a_j$ with $i < j$: *occlusion*. One is dashed, with its price. With these
-# numbers the error grows along the ray, because more can stand before a cell that is farther away. (With labels that are
-# right with 0.8 it is 0.12 to 0.14 everywhere: then even the nearest cell loses much by not hearing what the pixels behind
-# it say.) Nothing in this lecture repairs it; the LIDAR can help (lecture 08).
+# Equation (1) cuts every slanted arrow, $m_i \to a_j$ with $i < j$: *occlusion*. One of them is dashed, with its
+# price. With these numbers the error grows along the ray, because more can stand in front of a cell that is farther
+# away. (With labels that are right only with 0.8 it is 0.12 to 0.14 in all four cells: then even the nearest cell
+# loses much by not hearing what the pixels behind it say.) Nothing in this lecture repairs it; the LIDAR can help
+# (lecture 08).
 #
 # ## Two similar triangles
 #
@@ -497,9 +500,9 @@ print("package:", project(behind, toy)[0], " in view:", project(behind, toy)[1])
 print(f"of the course's grid {100 * ground.mean():.0f} % is in view on the ground plane of the drive's camera")
 
 # %% [markdown]
-# So a point is **in view** if it lies in front of the camera *and* its pixel lies among the *centres* of the image's
-# pixels, $0 \le u \le w - 1$, $0 \le v \le h - 1$, since equation (2) interpolates between centres. The code calls this
-# `visible`; it says nothing about what stands in between.
+# So a point is **in view** if it lies in front of the camera *and* its pixel lies between the outermost *centres* of
+# the image's pixels, $0 \le u \le w - 1$, $0 \le v \le h - 1$, since equation (2) interpolates between centres. The
+# code calls this `visible`; it says nothing about what stands in between.
 #
 # ## The wrong height
 #
@@ -570,8 +573,8 @@ plt.show()
 # more than a cell, because near the camera's own height a ray is nearly level: there 10 cm of height are metres of
 # road. The planes only make sure that better answers are among those offered. The choice is left to what is learnt.
 #
-# As a graph: a class $c$ says something about the height $h$ that a pixel shows, and the height says at which place $x$
-# along the ray the thing stands.
+# As a graph: a class $c$ says something about the height $h$ of what a pixel shows (in metres; not the image's $h$),
+# and the height says at which place $x$ along the ray the thing stands.
 
 # %% tags=["graph-height"] jupyter={"source_hidden": true} alt="a directed graph: class c to height h to place x, and class c to the observed label a"
 height_stage = pixel_height()
@@ -607,9 +610,9 @@ np.testing.assert_allclose(counts / counts.sum(), CAR_HEIGHTS, atol=0.01)
 # <details><summary>Answer</summary>
 #
 # In more than half, 55 %; over the whole drive it is 52 to 67 %. And here is a surprise: another 32 % read something
-# *behind* the cell. The road has a crest. In this frame the ground 40 m ahead lies 0.7 m lower than below the vehicle,
-# so the ray through the plane's cell flies over it and meets something lower than the plane. Only 13 % read what stands
-# in the cell.
+# *behind* the cell. The road has a crest. In this frame the ground 40 m ahead lies 0.7 m lower than below the
+# vehicle, so the ray through the plane's cell passes above the road there and meets something farther away, lower
+# than the plane. Only 13 % read something at the cell's own distance, to within a tenth.
 #
 # </details>
 
@@ -645,9 +648,9 @@ plt.show()
 
 # %% [markdown]
 # Left: the *true* labels of the image, laid on the ground by equation (1); right: the true map. Hatched: the pixel
-# shows something nearer, which is drawn out to the edge of the grid. No camera model repairs that. The LIDAR knows
-# which cells are hidden, and the occupancy grid calls them UNKNOWN: one reason to use both sensors. Far
-# ahead, what the map lacks is the road's own shape: there a plane *below* zero would be right.
+# shows something nearer, which is drawn out, often to the edge of the grid. No camera model repairs that. The LIDAR
+# knows which cells are hidden, and the occupancy grid calls them UNKNOWN: one reason to use both sensors. Far ahead,
+# what the map lacks is the road's own shape: there a plane *below* zero would be right.
 # [The companion](deeper/05_cells_and_slopes.ipynb) measures slopes, and how few pixels a far cell has.
 #
 # ## A real street
@@ -708,7 +711,8 @@ _ = interact(show, height=FloatSlider(value=0.0, min=-1.0, max=3.8, step=0.05, d
 # have seen the second fail. The first: the camera is turned by $\psi$ = 1°, and nobody has told the calibration.
 #
 # **Predict before you run.** In metres, 30 m ahead: how far is a cell off if the toy camera is turned to the side
-# (yaw)? And if it nods (pitch), so that the row of the ground at 30 m, 48 + 300 / 30 = 58, is really row 54.5 or 61.5?
+# (yaw)? And if it nods (pitch)? Row 48 + 300 / 30 = 58, where the ground at 30 m should be, then really looks where
+# row 54.5 or 61.5 should.
 #
 # <details><summary>Answer</summary>
 #
@@ -774,8 +778,8 @@ Markdown(ledger_table(ledger("pixel") + ledger("height")))
 # %% [markdown]
 # ## In five lines
 #
-# 1. $(X/Z, Y/Z)$ is the picture one metre ahead; $K$ turns it into pixels. Resized, $K$ moves by half pixels; cropped,
-#    it shifts.
+# 1. $(X/Z, Y/Z)$ is the picture one metre ahead; $K$ turns it into pixels. Resizing scales $c$ from the image's edge,
+#    half a pixel before the first centre; cropping shifts it.
 # 2. Transforms are read by names, right to left; the inverse undoes the shift first, then the turn.
 # 3. A point in view has one pixel, (1); a pixel has a whole ray of points. All planes meet at the horizon.
 # 4. A wrong height moves a thing by $x\,(z - \delta) / (z_\text{cam} - z)$: 17 cm of sidewalk are half a metre on the map.

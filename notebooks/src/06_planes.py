@@ -5,7 +5,7 @@
 # pixel receives its share of the gradient by the same four weights; so an error on the map can train the image network.
 #
 # **You will be able to**
-# - compute a bilinear sample by hand, and its gradient with respect to the scores and to u and v (short: *in* them);
+# - compute a bilinear sample by hand, and its gradient with respect to (short: *in*) the scores, u and v;
 # - write equation (2) as a sparse matrix, and say why its transpose (the *adjoint*) carries the gradient;
 # - check any gradient by finite differences;
 # - calibrate a camera by gradient descent, and say what it finds when the ground isn't flat;
@@ -156,14 +156,15 @@ plotting.animate(converging(), period=0.5, alt="the map's cells slide onto road 
 # %% [markdown]
 # A: each dot is a cell that the map calls road or sidewalk, at the pixel that equation (1) gives to it with the pitch
 # learnt so far. B: that pitch. After four steps the border between the colours lies on the kerb. (Why the pitch ends
-# at -0.3° and not at 0 comes below.) What made this possible is that *reading a pixel has a derivative*: the loss on the map says in which direction each dot should move,
-# and the chain rule collects that into one number. The same derivative, in the scores instead of the place, trains the
-# whole image network (lecture 08). This lecture builds both, from four numbers on.
+# at -0.3° and not at 0 comes below.) This works because *reading a pixel has a derivative*: the loss on the map says
+# in which direction each dot should move, and the chain rule collects that into one number. The same derivative, in
+# the scores instead of the place, trains the whole image network (lecture 08). This lecture builds both, from four
+# numbers on.
 #
 # ### The graph
 #
 # One thing first that no derivative repairs. $m$ is what lies on a patch of ground, $a$ the label of the pixel that
-# shows it, and $x_1, x_2, \dots$ are the cells that read this pixel:
+# shows it, and $x_1, x_2, \dots$ are what different cells read there:
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: the patch m, below it the pixel a, below it four observed cells x1 to x4 that all depend on the pixel"
 stage = shared_pixel()
@@ -224,7 +225,8 @@ for name, (at, seen) in {"drive": (pixels, visible), "real street": on_street}.i
 # </details>
 #
 # One rule for all nine pixels: a pixel's weight falls from 1 to 0 as the point moves away by one pixel, across and
-# down alike. That is a kernel, $k(t) = \max(0, 1 - |t|)$, and the interpolation is the paper's equation:
+# down alike. That is a kernel, $k(t) = \max(0, 1 - |t|)$, and the interpolation is the paper's equation ($n$ counts
+# rows, $m$ columns):
 #
 # $$ p_{c,d,j} = \sum_n \sum_m s_{c,n,m}\; k(u_j - m)\; k(v_j - n) \qquad (2) $$
 
@@ -695,14 +697,14 @@ axes[0].legend(fontsize="small")
 plt.show()
 
 # %% [markdown]
-# On the left the mean has a wide floor instead of one lowest point, because the heights are wrong by other amounts in each image.
-# On the right it has one, 0.3° from the truth: 0.9 pixels in this image. Most of this comes from cells beside things that
-# stand, because a point that lies too high reads the thing, and one too low still reads road: the curves rise faster to
-# the right. With the 77 % of the cells that keep two pixels away from such things, both descents end at -0.1°. So the
-# descent works; what was wrong on the left is what the model holds fixed, height 0. A gradient changes *whatever may
-# move*: if an error lies in what is held fixed, it bends something else to make up for it. (The map used here is the
-# simulator's, so this is a demonstration, not a calibration without measurements.) Read by the nearest pixel, the loss
-# has no slope at all:
+# On the left the mean has a wide floor instead of one lowest point, because the heights are wrong by a different
+# amount in each image. On the right it has one, 0.3° from the truth: 0.9 pixels in this image. Most of this comes
+# from cells beside things that stand, because a point that lies too high reads the thing, and one too low still reads
+# road: the curves rise faster to the right. With the 77 % of the cells that keep two pixels away from such things,
+# both descents end at -0.1°. So the descent works; what was wrong on the left is what the model holds fixed,
+# height 0. A gradient changes *whatever may move*: if an error lies in what is held fixed, it bends something else to make
+# up for it. (The map used here is the simulator's, so this is a demonstration, not a calibration without
+# measurements.) Read by the nearest pixel, the loss has no slope at all:
 
 # %%
 u, v = pixels_at(on_zero[0][2], torch.tensor(0.03, requires_grad=True))

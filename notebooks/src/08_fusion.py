@@ -18,7 +18,7 @@
 #
 # **Time.** 75 minutes; the computer needs one.
 #
-# **Paper.** Sections 3.4 and 4.1, figures 4 and 5; claims 7 and 9.
+# **Paper.** Sections 3.4 and 4.1, figures 4 and 5; claims 7 and 9 (lecture 12 has the list of the paper's claims).
 
 # %% jupyter={"source_hidden": true}
 import json
@@ -185,9 +185,9 @@ assert story[-1][3][0] < story[0][3][0] - 5
 
 # %% [markdown]
 # A: the class with the highest score in each pixel. B: the map. C: its truth. D: the share of each that is right. The
-# map gets better, while the labels of the pixels get *worse*. The gradient of the map's loss reaches every weight of
-# the image network, and asks it for scores that help the map, whatever they say about pixels. This is what the paper's
-# title calls *end to end*. The lecture builds it piece by piece.
+# map gets better, while the labels of the pixels get *worse*. The gradient of the map's loss reaches down to the
+# first convolution of the image network (we check this below). It asks for scores that help the map, whatever they
+# say about pixels. This is what the paper's title calls *end to end*. The lecture builds it piece by piece.
 #
 # ### The graph
 #
@@ -231,9 +231,10 @@ assert d_separated(stage.model, "a", "o", given=("m", "hid"))
 #
 # ## Which plane is right? The 1x1 reduction
 #
-# Lecture 06 leaves 14 scores on 20 planes above each cell, 280 numbers. Which should the map believe? A car stands 8 m
-# ahead on an empty road, 4 m long and 1.4 m high. The camera looks over it from 1.65 m. Take a cell before the car
-# (centre 6 m ahead), one in it (10 m) and one behind it (14 m), and above each two points, on the ground and at 1.4 m.
+# Lecture 06 leaves 14 scores on 20 planes above each cell, 280 numbers. Which should the map believe? A car stands
+# 8 m ahead on an empty road, 4 m long and 1.4 m high. The camera looks over it from 1.65 m. Take a cell in front of the
+# car (centre 6 m ahead), one in it (10 m) and one behind it (14 m), and above each two points, on the ground and at
+# 1.4 m.
 #
 # **Predict before you run.** Draw the six rays from the side. Which of the six points does the camera call *car*?
 #
@@ -324,8 +325,8 @@ print("road", reduce(p, theta, beta)[0], "  car", reduce(p, theta, beta)[1])
 #
 # One detail matters later. A point of a plane that the camera doesn't see takes the score 0 for every class. So on
 # planes zero has a meaning, "nobody looked". Under a soft-max the same number may be added to all scores of a pixel
-# and nothing changes (lecture 07). Here the map changes. (*Semantic cells* are those in which a class like road or car is
-# true, and not one of the four *unknown* ones.)
+# and nothing changes. Here the map changes: lecture 07 counted it on one frame, here are ten. (*Semantic cells* are
+# those in which a class like road or car is true, and not one of the four *unknown* ones.)
 
 # %% tags=["nbval-ignore-output"]
 print(f"weights of the reduction: {sum(part.numel() for part in net.fusion.reduce[0].parameters()):,}")
@@ -394,8 +395,8 @@ with torch.inference_mode():
 # <details><summary>Answer</summary>
 #
 # Of all cells 52 % with the label, 56 % with $o$, 74 % with both; the network 80 %. Late fusion: 73 %, half a point
-# less. So the dashed edge is nearly free here, although in the toy it made 0.33 of 0.22. What the table leaves
-# out besides costs much more: on semantic cells it stays at 50 % and the network reaches 73 %.
+# less. So on this drive cutting the dashed edge costs little, although in the toy P(car) became 0.33 instead of 0.22.
+# What else the table leaves out costs much more: on semantic cells it stays at 50 %, and the network reaches 73 %.
 #
 # </details>
 
@@ -465,7 +466,8 @@ Markdown(as_table(drive_rows))
 
 # %% [markdown]
 # The last row is a table that could really be used: it has seen neither a true label of a pixel nor this drive. (The
-# table fitted here is the best one over *all* cells. Over semantic cells another can be better, and this one is.)
+# *table of both* is the best one over all cells of this drive. Over semantic cells another can be better, and the one
+# from the training frames is.)
 #
 # Two cautions. The truth of the *unknown* classes is defined by $o$ (lecture 09), so over all cells a table that knows
 # $o$ starts with a gift; that is why the second column counts semantic cells alone. And by class accuracy late
@@ -505,8 +507,8 @@ print(f"label and state share {shared(a, b, m):.2f} bits once the class is known
 # <details><summary>Answer</summary>
 #
 # Without $o$ hardly any cell of cars and buildings is found, and sidewalk falls from 57 to 19 %. Without the image
-# buildings lose most, from 85 to 17 %. The sidewalk loses less, from 57 to 40 %: both it and road are FREE, so $o$ in a
-# single cell can't tell them apart (claim 7), but the neighbours' $o$ helps.
+# buildings lose most, from 85 to 17 %. The sidewalk loses less, from 57 to 40 %. It is FREE like the road, so the $o$
+# of a single cell can't tell them apart (claim 7); what still finds it is probably the $o$ of the cells around it.
 #
 # </details>
 
@@ -562,11 +564,12 @@ assert shares["image silent"][SIDEWALK] < 0.8 * shares["image and o"][SIDEWALK]
 #
 # ## One cell sees little: the conv-deconv network
 #
-# After the reduction comes a network like lecture 07's SegNet, with skips (figure 5): 3x3 convolutions, three poolings,
-# and back up. It brings in the neighbours: a shadow has something at its near end. On the way down it has one
-# convolution at full size, one after a pooling, two after the next, and as many on the way up. So $1 + 2 + 4 + 4$ cells
-# each way, 22, and with the windows of pooling at most 36 cells, 18 m. How far does it really listen? Differentiate the
-# winning score of one cell with respect to $o$ in every other:
+# After the reduction comes a network like lecture 07's SegNet, with skips (figure 5): 3x3 convolutions, three
+# poolings, and back up. It brings in the neighbours: a shadow has something at its near end. On the way down it has
+# one convolution at full size, one after a pooling, two after the next, and as many on the way up. So it sees
+# $1 + 2 + 4 + 4 = 11$ cells to each side on the way down, 11 more on the way up, and with the windows of pooling at
+# most 36 cells, 18 m. How far does it really listen? Differentiate the winning score of one cell with respect to $o$
+# in every other:
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="a map of how strongly the score of one cell depends on the occupancy of others: strongest in the cell itself, about a hundred times weaker 5 m away, and nothing beyond about 11 m"
 row, col = 100, 31  # 20.75 m ahead, in the middle
@@ -879,8 +882,8 @@ Markdown(
 #
 # ## A real street
 #
-# What is $o$ worth? On simulated streets, by *true* labels, networks trained with and without $o$ were compared; on a
-# real street (PandaSet), by labels that people gave to LIDAR returns, too:
+# What is $o$ worth? On simulated streets, by *true* labels, networks trained with and without $o$ were compared. So
+# were networks on a real street (PandaSet), by labels that people gave to LIDAR returns:
 
 # %% jupyter={"source_hidden": true}
 results = Path("../docs/results")
@@ -905,13 +908,15 @@ rows = [
 Markdown("\n".join([head, *rows]))
 
 # %% [markdown]
-# In brackets 95 % intervals; the simulated rows are of an earlier version of the simulator. The real row has none: two
-# cameras for four seconds are too little for one. By true labels $o$ brings about six points; by real labels about 26,
-# on one street corner, with one network without $o$. The judges differ, too: a real cell is labelled only where a
-# *LIDAR return* lies, and there $o$ has evidence. And look at the last column: on cameras that no network has seen, a
-# table of $o$ alone does about as well as the networks, which get 63 to 72 by seed. The second row is a surprise of its
-# own: a network that was trained with the ground plane alone does as well as one with twenty. So on these simulated
-# streets it isn't the number of planes that a network has over a table.
+# In brackets 95 % intervals. The simulated rows are of an earlier version of the simulator, and their networks learnt
+# in 500 steps from labels made with the LIDAR (lecture 09), so don't compare their 45 % with the 73 % above. The real
+# row has no interval: two cameras for four seconds are too little for one. By true labels $o$ brings about six
+# points; by real labels about 26, on one street corner, with one network without $o$. The judges differ, too: a real
+# cell is labelled only where a *LIDAR return* lies, and there $o$ has evidence. And look at the last column: on
+# cameras that no network has seen, a table of $o$ alone does about as well as the networks, which get 63 to 72 by
+# seed. The second row is a surprise of its own: a network that was trained with the ground plane alone does as well
+# as one with twenty. So on these simulated streets, with these labels, the number of planes isn't what a network has
+# over a table.
 #
 # Is late fusion nearly free on the real street, too? Labels by the shipped real network, state by the filter, truth by
 # people:
@@ -940,10 +945,11 @@ plt.show()
 
 # %% [markdown]
 # Twice as many bits are shared as on the simulated drive, and again late fusion loses half a point against the table.
-# (The network has learnt from these very frames, so its row shows what it can hold, not how it does on a new street.) B
-# finds most of the road, half of the cells of cars and two thirds of those of buildings, and calls many others so. It
-# names no vegetation, sidewalk, bicycle or pedestrian at all. The road nearer than 13 m is missing, too: this camera
-# doesn't see the ground so near, and a table can't ask the neighbours.
+# (The network has learnt from these very frames, so its row shows what it can hold, not how it does on a new street.)
+# Over all ten frames late fusion finds most of the road, half of the cells of cars and two thirds of those of
+# buildings, and gives these names to many other cells (B shows the last frame). It names no vegetation, sidewalk,
+# bicycle or pedestrian at all. The road nearer than 13 m is missing, too: this camera doesn't see the ground so near,
+# and a table can't ask the neighbours.
 #
 # ## Play with it
 #
@@ -987,9 +993,10 @@ _ = interact(show, pitch=FloatSlider(value=1.0, min=-3, max=3, step=0.25, descri
 #
 # <details><summary>Answer</summary>
 #
-# Yaw moves a cell 30 m ahead by half a metre; pitch makes it read the ground 16 m too far or 8 m too near (lecture 05,
-# for a camera at 1.5 m). Pointing too high by one degree costs the three networks 4 to 14 points, yaw of one degree 3
-# at most. Pointing too *low* by one degree costs none of them anything: SegNet gains one point and FCN four.
+# Yaw moves a cell 30 m ahead by half a metre; pitch makes it read the ground 16 m too far or 8 m too near (lecture
+# 05, for a camera at 1.5 m). Pointing too high by one degree costs the three networks 4 to 14 points, yaw of one
+# degree 3 at most. Pointing too *low* by one degree costs none of them anything: SegNet gains one point and FCN
+# nearly four.
 #
 # </details>
 
@@ -1076,9 +1083,9 @@ plt.show()
 Markdown(ledger_table(ledger("fusion")))
 
 # %% [markdown]
-# Late fusion cuts it; this network needn't. On both drives the edge is worth half a point of all cells. What the network
-# has over a table must lie elsewhere. On simulated streets it isn't the number of planes; neighbours are left, and scores
-# that were learnt for the map.
+# Late fusion cuts it; this network needn't. On both drives the edge is worth half a point of all cells. What the
+# network has over a table must lie elsewhere. On simulated streets it isn't the number of planes. What remains is its
+# look at the cells around, and scores that were learnt for the map.
 #
 # ## In five lines
 #

@@ -128,10 +128,11 @@ assert not d_separated(graph.model, "x1", "x2", given=("m",))
 # is **open** from $x_1$ to $x_2$, that is, lets information pass. (Those through $y$ are closed, because $y$ is their common effect and isn't given.) The
 # calibration is *not* known, so they all share one error. Soon we shall see what that does to a vote.
 #
-# The recipe also leaves edges out. It counts votes as if $\kappa$ were known (dashed, with its price: nine returns are
-# wrong with probability 0.10, where independent errors would leave .012). It doesn't ask $o$ once there is a vote. It
-# joins the labels of neighbours $y'$ only in the clean-up, without asking what else is known of them. And it takes a
-# return to lie on the very thing that its pixel shows (dashed, from $a_1$ to $d_1$). We begin with that one.
+# The recipe also leaves edges out. It counts votes as if $\kappa$ were known (dashed, with its price: a vote of nine
+# returns is wrong with probability 0.10, where independent errors would leave .012). It doesn't ask $o$ once there is
+# a vote. It joins the labels of neighbours $y'$ only in the clean-up, without asking what else is known of them. And
+# it takes a return to lie on the very thing that its pixel shows (dashed, from $a_1$ to $d_1$). We begin with that
+# one.
 #
 # ## Step 1: which returns does the camera see?
 #
@@ -259,10 +260,10 @@ plt.show()
 # %% [markdown]
 # **The rule does almost nothing here.** It drops 3 % of the hidden returns of 20 scans, because two of so few returns
 # seldom meet on one pixel. On the one scan of an HDL-64E that we tried, with twice as many returns in view, it still
-# leaves more than four in five. Not each hidden return does harm: some lie on the same kind of thing as their pixel
-# shows, as grass behind grass (last line). In the picture, most hidden returns (red crosses) are at the fence, others at
-# the poles and the bicycle: the LIDAR looks between the pales and over them onto the grass and the house, and the pixel
-# shows a pale. That is the patch **A** of the opening picture.
+# leaves more than four in five. Not every hidden return does harm: a quarter of them bring their cell's true label
+# all the same (last line), as grass behind grass does. In the picture, most hidden returns (red crosses) are at the
+# fence, others at the poles and the bicycle: the LIDAR looks between the pales and over them onto the grass and the
+# house, and the pixel shows a pale. That is the patch **A** of the opening picture.
 #
 # ## Step 2: from the pixel back to the grid
 #
@@ -375,9 +376,10 @@ plt.show()
 # %% [markdown]
 # With outlines alone (triangles) a majority soon is nearly always right. With the calibration as well (circles) it
 # sinks to 0.1 (dotted) and no further. Remember this line when we add up nineteen scans. *Standing* (squares) gets
-# worse for a road cell the more returns there are. (It gets better for a car cell, which is why thin things like it.)
-# ("Outlines" are the errors of people who draw outlines a little off, by themselves at each return.) Where all returns
-# of a cell bring one class, the two rules are the same. How often do they differ with one scan, and with nineteen?
+# worse for a road cell the more returns there are. (For a car cell it gets better; so it helps what is thin.)
+# ("Outlines" are the errors of people who draw outlines a little off, by themselves at each return.) Where all
+# returns of a cell bring one class, the two rules are the same. How often do they differ with one scan, and with
+# nineteen?
 #
 # ## Step 4: what has no label
 #
@@ -918,7 +920,7 @@ policy_errors(result | {"sums": chosen})
 plt.show()
 
 # %% [markdown]
-# In the bars look at the rows "9 before and after". But for the last one, which is restricted to the camera's sight,
+# In the bars look at the rows "9 before and after". Except for the last one, which keeps only what the camera sees,
 # they are short in the middle panel (cells without a label) and longer than the first row in the right one (wrong
 # labels). The second table compares two policies drive by drive. In its lines:
 #
@@ -932,8 +934,9 @@ plt.show()
 # - **With own images, carving makes somewhat fewer labels wrong, and carrying doesn't** (h, i). Carried returns land where
 #   the filter's velocity puts them, and its errors land with them. With one image for all scans the three ways hardly
 #   differ: the labels that it gives to other scans' returns are the larger error.
-# - **What stands wins** hardly matters with one scan (j), and is clearly worse than a majority with nineteen (k), because
-#   with nineteen scans many more cells hold returns of two classes. With one scan it still matters for thin things.
+# - **What stands wins** hardly matters with one scan (j), and is clearly worse than a majority with nineteen (k),
+#   because with nineteen scans many more cells hold returns of two classes. With one scan it still matters for thin
+#   things: it finds 20 % of the cells of bicycles, a majority 9 %.
 # - **De-skewing changes next to nothing here** (l, m). The scanner faces the camera's direction when the image is
 #   taken. At the image's edge, 40° to the side, it is 0.1 s · 40 / 360 = 11 ms off, and at 10 m/s the vehicle moves by
 #   11 cm in that time, a fifth of a cell.
@@ -1090,11 +1093,11 @@ plotting.class_legend(axes[-1], KITTI_14, made)
 plt.show()
 
 # %% [markdown]
-# On these ten frames one degree to either side raises wrong labels from 22 % to 28 %. One degree of nodding raises them to
-# 25 or 48 %, depending on its sign. With a positive sign each return takes the label of a pixel *above*
-# its own: the far road gets the labels of trees, cars and sidewalk (right map). With a negative sign it takes the label
-# of a pixel below, and below the road there is mostly road. That is also why 27 cells don't ruin the map: a label that
-# moves from road to road does no harm. The harm is at the outlines.
+# On these ten frames one degree to either side raises wrong labels from 22 % to 28 %. One degree of nodding raises
+# them to 25 or 48 %, depending on its sign. With a positive sign each return takes the label of a pixel *above* its
+# own: the far road gets the labels of trees, cars and sidewalk (right map). With a negative sign it takes the label
+# of a pixel below, and below the road there is mostly road. So a shift by this sign, 18 cells at 20 m, spoils little
+# of the map: a label that moves from road to road does no harm. The harm is at the outlines.
 #
 # **Where no beam went.** A recipe can only carry what was measured. Of the cells that the camera sees, how many were
 # hit by a labelled return at all?
@@ -1128,8 +1131,8 @@ for name in ("road", "sidewalk", "car", "pedestrian", "bicycle", "signage"):
 #   have moved.
 # - *How fast something moves*, in the first instants in which the filter sees it. Smearing, carving and carrying are
 #   three ways to be wrong about it.
-# - *Its own calibration.* You have seen that returns share it. A made truth looks consistent even if the camera is
-#   off: no vote and no frame contradicts another.
+# - *Its own calibration.* You have seen that returns share it. A made truth can look consistent although the camera
+#   is off, because no vote is free of the error.
 # - *What the annotator overlooked.* The recipe carries the absence of a label as faithfully as a label.
 #
 # What does it cost to *learn* from such a truth? A network might even out errors that vary from frame to frame,
@@ -1144,9 +1147,9 @@ for name in ("road", "sidewalk", "car", "pedestrian", "bicycle", "signage"):
 Markdown(ledger_table(ledger("label")))
 
 # %% [markdown]
-# Its other cut edges have no price in the ledger. In the toy of the clean-up, road has 0.43 where the clean-up says road for
-# sure; on the drive three in four wrong labels come from there. That a return lies on what its pixel shows costs more
-# than half of the wrong votes.
+# Its other cut edges have no price in the ledger. In the toy of the clean-up, road has 0.43 where the clean-up says
+# road for sure; on the drive three in four wrong labels come from there. To take each return to lie on what its pixel
+# shows costs more than half of the wrong votes.
 #
 # ## In five lines
 #

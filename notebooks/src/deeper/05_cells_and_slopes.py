@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Cells and slopes: how many pixels a cell has, and which plane a road needs
 #
-# **In one sentence.** A cell's share of the image falls like the third power of its distance, and a road that falls
+# **In one sentence.** A cell's share of the image falls with the third power of its distance, and a road that falls
 # away needs planes below zero: both are measured here, on the toy camera, on the drive and on a real street.
 #
 # **You will be able to**

@@ -159,10 +159,10 @@ for name, columns in looked.items():
 
 # %% [markdown]
 # (The pictures show the square root, so that small slopes can be seen too.) The dashed lines are the edges of the
-# field. SegNet uses nearly all of it, 51 of 56 columns to the left; so do FCN (221 of 230) and DeepLab (196 of 198),
-# whose slopes also reach the right border of the image. But the slopes are unequal: half of their sum lies between the
-# dotted lines, in 24 columns of SegNet, 67 of FCN and 51 of DeepLab. DeepLab's picture is made of blocks of 8 pixels,
-# as wide as the cells of its map.
+# field (FCN's lie outside the picture). SegNet uses nearly all of it, 51 of 56 columns to the left; so do FCN
+# (221 of 230) and DeepLab (196 of 198), whose slopes also reach the right border of the image. But the slopes are unequal:
+# half of their sum lies between the dotted lines, in 24 columns of SegNet, 67 of FCN and 51 of DeepLab. DeepLab's
+# picture is made of blocks of 8 pixels, as wide as the cells of its map.
 #
 # ## Before the first label: ImageNet
 #

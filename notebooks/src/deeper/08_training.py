@@ -186,8 +186,9 @@ ax.legend(frameon=False, fontsize="small", ncols=2)
 plt.show()
 
 # %% [markdown]
-# With one parameter, momentum and a rate ten times as large arrive equally soon, and both then go wherever the noise
-# pushes them. With the falling rate momentum comes to rest, because small last steps average over many gradients.
+# With one parameter, momentum and a rate ten times as large both arrive within 15 steps, and both then go wherever
+# the noise pushes them. With the falling rate momentum comes to rest, because small last steps average over many
+# gradients.
 #
 # ## All of it in twenty lines
 #
@@ -452,12 +453,12 @@ plt.show()
 # 0.3 to 0.6 of that norm, as the printed line says: a norm doesn't show what was learnt. C: what is found when
 # all higher planes fall silent.
 #
-# So does it use the right heights? For the road, yes: the ground plane alone finds it. Cars gain seven points from the
-# planes up to 1.4 m; those above 2.4 m never show a car, and *with* them four points fewer are found. Bicycles gain
-# from planes above 2 m, which never show a bicycle. Buildings are the surprise: with the planes up to 0.6 m two in five
-# of their cells are found, although the labels there are right in far fewer. What there is to use, low down, is the
-# foot of the wall and the lawn before it; $o$ says where the wall stands. The network reads from context what geometry
-# doesn't show it.
+# So does it use the right heights? For the road, yes: the ground plane alone finds it. Cars gain seven points from
+# the planes up to 1.4 m; those above 2.4 m never show a car, and *with* them four points fewer are found. Bicycles
+# gain from planes above 2 m, which never show a bicycle. Buildings are the surprise: with the planes up to 0.6 m two
+# in five of their cells are found, although the labels there are right in far fewer. Low down there are the foot of
+# the wall and the lawn in front of it, and $o$ says where the wall stands. So the network probably reads from such
+# context what geometry doesn't show it; which part of it, this test doesn't say.
 #
 # One network is one sample. The same on the three shipped ones, which differ in their image network alone:
 

@@ -2,7 +2,7 @@
 # # What wrong labels cost the network that learns from them
 #
 # **In one sentence.** A network can even out errors that its labels make at random, and learns those that they always
-# make; and test labels with the same errors can't tell.
+# make; and test labels with the same errors hide it.
 #
 # **You will be able to**
 # - work out which errors of labels a network learns, and what class weights do to that;
@@ -93,12 +93,13 @@ print(f"a bad recipe: the test says that {np.trace(bad) / bad.sum():.2f} of the 
 print(f"and {bad[0].sum() / bad.sum():.2f} are")
 
 # %% [markdown]
-# Given the true class (shaded), the network's call and the test's label aren't independent: a path leads from $c$ over
-# $w$ and $y$ up to the recipe, and down to $y'$. Given the recipe as well, they are. In this toy three recipes in ten
-# are bad; a bad one is wrong in 80 % of such cells, a good one in 5 %. So a test label is wrong with probability 0.28.
-# But where the network is wrong, the test label is wrong with 0.48, and then the test counts the error as right. With a
-# bad recipe the test says that 61 % of the calls are right; 31 % are. Labels of the recipe from which the network
-# learned can't find such errors. The truth can, and labels of another recipe only as far as their errors are others.
+# Given the true class (shaded), the network's call and the test's label aren't independent: a path leads from $c$
+# over $w$ and $y$ up to the recipe, and down to $y'$. Given the recipe as well, they are. In this toy three recipes
+# in ten are bad; a bad one is wrong in 80 % of such cells, a good one in 5 %. So a test label is wrong with
+# probability 0.28. But where the network is wrong, the test label is wrong with 0.48, and then the test counts the
+# error as right. With a bad recipe the test says that 61 % of the calls are right; 31 % are. Labels of the recipe
+# from which the network learned miss many of its errors. The truth finds them all, and labels of another recipe find
+# those that the other recipe doesn't make.
 #
 # ## Eight kinds of labels, one network
 #
