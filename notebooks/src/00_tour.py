@@ -113,16 +113,16 @@ plt.show()
 
 # %% [markdown]
 # At the top is the world: what the cells hold ($m_t$, $m'_t$), which sensors see but we don't. Below is what the paper
-# computes. Information flows down, and from one instant to the next only inside $o$.
+# computes: there, information flows down, and from one instant to the next only inside $o$.
 #
-# **Dashed edges are missing.** An exact answer would use what they carry. The system cuts them because then every stage
-# is small enough to compute, ten times a second. The numbers on a dashed edge are its **price** on this toy street, where
-# the exact answer can be computed by summing over everything that may happen. (Three dashed edges have no number, because
-# their price isn't measured.) Here prices are mean surprise, $-\log P(\text{truth})$ in **nats**: first the exact
-# answer's, then the system's. On the edge from $g_{t-1}$ to $g_t$ the class of the far cell gets .62 nats if the earlier
-# image is used, and .72 if it is forgotten; in the geometric mean the truth then has the probability $e^{-.62} = .54$ or
-# $e^{-.72} = .49$. Where a dashed line runs beside a solid arrow, only a part is cut: from $s_t$ to $p_t$ the scores do
-# flow, but not the distance at which each thing was seen.
+# **Dashed edges are missing.** An exact answer would use what they carry. The system cuts them so that every stage is
+# small enough to compute at each scan. The numbers on a dashed edge are its **price** on this toy street, where the
+# exact answer can be computed by summing over everything that may happen. (Three dashed edges have no number, because
+# their price isn't measured on this street.) Prices here are mean surprise, $-\log P(\text{truth})$ in **nats**: first
+# the exact answer's, then the system's. On the edge from $g_{t-1}$ to $g_t$ the class of the far cell gets .62 nats if
+# the earlier image is used, and .72 if it is forgotten; in the geometric mean the truth then has the probability
+# $e^{-.62} = .54$ or $e^{-.72} = .49$. Where a dashed line runs beside a solid arrow, only a part is cut: from $s_t$ to
+# $p_t$ the scores do flow, but not the distance at which each thing was seen.
 #
 # **Predict before you run.** You know $o_t$ and $p_t$. Does the earlier map $g_{t-1}$ still tell you something about
 # $g_t$, as the system computes it? And does the earlier image $i_{t-1}$ tell you something about the *world* $m_t$,
@@ -192,7 +192,7 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # | $\sigma$ | a standard deviation; its index says of what | |
 #
 # H x W are cells, h x w pixels, C = 14 classes, D = 20 planes, N points. ($v$ is a velocity in 01 to 04 and a pixel's
-# row from 05 on; the two never meet. A letter that isn't in this table means something on its own page only.)
+# row here and from 05 on; the two never meet. A letter that isn't in this table means something on its own page only.)
 #
 # ## A map with forward up
 #
@@ -252,7 +252,7 @@ np.testing.assert_allclose(after, product / product.sum(), atol=1e-6)
 print({state.name: round(float(p), 2) for state, p in zip(State, after, strict=True)})
 
 # %% [markdown]
-# The paper's filter, **CMCDOT**, does this in every cell ten times a second, and three things more: it moves the map
+# The paper's filter, **CMCDOT**, does this in every cell at each scan, and three things more: it moves the map
 # with the vehicle, it predicts what may happen between two scans, and it carries what moves as particles with a
 # velocity. On the real street it makes this of ten scans:
 
@@ -266,11 +266,12 @@ plotting.animate_occupancy(
 )
 
 # %% [markdown]
-# The vehicle is at the bottom, in the middle. Light is FREE, dark STATIC, grey UNKNOWN: no beam has said anything about
-# these cells, for instance because something stands in front of them. DYNAMIC cells have the colour of their velocity on
-# the wheel; where no velocity is drawn, as in panels B and C, DYNAMIC is orange. Our cell lies in the row of parked cars
-# on the right, and panel C says the same of it: nearly certainly STATIC from the second scan on. Dark trails grow behind
-# the cars that drive off ahead of us; lectures 02 to 04 explain where they come from.
+# The vehicle is at the bottom, in the middle. Light is FREE, dark STATIC, grey UNKNOWN: no beam has said anything
+# about these cells, or not for some time, for instance because something stands in front of them. DYNAMIC cells have
+# the colour of their velocity on the wheel; where no velocity is drawn, as in panels B and C, DYNAMIC is orange. Our
+# cell lies in the row of parked cars on the right, and panel C says the same of it: nearly certainly STATIC from the
+# second scan on. Dark trails grow behind the cars that drive off ahead of us; lectures 02 to 04 explain where they
+# come from.
 #
 # ## Stage 2, $i \to s$: what it looks like
 #
@@ -654,8 +655,9 @@ assert clear[0] > 0.9 > 0.65 > clear[1]
 # The first scans show that *something* is there, and nothing says that it moves: STATIC is the better bet. The filter
 # changes its mind only when the thing arrives where free space was seen before. For the first car that takes most of a
 # second. For the second it takes longer. The likely reason is that the street in front of it is less surely free: the
-# first car hides it, and then leaves a trail there that still looks occupied. Until then, a planner that trusts this map takes a moving car
-# for a parked one. What the image shows might help; that is the dashed edge from $i_t$ to $o_t$.
+# first car hides it, and then leaves a trail there that still looks occupied. Until then, a planner that trusts this
+# map takes a moving car for a parked one. What the image shows might help; that is the dashed edge from $i_t$ to
+# $o_t$.
 #
 # **Far away everything is worse.**
 
@@ -681,7 +683,7 @@ print("height of a cell in the network's image:", ", ".join(f"{h:.2f} pixels at 
 # Near the vehicle most semantic cells are right, beyond 45 m far fewer. At 45 m more than a dozen cells share one row
 # of the network's pixels, and the LIDAR's rings lie metres apart.
 #
-# **Small things are lost.** Of all cells that truly hold a class, how many does the map call by this name?
+# **Cars and pedestrians are missed.** Of all cells that truly hold a class, how many does the map call by this name?
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 for name in ("road", "sidewalk", "car", "pedestrian", "bicycle"):
@@ -691,11 +693,12 @@ for name in ("road", "sidewalk", "car", "pedestrian", "bicycle"):
     assert (found[1] > found[0]) == (name == "road")
 
 # %% [markdown]
-# The CRF finds a little more of the road and less of each of the four others. Lecture 10 counts which classes lose most.
+# Of the road most cells are found, of cars and pedestrians fewer than half. The CRF finds a little more of the road and
+# less of each of the four others. Lecture 10 counts which classes lose most.
 #
 # ## The ledger of cut edges
 #
-# Every stage is exact inference in *some* model, and each was made affordable by cutting edges. Here is what that
+# Every stage can be read as inference in a model from which edges were cut to make it affordable. Here is what that
 # costs, each on a toy world of its own lecture in which the exact answer can be computed. *What is asked* names a
 # quantity; the last two columns give its exact value, and what the system says without the edge. (In the first row more
 # is better: how often a place is named rightly. In the rows with an error or with nats, less is better. In the others
@@ -734,7 +737,7 @@ Markdown(stage_table())
 #    (2) reads the score there. No depth is used.
 # 4. A second network fuses planes and occupancy into classes; a CRF tidies up, and pixel accuracy alone would flatter
 #    a lazy map.
-# 5. Each stage is exact in a model with some edges cut. The graph shows the cuts, and the ledger their price.
+# 5. Each stage is inference in a model with some edges cut. The graph shows the cuts, and the ledger their price.
 #
 # What you can now do: take any cell of any map that this system makes and tell which stage said what about it. The
 # page that `semgrid-edu demo --open` writes does it at a click.

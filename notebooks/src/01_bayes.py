@@ -94,8 +94,8 @@ plotting.animate(ring_frames(), period=0.7, alt="a belief follows a vehicle roun
 
 # %% [markdown]
 # At first all ten bars are alike. Two readings of *pole* in a row fit the pair at A best, so the bars gather there, and
-# from then on they mostly follow the vehicle. Each prediction makes them blunter, and most readings make them sharper again.
-# By the end of this page you will have written this filter.
+# from then on they mostly follow the vehicle. Each prediction makes them blunter, and most readings make them sharper
+# again. By the end of this page you will have written this filter.
 #
 # ## The graph
 #
@@ -321,7 +321,7 @@ assert favourite[7] == 6 != places[7] == 5
 # mostly down with every update (squares). At step 3 the sensor has said *pole* twice in a row. That fits the pair at A,
 # so the filter takes the vehicle to be in cell 3. But the vehicle hasn't moved and is still in cell 2, beside the same
 # pole. One step later it is in cell 3, and the filter is right. But nothing is settled for good, because the next
-# prediction takes away most of what an update gains: at step 7 the filter has lost the vehicle again.
+# prediction takes away most of what an update gains: at step 7 the filter is one cell ahead again.
 #
 # Six readings are surprises: not what the favourite cell made one expect. At steps 8, 14 and 16 the sensor says
 # *nothing* where a pole was expected, and these three updates raise the entropy. At steps 2, 4 and 18 it says *pole*
@@ -514,9 +514,9 @@ theirs = np.array(most_likely_path(stage, says_pole))
 np.testing.assert_allclose(log_probability(best_path(says_pole), says_pole), log_probability(theirs, says_pole))
 
 # %% [markdown]
-# A folded cell compares filter and smoother with the package's exact inference on the graph (they agree to $10^{-12}$),
-# and checks that no path is more probable than ours. There the smoother's $b$ and $\beta$ are the messages that run forward and backward along the chain, and
-# the filter is one half of this message passing.
+# A folded cell compares filter and smoother with the package's exact inference on the graph: they agree to $10^{-12}$,
+# and the package's best path is as probable as ours. On the graph, $b$ and $\beta$ are **messages** that run forward
+# and backward along the chain. The filter sends only the forward ones.
 #
 # **Predict before you run.** Over 400 random trips of 30 steps each, how often do filter, smoother and best path name
 # the right cell? Which of the three is right most often?
@@ -638,14 +638,14 @@ np.testing.assert_allclose(predict_states(one_reading, MOVE), predict(one_readin
 #
 # Give the rates $R_{ij}$ from state $i$ to $j$, in 1/s. In a very short time $\epsilon$ the belief changes by
 # $\epsilon\, b R$ (the diagonal of $R$ is what leaves, so rows of $R$ sum to zero). With two states we can solve this.
-# A free cell becomes occupied at the rate $\alpha$, an occupied one free at the rate $\gamma$. Let $p$ be
-# P(OCCUPIED). It gains $\alpha (1 - p)$ a second and loses $\gamma p$. Both balance at
-# $p_\infty = \alpha / (\alpha + \gamma)$, and the difference to it decays exponentially:
+# A free cell becomes occupied at the rate $\alpha$, an occupied one free at the rate $\gamma$. Let $b$ be the
+# belief in OCCUPIED. It gains $\alpha (1 - b)$ a second and loses $\gamma b$. Both balance at
+# $b_\infty = \alpha / (\alpha + \gamma)$, and the difference to it decays exponentially:
 #
-# $$ p(t) = p_\infty + \left(p(0) - p_\infty\right) e^{-(\alpha + \gamma)\, t} $$
+# $$ b(t) = b_\infty + \left(b(0) - b_\infty\right) e^{-(\alpha + \gamma)\, t} $$
 #
-# By hand: with $\alpha$ = 0.5 and $\gamma$ = 1.5 per second, $p_\infty$ = 0.25. After 0.1 s a share $e^{-0.2}$ = 0.82
-# of the difference is left, so a cell that is surely occupied has p = 0.25 + 0.75 · 0.82 = 0.86.
+# By hand: with $\alpha$ = 0.5 and $\gamma$ = 1.5 per second, $b_\infty$ = 0.25. After 0.1 s a share $e^{-0.2}$ = 0.82
+# of the difference is left, so a cell that was surely occupied has 0.25 + 0.75 · 0.82 = 0.86.
 #
 # With more states there is no such short formula, but the same idea: cut the time step $\Delta t$, in the code `dt`,
 # into many short ones:
@@ -700,8 +700,8 @@ plt.show()
 
 # %% [markdown]
 # A wall is remembered for a while. Of a moving thing one can say little after a second: it leaves the cell, and what
-# comes next nobody knows. Memory of a thing should last as long as the thing stays. A matrix with four states can say
-# that, and one with two can't.
+# comes next nobody knows. Memory of a thing should last as long as the thing stays. With four states a matrix can give
+# walls and cars a memory each; with two it can't.
 #
 # ## One cell of the drive
 #
@@ -933,8 +933,8 @@ assert rates["D"] > 0.8 > 0.5 > rates["C"] > rates["E"] > rates["F"] > 0.2
 # ## Where this breaks
 #
 # **Sure and wrong.** A filter says how sure it is, and that can be tested: over our 400 trips, take the belief that it
-# gives to its favourite cell, and see how often the vehicle is there. If the two agree, the filter is called **calibrated**. Now break
-# one assumption at a time.
+# gives to its favourite cell, and see how often the vehicle is there. If the two agree, the filter is called
+# **calibrated**. Now break one assumption at a time.
 
 
 # %% jupyter={"source_hidden": true}
@@ -973,10 +973,10 @@ assert all(claim > truth + 0.1 for claim, truth in broken)
 
 # %% [markdown]
 # The first pair agrees. In the other three the filter claims far more than it knows, and nothing in its belief shows
-# it. Counting twice often comes in disguise. Ten returns of one scan
-# from the same bush, or the same bush in ten scans, are not ten independent witnesses: they share an error, as in the
-# right graph of the section on witnesses. That is why the package's sensor model lets only the first `max_returns`
-# returns of a cell count, and its defaults are far from a perfect sensor.
+# it. Counting twice often comes in disguise. Ten returns of one scan from the same bush, or the same bush in ten
+# scans, are not ten independent witnesses: they share an error, as in the right graph of the section on witnesses.
+# That is why the package's sensor model lets only the first `max_returns` returns of a cell count, and its defaults
+# are far from a perfect sensor.
 #
 # **A ghost.** The road has been free for two seconds. Now two grazing rays come back from it, and then beams pass
 # again.
@@ -990,8 +990,8 @@ for name, scan in (("two returns", two_returns), *[("pass", passes)] * 5):
     print(f"{name:<12}FREE {road[State.FREE]:.2f}  DYNAMIC {road[State.DYNAMIC]:.2f}")
 
 # %% [markdown]
-# For two scans something seems to stand on the road, and to move. The cell can't know better: that something turns up
-# in free space *is* what the rates call moving. Its neighbours could tell. Here are seven cells of one lane of a **real
+# For two scans the filter believes that something moves on the road. The cell can't know better: by our rates, what
+# appears in a free cell is most probably DYNAMIC. Its neighbours could tell. Here are seven cells of one lane of a **real
 # street**, watched from a standing vehicle for 1.8 s (PandaSet by Hesai and Scale AI, CC BY 4.0), in the letters from
 # above:
 

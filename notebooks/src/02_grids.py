@@ -1,9 +1,9 @@
 # %% [markdown]
 # # 02 · Occupancy grids: one number per cell, and what that forgets
 #
-# **In one sentence.** An occupancy grid gives every cell of a map the Bayes filter of lecture 01 and cuts all edges
-# between cells, scans and errors; here you build one, compute on small worlds what cuts cost, and find the price again
-# on the street, as smears and boasts.
+# **In one sentence.** An occupancy grid runs a Bayes filter in every cell of a map and cuts the edges between cells,
+# through time and to shared errors; here you build one, compute on small worlds what the cuts cost, and see the price
+# on the street: smears behind cars, and cells that promise too much.
 #
 # **You will be able to**
 # - say what one beam tells about each cell that it meets, in numbers;
@@ -160,8 +160,9 @@ plt.show()
 
 # %% [markdown]
 # - **The fork.** One cell, two scans $z_1$ and $z_2$. Both depend on the cell, and on nothing else that they share.
-#   There is one node $m$ for all times: the grid cuts the edge to the cell *later*, so it has no word for "moves". It
-#   takes as given what is *in front*, and it takes the errors of two scans as independent.
+#   There is one node $m$ for all times: the grid cuts the edge to the cell *later*, so it has no word for "moves".
+#   Whether a beam reaches the cell depends on what stands *in front*; the grid takes that as given. And it takes the
+#   errors of two scans as independent.
 # - **The collider.** One beam crosses several cells, is reflected at $r$, and reports a range $z_1$. The grid keeps
 #   one number per cell, so it cuts whatever the beam has coupled.
 # - **The shared error.** Two returns of one scan (here $z_1$ and $z_2$) are wrong *together*, because both were
@@ -304,8 +305,8 @@ print(f"after a return and a pass: L = {L:.2f}, P(occupied) = {exact:.3f}")
 #
 # Where is the prior? It is the first $L$, which we call $L_0$, and it is nowhere else, because the scan brings
 # *likelihoods*. Many sensor models bring $P(\text{occupied} \mid z_t)$ instead. Such an **inverse sensor model** has
-# the prior in each scan. If its answer has the log-odds $S_t$, you have to take the prior out again: $L_t = L_{t-1} +
-# S_t - L_0$.
+# the prior in each scan. If its answer has the log-odds $L(z_t)$, you have to take the prior out again: $L_t =
+# L_{t-1} + L(z_t) - L_0$.
 #
 # **Predict before you run.** In a car park, P(occupied) = 0.2 before any scan. An inverse model answers 0.2 for a
 # cell of which a scan says nothing. Somebody adds up the log-odds of ten such scans and forgets to subtract. Where is
@@ -499,12 +500,12 @@ assert walls.thickness[2, -1] > 2 * walls.thickness[0, -1] > 2 * 0.9
 
 # %% [markdown]
 # Exact inference keeps the wall one cell thick. With the same beam model, the cut between cells alone costs about a
-# tenth of a cell, and with this sensor nothing grows. The package's grid makes the wall more than twice as thick. So
-# most of that isn't the price of the cut. It comes from the package's evidence, which takes each range as exact, gives a
-# pass less weight, and has a clamp. The cut is what makes the grid possible at all: on the paper's grid it keeps 55,025
-# numbers instead of a probability for each of $2^{55025}$ maps. There are two ways to lower its price: an error that is
-# small against a cell, or a prior that ties neighbours together. The second is a conditional random field, lecture
-# [10](10_crf.ipynb).
+# tenth of a cell, and the belief behind the wall doesn't rise. The package's grid makes the wall more than twice as
+# thick. So most of that isn't the price of the cut. It comes from the package's evidence, which takes each range as
+# exact, gives a pass less weight, and has a clamp. The cut is what makes the grid possible at all: on the paper's grid
+# it keeps 55,025 numbers instead of a probability for each of $2^{55025}$ maps. There are two ways to lower its price:
+# an error that is small against a cell, or a prior that ties neighbours together. The second is a conditional random
+# field, lecture [10](10_crf.ipynb).
 #
 # ## The missing time: the smear
 #
@@ -658,8 +659,8 @@ np.testing.assert_allclose([occupied, grid, faded_to], [0.69, 0.97, 0.52], atol=
 # %% [markdown]
 # That is the price of the missing time, **0.97 instead of 0.69**. A memory of 0.5 s errs to the other side. The same 0.52
 # is all that it leaves of a house that a lorry has hidden for two seconds: a binary grid has one dial for the car and for
-# the house, because it has no word for the difference. In its graph a cell has one state for ever, so **it can't say "moves"**. Lecture
-# [03](03_bof.ipynb) draws that edge again and gives cells a velocity.
+# the house, because it has no word for the difference. In its graph a cell has one state for ever, so **it can't say
+# "moves"**. Lecture [03](03_bof.ipynb) draws that edge again and gives cells a velocity.
 #
 # ## Play with it
 #
@@ -803,11 +804,11 @@ assert but_plants[wrong].mean() > 0.6
 assert by_chance < 0.3
 
 # %% [markdown]
-# So hardly any return is an invention. Something stands there, in a third of the cases only a plant, but a tenth of a
-# metre beside, in the next cell. Look at the red strip in the map of a single scan above: along the whole side of a
-# car, returns fall over the border of their cells. It may be an error of the pose or of a range, or a label that is
-# drawn a little too small. If the returns of that side share it, they are wrong together. Take the third graph on a
-# row of cells, with a pose error of one cell, and let one, two, three returns of a scan come from the same cell:
+# So hardly any return is an invention. Something stands there, in a third of the cases only a plant, but in the next
+# cell, typically a tenth of a metre away. Look at the red strip in the map of a single scan above: along the whole
+# side of a car, returns fall over the border of their cells. It may be an error of the pose or of a range, or a label
+# that is drawn a little too small. If the returns of that side share it, they are wrong together. Take the third graph
+# on a row of cells, with a pose error of one cell, and let one, two, three returns of a scan come from the same cell:
 
 # %%
 counted = count_rings()
@@ -876,8 +877,8 @@ Markdown(ledger_table(lines))
 # 3. The collider: a range couples the cells along its beam. One number per cell forgets that, and a cell behind a wall
 #    got 0.57 instead of 0.34.
 # 4. The shared error: two returns of one scan can be wrong together, so the second makes the map surer than it should.
-# 5. A grid without time leaves a smear behind whatever moves, 4 passes long where you see it and without end where
-#    you don't.
+# 5. A grid without time leaves a smear behind whatever moves. Where beams see it, the smear is as long as the
+#    distance covered in four scans; in a shadow it grows without end.
 #
 # **You can now** build an occupancy grid, check whether it keeps its promises, and name the cut edge behind an error.
 #

@@ -115,8 +115,9 @@ plotting.animate(frames_of(scene), 0.3, alt="a column of velocities is sheared, 
 # ## The graph
 #
 # Write $m_k^t$ for the state of cell $k$ at scan $t$. Until now it was free or occupied. Now it is FREE, or it is
-# occupied with one of the velocities $v$ of the lattice; and a cell that no scan has ever told anything of is UNKNOWN.
-# Velocity zero is called STATIC, all others together DYNAMIC. Here are four cells on a line, at $t-1$ and at $t$:
+# occupied with one of a fixed set of velocities $v$, the **lattice**; and a cell of which no scan has told anything,
+# or not for long, is UNKNOWN. Velocity zero is called STATIC, all others together DYNAMIC. Here are four cells on a
+# line, at $t-1$ and at $t$:
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a graph of four cells at two times; arrows run from each cell before to itself and its two neighbours now, from each cell now to its scan, and from three cells before to a node that says at most one thing; dashed lines are the edges that BOF cuts"
 stage = bof_stage()
@@ -154,10 +155,11 @@ assert not d_separated(stage.model, "m1,1", "m2,1")
 assert d_separated(stage.model, "m1,1", "m2,1", before)
 
 # %% [markdown]
-# So after one step each cell depends on its neighbours, after two on theirs, and soon all cells of a map hang together.
-# No filter can keep that distribution for a whole map. BOF keeps each cell's own, and cuts edges of three kinds, dashed
-# above: between cells of one instant, from "≤ 1" back to the cells before, and between antecedents. The numbers on them are the exact
-# answer and BOF's, each in a small world in which the edge matters; you will compute them below.
+# So after one step each cell depends on its neighbours, after two on theirs, and soon all cells of a map hang
+# together. No filter can keep that distribution for a whole map. BOF keeps each cell's own, and cuts edges of three
+# kinds, dashed above: between cells of one instant, from "≤ 1" back to the cells before, and between antecedents. The
+# numbers on them are the exact answer and BOF's, each in a small world in which the edge matters; you will compute
+# them below.
 #
 # ## Where did it come from?
 #
@@ -331,7 +333,7 @@ for when, given in (("after the flight", only_one), ("after the scan", row_evide
 # stops at 0.999. *No
 # message back*: the thing in cell 2 stands (0.3) or drives (0.6) towards a fence that is there with 0.5. Strike out
 # 0.6 · 0.5 of driving into the fence: 0.7 is left, 0.3 of it stands. Then it is less probable
-# that it drives. BOF asks the fence only what happens in the fence's own cell.
+# that it drives. BOF lets the fence act only on the fence's own cell, so its cell 2 keeps .30.
 
 # %%
 for world, cell, states in ((HEAD_ON, 2, [Cell.LEFT, Cell.RIGHT]), (TOWARDS_A_FENCE, 2, [Cell.STATIC])):
@@ -465,7 +467,7 @@ print(f"cell 0: mean {mean[0]:+.2f} m/s, variance {covariance[0][0]:.2f};  cell 
 #
 # ## From six cells to a street
 #
-# On a street five more things happen. All are parameters of `WorldModel`, the same for BOF and for lecture 04's filter:
+# On a street five more things happen. The first four are parameters of `WorldModel`, as in lecture 04's filter:
 #
 # | what happens | what the filter does |
 # |---|---|
@@ -698,8 +700,8 @@ print("ghosts after 1.9 s [m²]: log-odds {:.0f}, BOF without looking back {:.0f
 # <details><summary>Answer</summary>
 #
 # STATIC, with 4 and with 2 m/s: in a tenth of a second the person covers 0.14 m, where zero velocity predicts 0 m and
-# the next one, with 2 m/s, 0.2 m. So in each single scan zero is nearly right, and the prior says that most things
-# stand. Even with 1 m/s the mean P(DYNAMIC) of the second second is below one half.
+# 2 m/s predicts 0.2 m. Cells are 0.5 m wide, so a single scan hardly tells the two apart, and the prior says that most
+# things stand. Even with 1 m/s the mean P(DYNAMIC) of the second second is below one half.
 #
 # </details>
 
@@ -738,8 +740,8 @@ assert np.allclose([p[11:21].mean() for p in walker.values()], [0.02, 0.05, 0.35
 assert walker[2][-10:].mean() < 0.2 < 0.7 < walker[1][-10:].mean()
 
 # %% [markdown]
-# So with this lattice the filter doesn't see that people walk, not even after six seconds. That is no detail for a
-# vehicle. A spacing of 1 m/s finds the walker, but not within two seconds. Try other speeds below.
+# So with this lattice the filter doesn't see this person walk, not even after six seconds, and hardly those on the
+# drive. A spacing of 1 m/s finds the walker, but not within two seconds. Try other speeds below.
 # (Without a running kernel there is no slider; the figure shows the whole range.)
 
 
@@ -800,7 +802,7 @@ for way, (x_0, y_0), (vx, vy) in (("drives away", (9.2, 0), (2, 0)), ("crosses t
 # Why not take a finer lattice all the same? **What it costs** is a map for every velocity. The number of velocities grows with the
 # *area* of the disc. The drive's 197 velocities take 43 MB on the paper's grid of 355 x 155 cells; half the spacing
 # takes four times as much, and a lattice 0.5 m/s apart up to 25 m/s has 7845 velocities and takes 1.7
-# GB, all of it read and written ten times a second. And nearly all of it would be zeros:
+# GB, all of it read and written ten times a second. And nearly all of it would hold next to nothing:
 
 # %%
 full = max((belief.probability[DYNAMIC] > 0.1).mean() for belief in beliefs)
@@ -860,12 +862,13 @@ plotting.animate_occupancy(
 # pedestrians. In lane E BOF needs a second to find the cars, and then finds nearly all of their cells. Of the ghosts of
 # the log-odds grid a third is left. More than half of these lie in the lane beside ours, 2 to 4 m to the left, where cars
 # drive away and only few of their cells turn blue. The car **F** ahead of us rolls away, too, and stays dark; lecture 04
-# asks why. And on the sample drive the rear of the overtaking car came later than its front. This we
+# asks why. And on the sample drive the rear of the overtaking car was slower than its front. This we
 # can explain now.
 #
 # ## Where this breaks
 #
-# **A flank looks the same wherever it goes.** A bus 12 m long passes you at 8 m/s, which the lattice has exactly.
+# **A flank looks the same whether it stands or moves.** A bus 12 m long passes you at 8 m/s, which the lattice has
+# exactly.
 #
 # **Predict before you run.** What does BOF say of its front, and what of the middle of its flank?
 #
@@ -900,8 +903,8 @@ for ax, cell, title in ((axes[0], 9, "A   a cell of the flank"), (axes[1], 17, "
 plt.show()
 
 # %% [markdown]
-# The sketch shows two instants, 0.2 s apart, in cells of 0.8 m. At A both antecedents lie in the bus. At B only one of them does: standing
-# would need something that stood on free road. Now the filter:
+# The sketch shows two instants, 0.2 s apart, in cells of 0.8 m. At A both antecedents lie in the bus. At B only one of
+# them does: standing would need something that stood on free road. Now the filter:
 
 # %%
 ahead = GridSpec(x_min=0, x_max=30, y_min=-6, y_max=6, cell=0.5)
@@ -923,9 +926,9 @@ axes[1].set(xlabel="behind the front of the bus [m]", ylabel="P(DYNAMIC), where 
 plt.show()
 
 # %% [markdown]
-# The first metres move for sure; farther back the bus seems to stand. So the rear of the overtaking car came out slower
-# than its front. Is this the lattice's fault, or the LIDAR's? Ask exact inference. A bus of three cells, each of which stands
-# (0.7) or drives (0.3), is seen twice, one cell further each time:
+# The first metres move for sure; farther back the bus seems to stand. The rear of the overtaking car, 12 instead of 14
+# m/s, shows a little of the same. Is this the lattice's fault, or the LIDAR's? Ask exact inference. A bus of three
+# cells, each of which stands (0.7) or drives (0.3), is seen twice, one cell further each time:
 
 # %%
 bus = CellsInARow(({"static": 0.7, "right": 0.3},) * 3 + ({},) * 3, (".xxx..", "..xxx."), clearing_time=0)
@@ -959,8 +962,8 @@ Markdown(ledger_table(lines))
 #    two places at once, and a cell holds .5 where .059 is right.
 # 4. Where something arrives and something stands, strike the pair out. The zero velocity is STATIC, the others are
 #    DYNAMIC; mean and covariance come from them.
-# 5. Memory grows with the *area* of the lattice. The middle of a flank seems to stand, and so does what is slower than
-#    half a spacing.
+# 5. Memory grows with the *area* of the lattice. The middle of a flank seems to stand, and so do boxes that
+#    come at half a spacing or less.
 #
 # **What you can now do**: write the filter on a lattice yourself, and say of any grid filter which edges it cut.
 # In the exercise you do both, and the map that lights up is yours.
@@ -979,5 +982,5 @@ Markdown(ledger_table(lines))
 #
 # ## Exercise
 #
-# [Exercise 03](exercises/03_bof.ipynb): flights and scans that the lecture doesn't print, one thing followed exactly,
-# and at the end your own filter on both streets.
+# [Exercise 03](exercises/03_bof.ipynb): one velocity's flight, a scanner that measures velocities, one thing followed
+# exactly, and at the end your own filter on both streets.

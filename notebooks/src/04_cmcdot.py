@@ -2,7 +2,7 @@
 # # 04 · CMCDOT: four states, particles, resampling
 #
 # **In one sentence.** Only what moves needs a velocity, so CMCDOT carries that part of its belief by particles and all
-# the rest by a few numbers per cell; four small steps, ten times a second, tell a car that drives from one that stands.
+# the rest by a few numbers per cell; four small steps at each scan tell most of what drives from what stands.
 #
 # **You will be able to**
 # - read the filter's graph, name the three edges that are cut, and say what each of them costs;
@@ -159,7 +159,7 @@ print(f"CMCDOT: {cells:,} cells x 4, and {params.n_particles:,} particles x 5 = 
 # | FREE | nothing | still nothing, here | one number per cell |
 # | STATIC | something that stands | still here | one number per cell |
 # | DYNAMIC | something that moves | **elsewhere** | particles: place, velocity, weight |
-# | UNKNOWN | no scan has said anything | still unknown, here | one number per cell |
+# | UNKNOWN | no scan has said anything, or not for long | still unknown, here | one number per cell |
 #
 # Only DYNAMIC leaves its cell. So only DYNAMIC needs velocities, and these need no lattice: a sample will do, as large
 # as you can pay for, wherever something may move. The sample consists of **particles** $q$. Each has a place, a
@@ -748,9 +748,10 @@ for name, (wall, parked, car) in found.items():
 Markdown("\n".join(rows))
 
 # %% [markdown]
-# So a thing is DYNAMIC because particles *arrive* with it, in cells that were known to be free. The cells of a parked
-# car are STATIC because at first sight most obstacles are, and because nothing ever arrives there. Two cells of this
-# world, one on the way of the oncoming car and one of the parked car, get the same kind of evidence, "occupied":
+# So a thing is DYNAMIC because particles *arrive* with it, in cells that were known to be free. The cells of the
+# parked car are STATIC because hardly a particle arrives there: even with even odds at first sight, only 5 % are
+# DYNAMIC. Two cells of this world, one on the way of the oncoming car and one of the parked car, get the same kind of
+# evidence, "occupied":
 
 # %% jupyter={"source_hidden": true} alt="two charts over 2.5 seconds: a cell on the way of the car is free, then an orange band for half a second, then free; the cell of the parked car turns dark after the first scans and stays so"
 run = list(watch(street, 2.5, speed=5.0))
@@ -891,8 +892,8 @@ assert np.hypot(moved_by.dx, moved_by.dy) < 0.2  # we stand
 # %% [markdown]
 # In the first scans the cars in lane E are STATIC, as first sight says. Then particles arrive in free cells of the
 # lane, and from 1.2 s on nearly all hit cells there are DYNAMIC. Of what stands on the right, hardly a cell is ever
-# called DYNAMIC. But F is a failure: it rolls at 2.4 m/s on average, and is called STATIC. The section *Where this
-# breaks* asks why.
+# called DYNAMIC. But F is a failure: it rolls at 2.4 m/s on average, and is mostly called STATIC. The section *Where
+# this breaks* asks why.
 #
 # ## Play with it
 #
@@ -1027,11 +1028,11 @@ as_it_is, without_rules, even_odds, both_off = (shares[-1] for shares in of_f.va
 assert as_it_is < 20 < 30 < min(without_rules, even_odds) < max(without_rules, even_odds) < both_off < 75
 
 # %% [markdown]
-# In the last scan 13 % of F's cells are DYNAMIC as the filter is, 47 % without the rules, 40 % with even odds at first
-# sight, and 60 % with both changes. So both are causes, and they don't explain all of it: 40 % aren't DYNAMIC even then.
-# This is what the rules cost on a real street, and it hurts: a vehicle that starts when the car ahead is DYNAMIC would
-# start late. The rules are there because without them walls that come into view are called DYNAMIC, as the companion
-# [phantoms on real streets](deeper/04_real_streets.ipynb) shows.
+# In the last scan 13 % of F's hit cells are DYNAMIC as the filter is, 47 % without the rules, 40 % with even odds at
+# first sight, and 60 % with both changes. So both are causes, and they don't explain all of it: 40 % aren't DYNAMIC
+# even then. This is what the rules cost on a real street, and it hurts: a vehicle that starts when the car ahead is
+# DYNAMIC would start late. The rules are there because without them walls that come into view are called DYNAMIC, as
+# the companion [phantoms on real streets](deeper/04_real_streets.ipynb) shows.
 #
 # ## In five lines
 #

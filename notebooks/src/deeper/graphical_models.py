@@ -509,11 +509,11 @@ plt.show()
 # %% [markdown]
 # Eliminate from the left (blue), and what arrives at *now* is a table that sums up everything to its left: a
 # **message**. Eliminate from the right (orange), and another message sums up everything to its right. The belief of
-# *now* is the product of both messages and of its own scan. Each message serves several questions, so one sweep in each
-# direction gives *all* marginals. This is the **forward-backward algorithm**. Let $\overrightarrow{b}_t$ be the forward
-# message into time $t$, $\overleftarrow{b}_t$ the backward one, and $\ell_t$ the likelihood of the scan. The first
-# forward message is $P(\text{before})$; the last backward one is 1 everywhere, because no scan follows. Where two stand
-# side by side, multiply entry by entry ($\propto$ means: then normalise):
+# *now* is the product of both messages and of its own scan. Each message serves several questions, so one sweep in
+# each direction gives *all* marginals. This is the **forward-backward algorithm**. Let $\overrightarrow{b}_t$ be the
+# forward message into time $t$, $\overleftarrow{b}_t$ the backward one (lecture 01's $\beta_t$), and $\ell_t$ the
+# likelihood of the scan. The first forward message is $P(\text{before})$; the last backward one is 1 everywhere,
+# because no scan follows. Where two stand side by side, multiply entry by entry ($\propto$ means: then normalise):
 #
 # $$ \overrightarrow{b}_{t+1} = (\overrightarrow{b}_t\, \ell_t)\, M, \qquad \overleftarrow{b}_{t-1} = M\, (\ell_t\, \overleftarrow{b}_t), \qquad P(m_t \mid \text{all scans}) \propto \overrightarrow{b}_t\, \ell_t\, \overleftarrow{b}_t $$
 
@@ -562,12 +562,12 @@ print("most likely sequence:", {name: ("FREE", "OCCUPIED")[state] for name, stat
 #
 # $$ \mu_{x \to f}(x) = \prod_{h \neq f} \mu_{h \to x}(x), \qquad \mu_{f \to x}(x) = \sum_{y \neq x} f(x, y, \ldots) \prod_{y \neq x} \mu_{y \to f}(y) $$
 #
-# The forward step above is both in one: multiply by the scan, then sum over $M$'s first axis. A marginal is the product
-# of all messages into its variable. `sum_product` sends these messages on any graph. As long as the factor graph is a
-# tree, without loops, its answers are exact, because each message sums up one side of an edge and the two sides have nothing in common. With max in place
-# of sum one finds the most likely sequence (`max_product`; on a chain, the Viterbi algorithm). Look at it again: free
-# all three times, although the cell is occupied *now* with probability 0.65. That probability is shared by four
-# sequences, and none of them alone beats the quiet one.
+# The forward step above is both in one: multiply by the scan, then sum over $M$'s first axis. A marginal is the
+# product of all messages into its variable. `sum_product` sends these messages on any graph. As long as the factor
+# graph is a tree, without loops, its answers are exact, because each message sums up one side of an edge and the two
+# sides have nothing in common. With max in place of sum one finds the most likely sequence (`max_product`; on a chain,
+# the Viterbi algorithm). Look at it again: free all three times, although the cell is occupied *now* with probability
+# 0.65. That probability is shared by four sequences, and none of them alone beats the quiet one.
 #
 # ## When messages meet their own echo
 #
@@ -811,10 +811,10 @@ show_stages(("error", "BOF", "CMCDOT", "label"), (12, 8.5))
 show_stages(("CRF", "system"), (13, 5.6))
 
 # %% [markdown]
-# Look at the CRF on the left: its model cuts nothing between pairs. What is cut is *every* pair in mean field's answer,
-# and one dashed edge stands for all of them. Lectures 05 to 08 and 14 cut edges too, and draw
-# graphs of their own. In *One cell, four states* a raised minus marks a state before its scan, after the prediction, and
-# *seen?* says whether the scan looked at the cell at all.
+# Look at the CRF on the left. Its model keeps the edges of all pairs; mean field's answer has none of them. One dashed
+# edge stands for all of these. Lectures 05 to 08 and 14 cut edges too, and draw graphs of their own. In *One cell,
+# four states* a raised minus marks a state before its scan, after the prediction, and *seen?* says whether the scan
+# looked at the cell at all.
 #
 # ## Where this breaks
 #

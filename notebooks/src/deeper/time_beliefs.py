@@ -156,8 +156,8 @@ assert forward[15] > 0.5 > 0.35 > smooth[15]
 
 # %% [markdown]
 # At step 2 a single hit raises the filter to 0.45. The smoother knows that nothing followed, and says 0.3. At step 6 it is
-# the other way round: the filter still doubts what the smoother knows. At 15 the filter takes a while to believe that the
-# cell is free again. The path gives one block, from 6 to 14. It doesn't say how sure it is.
+# the other way round: the filter still doubts what the smoother knows. At 15 the filter still says occupied, with 0.70,
+# where the smoother says free. The path gives one block, from 6 to 14. It doesn't say how sure it is.
 #
 # A vehicle can't wait for the end of the drive, but it may wait for a moment. A smoother that uses the scans up to a few
 # steps later, always the same number, is called a **fixed-lag smoother**; exercise 01 asks for one.
@@ -170,12 +170,12 @@ assert forward[15] > 0.5 > 0.35 > smooth[15]
 # Keep a product of one small table per cell. Each step makes it a joint table with couplings; then go back to the
 # nearest product. This is **assumed-density filtering**: the belief is assumed to have a certain form, and is brought
 # back to that form (*projected*) after each step. Which product is the nearest? Measure by the Kullback-Leibler
-# divergence from the joint belief $p$ to the product $r$:
+# divergence from the joint belief $P$ to the product $r$:
 #
-# $$ D(p \,\|\, r) = \sum_{m} p(m) \log \frac{p(m)}{r_1(m_1) \cdots r_K(m_K)} $$
+# $$ D(P \,\|\, r) = \sum_{m} P(m) \log \frac{P(m)}{r_1(m_1) \cdots r_K(m_K)} $$
 #
-# By hand, for two cells: the sum splits into $-\sum_{m_1} p(m_1) \log r_1(m_1)$, the same for cell 2, and a constant.
-# Each part is smallest when $r_k$ equals the marginal $p(m_k)$. So the nearest product is that of the **marginals**,
+# By hand, for two cells: the sum splits into $-\sum_{m_1} P(m_1) \log r_1(m_1)$, the same for cell 2, and a constant.
+# Each part is smallest when $r_k$ equals the marginal $P(m_k)$. So the nearest product is that of the **marginals**,
 # which is table B. The divergence that is left is called the mutual information. For A and B it is $\log 2$ = 0.69
 # nats: knowing one cell tells which of two cases the other is in.
 
@@ -297,9 +297,9 @@ for name, beliefs in (("exact", exact_beliefs(STANDING_OR_DRIVING)), ("BOF", bof
 # **effective sample size** $1 / \sum_i w_i^2$ is $N$ when all weigh the same, and 1 when one has everything. Here it is
 # $1 / (3 \cdot 0.258^2 + 7 \cdot 0.032^2)$ = 4.8.
 #
-# Over time, each particle moves at random and its weights multiply. That goes wrong: after some steps one particle is by
-# luck a little better than all others and has all the weight. So we **resample**: draw $N$ particles with probabilities
-# equal to the weights, and let all weigh the same again. Here is the whole **particle filter**:
+# Over time, each particle moves at random and its weights multiply. That goes wrong: after some steps a few particles,
+# which were lucky, have nearly all the weight. So we **resample**: draw $N$ particles with probabilities equal to the
+# weights, and let all weigh the same again. Here is the whole **particle filter**:
 
 # %% tags=["particle-filter"]
 N_CELLS, POLES, MOVED = 10, [2, 3, 7], [0.1, 0.8, 0.1]
@@ -330,9 +330,9 @@ def particle_filter(n, rng, resample=True):
 #
 # <details><summary>Answer</summary>
 #
-# Without resampling about two; with it several hundred, and at no step fewer than 300. The error of an average of $N$ independent draws falls like
-# $1/\sqrt{N}$, so 100 times as many particles make it 10 times smaller. Resampling makes particles dependent, but the
-# law stays.
+# Without resampling about two; with it several hundred, and at no step fewer than 300. The error of an average of $N$
+# independent draws falls like $1/\sqrt{N}$, so 100 times as many particles make it 10 times smaller. Resampling makes
+# particles dependent, but the law stays.
 #
 # </details>
 
@@ -528,8 +528,10 @@ assert round(straight / (straight + crossed), 2) == 0.73
 #
 # 1. In a dynamic Bayesian network each slice is cheap, and the belief still becomes entangled.
 # 2. Filter, smoother and Viterbi answer three different questions about one chain.
-# 3. Assumed density: keep the marginals. Projecting after the prediction costs more than after the whole step.
-# 4. Importance sampling: weights correct for what was drawn. Without resampling one particle gets everything.
+# 3. Assumed density: keep the marginals. In two of five worlds projecting after the prediction cost far more than after
+#    the whole step, and in none did it cost less.
+# 4. Importance sampling: weights correct for what was drawn. Without resampling a few particles get nearly
+#    all the weight.
 # 5. Rao-Blackwell: sample what you must and compute the rest. CMCDOT does so, within BOF's product of cells.
 #
 # ## Further reading
