@@ -303,16 +303,16 @@ print(f"by the simulator {true_height:.2f} m")
 #
 # ## A new image, a new $K$
 #
-# Networks see smaller images, and often only a part. A row of 8 pixels, its axis in the middle, at $c_u$ = 3.5; $f_u$ =
-# 10. Take pairs of pixels together, 4 are left.
+# Networks see smaller images, and often only a part. Take a row of 8 pixels with its axis in the middle, at $c_u$ =
+# 3.5, and $f_u$ = 10. Average the pixels in pairs: 4 are left.
 #
 # **Predict before you run.** The new $c_u$? The new $f_u$? And if you cut two pixels off on the left instead?
 #
 # <details><summary>Answer</summary>
 #
 # The middle of 4 pixels, at 0, 1, 2, 3, is 1.5. Not 3.5 / 2 = 1.75! The image begins half a pixel *before* the centre
-# of its first pixel, and that edge is what stays in place: 3.5 + 0.5 = 4 pixels from the edge, half of them is 2, less
-# 0.5. The focal length is a length, without a place: 5. A cut shifts: $c_u$ = 1.5, and $f_u$ is still 10.
+# of its first pixel, and that edge is what stays in place: 3.5 + 0.5 = 4 pixels from the edge, half of them is 2,
+# less 0.5. The focal length is only scaled: 5. A cut shifts: $c_u$ = 1.5, and $f_u$ is still 10.
 #
 # </details>
 #
@@ -355,7 +355,7 @@ print(
 )
 
 # %% [markdown]
-# A quarter of a pixel, and no error message. Lecture 06 turns it into metres.
+# A quarter of a pixel, and no error message. Lecture 06 turns such errors into metres.
 #
 # ## Where the camera stands: reading names
 #

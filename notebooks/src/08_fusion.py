@@ -184,10 +184,11 @@ assert story[-1][3][1] > story[0][3][1] + 30
 assert story[-1][3][0] < story[0][3][0] - 5
 
 # %% [markdown]
-# A: the class with the highest score in each pixel. B: the map. C: its truth. D: the share of each that is right. The
-# map gets better, while the labels of the pixels get *worse*. The gradient of the map's loss reaches down to the
-# first convolution of the image network (we check this below). It asks for scores that help the map, whatever they
-# say about pixels. This is what the paper's title calls *end to end*. The lecture builds it piece by piece.
+# A: the class with the highest score in each pixel. B: the map. C: its truth. D: the share of each that is right in
+# these two frames. The map gets better, while the labels of the pixels get *worse*. The gradient of the map's loss
+# reaches down to the first convolution of the image network (we check this below). It asks for scores that help the
+# map, whatever they say about pixels. This is what the paper's title calls *end to end*. The lecture builds it piece
+# by piece.
 #
 # ### The graph
 #

@@ -262,8 +262,8 @@ plt.show()
 # seldom meet on one pixel. On the one scan of an HDL-64E that we tried, with twice as many returns in view, it still
 # leaves more than four in five. Not every hidden return does harm: a quarter of them bring their cell's true label
 # all the same (last line), as grass behind grass does. In the picture, most hidden returns (red crosses) are at the
-# fence, others at the poles and the bicycle: the LIDAR looks between the pales and over them onto the grass and the
-# house, and the pixel shows a pale. That is the patch **A** of the opening picture.
+# fence, others at the poles, the bicycle and far down the road. The LIDAR looks between the pales and over them onto
+# the grass and the house, and the pixel shows a pale. That is the patch **A** of the opening picture.
 #
 # ## Step 2: from the pixel back to the grid
 #
