@@ -73,7 +73,7 @@ o, log_g = occupancies[5], said[5]
 unary, params = unary_from_log_probability(log_g), CrfParams.for_cells(spec.cell)
 
 # %% [markdown]
-# Lecture 10 refined grids of a few cells, because its mean field visits every pair of cells. A real map has thousands of
+# Lecture 10 refined 2400 cells near the vehicle, and its mean field visited every pair of them. The whole map has more
 # cells. Here is one instant of the sample drive: what the network says, what the CRF makes of it, and the occupancy grid
 # that the CRF looks at. Look at **A**, vegetation on the right: the single cells of other classes in it are gone. Left
 # of **B** the oncoming cars are still there, with fewer cells.
@@ -95,7 +95,7 @@ assert cars > fewer > cars / 2
 
 # %% [markdown]
 # The middle map took ten iterations of mean field over 8804 cells and 14 classes. There are 39 million pairs of these
-# cells, and lecture 10 would have visited all of them in each iteration. In this lecture we find out how to avoid that.
+# cells, and the mean field of lecture 10 would visit all of them in each iteration. In this lecture we find out how to avoid that.
 # (The occupancy grid comes from a particle filter, which magnifies rounding errors. So on another kind of processor some
 # printed numbers differ a little from those in the text.)
 #
@@ -391,9 +391,9 @@ print("\n".join(table))
 # <details><summary>Answer</summary>The residuals are (-1.3, -1.4, -0.3). The second number was rounded up the farthest,
 # so round it down: (3, 0, -3), with residuals (-1.3, 1.6, -0.3). Now the second residual is the largest.</details>
 #
-# In general, with the residuals sorted, $r_0 \ge r_1 \ge \dots \ge r_d$, the corner with remainder $m$ has the weight
+# In general, with the residuals sorted, $\rho_0 \ge \rho_1 \ge \dots \ge \rho_d$, the corner with remainder $m$ has the weight
 #
-# $$ b_m = \frac{r_{d-m} - r_{d+1-m}}{d+1} \;\; (m = 1 \dots d), \qquad b_0 = 1 - \sum_{m=1}^{d} b_m $$
+# $$ b_m = \frac{\rho_{d-m} - \rho_{d+1-m}}{d+1} \;\; (m = 1 \dots d), \qquad b_0 = 1 - \sum_{m=1}^{d} b_m $$
 
 
 # %% tags=["simplex"] jupyter={"outputs_hidden": true}
@@ -669,7 +669,7 @@ print(
 # A cell that counts itself confirms its own opinion. Among many similar cells that hardly matters, because after
 # normalisation a cell's own share is a few per cent. But a cell whose occupancy is unlike that of all cells around it
 # hears nearly nothing but itself: its share goes up to 1. In such cells a forgotten self-response changes a probability by
-# more than a half at most, although only some twenty of 8804 labels differ in the end.
+# up to two thirds, although only some twenty of 8804 labels differ in the end.
 #
 # ## What kernel is it really?
 #
@@ -826,7 +826,7 @@ for infer in (mean_field_naive, mean_field_accurate, mean_field):
 
 # %% [markdown]
 # **Error** (left, and the first table). "Settled" is the map after 100 iterations with all pairs. With all pairs, each
-# iteration brings us nearer to it. The lattice keeps up for about five iterations. At forty it has fallen behind, because
+# iteration brings us nearer to it. The lattice keeps up for about three iterations. At forty it has fallen behind, because
 # then its kernel error is larger than what is left to converge. At ten iterations both errors are below two thousandths,
 # and 97 % of the labels or more agree. So at the package's ten iterations neither spoils the map. How can the map be so good when the kernel is off by so
 # much more? Most of that is the diagonal, which is subtracted, and an error that all cells share is taken out by the
@@ -893,8 +893,8 @@ plt.show()
 
 # %% [markdown]
 # With zero iterations (left) you see the network's map. The three refined maps are more alike than one might expect:
-# each changes about a tenth of the labels. With each of them fewer cells are called car than in the network's map. Is it
-# because the free cells around a car count as similar to it? Look at the occupancy of the car cells that get lost:
+# each changes about a tenth of the labels. With each of them fewer cells are called car than in the network's map. Do free
+# cells around a car outvote it, because they count as similar? Look at the occupancy of the car cells that get lost:
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 CAR = KITTI_14.index("car")
@@ -905,8 +905,8 @@ for sigma_beta in (0.03, 0.2, 2.0):
     assert 0.2 < (o.argmax(axis=0)[lost] == 0).mean() < 0.8
 
 # %% [markdown]
-# A third to a half of them are FREE themselves: cells that the network called car although a beam has passed through
-# them. For these, "similar cells around" are free ones, with any width. So the width explains only a part.
+# From a third to a bit more than half of them are FREE themselves: cells that the network called car although a beam has
+# passed through them. With any width, the cells similar to these are free ones. So the width explains only a part.
 #
 # ## Where this breaks
 #
@@ -944,8 +944,8 @@ print("\n".join(table))
 
 # %% [markdown]
 # For each of these widths, what a typical cell hears from all cells is between six and nine tenths of what it should be.
-# In each row the error of the map is larger without normalisation than with it. The mean also hides the worst cell: see
-# the columns "worst". And one thing didn't happen: a width of 0.3 cells, far below a cell, does no harm, because
+# In each row the mean error, |dQ|, is larger without normalisation than with it. It hides the worst cell, for which that
+# isn't so in each row (columns "worst"). And one thing didn't happen: a width of 0.3 cells, far below a cell, does no harm, because
 # then the kernel is so narrow that cells hardly hear each other in either way.
 #
 # **Many dimensions.** A cell has only $d + 1$ corners, but the kernel gets worse with each dimension, as you have seen
@@ -982,7 +982,8 @@ assert min(pixels[1:]) > pixels[0]
 assert max(classes[1:]) < classes[0] - 0.05
 
 # %% [markdown]
-# The CRF finds more of the road, and less of sidewalk, building, car, pedestrian and signage. Lattice and window differ by
+# The CRF finds more of the road, and less of sidewalk, building, car, pedestrian and signage. (Within 30 m, in lecture 10,
+# sidewalk and car gained.) Lattice and window differ by
 # about one point at most. So a better filter doesn't bring them back: it is the model that loses them, because a
 # pedestrian is a few cells among hundreds that say something else, and with these weights the many win.
 #

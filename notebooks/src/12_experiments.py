@@ -261,8 +261,8 @@ plt.show()
 #
 # By leaving it out. Four drives have 100 cells each, and 80, 84, 78 and 82 of them are called right: 81 %. Without the
 # first drive it is 244 of 300, 81.3 %; without the others 80.0, 82.0 and 80.7. These four numbers differ from their
-# mean by 0.33, -1, 1 and -0.33, so their squares sum to 2.22. Leaving out one of four drives moves the score much less
-# than a new drive would differ. So the sum is not divided by $V (V - 1)$, as for a standard error, but taken nearly
+# mean by 0.33, -1, 1 and -0.33, so their squares sum to 2.22. The score moves much less when a drive is left out
+# than the drives themselves differ. So the sum is not divided by $V (V - 1)$, as for a standard error, but taken nearly
 # whole:
 #
 # $$ e_d^2 = \frac{V - 1}{V} \sum_{v=1}^{V} \left( \theta_{-v} - \bar\theta \right)^2 $$
@@ -304,7 +304,7 @@ plt.show()
 # %% [markdown]
 # Left, each row below the first leaves one drive out (×), and the score moves a little. Right, the four scores
 # without a drive lie three times as close together as the drives' own: each still shares two drives of three with
-# every other. So their squares are summed and kept, not divided by $V - 1$ as those of independent values are.
+# every other. So their squares are summed and kept, not divided by $V (V - 1)$ as those of independent values are.
 
 
 # %% tags=["jackknife"]
@@ -344,11 +344,11 @@ for metric in METRICS.values():
 # (Cochran and Cox, *Experimental designs*). Each factor $t$ counts as much as its variance does. If seeds don't differ,
 # $e_s = 0$, and what remains is $t_{V-1}\, e_d$, the jackknife. If they do, three seeds cost width. (One drive may suit
 # one seed and not another. That part of what drives do is in the seeds' variance already, so the package subtracts it
-# from $e_d^2$.) How often such intervals contain the true value of a population that is known,
-# `benchmarks/interval_coverage.py` tries out.
+# from $e_d^2$.) `benchmarks/interval_coverage.py` tests how often such intervals contain the true
+# value, on populations in which it is known.
 #
 # Is an interval over three or five seeds trustworthy? Don't decide: look at every one of them. That is why each figure
-# here shows the circles. Here is for each row of Table 1 how far the seeds spread.
+# here shows the circles. And here is how far the seeds spread in each row of Table 1.
 
 # %% jupyter={"source_hidden": true}
 print("pixel accuracy, labels made with the LIDAR, all cells")
@@ -550,7 +550,7 @@ assert ahead + behind == len(gains)
 assert [what for what, behind in lost.items() if behind] == ["geometry with true image labels"]
 
 # %% [markdown]
-# SegNet is ahead of the first four in every comparison. Geometry with true image labels overtakes it in all metrics
+# SegNet is ahead of the first four in every comparison. Geometry with true image labels beats it in all metrics
 # over all cells, and in class accuracy over semantic cells; there SegNet keeps ahead in pixel accuracy and FmIoU. (No
 # baseline is an upper limit: another rule for carrying labels may do better.)
 #
@@ -573,7 +573,7 @@ assert [what for what, behind in lost.items() if behind] == ["geometry with true
 # the probability of *any* false alarm is at most 5 %, also when the comparisons depend on each other. The price is
 # width, so true differences are missed more often. The cell below counts all comparisons of our Table 1 and of the
 # *ablations*, in which one part of the system is left out or changed (Table 2 has too few drives), and widens each bar
-# as if it were normal. (With few seeds the right factor is larger, so "at most" it says.)
+# as if it were normal. (With few seeds the right factor is larger. Hence the "at most" in the output.)
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true}
 print(f"twenty equal pairs: {100 * (1 - 0.95**20):.0f} %")
@@ -727,8 +727,8 @@ plt.show()
 #   order *and* a reason. Our statements test the order alone, and FCN is clearly ahead of SegNet in all three
 #   metrics, although our SegNet is still the smallest of the three. That speaks against the reason, too, but weakly:
 #   all three have less than a million parameters. Whether SegNet loses least when frames are few is in the companion.
-# - **Claims 1 and 2** are judged with labels made with the LIDAR, like the paper's. The cell below judges the same
-#   statements with true labels, and can't tell either: SegNet and FCN no longer differ clearly, and the CRF's gain in
+# - **Claims 1 and 2** are judged with labels made with the LIDAR, like the paper's. Judged with
+#   true labels, both become *cannot tell* (the cell below): SegNet and FCN no longer differ clearly, and the CRF's gain in
 #   pixel accuracy is clear for one network of three. And no statement tests the claim's word *slightly*.
 # - **Claims 3 and 4** rest on twenty routes each, not on the two test drives and the one of Tables 2 and 3. You have
 #   seen what an interval over two drives is worth. From a single drive no interval can be computed at all.
@@ -831,7 +831,7 @@ assert min(crf_gains) > 0
 #
 # Is SegNet now better than FCN, as the paper says, or worse, as our long runs say? **Neither follows.** Two seeds and
 # eight drives give no interval, so the rule refuses, and it does so before it looks at the means. That is what it is
-# for: these means are as pretty as those of any published table. What a quick run does show is that every step works
+# for: these means look as good as those of any published table. What a quick run does show is that every step works
 # on your machine. That its ranking isn't the one of the long runs has many possible reasons: fewer frames, fewer
 # steps, two seeds, other streets.
 #
@@ -1031,8 +1031,8 @@ for share in (0.8, 0.3, 0.1, 0.05):
 # 5. An interval covers what varied in the experiment, and nothing else. List what didn't.
 #
 # **What you can now do**: read any table of scores, ask for its drives and seeds, and write down a rule before you look. (The
-# ledger gets no line here: no edge of the system is cut. What a table without intervals cuts is the drive as a common
-# parent: the intervals over cells contained the true value in 8 of 100 experiments.)
+# ledger gets no line here, because no edge of the system is cut. An interval over cells cuts one, the drive as a common
+# parent. Its price: it contained the true value in 8 of 100 experiments.)
 #
 # ## Further reading
 #
