@@ -131,7 +131,7 @@ plt.show()
 
 # %% [markdown]
 # This is the last frame, before any check: the image with the LIDAR's points on it, the occupancy grid, and the
-# semantic grid that the network from simulated streets makes of both. A is the white car before us, B a row of parked
+# semantic grid that the network from simulated streets makes of both. A is the white car ahead of us, B a row of parked
 # cars, and C a house wall. (On the maps each letter stands beside its cells.) The occupancy grid shows occupied cells
 # at A and B, where you expect them. You wouldn't want to drive by the semantic grid. Is the data wrong, the network,
 # or the model? That is the question of this lecture.
@@ -486,8 +486,9 @@ plt.show()
 
 # %% [markdown]
 # The wall on the right is upright within half a degree, so the LIDAR doesn't lean: the ground rises, the walls don't
-# lean, and the cause is the street. The picture agrees. Only our own lane slopes, to its gutter; left of the middle
-# the returns from the road lie well below the orange line. A street with such a **crown** is no plane. The ground
+# lean, and the cause is the street. The picture agrees. Our own lane slopes to its gutter. Left of the middle
+# the road levels out and then falls again, and its returns lie well below the orange line. A street with such a
+# **crown** is no plane. The ground
 # filter of lecture 02 doesn't need to know. It follows the ground outward from the vehicle.
 #
 # ## Check 5: does the vehicle move as its poses say?
@@ -613,8 +614,9 @@ for k, frame in list(enumerate(FAULTS["LIDAR tilted"](frames)))[::4]:
 # ## The map, scored
 #
 # The geometry has passed, as far as this drive can tell. So the map can be judged. The excerpt has labels: the
-# classes of the LIDAR's returns, collected over some scans, say what stands in 27,445 of the cells that the camera
-# sees, in ten frames. What should a map be compared with? With a map that never looks at the image: a **table** that
+# classes of the LIDAR's returns, collected over some scans, say what stands in 27,445 cells in the camera's view, in ten
+# frames. (Lecture 10 took the 15,431 of them that are marked as seen in their own frame. There the network from simulated
+# streets has 75 % right.) What should a map be compared with? With a map that never looks at the image: a **table** that
 # gives each cell the class that is most frequent in its occupancy state, learned from these very labels.
 #
 # **Predict before you run.** Of these cells the table has 76 % right. How many has the network from simulated
@@ -799,7 +801,7 @@ for name, one in agreement.items():
 # Data checked, network taught: what is left is the model. The paper's system cuts edges, and the course keeps a ledger
 # of their prices on toy worlds. On a labelled street two of them can be measured by paying them back. **Memory**
 # (lecture 14's edge, from the earlier semantic grid to the present one) joins what all earlier frames said of a cell.
-# The **CRF** of lecture 10 pays back the edge between cells, with mean field.
+# The **CRF** of lecture 10 joins neighbouring cells, which the network names one by one.
 #
 # **Predict before you run.** Which of the two makes the map of this street better, for the network from simulated
 # streets? By how many points?
@@ -839,8 +841,9 @@ if ours:
 #
 # </details>
 #
-# The printed lines give both prices on a toy and on this street. They don't have the same unit, and needn't have the
-# same order. That is the use of a ledger: it says where to look, and the street says what it costs there.
+# The toy lines have other units, so their order needn't be that of this street. And the one of lecture 10 prices what
+# mean field cuts inside a CRF, not what a map without a CRF lacks. A ledger says where to look, and the street says what
+# it costs there.
 #
 # ## The report card
 #
@@ -882,7 +885,8 @@ plt.show()
 #    passes, alarm, can't tell.
 # 2. When a check fails, doubt the check as well as the data; a second check that depends on one suspect alone tells
 #    the causes apart.
-# 3. Without images a table of occupancy states had 76 % of this street right; the network from simulated streets 55
+# 3. Without images a table of occupancy states, made from its labels, had 76 % of this street right; the network from
+#    simulated streets 55
 #    %, or 69 % when it mustn't answer *unknown*.
 # 4. A network that learned on one half of a street does well there, and worse and too surely on the other. Test where
 #    you haven't learned.

@@ -87,7 +87,8 @@ def believed(evidence):
 # 4. **Measure** all heights from the line through the ground that was found.
 #
 # For step 3, a short way allows 0.1 m, which is most of a kerb, and a slope of 1 in 3. A long way allows 0.3 m and a
-# grade of 5 in 100. By hand: from 6 to 7 m the first allows 0.1 + 1/3 = 0.43 and the second 0.35. The step of 0.25 is
+# grade of 5 in 100; beyond 10 m, $d$ counts as 10 m. By hand: from 6 to 7 m the first allows 0.1 + 1/3 = 0.43 and the
+# second 0.35. The step of 0.25 is
 # within both, so it is ground.
 #
 # $$ |h - h_\text{ground}| \le \min\left(0.1 + \tfrac13 d,\; 0.3 + 0.05\, d\right), \qquad d \le 10\ \text{m} $$

@@ -256,7 +256,8 @@ plt.show()
 # %% [markdown]
 # While the box brakes, its true speed lies between two velocities of the lattice. The mass at the higher one runs ahead
 # of the box and is contradicted by the scans. The lower one starts with the small share that has jumped there. So the
-# filter's speed lags behind and is too high, and P(DYNAMIC) is lower than for a steady box. The particles of lecture 04
+# filter's speed lags behind and is too high, and P(DYNAMIC) is lower on average than for a steady box. The particles
+# of lecture 04
 # change their speed a little at every step.
 #
 # **Two more limits.** What nobody has seen before has no antecedent: a car that comes out from behind another is

@@ -42,7 +42,8 @@ error = json.loads((results / "crf_error.json").read_text(encoding="utf-8"))
 #
 # Lecture 10 showed one grid of nine cells whose opinions were split on purpose. Was this a rare case? Here are 20
 # random CRFs for each of four sizes. Scores are drawn from a normal distribution, occupancy from a Dirichlet
-# distribution, and the coupling $w_1$ goes from 0 to 4, the package's default ($w_2$ is 3/4 of it). A grid of 4 x 4
+# distribution (one over numbers that sum to 1), and the coupling $w_1$ goes from 0 to 4, the package's default ($w_2$
+# is 3/4 of it). A grid of 4 x 4
 # cells and 3 classes has 43 million labellings; visiting each of them gives the exact marginals and the most likely
 # labelling (`semgrid-edu reproduce crf-coupling`).
 #
@@ -78,7 +79,7 @@ assert max(v[:, : at[1] + 1].max() for v in variation.values()) < 0.01
 # %% [markdown]
 # **Marginals (above).** The columns of the table are couplings of 1, 2, 3 and 4. Up to 1, every way is within 1 % of
 # the exact marginals. At each size and each coupling, converged mean field is at least as far off as mean field stopped
-# after ten updates: what helps isn't the stopping, but that the stopped one isn't yet so sure. Messages (loopy
+# after ten updates. A likely reason: the stopped one isn't yet so sure. Messages (loopy
 # sum-product) are nearer than converged mean field up to a coupling of 2; at 4 they are wrong by 10 to 15 %, because
 # they pick a side too.
 #
@@ -185,7 +186,7 @@ Markdown(crf_error_tables(error))
 # 0.0004, as mean differences of probabilities.)
 #
 # **The window is exact for all that matters here**: its kernel error is a few millionths. Its time depends on the width
-# of the kernel, so it gains least where cells are small.
+# of the kernel, so on the crops, where cells are small, it gains nothing over the matrix.
 #
 # **Landmarks depend on the map.** On the crops, 512 landmarks stand for 4096 cells, and their kernel error is smaller
 # than the lattice's. On the compact grid, which is larger and more varied, it is 1.4 % with 512 landmarks, four times

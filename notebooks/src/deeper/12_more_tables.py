@@ -72,7 +72,7 @@ def chart(ax, values):
 # First, how does one read it? The paper says that *lane markings have a high correct detection rate*: 26.69 %. Is that
 # high? Of the cells of road, wherever they are, 4.85 % are called lane. So a cell of a marking is five and a half times
 # as likely to be called lane as a cell of road. (The table doesn't say how it is with the road right beside the
-# markings.) That is the statement which claim 4 uses.
+# markings.) Claim 4 uses this statement.
 
 # %% jupyter={"source_hidden": true} alt="two confusion matrices side by side, ours and the paper's, with ten classes each; the first column, void, is dark in the paper's, the column of vegetation in ours"
 confusion_picture(table3)
