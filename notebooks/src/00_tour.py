@@ -192,7 +192,8 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # | $\sigma$ | a standard deviation; its index says of what | |
 #
 # H x W are cells, h x w pixels, C = 14 classes, D = 20 planes, N points. ($v$ is a velocity in 01 to 04 and a pixel's
-# row here and from 05 on; the two never meet. A letter that isn't in this table means something on its own page only.)
+# row here and from 05 on; $K$ and $T$ also count cells and scans, before 05. A letter that isn't in this table means
+# something on its own page only.)
 #
 # ## A map with forward up
 #

@@ -279,7 +279,7 @@ def entropy(belief):
 #
 # Prediction never lowers it: each new number is a mean of old ones, so peaks get lower and holes fill up. Update lowers
 # it usually, but not always: a reading that contradicts what you believed leaves you with two explanations instead of
-# one. A surprise makes you less sure, and rightly so. (Where a road ends at a wall, even prediction can lower the
+# one. A surprise can make you less sure, and rightly so. (Where a road ends at a wall, even prediction can lower the
 # entropy, because in time every vehicle stands at the wall.)
 #
 # </details>

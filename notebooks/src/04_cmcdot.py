@@ -905,8 +905,8 @@ assert np.hypot(moved_by.dx, moved_by.dy) < 0.2  # we stand
 #
 # <details><summary>Answer</summary>
 #
-# With `stop_speed`, the person: at 2 m/s a walk still counts as standing. With few particles also the person: beams hit
-# fewer cells of the person than of the car, so hardly a particle is born there with the right velocity.
+# With `stop_speed`, the person: at 2 m/s a walk still counts as standing. With few particles mostly the person, too: beams
+# hit fewer cells of the person than of the car, so hardly a particle is born there with the right velocity.
 #
 # </details>
 
