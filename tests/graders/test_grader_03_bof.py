@@ -372,14 +372,15 @@ def update(joint, if_occupied, if_free):
             "a loop over cells, numpy's own average and covariance",
             task="mean-and-covariance",
             code="""
-def mean_and_covariance(joint, velocities):
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
     shape = joint.shape[1:]
     mean, covariance = np.full((2, *shape), np.nan), np.full((2, 2, *shape), np.nan)
     for r, c in np.ndindex(shape):
-        weights = joint[1:, r, c]
+        weights = joint[fast, r, c]
         if weights.sum() > 0:
-            mean[:, r, c] = np.average(velocities[1:], axis=0, weights=weights)
-            covariance[:, :, r, c] = np.cov(velocities[1:].T, aweights=weights, ddof=0)
+            mean[:, r, c] = np.average(velocities[fast], axis=0, weights=weights)
+            covariance[:, :, r, c] = np.cov(velocities[fast].T, aweights=weights, ddof=0)
     return mean, covariance""",
         ),
         right(
@@ -394,9 +395,10 @@ def mean(weights, values):
     return sum(w * v for w, v in zip(weights, values)) / total if total > 0 else float("nan")
 
 
-def mean_and_covariance(joint, velocities):
-    (_, H, W), v = joint.shape, velocities[1:]
-    m, axes = joint[1:], (0, 1)
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    (_, H, W), v = joint.shape, velocities[fast]
+    m, axes = joint[fast], (0, 1)
     means = [[[mean(m[:, r, c], v[:, i]) for c in range(W)] for r in range(H)] for i in axes]
 
     def covariance(i, j, r, c):
@@ -408,8 +410,9 @@ def mean_and_covariance(joint, velocities):
             "moments",
             task="mean-and-covariance",
             code="""
-def mean_and_covariance(joint, velocities):
-    m, v = joint[1:], velocities[1:]
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    m, v = joint[fast], velocities[fast]
     total = m.sum(axis=0)
     mean = np.tensordot(v.T, m, axes=1) / total
     second = np.tensordot(np.einsum("vi,vj->ijv", v, v), m, axes=1) / total
@@ -419,10 +422,11 @@ def mean_and_covariance(joint, velocities):
             "not divided by the probability",
             task="mean-and-covariance",
             loses=2,
-            says="given that something moves means divided by P(DYNAMIC)",
+            says="given that something moves means divided by P(it moves)",
             code="""
-def mean_and_covariance(joint, velocities):
-    m, v = joint[1:], velocities[1:]
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    m, v = joint[fast], velocities[fast]
     mean = np.tensordot(v.T, m, axes=1)
     apart = v[:, :, None, None] - mean / m.sum(axis=0)
     return np.where(m.sum(axis=0) > 0, mean, np.nan), np.einsum("vhw,vihw,vjhw->ijhw", m, apart, apart)""",
@@ -433,7 +437,8 @@ def mean_and_covariance(joint, velocities):
             loses=2,
             says="what stands doesn't move",
             code="""
-def mean_and_covariance(joint, velocities):
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
     share = joint / joint.sum(axis=0)
     mean = np.einsum("vhw,vi->ihw", share, velocities)
     apart = velocities[:, :, None, None] - mean
@@ -445,8 +450,9 @@ def mean_and_covariance(joint, velocities):
             loses=4,
             says="x and y are swapped",
             code="""
-def mean_and_covariance(joint, velocities):
-    share, v = joint[1:] / joint[1:].sum(axis=0), velocities[1:, ::-1]
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    share, v = joint[fast] / joint[fast].sum(axis=0), velocities[fast][:, ::-1]
     mean = np.einsum("vhw,vi->ihw", share, v)
     apart = v[:, :, None, None] - mean
     return mean, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)""",
@@ -457,9 +463,10 @@ def mean_and_covariance(joint, velocities):
             loses=4,
             says="every velocity counts the same",
             code="""
-def mean_and_covariance(joint, velocities):
-    nothing = np.where(joint[1:].sum(axis=0) > 0, 0, np.nan)
-    mean, covariance = velocities[1:].mean(axis=0), np.cov(velocities[1:].T)
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    nothing = np.where(joint[fast].sum(axis=0) > 0, 0, np.nan)
+    mean, covariance = velocities[fast].mean(axis=0), np.cov(velocities[fast].T)
     return mean[:, None, None] + nothing, covariance[..., None, None] + nothing""",
         ),
         mistake(
@@ -468,11 +475,12 @@ def mean_and_covariance(joint, velocities):
             loses=2,
             says="that is the most probable velocity",
             code="""
-def mean_and_covariance(joint, velocities):
-    share, v = joint[1:] / joint[1:].sum(axis=0), velocities[1:]
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    share, v = joint[fast] / joint[fast].sum(axis=0), velocities[fast]
     mean = np.einsum("vhw,vi->ihw", share, v)
     apart = v[:, :, None, None] - mean
-    best = v[joint[1:].argmax(axis=0)].transpose(2, 0, 1) + 0 * mean
+    best = v[joint[fast].argmax(axis=0)].transpose(2, 0, 1) + 0 * mean
     return best, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)""",
         ),
         mistake(
@@ -481,10 +489,11 @@ def mean_and_covariance(joint, velocities):
             loses=1,
             says="no velocity isn't zero velocity",
             code="""
-def mean_and_covariance(joint, velocities):
-    share = joint[1:] / np.maximum(joint[1:].sum(axis=0), 1e-12)
-    mean = np.einsum("vhw,vi->ihw", share, velocities[1:])
-    apart = velocities[1:, :, None, None] - mean
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    share = joint[fast] / np.maximum(joint[fast].sum(axis=0), 1e-12)
+    mean = np.einsum("vhw,vi->ihw", share, velocities[fast])
+    apart = velocities[fast][:, :, None, None] - mean
     return mean, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)""",
         ),
         mistake(
@@ -493,11 +502,12 @@ def mean_and_covariance(joint, velocities):
             loses=1,
             says="on inputs you haven't seen: NaN where something may move",
             code="""
-def mean_and_covariance(joint, velocities):
-    total = joint[1:].sum(axis=0)
-    share = joint[1:] / np.where(total > 1e-3, total, np.nan)
-    mean = np.einsum("vhw,vi->ihw", share, velocities[1:])
-    apart = velocities[1:, :, None, None] - mean
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    total = joint[fast].sum(axis=0)
+    share = joint[fast] / np.where(total > 1e-3, total, np.nan)
+    mean = np.einsum("vhw,vi->ihw", share, velocities[fast])
+    apart = velocities[fast][:, :, None, None] - mean
     return mean, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)""",
         ),
         mistake(
@@ -506,8 +516,9 @@ def mean_and_covariance(joint, velocities):
             loses=2,
             says="take the mean velocity off first",
             code="""
-def mean_and_covariance(joint, velocities):
-    share, v = joint[1:] / joint[1:].sum(axis=0), velocities[1:]
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    share, v = joint[fast] / joint[fast].sum(axis=0), velocities[fast]
     return np.einsum("vhw,vi->ihw", share, v), np.einsum("vhw,vi,vj->ijhw", share, v, v)""",
         ),
         mistake(
@@ -516,10 +527,11 @@ def mean_and_covariance(joint, velocities):
             loses=2,
             says="the two components vary together",
             code="""
-def mean_and_covariance(joint, velocities):
-    share = joint[1:] / joint[1:].sum(axis=0)
-    mean = np.einsum("vhw,vi->ihw", share, velocities[1:])
-    variance = np.einsum("vhw,vihw->ihw", share, (velocities[1:, :, None, None] - mean) ** 2)
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    share = joint[fast] / joint[fast].sum(axis=0)
+    mean = np.einsum("vhw,vi->ihw", share, velocities[fast])
+    variance = np.einsum("vhw,vihw->ihw", share, (velocities[fast][:, :, None, None] - mean) ** 2)
     return mean, variance[None] * np.eye(2)[:, :, None, None]""",
         ),
         mistake(
@@ -528,10 +540,11 @@ def mean_and_covariance(joint, velocities):
             loses=2,
             says="these are standard deviations",
             code="""
-def mean_and_covariance(joint, velocities):
-    share = joint[1:] / joint[1:].sum(axis=0)
-    mean = np.einsum("vhw,vi->ihw", share, velocities[1:])
-    variance = np.einsum("vhw,vihw->ihw", share, (velocities[1:, :, None, None] - mean) ** 2)
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    share = joint[fast] / joint[fast].sum(axis=0)
+    mean = np.einsum("vhw,vi->ihw", share, velocities[fast])
+    variance = np.einsum("vhw,vihw->ihw", share, (velocities[fast][:, :, None, None] - mean) ** 2)
     return mean, np.sqrt(variance)[None] * np.eye(2)[:, :, None, None]""",
         ),
         # ---- task 5
@@ -543,7 +556,7 @@ def arrive(own, arrives):
     after = np.zeros_like(own)
     for state in range(4):
         for comes, p in ((True, arrives), (False, 1 - arrives)):
-            if not (comes and state == 1):
+            if not (comes and state in (1, 2)):
                 after[2 if comes else state] += p * own[state]
     return after / after.sum(axis=0)""",
         ),
@@ -555,7 +568,7 @@ def arrive(own, arrives):
     after = np.zeros(own.shape)
     for r in range(own.shape[1]):
         for c in range(own.shape[2]):
-            a, s = arrives[r, c], own[1, r, c]
+            a, s = arrives[r, c], own[1, r, c] + own[2, r, c]
             after[:, r, c] = (1 - a) * own[:, r, c] / (1 - a * s)
             after[2, r, c] = 1 - after[0, r, c] - after[1, r, c] - after[3, r, c]
     return after""",
@@ -580,7 +593,7 @@ def arrive(own, arrives):
 def arrive(own, arrives):
     free, static, dynamic, unknown = own
     nothing = 1 - arrives
-    return np.stack([nothing * free, static, arrives * (1 - static) + nothing * dynamic, nothing * unknown])""",
+    return np.stack([nothing * free, static, arrives * (free + unknown) + dynamic, nothing * unknown])""",
         ),
         mistake(
             "added and scaled",
@@ -593,16 +606,60 @@ def arrive(own, arrives):
     after[2] += arrives
     return after / after.sum(axis=0)""",
         ),
-        mistake(
-            "what moves can't be arrived at either",
+        right(
+            "what is left, scaled",
             task="arrive",
-            loses=3,
-            says="only STATIC and arriving exclude each other",
             code="""
 def arrive(own, arrives):
     after = (1 - arrives) * own
     after[2] += arrives * (own[0] + own[3])
     return after / after.sum(axis=0)""",
+        ),
+        mistake(
+            "the package's function, wrapped",
+            task="arrive",
+            loses=3,
+            says="you strike out one pair, as the lecture does",
+            code="""
+def arrive(own, arrives):
+    from semgrid_edu.occupancy.literal.cmcdot import collide_literal
+    none = np.zeros_like(arrives)
+    return collide_literal(own, own[2], none, none, arrives, none)[0]""",
+        ),
+        mistake(
+            "the package's function, wrapped",
+            task="mean-and-covariance",
+            loses=5,
+            says="you leave the first bin out",
+            code="""
+def mean_and_covariance(joint, velocities, slow):
+    from semgrid_edu.occupancy.bof import bof_velocity
+    from semgrid_edu.occupancy.bof_state import BofState
+    none = np.zeros(joint.shape[1:])
+    return bof_velocity(BofState(none, none, joint, velocities, np.zeros_like(velocities)))""",
+        ),
+        mistake(
+            "the package's function, wrapped",
+            task="shift",
+            loses=2,
+            says="on inputs you haven't seen: wrong for a way of 0",
+            code="""
+def shift(mass, down, right):
+    from semgrid_edu.occupancy.literal.bof import elsewhere_literal
+    return elsewhere_literal(mass, np.array([[down, right]]))[0]""",
+        ),
+        mistake(
+            "the zero velocity alone left out",
+            task="mean-and-covariance",
+            loses=2,
+            says="what moves at 0.7 m/s isn't faster than `slow` either",
+            code="""
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.abs(velocities).max(axis=1) > 0
+    share = joint[fast] / joint[fast].sum(axis=0)
+    mean = np.einsum("vhw,vi->ihw", share, velocities[fast])
+    apart = velocities[fast][:, :, None, None] - mean
+    return mean, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)""",
         ),
         mistake(
             "what moved already lost",
@@ -612,7 +669,7 @@ def arrive(own, arrives):
             code="""
 def arrive(own, arrives):
     after = (1 - arrives) * own
-    after[2] = arrives * (1 - own[1])
+    after[2] = arrives * (own[0] + own[3])
     return after / after.sum(axis=0)""",
         ),
         mistake(
@@ -623,30 +680,30 @@ def arrive(own, arrives):
             code="""
 def arrive(own, arrives):
     after = (1 - arrives) * own
-    after[2] += arrives * (1 - own[1])
+    after[2] += arrives * (own[0] + own[3])
     return after""",
         ),
         mistake(
             "what is struck out becomes UNKNOWN",
             task="arrive",
             loses=3,
-            says="isn't UNKNOWN, it is impossible",
+            says="aren't UNKNOWN, they are impossible",
             code="""
 def arrive(own, arrives):
     after = (1 - arrives) * own
-    after[2] += arrives * (1 - own[1])
-    after[3] += arrives * own[1]
+    after[2] += arrives * (own[0] + own[3])
+    after[3] += arrives * (own[1] + own[2])
     return after""",
         ),
         mistake(
             "FREE and STATIC mixed up",
             task="arrive",
             loses=3,
-            says="by hand: 0.21, 0.12, 0.50, 0.09",
+            says="by hand: 0.21, 0.12, 0.38, 0.09",
             code="""
 def arrive(own, arrives):
     after = (1 - arrives) * own
-    after[2] += arrives * (1 - own[0])
+    after[2] += arrives * (own[1] + own[3])
     return after / after.sum(axis=0)""",
         ),
         mistake(
@@ -658,7 +715,7 @@ def arrive(own, arrives):
 def arrive(own, arrives):
     odds = arrives / (1 - arrives)
     after = own.copy()
-    after[2] += odds * (1 - own[1])
+    after[2] += odds * (own[0] + own[3])
     return after / after.sum(axis=0)""",
         ),
         right(
@@ -669,7 +726,7 @@ def arrive(own, arrives):
     after = np.zeros_like(own)
     for r, c in np.ndindex(arrives.shape):
         for state, comes in np.ndindex(4, 2):
-            if not (state == 1 and comes):
+            if not (state in (1, 2) and comes):
                 chance = arrives[r, c] if comes else 1 - arrives[r, c]
                 after[2 if comes else state, r, c] += chance * own[state, r, c]
     return after / after.sum(axis=0)""",
@@ -697,7 +754,7 @@ def update(joint, if_occupied, if_free):
             code="""
 def arrive(own, arrives):
     free, static, dynamic, unknown = own
-    comes, possible = arrives * (1 - static), 1 - arrives * static
+    comes, possible = arrives * (free + unknown), 1 - arrives * (static + dynamic)
     np.subtract(1, arrives, out=arrives)
     return np.stack([arrives * free, arrives * static, comes + arrives * dynamic, arrives * unknown]) / possible""",
         ),
@@ -716,8 +773,8 @@ def update(joint, if_occupied, if_free):
             code="""
 def arrive(own, arrives):
     a, after = np.minimum(arrives, 0.999), np.empty_like(own)
-    after[:] = (1 - a) * own / (1 - a * own[1])
-    after[2] += a * (1 - own[1]) / (1 - a * own[1])
+    after[:] = (1 - a) * own / (1 - a * (own[1] + own[2]))
+    after[2] += a * (own[0] + own[3]) / (1 - a * (own[1] + own[2]))
     return after""",
         ),
         mistake(
@@ -726,12 +783,13 @@ def arrive(own, arrives):
             loses=5,
             says="it changes an argument",
             code="""
-def mean_and_covariance(joint, velocities):
-    total = joint[1:].sum(axis=0)
-    joint[1:] /= total
-    mean = np.einsum("vhw,vi->ihw", joint[1:], velocities[1:])
-    apart = velocities[1:, :, None, None] - mean
-    return mean, np.einsum("vhw,vihw,vjhw->ijhw", joint[1:], apart, apart)""",
+def mean_and_covariance(joint, velocities, slow):
+    fast = np.hypot(*velocities.T) > slow
+    total = joint[fast].sum(axis=0)
+    joint[fast] /= total
+    mean = np.einsum("vhw,vi->ihw", joint[fast], velocities[fast])
+    apart = velocities[fast][:, :, None, None] - mean
+    return mean, np.einsum("vhw,vihw,vjhw->ijhw", joint[fast], apart, apart)""",
         ),
         # ---- task 6
         right(

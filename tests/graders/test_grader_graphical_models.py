@@ -2,12 +2,11 @@
 
 from grader_checks import GraderChecks, mistake, right
 
-SLICED = """
-def posterior(factor, wanted, given):
-    names, table = list(factor[0]), factor[1]
-    for name, state in given.items():
-        table = np.take(table, state, axis=names.index(name))
-        names.remove(name)
+WEIGHTED = """
+def posterior(factor, wanted, heard):
+    names, table = list(factor[0]), np.array(factor[1], float)
+    for name, likelihood in heard.items():
+        table = table * np.reshape(likelihood, [-1 if n == name else 1 for n in names])
     for name in list(names):
         if name != wanted:
             table = table.sum(axis=names.index(name))
@@ -15,7 +14,10 @@ def posterior(factor, wanted, given):
 """
 
 RECIPE = """
-def separated(parents, a, b, given=()):
+def separated(parents, a, b, given=(), exact=()):
+    given = set(given)
+    for _ in parents:
+        given |= {name for name in exact if set(parents[name]) <= given}
     kept, queue = set(), [a, b, *given]
     while queue:
         name = queue.pop()
@@ -36,7 +38,10 @@ def separated(parents, a, b, given=()):
 """
 
 PATHS = """
-def separated(parents, a, b, given=()):
+def separated(parents, a, b, given=(), exact=()):
+    given = set(given)
+    for _ in parents:
+        given |= {name for name in exact if set(parents[name]) <= given}
     children = {name: [c for c in parents if name in parents[c]] for name in parents}
 
     def below(name):
@@ -59,7 +64,7 @@ def separated(parents, a, b, given=()):
 """
 
 ELIMINATE = """
-def eliminate(factors, order, seen):
+def eliminate(factors, order, seen, best=()):
     factors = [f.given(**{n: s for n, s in seen.items() if n in f.names}) for f in factors]
     largest = 0
     for name in order:
@@ -68,7 +73,8 @@ def eliminate(factors, order, seen):
         for f in touching[1:]:
             together = together * f
         largest = max(largest, together.table.size)
-        factors = [f for f in factors if name not in f.names] + [together.sum(name)]
+        taken = together.max(name) if name in best else together.sum(name)
+        factors = [f for f in factors if name not in f.names] + [taken]
     result = factors[0]
     for f in factors[1:]:
         result = result * f
@@ -275,9 +281,9 @@ def divide(f, g):
         ),
         # ---- task 2
         right(
-            "slice and sum, one axis after the other",
+            "multiply and sum, one axis after the other",
             task="posterior",
-            code=SLICED
+            code=WEIGHTED
             + """
     if not table.any():
         raise ValueError("impossible")
@@ -287,63 +293,110 @@ def divide(f, g):
             "a loop over all states",
             task="posterior",
             code="""
-def posterior(factor, wanted, given):
+def posterior(factor, wanted, heard):
     names, table = factor
     weights = [0.0] * table.shape[names.index(wanted)]
     for index in np.ndindex(*table.shape):
         at = dict(zip(names, index))
-        if all(at[name] == state for name, state in given.items()):
-            weights[at[wanted]] += table[index]
+        weights[at[wanted]] += table[index] * np.prod([row[at[name]] for name, row in heard.items()])
     if sum(weights) == 0:
         raise ValueError("impossible")
     return [w / sum(weights) for w in weights]""",
         ),
         right(
-            "the package, whose error is a ValueError",
+            "a model with one more factor for each report, whose error is a ValueError",
             task="posterior",
             code="""
-def posterior(factor, wanted, given):
-    sliced = Factor(*factor).given(**given)
-    return sliced.sum(*(n for n in sliced.names if n != wanted)).normalised().table""",
+from semgrid_edu.graphical import product
+
+
+def posterior(factor, wanted, heard):
+    joint = product([Factor(*factor), *(Factor(name, row) for name, row in heard.items())])
+    return joint.sum(*(n for n in joint.names if n != wanted)).normalised().table""",
         ),
         mistake(
-            "what is known summed out",
+            "the package's function, wrapped",
+            task="posterior",
+            loses=3,
+            says="expected a state from 0 to 1",
+            code="""
+from semgrid_edu.graphical import GraphicalModel, enumerate_marginals
+
+
+def posterior(factor, wanted, heard):
+    return enumerate_marginals(GraphicalModel([Factor(*factor)]), wanted, heard).normalised().table""",
+        ),
+        mistake(
+            "the companion's slice",
+            task="posterior",
+            loses=2,
+            says="you take the report for certain",
+            code=WEIGHTED.replace("reshape(likelihood", "reshape(np.eye(len(likelihood))[np.argmax(likelihood)]")
+            + """    if not table.any():
+        raise ValueError("impossible")
+    return table / table.sum()""",
+        ),
+        mistake(
+            "a mixture of the answers",
+            task="posterior",
+            loses=2,
+            says="you mix the answers for z = 0 and z = 1",
+            code="""
+def posterior(factor, wanted, heard):
+    names, table = list(factor[0]), np.array(factor[1], float)
+    for name, likelihood in heard.items():
+        others = tuple(k for k, n in enumerate(names) if n != name)
+        share = np.reshape(likelihood, [-1 if n == name else 1 for n in names])
+        table = table / np.maximum(table.sum(axis=others, keepdims=True), 1e-300) * share
+    weights = table.sum(axis=tuple(k for k, n in enumerate(names) if n != wanted))
+    if weights.sum() == 0:
+        raise ValueError("impossible")
+    return weights / weights.sum()""",
+        ),
+        mistake(
+            "a report of what is wanted left out",
+            task="posterior",
+            loses=2,
+            says="there is a report of z itself",
+            code=WEIGHTED.replace("in heard.items():", "in heard.items():\n        if name == wanted: continue")
+            + """    if not table.any():
+        raise ValueError("impossible")
+    return table / table.sum()""",
+        ),
+        mistake(
+            "what is heard left out",
             task="posterior",
             loses=3,
             says="you summed z out",
             code="""
-def posterior(factor, wanted, given):
+def posterior(factor, wanted, heard):
     names, table = factor
     weights = table.sum(axis=tuple(k for k, n in enumerate(names) if n != wanted))
     return weights / weights.sum()""",
         ),
         mistake(
-            "always state 0",
+            "likelihoods the other way round",
             task="posterior",
             loses=3,
-            says="use its value",
-            code=SLICED.replace("table, state, axis", "table, 0, axis") + "    return table / table.sum()",
+            says="the first number of a likelihood is that of state 0",
+            code=WEIGHTED.replace("reshape(likelihood", "reshape(likelihood[::-1]") + "    return table / table.sum()",
         ),
         mistake(
-            "wanted ignored after the slice",
+            "wanted ignored",
             task="posterior",
             loses=2,
-            says="the axes have moved up after the slice, or `wanted` is ignored",
-            code="""
-def posterior(factor, wanted, given):
-    names, table = factor
-    table = table[tuple(given.get(name, slice(None)) for name in names)]
-    weights = table.sum(axis=tuple(range(1, table.ndim)))
-    if weights.sum() == 0:
+            says="look where the axis of `wanted` is",
+            code=WEIGHTED.replace("name != wanted", "name != factor[0][0]")
+            + """    if not table.any():
         raise ValueError("impossible")
-    return weights / weights.sum()""",
+    return table / table.sum()""",
         ),
         mistake(
             "maximum instead of sum",
             task="posterior",
             loses=2,
             says="an unknown variable is summed out",
-            code=SLICED.replace("table.sum(axis", "table.max(axis")
+            code=WEIGHTED.replace("table.sum(axis", "table.max(axis")
             + """    if not table.any():
         raise ValueError("impossible")
     return table / table.sum()""",
@@ -352,54 +405,42 @@ def posterior(factor, wanted, given):
             "mean instead of sum, not normalised",
             task="posterior",
             loses=3,
-            says="you took the mean over m1",
-            code=SLICED.replace("table.sum(axis", "table.mean(axis") + "    return table",
+            says="you took the mean over the others",
+            code=WEIGHTED.replace("table.sum(axis", "table.mean(axis") + "    return table",
         ),
         mistake(
             "not normalised, but it knows the impossible",
             task="posterior",
             loses=2,
             says="divide by their sum, 28",
-            code=SLICED
+            code=WEIGHTED
             + """    if not table.any():
         raise ValueError("impossible")
     return table""",
-        ),
-        mistake(
-            "state 0 taken for nothing known, but it knows the impossible",
-            task="posterior",
-            loses=2,
-            says="state 0 is no `False`",
-            code="""
-def posterior(factor, wanted, given):
-    names, table = factor
-    kept = [n for n in names if not given.get(n)]
-    table = table[tuple(given.get(n) or slice(None) for n in names)]
-    weights = table.sum(axis=tuple(k for k, n in enumerate(kept) if n != wanted))
-    if weights.sum() == 0:
-        raise ValueError("impossible")
-    return weights / weights.sum()""",
         ),
         mistake(
             "not normalised",
             task="posterior",
             loses=3,
             says="divide by their sum, 28",
-            code=SLICED + "    return table",
+            code=WEIGHTED + "    return table",
         ),
         mistake(
             "divided by the sum of the whole table",
             task="posterior",
             loses=3,
-            says="divide by that of the slice",
-            code=SLICED + "    return table / factor[1].sum()",
+            says="divide by what is left of it",
+            code=WEIGHTED + "    return table / factor[1].sum()",
         ),
         mistake(
             "the unknown variable at state 0",
             task="posterior",
             loses=2,
             says="you looked at m1 = 0 only",
-            code=SLICED.replace("table.sum(axis=names.index(name))", "np.take(table, 0, axis=names.index(name))")
+            code=WEIGHTED.replace(
+                "table.sum(axis=names.index(name))",
+                "table.sum(axis=names.index(name)) if name in heard else np.take(table, 0, axis=names.index(name))",
+            )
             + """    if not table.any():
         raise ValueError("impossible")
     return table / table.sum()""",
@@ -409,14 +450,14 @@ def posterior(factor, wanted, given):
             task="posterior",
             loses=1,
             says="0 / 0 gives NaN",
-            code=SLICED + "    return table / table.sum()",
+            code=WEIGHTED + "    return table / table.sum()",
         ),
         mistake(
             "uniform for the impossible",
             task="posterior",
             loses=1,
             says="nothing follows from it",
-            code=SLICED
+            code=WEIGHTED
             + """    if not table.any():
         return np.full(len(table), 1 / len(table))
     return table / table.sum()""",
@@ -426,7 +467,7 @@ def posterior(factor, wanted, given):
             task="posterior",
             loses=1,
             says="raise ValueError instead of returning nothing",
-            code=SLICED
+            code=WEIGHTED
             + """    if table.any():
         return table / table.sum()""",
         ),
@@ -435,7 +476,7 @@ def posterior(factor, wanted, given):
             task="posterior",
             loses=1,
             says="a zero in one entry is no reason to raise",
-            code=SLICED
+            code=WEIGHTED
             + """    if not table.all():
         raise ValueError("impossible")
     return table / table.sum()""",
@@ -445,7 +486,7 @@ def posterior(factor, wanted, given):
             task="posterior",
             loses=1,
             says="on inputs you haven't seen: a tiny weight isn't zero",
-            code=SLICED
+            code=WEIGHTED
             + """    if np.isclose(table.sum(), 0):
         raise ValueError("impossible")
     return table / table.sum()""",
@@ -456,13 +497,12 @@ def posterior(factor, wanted, given):
             loses=2,
             says="on inputs you haven't seen",
             code="""
-def posterior(factor, wanted, given):
+def posterior(factor, wanted, heard):
     names, table = factor
     table = table.copy()
-    for name, state in given.items():
-        for other in range(2):
-            if other != state:
-                table[(slice(None),) * names.index(name) + (other,)] = 0
+    for name, likelihood in heard.items():
+        for state in range(2):
+            table[(slice(None),) * names.index(name) + (state,)] *= likelihood[state]
     weights = table.sum(axis=tuple(k for k, n in enumerate(names) if n != wanted))
     if weights.sum() == 0:
         raise ValueError("impossible")
@@ -474,7 +514,10 @@ def posterior(factor, wanted, given):
             "the Bayes ball",
             task="separated",
             code="""
-def separated(parents, a, b, given=()):
+def separated(parents, a, b, given=(), exact=()):
+    given = set(given)
+    for _ in parents:
+        given |= {name for name in exact if set(parents[name]) <= given}
     above, queue = set(), list(given)
     while queue:
         name = queue.pop()
@@ -501,7 +544,10 @@ def separated(parents, a, b, given=()):
 from semgrid_edu.graphical import GraphicalModel, enumerate_marginals
 
 
-def separated(parents, a, b, given=()):
+def separated(parents, a, b, given=(), exact=()):
+    given = set(given)
+    for _ in parents:
+        given |= {name for name in exact if set(parents[name]) <= given}
     rng, factors = np.random.default_rng(0), []
     for child, above in parents.items():
         p = rng.uniform(0.2, 0.8, size=[2] * len(above))
@@ -515,7 +561,10 @@ def separated(parents, a, b, given=()):
             "powers of a matrix of links",
             task="separated",
             code="""
-def separated(parents, a, b, given=()):
+def separated(parents, a, b, given=(), exact=()):
+    given = set(given)
+    for _ in parents:
+        given |= {name for name in exact if set(parents[name]) <= given}
     names = list(parents)
     down = np.eye(len(names), dtype=int)
     for child, family in parents.items():
@@ -531,11 +580,45 @@ def separated(parents, a, b, given=()):
     return reached[names.index(a), names.index(b)] == 0""",
         ),
         mistake(
+            "the package's Bayes ball, wrapped",
+            task="separated",
+            loses=4,
+            says="pixel is exact and its parent known",
+            code="""
+from semgrid_edu.graphical import GraphicalModel, d_separated
+
+
+def separated(parents, a, b, given=(), exact=()):
+    tables = [Factor((name, *above), np.full([2] * (len(above) + 1), 0.5)) for name, above in parents.items()]
+    return d_separated(GraphicalModel(tables, parents), a, b, given)""",
+        ),
+        mistake(
+            "one known parent is enough",
+            task="separated",
+            loses=2,
+            says="*all* its parents must be known",
+            code=RECIPE.replace("set(parents[name]) <= given", "set(parents[name]) & given"),
+        ),
+        mistake(
+            "what is exact looked at once",
+            task="separated",
+            loses=2,
+            says="look again whenever something has become known",
+            code=RECIPE.replace("for _ in parents:", "for _ in range(1):"),
+        ),
+        mistake(
+            "what is exact taken for known",
+            task="separated",
+            loses=4,
+            says="nothing is known: pixel is exact, but its parent isn't known",
+            code=RECIPE.replace("if set(parents[name]) <= given", ""),
+        ),
+        mistake(
             "the argument changed",
             task="separated",
             loses=2,
             says="changed its argument `parents`",
-            code=RECIPE.replace("    kept, queue", "    parents.update(dict.fromkeys(given, ()))\n    kept, queue", 1)
+            code=RECIPE.replace("    given = set", "    parents.update(dict.fromkeys(given, ()))\n    given = set", 1)
             .replace("parents.update", "old = dict(parents)\n    parents.update")
             .replace("parents[name]", "old[name]")
             .replace("parents[child]", "old[child]"),
@@ -606,7 +689,10 @@ def separated(parents, a, b, given=()):
             loses=4,
             says="the chain is open while now isn't known",
             code="""
-def separated(parents, a, b, given=()):
+def separated(parents, a, b, given=(), exact=()):
+    given = set(given)
+    for _ in parents:
+        given |= {name for name in exact if set(parents[name]) <= given}
     return a not in parents[b] and b not in parents[a]""",
         ),
         mistake(
@@ -674,7 +760,10 @@ def separated(parents, a, b, given=()):
             loses=2,
             says="on inputs you haven't seen",
             code="""
-def separated(parents, a, b, given=()):
+def separated(parents, a, b, given=(), exact=()):
+    given = set(given)
+    for _ in parents:
+        given |= {name for name in exact if set(parents[name]) <= given}
     above, queue = set(), list(given)
     while queue:
         name = queue.pop()
@@ -705,25 +794,27 @@ from functools import reduce
 from semgrid_edu.graphical import product
 
 
-def eliminate(factors, order, seen):
+def eliminate(factors, order, seen, best=()):
     factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     sizes = []
     for name in order:
         without = [f for f in factors if name not in f.names]
         together = reduce(lambda f, g: f * g, [f for f in factors if name in f.names])
         sizes.append(int(np.prod(together.table.shape)))
-        factors = [*without, together.sum(name)]
+        factors = [*without, (Factor.max if name in best else Factor.sum)(together, name)]
     return product(factors), max(sizes)""",
         ),
-        right(
-            "the package's elimination, sizes from the names alone",
+        mistake(
+            "the package's elimination, wrapped; sizes from the names alone",
             task="eliminate",
+            loses=2,
+            says="take the largest entry over it, don't sum",
             code="""
 from semgrid_edu.graphical import GraphicalModel
 from semgrid_edu.graphical import eliminate as exact
 
 
-def eliminate(factors, order, seen):
+def eliminate(factors, order, seen, best=()):
     model = GraphicalModel(factors)
     left = [name for name in model.names if name not in order and name not in seen]
     scopes, largest = [set(f.names) - set(seen) for f in factors], 0
@@ -740,20 +831,21 @@ def eliminate(factors, order, seen):
 from functools import reduce
 
 
-def eliminate(factors, order, seen=()):
+def eliminate(factors, order, seen=(), best=()):
     factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     if not order:
         return reduce(Factor.__mul__, factors), 0
     name, *rest = order
     together = reduce(Factor.__mul__, [f for f in factors if name in f.names])
-    result, largest = eliminate([f for f in factors if name not in f.names] + [together.sum(name)], rest)
+    taken = together.max(name) if name in best else together.sum(name)
+    result, largest = eliminate([f for f in factors if name not in f.names] + [taken], rest, best=best)
     return result, max(largest, together.table.size)""",
         ),
         mistake(
             "what is left counted too",
             task="eliminate",
             loses=1,
-            says="from which a variable is summed out, not of what is left",
+            says="from which a variable is taken out, not of what is left",
             code=ELIMINATE.replace("result, largest\n", "result, max(largest, result.table.size)\n"),
         ),
         mistake(
@@ -761,7 +853,7 @@ def eliminate(factors, order, seen=()):
             task="eliminate",
             loses=2,
             says="on inputs you haven't seen: right up to a factor",
-            code=ELIMINATE.replace("+ [together.sum(name)]", "+ [together.sum(name)] * (together.table.ndim > 1)"),
+            code=ELIMINATE.replace("+ [taken]", "+ [taken] * (together.table.ndim > 1)"),
         ),
         mistake(
             "everything multiplied first",
@@ -769,13 +861,15 @@ def eliminate(factors, order, seen=()):
             loses=1,
             says="you multiplied all factors first",
             code="""
-def eliminate(factors, order, seen):
+def eliminate(factors, order, seen, best=()):
     factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     together = factors[0]
     for f in factors[1:]:
         together = together * f
     largest = together.table.size
-    return together.sum(*order), largest""",
+    for name in order:
+        together = together.max(name) if name in best else together.sum(name)
+    return together, largest""",
         ),
         mistake(
             "counted after the sum",
@@ -817,14 +911,14 @@ def eliminate(factors, order, seen):
             task="eliminate",
             loses=3,
             says="take the factors you have used out of the list",
-            code=ELIMINATE.replace("[f for f in factors if name not in f.names] + [together", "factors + [together"),
+            code=ELIMINATE.replace("[f for f in factors if name not in f.names] + [taken", "factors + [taken"),
         ),
         mistake(
             "the sum never put back",
             task="eliminate",
             loses=3,
             says="put each sum back among the factors",
-            code=ELIMINATE.replace(" + [together.sum(name)]", "").replace(
+            code=ELIMINATE.replace(" + [taken]", "").replace(
                 "    result = factors[0]\n",
                 "    if not factors:\n        return Factor((), 1.0), largest\n    result = factors[0]\n",
             ),
@@ -835,7 +929,7 @@ def eliminate(factors, order, seen):
             loses=3,
             says="multiply first, then sum",
             code="""
-def eliminate(factors, order, seen):
+def eliminate(factors, order, seen, best=()):
     factors = [f.given(**{n: seen[n] for n in f.names if n in seen}) for f in factors]
     largest = 0
     for name in order:
@@ -855,7 +949,7 @@ def eliminate(factors, order, seen):
             task="eliminate",
             loses=2,
             says="normalise nowhere",
-            code=ELIMINATE.replace("together.sum(name)", "together.sum(name).normalised()").replace(
+            code=ELIMINATE.replace("+ [taken]", "+ [taken.normalised()]").replace(
                 "return result, largest", "return Factor(result.names, result.table / 4), largest"
             ),
         ),

@@ -196,43 +196,46 @@ _test()
 # %% [markdown]
 # ## Task 4: how fast, and how sure (2 + 1 + 2 points)
 #
-# `joint` (V, H, W) as before; `velocities` (V, 2) names the velocity of each bin, x and y, in metres a second. The first of them is zero: its
-# mass is STATIC, that of all the others is DYNAMIC. **Given that something moves** in a cell, what is its mean velocity, and what
-# is the covariance of its velocity?
+# `joint` (V, H, W) as before; `velocities` (V, 2) names the velocity of each bin, x and y, in metres a second. This lattice isn't the lecture's: its bins
+# stand **in any order**, and a bush that sways in the wind fills some of them as well. So only what is faster than `slow`, in m/s, counts as moving.
+# **Given that something moves** in a cell, what is its mean velocity, and what is the covariance of its velocity?
 #
 # Complete `mean_and_covariance`: it returns the mean, (2, H, W) in m/s, and the covariance, (2, 2, H, W) in m²/s². Where nothing moves there is
 # no velocity: both are NaN there. Leave the arguments as they are.
 
 
 # %% nbgrader={"grade": false, "grade_id": "mean-and-covariance", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def mean_and_covariance(joint, velocities):
-    """Return mean (2, H, W) and covariance (2, 2, H, W) of the velocity of what moves."""
+def mean_and_covariance(joint, velocities, slow):
+    """Return mean (2, H, W) and covariance (2, 2, H, W) of the velocity of what moves, faster than `slow`."""
     ### BEGIN SOLUTION
-    share = joint[1:] / joint[1:].sum(axis=0)  # P(v | DYNAMIC); 0 / 0 is NaN, as it should be
-    mean = np.einsum("vhw,vi->ihw", share, velocities[1:])
-    apart = velocities[1:, :, None, None] - mean
+    fast = np.hypot(*velocities.T) > slow
+    share = joint[fast] / joint[fast].sum(axis=0)  # P(v | it moves); 0 / 0 is NaN, as it should be
+    mean = np.einsum("vhw,vi->ihw", share, velocities[fast])
+    apart = velocities[fast][:, :, None, None] - mean
     return mean, np.einsum("vhw,vihw,vjhw->ijhw", share, apart, apart)
     ### END SOLUTION
 
 
 # %% nbgrader={"grade": true, "grade_id": "mean-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    velocities = np.array([[0.0, 0.0], [4.0, 2.0], [4.0, -6.0], [-4.0, 0.0]])
-    joint = np.zeros((4, 1, 3))
-    joint[:, 0, 0] = [0.3, 0.2, 0.1, 0.1]
-    joint[0, 0, 1] = 0.9  # something stands in cell (0, 1); cell (0, 2) is free
-    got = mean_and_covariance(joint, velocities)
+    velocities = np.array([[4.0, 2.0], [0.0, 0.0], [4.0, -6.0], [-4.0, 0.0], [0.5, -0.5]])
+    joint = np.zeros((5, 1, 3))
+    joint[:, 0, 0] = [0.2, 0.2, 0.1, 0.1, 0.1]
+    joint[1, 0, 1] = 0.9  # something stands in cell (0, 1); cell (0, 2) is free
+    got = mean_and_covariance(joint, velocities, slow=1.0)
     assert got is not None, "mean_and_covariance returned nothing: did you forget `return`?"
     two = isinstance(got, (tuple, list)) and len(got) == 2
     assert two, "return two arrays, the mean and the covariance"
     mean = answer_array(got[0], "the mean")
     assert mean.shape == (2, 1, 3), f"the mean has a plane for x and one for y, shape (2, 1, 3), got {mean.shape}"
     slips = {
-        (0.8, -0.2): "you weigh by P(occupied, v): given that something moves means divided by P(DYNAMIC)",
-        (8 / 7, -2 / 7): "what stands doesn't move: leave the zero velocity, the first bin, out of both sums",
+        (0.8, -0.2): "you weigh by P(occupied, v): given that something moves means divided by P(it moves)",
+        (8.5 / 7, -2.5 / 7): "what stands doesn't move: leave the bins that aren't faster than `slow` out of both sums",
+        (1.7, -0.5): "only the zero velocity is left out: what moves at 0.7 m/s isn't faster than `slow` either",
+        (0.1, -1.3): "you leave the first bin out: here the bins stand in any order, so look at their speeds",
         (-0.5, 2.0): "x and y are swapped: velocities[:, 0] is x, the first plane of the mean",
         (4 / 3, -4 / 3): "every velocity counts the same: weigh each by what the cell believes of it",
-        (1.0, -1.0): "every velocity counts the same: weigh each by what the cell believes of it",
+        (0.9, -0.9): "every velocity counts the same: weigh each by what the cell believes of it",
         (4.0, 2.0): "that is the most probable velocity: the mean weighs all of them",
     }
     for slip, hint in slips.items():
@@ -252,16 +255,19 @@ _test()
 
 # %% nbgrader={"grade": true, "grade_id": "no-mass-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    velocities = np.array([[0.0, 0.0], [4.0, 2.0], [4.0, -6.0], [-4.0, 0.0]])
-    joint = np.zeros((4, 1, 3))
-    joint[:, 0, 0] = [0.3, 0.2, 0.1, 0.1]
-    joint[0, 0, 1] = 0.9
-    mean, covariance = answer_arrays(mean_and_covariance(joint, velocities), 2, "mean_and_covariance")
+    velocities = np.array([[4.0, 2.0], [0.0, 0.0], [4.0, -6.0], [-4.0, 0.0], [0.5, -0.5]])
+    joint = np.zeros((5, 1, 4))
+    joint[:, 0, 0] = [0.2, 0.2, 0.1, 0.1, 0.1]
+    joint[1, 0, 1], joint[4, 0, 3] = 0.9, 0.8
+    got = mean_and_covariance(joint, velocities, slow=1.0)
+    mean, covariance = answer_arrays(got, 2, "mean_and_covariance")
     shapes = mean.shape, covariance.shape
-    assert shapes == ((2, 1, 3), (2, 2, 1, 3)), f"expected shapes (2, 1, 3) and (2, 2, 1, 3), got {shapes}"
-    empty = {1: "what is in cell (0, 1) stands", 2: "cell (0, 2) is free"}
-    if np.allclose(mean[:, 0, 0], [8 / 7, -2 / 7]):  # what stands is counted in: that has cost its points above
-        del empty[1]
+    assert shapes == ((2, 1, 4), (2, 2, 1, 4)), f"expected shapes (2, 1, 4) and (2, 2, 1, 4), got {shapes}"
+    empty = {1: "what is in cell (0, 1) stands", 2: "cell (0, 2) is free", 3: "a bush sways in cell (0, 3)"}
+    if np.allclose(mean[:, 0, 0], [8.5 / 7, -2.5 / 7]):  # what stands is counted in: that has cost its points above
+        del empty[1], empty[3]
+    if np.allclose(mean[:, 0, 0], [1.7, -0.5]):  # and so has what sways
+        del empty[3]
     for col, why in empty.items():
         none = f"{why}, so nothing moves at 0 m/s there: no velocity isn't zero velocity"
         assert not np.allclose(mean[:, 0, col], 0), none
@@ -282,23 +288,27 @@ _test()
 
 # %% nbgrader={"grade": true, "grade_id": "covariance-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    velocities = np.array([[0.0, 0.0], [4.0, 2.0], [4.0, -6.0], [-4.0, 0.0]])
-    joint = np.array([0.3, 0.2, 0.1, 0.1]).reshape(4, 1, 1)
-    mean, covariance = answer_arrays(mean_and_covariance(joint, velocities.copy()), 2, "mean_and_covariance")
+    velocities = np.array([[4.0, 2.0], [0.0, 0.0], [4.0, -6.0], [-4.0, 0.0], [0.5, -0.5]])
+    joint = np.array([0.2, 0.2, 0.1, 0.1, 0.1]).reshape(5, 1, 1)
+    mean, covariance = answer_arrays(mean_and_covariance(joint, velocities.copy(), 1.0), 2, "mean_and_covariance")
     right_mean = np.round(mean.ravel(), 6).tolist() == [2.0, -0.5]
     if not right_mean:  # wrong weights have cost their points above; here they sum to 1
-        joint = np.array([0, 0.5, 0.25, 0.25]).reshape(4, 1, 1)
-        _, covariance = answer_arrays(mean_and_covariance(joint, velocities.copy()), 2, "mean_and_covariance")
+        joint = np.array([0.5, 0, 0.25, 0.25, 0]).reshape(5, 1, 1)
+        _, covariance = answer_arrays(mean_and_covariance(joint, velocities.copy(), 1.0), 2, "mean_and_covariance")
     assert covariance.shape == (2, 2, 1, 1), f"one 2 x 2 matrix a cell, shape (2, 2, 1, 1), got {covariance.shape}"
     got = covariance[:, :, 0, 0]
     slips = {
         "that is the mean of v v^T: take the mean velocity off first": [[16, -2], [-2, 11]],
         "the two components vary together: the off-diagonal isn't zero": [[12, 0], [0, 10.75]],
         "x and y are swapped": [[10.75, -1], [-1, 12]],
-        "you weigh by P(occupied, v): divide by P(DYNAMIC)": [[4.8, -0.4], [-0.4, 4.3]],
-        "what stands doesn't move: leave the zero velocity out": [[384 / 49, -40 / 49], [-40 / 49, 304 / 49]],
-        "every velocity counts the same: weigh each by what the cell believes of it": np.cov(velocities[1:].T, ddof=0),
-        "every velocity counts the same: weigh each by what the cell believes": np.cov(velocities[1:].T),
+        "you weigh by P(occupied, v): divide by P(it moves)": [[4.8, -0.4], [-0.4, 4.3]],
+        "what stands doesn't move: leave what isn't faster than `slow` out": np.cov(
+            velocities.T, aweights=[2, 2, 1, 1, 1], ddof=0
+        ),
+        "every velocity counts the same: weigh each by what the cell believes of it": np.cov(
+            velocities[[0, 2, 3]].T, ddof=0
+        ),
+        "every velocity counts the same: weigh each by what the cell believes": np.cov(velocities[[0, 2, 3]].T),
         "these are standard deviations, m/s: a covariance is in m^2/s^2": np.diag(np.sqrt([12, 10.75])),
     }
     for hint, slip in slips.items():
@@ -321,8 +331,8 @@ _test()
 #
 # Two opinions meet in a cell. Its own is `own` (4, H, W): FREE, STATIC, DYNAMIC, UNKNOWN, which sum to 1. Its neighbours say: with the probability
 # `arrives` (H, W) something moving arrives here. Take the two as independent, and write down the probability of each pair (own state; arrives or not).
-# One pair is impossible: nothing arrives where something STATIC stands. Strike it out. In the pairs that are left, what arrives makes the cell
-# DYNAMIC, whatever it was, and where nothing arrives the cell keeps its state.
+# Here DYNAMIC is what moves so slowly that it is still in the cell, and two solid things can't share a cell. So **two** pairs are impossible: nothing arrives where
+# something STATIC stands, nor where something DYNAMIC still is. Strike both out. In the pairs that are left, what arrives makes the cell DYNAMIC, and where nothing arrives the cell keeps its state.
 #
 # Complete `arrive`: it returns the belief (4, H, W) that is left, and leaves its arguments as they are.
 
@@ -333,8 +343,8 @@ def arrive(own, arrives):
     ### BEGIN SOLUTION
     free, static, dynamic, unknown = own
     nothing = 1 - arrives
-    possible = 1 - arrives * static
-    comes = arrives * (1 - static)
+    possible = 1 - arrives * (static + dynamic)
+    comes = arrives * (free + unknown)
     return np.stack([nothing * free, nothing * static, comes + nothing * dynamic, nothing * unknown]) / possible
     ### END SOLUTION
 
@@ -348,11 +358,13 @@ def _test():
     slips = {
         "you strike nothing out: that something arrives where something stands is impossible": [21, 12, 58, 9],
         "neither of the two wins: strike their pair out, and let what is left sum to 1": [21, 20, 50, 9],
-        "the pair that you strike out isn't UNKNOWN, it is impossible: let what is left sum to 1": [21, 12, 50, 17],
+        "the pairs that you strike out aren't UNKNOWN, they are impossible: let what is left sum to 1": [21, 12, 38, 29],
         "you add what arrives and scale: write down the pairs (own state; arrives or not) first": [25, 100 / 7, 50, 75 / 7],
-        "only STATIC and arriving exclude each other: where something moves, more may arrive": [26.25, 15, 47.5, 11.25],
+        "you strike out one pair, as the lecture does: here what is still moving in the cell excludes an arrival as well": [
+            2100 / 92, 1200 / 92, 5000 / 92, 900 / 92
+        ],
         "what moved in the cell already got lost: where nothing arrives, DYNAMIC stays DYNAMIC": [
-            2100 / 74, 1200 / 74, 3200 / 74, 900 / 74
+            2100 / 62, 1200 / 62, 2000 / 62, 900 / 62
         ],
     }  # fmt: skip
     for hint, slip in slips.items():
@@ -362,7 +374,7 @@ def _test():
     assert np.isclose(total, 1), struck_out
     assert np.allclose(got[:, 0, 2], own[:, 0, 2]), "in cell (0, 2) nothing arrives, so it must keep its belief"
     np.testing.assert_allclose(got[:, 0, 0], [2 / 7, 2 / 7, 3 / 7, 0], err_msg="by hand: 0.2, 0.2, 0.3, divided by 0.7")
-    np.testing.assert_allclose(got[:, 0, 1], np.array([21, 12, 50, 9]) / 92, err_msg="by hand: 0.21, 0.12, 0.50, 0.09")
+    np.testing.assert_allclose(got[:, 0, 1], np.array([21, 12, 38, 9]) / 80, err_msg="by hand: 0.21, 0.12, 0.38, 0.09")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import bof
 
@@ -523,7 +535,7 @@ def updated(joint, scan):
 
 def planes_of(joint, unknown, velocities):
     """Return the four states, the mean velocity and its covariance, (10, H, W)."""
-    mean, covariance = map(np.asarray, mean_and_covariance(joint, velocities))
+    mean, covariance = map(np.asarray, mean_and_covariance(joint, velocities, 0.0))
     states = [1 - joint.sum(axis=0) - unknown, joint[0], joint[1:].sum(axis=0), unknown]
     return np.concatenate([states, mean, covariance.reshape(4, *unknown.shape)]).astype(np.float32)
 

@@ -8,7 +8,7 @@
 # | task | about | points |
 # |---|---|---|
 # | 1 | divide two tables with named axes | 1 + 1 |
-# | 2 | what is seen: slice, sum out, normalise | 2 + 1 |
+# | 2 | what is heard: multiply, sum out, normalise | 2 + 1 |
 # | 3 | independence read off a graph | 2 + 2 |
 # | 4 | eliminate what isn't seen, in a given order, and say what it costs | 2 + 1 |
 # | 5 | messages forward and backward: filtering and smoothing | 2 + 2 |
@@ -121,42 +121,47 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 2: what is seen (2 + 1 points)
+# ## Task 2: what is heard (2 + 1 points)
 #
-# `factor` is again a pair `(names, table)`, a joint table of several variables. It need not sum to 1. `given` is a dictionary of what is known, such as `{"z": 1}`;
-# it may be empty.
+# The companion slices a table at what is known for certain. A report is seldom certain. `factor` is again a pair `(names, table)`, a joint table of several variables. It need
+# not sum to 1. `heard` is a dictionary, and may be empty. For each variable of which a report has come it holds the report's likelihood: `{"z": [0.3, 0.9]}` says that the
+# report is three times as probable if z is 1 as if z is 0. So a likelihood needn't sum to 1, and `[0, 1]` is the report of a witness who is never wrong.
+# Reports are independent of each other once all variables are known. There may be one about `wanted` itself.
 #
-# Complete `posterior`: it returns P(wanted | given), an array with one probability for each state of the variable `wanted`. For one more point: what is given may be
+# Complete `posterior`: it returns P(wanted | all reports), an array with one probability for each state of the variable `wanted`. For one more point: what is heard may be
 # impossible, because every entry that agrees with it is 0. Then there is no answer, so raise a `ValueError`.
 
 
 # %% nbgrader={"grade": false, "grade_id": "posterior", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def posterior(factor, wanted, given):
-    """Return P(wanted | given) as an array (K,)."""
+def posterior(factor, wanted, heard):
+    """Return P(wanted | all reports) as an array (K,)."""
     ### BEGIN SOLUTION
-    names, table = factor
-    kept = [name for name in names if name not in given]
-    table = table[tuple(given.get(name, slice(None)) for name in names)]
-    weights = table.sum(axis=tuple(axis for axis, name in enumerate(kept) if name != wanted))
+    names, weights = list(factor[0]), np.array(factor[1], float)
+    for name, likelihood in heard.items():
+        weights = np.moveaxis(np.moveaxis(weights, names.index(name), -1) * likelihood, -1, names.index(name))
+    weights = weights.sum(axis=tuple(axis for axis, name in enumerate(names) if name != wanted))
     if weights.sum() == 0:
-        raise ValueError(f"{given} can't happen")
+        raise ValueError("these reports exclude each other")
     return weights / weights.sum()
     ### END SOLUTION
 
 
 # %% nbgrader={"grade": false, "grade_id": "posterior-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_POSTERIOR_SLIPS = {  # P(m2 | z = 1) by a common slip
-    (19 / 41, 22 / 41): "you summed z out: z is known, so keep only the slice at z = 1",
-    (11 / 13, 2 / 13): "that is the slice at z = 0: a known state is an index, use its value",
-    (6 / 28, 22 / 28): "that is P(m1 | z = 1): the axes have moved up after the slice, or `wanted` is ignored",
+_POSTERIOR_SLIPS = {  # P(m2 | z is surely 1) by a common slip
+    (19 / 41, 22 / 41): "you summed z out: something is heard of z, so its states don't count alike",
+    (11 / 13, 2 / 13): "that is for z = 0: the first number of a likelihood is that of state 0",
+    (6 / 28, 22 / 28): "that is the answer for m1: look where the axis of `wanted` is",
     (6 / 22, 16 / 22): "you took the largest entry over m1: an unknown variable is summed out",
     (8, 20): "these are weights: divide by their sum, 28",
-    (
-        8 / 41,
-        20 / 41,
-    ): "these are P(m2, z = 1), the weights divided by the sum of the whole table: divide by that of the slice",
+    (8 / 41, 20 / 41): "these are the weights divided by the sum of the table as it was: divide by what is left of it",
     (2 / 6, 4 / 6): "you looked at m1 = 0 only: m1 isn't known, sum over its states",
-    (4, 10): "you took the mean over m1: sum, then divide by the sum",
+    (2, 5): "you took the mean over the others: sum, then divide by the sum",
+}
+_UNSURE_SLIPS = {  # P(m2 | a report of z that is three times as probable if z is 1)
+    (8 / 28, 20 / 28): "you take the report for certain: z may still be 0, with a smaller weight",
+    (0.4258, 0.5742): "you mix the answers for z = 0 and z = 1: a likelihood multiplies the joint table",
+    (8.75 / 41, 15.5 / 41): "divide by the sum of the weights, after the report has multiplied them",
+    (10.5, 18.6): "these are weights: divide by their sum",
 }
 
 
@@ -164,16 +169,20 @@ _POSTERIOR_SLIPS = {  # P(m2 | z = 1) by a common slip
 def _test():
     table = np.array([[[8.0, 2.0], [1.0, 4.0]], [[3.0, 6.0], [1.0, 16.0]]])  # axes m1, m2, z
     joint = (("m1", "m2", "z"), table.copy())
-    got = answer_array(posterior(joint, "m2", {"z": 1}), "posterior")
+    got = answer_array(posterior(joint, "m2", {"z": [0, 1]}), "posterior")
     assert np.array_equal(joint[1], table), "posterior changed the table it was given: make a new one"
     assert got.shape == (2,), f"one probability for each of the 2 states of m2, shape (2,), got {got.shape}"
     _explain(got, _POSTERIOR_SLIPS)
     np.testing.assert_allclose(got, [8 / 28, 20 / 28], err_msg="m2 = 0: 2 + 6 = 8; m2 = 1: 4 + 16 = 20")
-    got = answer_array(posterior(joint, "m2", {"m1": 1, "z": 0}), "posterior")
-    _explain(got, {(9 / 26, 17 / 26): "z = 0 is known too: state 0 is no `False`", (6 / 22, 16 / 22): "that is z = 1"})
-    np.testing.assert_allclose(got, [3 / 4, 1 / 4], err_msg="with both known one row is left: 3 and 1")
+    got = answer_array(posterior(joint, "m2", {"z": [0.3, 0.9]}), "posterior")
+    _explain(got, _UNSURE_SLIPS)
+    by_hand = "m2 = 0: 0.3 * (8 + 3) + 0.9 * (2 + 6) = 10.5; m2 = 1: 0.3 * (1 + 1) + 0.9 * (4 + 16) = 18.6"
+    np.testing.assert_allclose(got, [10.5 / 29.1, 18.6 / 29.1], err_msg=by_hand)
+    got = answer_array(posterior(joint, "z", {"m1": [1, 0], "z": [1, 0.5]}), "posterior")
+    _explain(got, {(9 / 15, 6 / 15): "there is a report of z itself: it counts like any other"})
+    np.testing.assert_allclose(got, [3 / 4, 1 / 4], err_msg="m1 is 0: 8 + 1 = 9 for z = 0, half of 2 + 4 for z = 1")
     got = answer_array(posterior(joint, "z", {}), "posterior")
-    np.testing.assert_allclose(got, [13 / 41, 28 / 41], err_msg="nothing given: sum the others out")
+    np.testing.assert_allclose(got, [13 / 41, 28 / 41], err_msg="nothing heard: sum the others out")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
@@ -189,7 +198,7 @@ _test()
 def _test():
     silent = (("m", "z"), np.array([[0.5, 0.0], [0.5, 0.0]]))  # a sensor that never says 1
     try:
-        got, raised = posterior(silent, "m", {"z": 1}), False
+        got, raised = posterior(silent, "m", {"z": [0, 1]}), False
     except ValueError:
         got, raised = None, True
     assert raised or got is not None, "z = 1 can't happen: raise ValueError instead of returning nothing"
@@ -197,7 +206,7 @@ def _test():
     assert not spread, "0 / 0 gives NaN, which spreads silently: raise ValueError instead"
     assert raised, f"z = 1 can't happen, so nothing follows from it, not even {got}: raise ValueError"
     try:
-        posterior((("m", "z"), np.array([[0.5, 0.0], [0.5, 0.2]])), "m", {"z": 1})
+        posterior((("m", "z"), np.array([[0.5, 0.0], [0.5, 0.2]])), "m", {"z": [0, 1]})
         can_happen = True
     except ValueError:
         can_happen = False
@@ -216,19 +225,23 @@ _test()
 # ## Task 3: independence read off a graph (2 + 2 points)
 #
 # `parents` describes a directed graph: for each variable the tuple of its parents, `()` for one without. Complete `separated`: it returns `True` when every path between
-# `a` and `b` is blocked once the variables in `given` are known, and `False` otherwise. `a` and `b` are two different variables that aren't in `given`.
+# `a` and `b` is blocked once the variables in `given` are known, and `False` otherwise. Some variables may be **exact**: each of those in `exact` is a function of its parents, without noise,
+# as the pixel of a point is a function of the camera's pose. So as soon as all its parents are known, it is known as well. `a` and `b` are two different variables that aren't known.
 #
-# You may follow paths. But there is a shorter recipe with the same result:
+# You may follow paths. But there is a shorter recipe with the same result: (0) add to `given` what is exact and has no unknown parent, again and again;
 # (1) keep only `a`, `b`, `given` and all their ancestors (parents, parents of parents, and so on); (2) link each variable with its parents, and the parents of each variable with each other (moralise); (3) take `given` out;
 # (4) is there still a way from `a` to `b`?
 #
-# Two points are for graphs of three variables, two for larger ones.
+# Two points are for graphs of three or four variables, two for larger ones.
 
 
 # %% nbgrader={"grade": false, "grade_id": "separated", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def separated(parents, a, b, given=()):
+def separated(parents, a, b, given=(), exact=()):
     """Return whether the graph alone makes a and b independent once `given` is known."""
     ### BEGIN SOLUTION
+    given = set(given)
+    for _ in exact:
+        given |= {name for name in exact if given.issuperset(parents[name])}
     kept, queue = set(), [a, b, *given]
     while queue:
         name = queue.pop()
@@ -262,6 +275,12 @@ _THREE = (
     (_MEET, "m1", "m2", ("z",), False, "explaining away: a known z opens the way. Link its parents, in step (2)"),
     (_MEET, "m1", "z", ("m2",), False, "an arrow links them: neighbours are never separated"),
 )
+_PIXEL = {"pose": (), "pixel": ("pose",), "z1": ("pixel",), "z2": ("pixel",)}
+_EXACT_FOUR = (
+    (_PIXEL, "z1", "z2", ("pose",), ("pixel",), True, "pixel is exact and its parent known, so pixel is known too, and blocks"),
+    (_PIXEL, "z1", "z2", ("pose",), (), False, "pixel isn't exact here: pose alone doesn't say what it is"),
+    (_PIXEL, "z1", "z2", (), ("pixel",), False, "nothing is known: pixel is exact, but its parent isn't known"),
+)  # fmt: skip
 
 
 # %% nbgrader={"grade": true, "grade_id": "separated-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
@@ -275,6 +294,9 @@ def _test():
     assert not opposite, "all answers are the opposite: True means separated, no open path"
     for answer, (_, a, b, given, right, hint) in zip(got, _THREE, strict=True):
         assert answer == right, f"{a} and {b} given {given}: you say {bool(answer)}, but {hint}"
+    for parents, a, b, given, exact, right, hint in _EXACT_FOUR:
+        answer = separated(dict(parents), a, b, given, exact)
+        assert answer == right, f"{a} and {b} given {given}, exact {exact}: you say {bool(answer)}, but {hint}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
@@ -301,6 +323,11 @@ _LARGE = (
     (_PITCH, "m1", "m2", ("z1", "z2"), False, "both colliders are known: the path through the pitch is open"),
     (_PITCH, "m1", "m2", ("z1", "z2", "pitch"), True, "pitch is the middle of a fork, and known: it blocks"),
 )
+_LOOKUP = {"pose": (), "K": (), "ray": ("pose",), "pixel": ("ray", "K"), "z1": ("pixel",), "z2": ("pixel",)}
+_EXACT_LARGE = (
+    (("K", "pose"), True, "pose gives ray, and ray and K give pixel: look again whenever something has become known"),
+    (("pose",), False, "K isn't known, so pixel isn't either: *all* its parents must be known"),
+)
 
 
 # %% nbgrader={"grade": true, "grade_id": "separated-large-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
@@ -309,6 +336,9 @@ def _test():
         answer = separated(dict(parents), a, b, given)
         assert np.shape(answer) == (), f"return True or False, got {answer}"
         assert answer == right, f"{a} and {b} given {given}: you say {answer}, but {hint}"
+    for given, right, hint in _EXACT_LARGE:
+        answer = separated(dict(_LOOKUP), "z1", "z2", given, ("pixel", "ray"))
+        assert answer == right, f"z1 and z2 given {given}, ray and pixel exact: you say {answer}, but {hint}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
@@ -326,12 +356,13 @@ _test()
 #
 # Complete `eliminate`. `factors` is a list of `Factor`s; `seen` says what is known, such as `{"z": 1}`, or nothing, `{}`; `order` holds the names of variables to sum out,
 # one after the other in this order. First slice each factor at what is known (`f.given(z=1)` does it; it refuses a variable that `f` doesn't have). Then, for each name in `order`,
-# multiply only those factors that contain it, and sum it out. Return two things: the product of all that is left in the end, as a `Factor`, not normalised; and the number of
-# entries of the largest table from which a variable was summed out. At least one variable is left in the end. Two points are for the factor, one for the size.
+# multiply only those factors that contain it, and sum it out; but a name that is in `best` as well is asked for its best state, so take the largest entry over it in place of the sum (`f.max("x")`
+# is the package's). Return two things: the product of all that is left in the end, as a `Factor`, not normalised; and the number of
+# entries of the largest table from which a variable was taken out. At least one variable is left in the end. Two points are for the factor, one for the size.
 
 
 # %% nbgrader={"grade": false, "grade_id": "eliminate", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def eliminate(factors, order, seen):
+def eliminate(factors, order, seen, best=()):
     """Return the Factor over the variables that are neither seen nor in `order`, and the entries of the largest table."""
     ### BEGIN SOLUTION
     factors = [factor.given(**{name: seen[name] for name in factor.names if name in seen}) for factor in factors]
@@ -342,7 +373,9 @@ def eliminate(factors, order, seen):
             if name in factor.names:
                 together = together * factor
         largest = max(largest, together.table.size)
-        factors = [factor for factor in factors if name not in factor.names] + [together.sum(name)]
+        factors = [factor for factor in factors if name not in factor.names] + [
+            together.max(name) if name in best else together.sum(name)
+        ]
     result = Factor((), 1.0)
     for factor in factors:
         result = result * factor
@@ -392,6 +425,11 @@ def _test():
     total = result.table.sum()
     assert np.isclose(total, 32), f"the weights must sum to Z = 32, not {total:.3g}: don't normalise"
     np.testing.assert_allclose(np.diag(result.table), [10, 10], err_msg="m1 = m3: 3 * 3 + 1 * 1")
+
+    got = eliminate(list(_ROW), ["m2"], {}, best=["m2"])
+    result = got[0] if isinstance(got, tuple | list) else got
+    assert not np.allclose(np.diag(result.table), 10), "m2 is in `best`: take the largest entry over it, don't sum"
+    np.testing.assert_allclose(result.table, [[9, 3], [3, 9]], err_msg="the best m2: 3 * 3 where m1 = m3, else 3 * 1")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
