@@ -7,13 +7,13 @@ def pooled(
     total="total + matrix",
     start="np.zeros_like(counts[0])",
     cells="total.sum(axis=1)",
-    score="np.mean([total[c, c] / cells[c] for c in range(len(cells)) if cells[c]])",
+    score="np.mean([total[c, c] / cells[c] for c in range(len(cells)) if cells[c] >= least])",
     chosen="name == drive",
     result="{drive: of(drive) for drive in drives}",
 ):
     """Return an answer to task 1 with these parts."""
     return f"""
-def drive_scores(counts, drives):
+def drive_scores(counts, drives, least=1):
     def of(drive):
         total = {start}
         for matrix, name in zip(counts, drives):
@@ -58,38 +58,46 @@ def town_interval(matrices, towns, metric, level=0.95):
 
 
 def paired(
-    without="metric(A - x) - metric(B - y)",
-    middle="metric(A) - metric(B)",
+    without="share(A - x, B - y)",
+    middle="share(A, B)",
     pairs="zip(a, b)",
     half="stats.t.ppf((1 + level) / 2, V - 1) * np.sqrt((V - 1) / V * ((w - w.mean()) ** 2).sum())",
+    share="(metric(x) - metric(y)) / (1 - metric(y))",
 ):
     """Return an answer to task 4 with these parts."""
     return f"""
 def paired_interval(a, b, metric, level=0.95):
+    def share(x, y):
+        return {share}
     V, A, B = len(a), a.sum(axis=0), b.sum(axis=0)
     w = np.array([{without} for x, y in {pairs}])
     half, middle = {half}, {middle}
     return middle - half, middle, middle + half"""
 
 
-def separate(half, middle="metric(a.sum(0)) - metric(b.sum(0))"):
-    """Return an answer to task 4 that makes two intervals, of half-widths ha and hb, and joins them so."""
+def separate(half):
+    """Return an answer to task 4 that leaves drives out of one method alone, and joins half-widths ha and hb so."""
     return f"""
 def paired_interval(a, b, metric, level=0.95):
-    def width(matrices):
-        V, total = len(matrices), matrices.sum(axis=0)
-        w = np.array([metric(total - m) for m in matrices])
-        return stats.t.ppf((1 + level) / 2, V - 1) * np.sqrt((V - 1) / V * ((w - w.mean()) ** 2).sum())
-    ha, hb = width(a), width(b)
-    half, middle = {half}, {middle}
+    def share(x, y):
+        return (metric(x) - metric(y)) / (1 - metric(y))
+    V, A, B = len(a), a.sum(axis=0), b.sum(axis=0)
+    def width(w):
+        return stats.t.ppf((1 + level) / 2, V - 1) * np.sqrt((V - 1) / V * ((np.array(w) - np.mean(w)) ** 2).sum())
+    ha, hb = width([share(A - x, B) for x in a]), width([share(A, B - y) for y in b])
+    half, middle = {half}, share(A, B)
     return middle - half, middle, middle + half"""
+
+
+IN_TURN = "np.repeat(np.arange(bins), list(map(len, np.array_split(sure, bins))))"
+"""The group of each cell, when they are cut as they stand."""
 
 
 def ece(
     labelled="truth != 255",
     sure="p.max(axis=1)",
     right="p.argmax(axis=1) == t",
-    group="np.minimum((sure * bins).astype(int), bins - 1)",
+    group=f"{IN_TURN}[sure.argsort().argsort()]",
     gap="abs(right[here].mean() - sure[here].mean())",
     weight="here.mean()",
     total="sum(gaps)",
@@ -119,8 +127,8 @@ def on_own_jackknife(number):
         task="paired",
         code="""
 def paired_interval(a, b, metric, level=0.95):
-    names = [str(v) for v in range(len(a))]
-    return town_interval(np.stack([a, b], axis=1), names, lambda two: metric(two[0]) - metric(two[1]), level)""",
+    names, pairs = [str(v) for v in range(len(a))], np.stack([a, b], axis=1)
+    return town_interval(pairs, names, lambda two: 1 - (1 - metric(two[0])) / (1 - metric(two[1])), level)""",
     )
 
 
@@ -133,10 +141,11 @@ class TestExperiments(GraderChecks):
             "np.unique and np.add.at",
             task="drive-scores",
             code="""
-def drive_scores(counts, drives):
+def drive_scores(counts, drives, least=1):
     names, number = np.unique(drives, return_inverse=True)
     totals = np.zeros((len(names), *counts.shape[1:]))
     np.add.at(totals, number, counts)
+    totals[totals.sum(axis=2) < least] = 0
     recalls = np.einsum("vcc->vc", totals) / totals.sum(axis=2)
     return dict(zip(names.tolist(), np.nanmean(recalls, axis=1).tolist()))""",
         ),
@@ -146,7 +155,7 @@ def drive_scores(counts, drives):
             loses=2,
             says="sum the matrices first",
             code="""
-def drive_scores(counts, drives):
+def drive_scores(counts, drives, least=1):
     def one(m):
         return np.mean([m[c, c] / m[c].sum() for c in range(len(m)) if m[c].sum()])
     return {d: np.mean([one(m) for m, name in zip(counts, drives) if name == d]) for d in drives}""",
@@ -206,7 +215,7 @@ def drive_scores(counts, drives):
             task="drive-scores",
             loses=2,
             says="on inputs you haven't seen: a wrong score",
-            code=pooled(score="np.mean([total[c, c] / cells[c] for c in range(2) if cells[c]])"),
+            code=pooled(score="np.mean([total[c, c] / cells[c] for c in range(2) if cells[c] >= least])"),
         ),
         right(
             "scores in arrays, and helpers with everyday names",
@@ -449,61 +458,87 @@ def town_interval(matrices, towns, metric, level=0.95):
             task="paired",
             code="""
 def paired_interval(a, b, metric, level=0.95):
-    names = [str(v) for v in range(len(a))]
-    return town_interval(np.stack([a, b], axis=1), names, lambda two: metric(two[0]) - metric(two[1]), level)""",
+    names, pairs = [str(v) for v in range(len(a))], np.stack([a, b], axis=1)
+    return town_interval(pairs, names, lambda two: 1 - (1 - metric(two[0])) / (1 - metric(two[1])), level)""",
         ),
         right(
             "pseudo-values",
             task="paired",
             code="""
 def paired_interval(a, b, metric, level=0.95):
-    V, d = len(a), metric(a.sum(0)) - metric(b.sum(0))
-    pseudo = [V * d - (V - 1) * (metric(a.sum(0) - a[v]) - metric(b.sum(0) - b[v])) for v in range(V)]
+    def share(x, y):
+        return 1 - (1 - metric(x)) / (1 - metric(y))
+    V, d = len(a), share(a.sum(0), b.sum(0))
+    pseudo = [V * d - (V - 1) * share(a.sum(0) - a[v], b.sum(0) - b[v]) for v in range(V)]
     half = stats.t.ppf((1 + level) / 2, V - 1) * np.std(pseudo, ddof=1) / V**0.5
     return d - half, d, d + half""",
         ),
+        mistake("b - a", task="paired", loses=2, says="a is better", code=paired(middle="share(B, A)")),
         mistake(
-            "b - a", task="paired", loses=2, says="a - b is asked for", code=paired(middle="metric(B) - metric(A)")
+            "divided by the errors of a",
+            task="paired",
+            loses=2,
+            says="divide by the errors of b, not by those of a",
+            code=paired(share="(metric(x) - metric(y)) / (1 - metric(x))"),
         ),
+        mistake(
+            "divided by what b calls right",
+            task="paired",
+            loses=2,
+            says="divide by what b calls wrong",
+            code=paired(share="metric(x) / metric(y) - 1"),
+        ),
+        mistake(
+            "the errors that remain",
+            task="paired",
+            loses=2,
+            says="that is the share of b's errors that a makes as well",
+            code=paired(share="(1 - metric(x)) / (1 - metric(y))"),
+        ),
+        mistake(
+            "the interval of the difference",
+            task="paired",
+            loses=2,
+            says="that is the interval of the difference",
+            code=paired(without="metric(A - x) - metric(B - y)"),
+        ),
+        mistake(
+            "divided by the errors in all drives",
+            task="paired",
+            loses=2,
+            says="by the errors in all drives",
+            code=paired(without="(metric(A - x) - metric(B - y)) / (1 - metric(B))"),
+        ),
+        *(on_own_jackknife(number) for number in range(5)),
         mistake(
             "variances added",
             task="paired",
             loses=2,
-            says="their variances are added",
+            says="two methods on *different* drives",
             code=separate("np.hypot(ha, hb)"),
         ),
+        mistake("drives left out of a alone", task="paired", loses=2, says="out of a alone", code=separate("ha")),
+        mistake("drives left out of b alone", task="paired", loses=2, says="out of b alone", code=separate("hb")),
+        mistake("ends swapped", task="paired", loses=2, says="can't simply be subtracted", code=separate("hb - ha")),
         mistake(
-            "half-widths added", task="paired", loses=2, says="you add the two half-widths", code=separate("ha + hb")
-        ),
-        mistake(
-            "half-widths subtracted",
-            task="paired",
-            loses=2,
-            says="you subtract the two half-widths",
-            code=separate("abs(ha - hb)"),
-        ),
-        mistake("ends subtracted", task="paired", loses=2, says="can't simply be subtracted", code=separate("ha - hb")),
-        mistake(
-            "mean of the drives' differences",
+            "mean of the drives' shares",
             task="paired",
             loses=2,
             says="Sum the matrices first",
-            code=paired(middle="np.mean([metric(x) - metric(y) for x, y in zip(a, b)])"),
+            code=paired(middle="np.mean([share(x, y) for x, y in zip(a, b)])"),
         ),
         mistake(
-            "each drive's own difference",
+            "each drive's own share",
             task="paired",
             loses=2,
-            says="you use each drive's own difference",
-            code=paired(
-                without="metric(x) - metric(y)", half="stats.t.ppf((1 + level) / 2, V - 1) * w.std(ddof=1) / np.sqrt(V)"
-            ),
+            says="you use each drive's own share",
+            code=paired(without="share(x, y)", half="stats.t.ppf((1 + level) / 2, V - 1) * w.std(ddof=1) / np.sqrt(V)"),
         ),
         mistake(
             "1.96",
             task="paired",
             loses=2,
-            says="expected 0.01317",
+            says="expected 0.2428",
             code=paired(half="1.96 * np.sqrt((V - 1) / V * ((w - w.mean()) ** 2).sum())"),
         ),
         mistake(
@@ -511,27 +546,22 @@ def paired_interval(a, b, metric, level=0.95):
             task="paired",
             loses=2,
             says="on inputs you haven't seen",
-            code=paired(
-                without="pixel_accuracy(A - x) - pixel_accuracy(B - y)", middle="pixel_accuracy(A) - pixel_accuracy(B)"
-            ),
+            code=paired(share="1 - (1 - pixel_accuracy(x)) / (1 - pixel_accuracy(y))"),
         ),
-        *(on_own_jackknife(number) for number in range(5)),
         # ---- task 5
         right("a loop over groups", task="calibration", code=ece()),
         right(
-            "np.digitize and sums",
+            "a table sorted by rows",
             task="calibration",
             code="""
 def calibration_error(probability, truth, bins=10):
-    sure, right = probability.max(axis=1), probability.argmax(axis=1) == truth
-    sure, right = sure[truth != 255], right[truth != 255]
-    group = np.digitize(sure, np.linspace(0, 1, bins + 1)[1:-1])
-    return np.abs(np.bincount(group, right - sure)).sum() / len(sure)""",
-        ),
-        right(
-            "edges included above",
-            task="calibration",
-            code=ece(group="np.maximum(np.ceil(sure * bins).astype(int) - 1, 0)"),
+    rows = sorted((p.max(), p.argmax() == t) for p, t in zip(probability, truth) if t != 255)
+    each, more, start, error = *divmod(len(rows), bins), 0, 0
+    for b in range(bins):
+        group = rows[start : start + each + (b < more)]
+        start += len(group)
+        error += abs(sum(right for _, right in group) - sum(sure for sure, _ in group))
+    return error / len(rows)""",
         ),
         right(
             "a number in a list, and helpers with everyday names",
@@ -551,13 +581,6 @@ def calibration_error(probability, truth, bins=10):
             loses=3,
             says="you take the plain mean of the groups",
             code=ece(weight="1", total="np.mean(gaps)"),
-        ),
-        mistake(
-            "plain mean of ten groups",
-            task="calibration",
-            loses=3,
-            says="you take the plain mean of ten groups",
-            code=ece(weight="1 / bins"),
         ),
         mistake(
             "no weights", task="calibration", loses=3, says="the gaps are added without weights", code=ece(weight="1")
@@ -584,13 +607,6 @@ def calibration_error(probability, truth, bins=10):
             code=ece(gap="(right[here].mean() - sure[here].mean()) ** 2"),
         ),
         mistake(
-            "the middle of the group",
-            task="calibration",
-            loses=3,
-            says="not the middle of the group",
-            code=ece(gap="abs(right[here].mean() - (b + 0.5) / bins)"),
-        ),
-        mistake(
             "largest gap",
             task="calibration",
             loses=3,
@@ -605,18 +621,39 @@ def calibration_error(probability, truth, bins=10):
             code=ece(gap="np.abs(right[here] - sure[here]).mean()"),
         ),
         mistake(
-            "a group for 1 alone",
+            "the surest first",
             task="calibration",
             loses=3,
-            says="has got a group of its own",
-            code=ece(group="(sure * bins).astype(int)", groups="range(bins + 1)"),
+            says="the first group, that of the least sure, has three",
+            code=ece(group=f"{IN_TURN}[(-sure).argsort().argsort()]"),
         ),
         mistake(
-            "1 in no group",
+            "what is left over gets a group of its own",
             task="calibration",
             loses=3,
-            says="is in no group",
-            code=ece(group="(sure * bins).astype(int)"),
+            says="the first group, that of the least sure, has three",
+            code=ece(group="sure.argsort().argsort() // (len(sure) // bins)", groups="range(bins + 1)"),
+        ),
+        mistake(
+            "what is left over gets lost",
+            task="calibration",
+            loses=3,
+            says="the ninth is in none of yours",
+            code=ece(group="sure.argsort().argsort() // (len(sure) // bins)"),
+        ),
+        mistake(
+            "not sorted",
+            task="calibration",
+            loses=3,
+            says="sort the cells by how sure",
+            code=ece(group=IN_TURN),
+        ),
+        mistake(
+            "too sure alone",
+            task="calibration",
+            loses=3,
+            says="you count only where it is surer than right",
+            code=ece(gap="max(0, sure[here].mean() - right[here].mean())"),
         ),
         mistake(
             "unlabelled cells count",
@@ -647,17 +684,17 @@ def calibration_error(probability, truth, bins=10):
             code=ece(sure="p[:, 0]"),
         ),
         mistake(
-            "ten groups, whatever is asked",
+            "two classes taken for granted",
             task="calibration",
             loses=3,
             says="on inputs you haven't seen",
-            code=ece(group="np.minimum((sure * 10).astype(int), 9)", groups="range(10)"),
+            code=ece(sure="p[:, :2].max(axis=1)"),
         ),
         mistake(
-            "empty groups",
+            "a mean of a group that is empty",
             task="calibration",
             loses=3,
-            says="an empty group has no mean",
+            says="is one of your groups empty?",
             code="""
 def calibration_error(probability, truth, bins=10):
     p, t = probability[truth != 255], truth[truth != 255]
@@ -668,17 +705,55 @@ def calibration_error(probability, truth, bins=10):
         ),
         # ---- passed, or lost, when somebody tried who had not written the tests
         mistake(
+            "the package's functions, wrapped",
+            task="drive-scores",
+            loses=2,
+            says="drive a has 4 cells of the second class, fewer than 5",
+            code="""
+def drive_scores(counts, drives, least=1):
+    from semgrid_edu.metrics import class_accuracy
+    from semgrid_edu.workshop.scoring.confusions import drive_confusions
+    return dict(zip(dict.fromkeys(drives), map(class_accuracy, drive_confusions(counts, drives))))""",
+        ),
+        mistake(
+            "the package's function, wrapped",
+            task="paired",
+            loses=2,
+            says="that is the difference of the two accuracies",
+            code="""
+def paired_interval(a, b, metric, level=0.95):
+    from semgrid_edu.workshop.scoring import statistics
+    return statistics.paired_interval(a[None], b[None], metric, level)""",
+        ),
+        mistake(
+            "the package's functions, wrapped",
+            task="calibration",
+            loses=3,
+            says="these groups are equally wide",
+            code="""
+def calibration_error(probability, truth, bins=10):
+    from semgrid_edu.crf import expected_calibration_error, reliability
+    return expected_calibration_error(reliability(probability.T, truth, bins))""",
+        ),
+        mistake(
+            "`least` counted in each frame",
+            task="drive-scores",
+            loses=2,
+            says="on inputs you haven't seen: a wrong score",
+            code=pooled(total="total + np.where(matrix.sum(axis=1, keepdims=True) >= least, matrix, 0)"),
+        ),
+        mistake(
             "a class that is never called is left out",
             task="drive-scores",
             loses=2,
             says="on inputs you haven't seen: a wrong score",
             code="""
-def drive_scores(counts, drives):
+def drive_scores(counts, drives, least=1):
     scores = {}
     for drive in dict.fromkeys(drives):
         total = sum(matrix for matrix, name in zip(counts, drives) if name == drive)
         cells = total.sum(axis=1)
-        use = (cells > 0) & (total.sum(axis=0) > 0)
+        use = (cells >= least) & (total.sum(axis=0) > 0)
         scores[drive] = np.mean(np.diag(total)[use] / cells[use])
     return scores""",
         ),
@@ -688,12 +763,12 @@ def drive_scores(counts, drives):
             loses=2,
             says="on inputs you haven't seen: a wrong score",
             code="""
-def drive_scores(counts, drives):
+def drive_scores(counts, drives, least=1):
     scores = {}
     for drive in dict.fromkeys(drives):
         total = sum(matrix for matrix, name in zip(counts, drives) if name == drive)
         cells = total.sum(axis=1)
-        use = np.diag(total) > 0
+        use = (np.diag(total) > 0) & (cells >= least)
         scores[drive] = np.mean(np.diag(total)[use] / cells[use])
     return scores""",
         ),
@@ -703,11 +778,11 @@ def drive_scores(counts, drives):
             code="""
 from decimal import Decimal
 
-def drive_scores(counts, drives):
+def drive_scores(counts, drives, least=1):
     scores = {}
     for drive in set(drives):
         total = counts[[name == drive for name in drives]].sum(axis=0).tolist()
-        shares = [Decimal(row[c]) / sum(row) for c, row in enumerate(total) if sum(row)]
+        shares = [Decimal(row[c]) / sum(row) for c, row in enumerate(total) if sum(row) >= least]
         scores[drive] = sum(shares) / len(shares)
     return scores""",
         ),

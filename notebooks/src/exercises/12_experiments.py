@@ -9,8 +9,8 @@
 # | 1 | frames pooled into drives, and class accuracy | 2 |
 # | 2 | which statements to give up | 2 |
 # | 3 | drives that share a town | 3 |
-# | 4 | a paired difference | 2 |
-# | 5 | expected calibration error | 3 |
+# | 4 | the share of errors that is saved, paired | 2 |
+# | 5 | calibration, in groups of equal number | 3 |
 # | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
@@ -49,18 +49,19 @@ def _three(result, name):
 # aren't always neighbours in the list.
 #
 # Complete `drive_scores`: it returns a dictionary that gives for each drive its class accuracy. First the matrices of its frames are *summed*, then the metric is
-# taken: the mean over classes of the share of the class's cells that are called right. A class without a true cell in the drive is left out of the mean.
+# taken: the mean over classes of the share of the class's cells that are called right. But three cells say little about a class. So a class with fewer than `least` true
+# cells in the drive (all its frames together) is left out of the mean; each drive has a class with more. `least` is at least 1.
 
 
 # %% nbgrader={"grade": false, "grade_id": "drive-scores", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def drive_scores(counts, drives):
+def drive_scores(counts, drives, least=1):
     """Return the class accuracy of each drive, by its name."""
     ### BEGIN SOLUTION
     scores = {}
     for drive in dict.fromkeys(drives):
         total = sum(matrix for matrix, name in zip(counts, drives, strict=True) if name == drive)
         cells = total.sum(axis=1)
-        scores[drive] = float(np.mean(np.diag(total)[cells > 0] / cells[cells > 0]))
+        scores[drive] = float(np.mean(np.diag(total)[cells >= least] / cells[cells >= least]))
     return scores
     ### END SOLUTION
 
@@ -89,6 +90,11 @@ def _test():
     _explain("drive b:", b, {0.375: as_zero, 0.875: as_zero.replace("as 0", "as 1")}, 1e-3)
     assert not np.isnan(b), "drive b: not a number: you divide by the 0 cells of a class that doesn't occur"
     assert np.isclose(b, 0.75), f"drive b: {b:.4f}, by hand 6/8 = 0.75"
+    drives = ["a", "b", "a"]
+    few, enough = (answer_number(drive_scores(counts.copy(), drives, least)["a"], "a score") for least in (5, 4))
+    assert not np.isclose(few, 0.475), "drive a has 4 cells of the second class, fewer than 5: leave it out of the mean"
+    assert np.isclose(few, 0.45), f"drive a, least=5: {few:.4f}, by hand 9/20 = 0.45"
+    assert np.isclose(enough, 0.475), f"drive a, least=4: {enough:.4f}; 4 cells aren't fewer than 4, so 0.475"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import experiments
 
@@ -232,24 +238,31 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: a paired difference (2 points)
+# ## Task 4: the share of errors that is saved (2 points)
 #
-# `a` and `b` are the confusion matrices of two methods on the **same** V drives, `(V, C, C)` each: `a[v]` and `b[v]` belong to the same drive. Leave a drive out of *both*
-# at once, and see what that does to `metric(a) - metric(b)`.
+# `a` and `b` are the confusion matrices of two methods on the **same** V drives, `(V, C, C)` each: `a[v]` and `b[v]` belong to the same drive. Two points of accuracy are little where a third is wrong,
+# and much where a fortieth is. So take the share of b's errors that a saves,
 #
-# Complete `paired_interval`: it returns `low, difference, high`, by the lecture's jackknife, one drive left out at a time, with the difference in place of $\theta$. (You may call your
+# $$ \theta = \frac{\text{metric}(a) - \text{metric}(b)}{1 - \text{metric}(b)} $$
+#
+# of the summed matrices. Leave a drive out of *both* methods at once, and see what that does to $\theta$.
+#
+# Complete `paired_interval`: it returns `low, share, high`, by the lecture's jackknife, one drive left out at a time. (You may call your
 # `town_interval`, whose mistakes cost nothing here, or write the formula again. Which towns, and what in place of the matrices, make it leave out both matrices of one drive?)
 
 
 # %% nbgrader={"grade": false, "grade_id": "paired", "locked": false, "schema_version": 3, "solution": true, "task": false}
 def paired_interval(a, b, metric, level=0.95):
-    """Return low, difference, high of metric(a) - metric(b)."""
+    """Return low, share, high of the errors of b that a saves."""
     ### BEGIN SOLUTION
     V, of_a, of_b = len(a), a.sum(axis=0), b.sum(axis=0)
-    difference = metric(of_a) - metric(of_b)
-    without = np.array([metric(of_a - x) - metric(of_b - y) for x, y in zip(a, b, strict=True)])
+
+    def share(x, y):
+        return (metric(x) - metric(y)) / (1 - metric(y))
+
+    without = np.array([share(of_a - x, of_b - y) for x, y in zip(a, b, strict=True)])
     half = stats.t.ppf((1 + level) / 2, V - 1) * np.sqrt((V - 1) / V * ((without - without.mean()) ** 2).sum())
-    return difference - half, difference, difference + half
+    return share(of_a, of_b) - half, share(of_a, of_b), share(of_a, of_b) + half
     ### END SOLUTION
 
 
@@ -260,47 +273,60 @@ def _of_cells(right, cells):
 
 
 def _by_own_jackknife(jackknife, a, b):
-    """Return what the jackknife of task 3 gives for the difference, be it right or not; NaN where it gives nothing."""
+    """Return what the jackknife of task 3 gives for the share, be it right or not; NaN where it gives nothing."""
+
+    def share(two):
+        return (pixel_accuracy(two[0]) - pixel_accuracy(two[1])) / (1 - pixel_accuracy(two[1]))
+
     try:
         pairs = np.stack([a, b], axis=1)
         names = [f"drive {v}" for v in range(len(pairs))]
-        return _three(jackknife(pairs, names, lambda two: pixel_accuracy(two[0]) - pixel_accuracy(two[1])), "it")
+        return _three(jackknife(pairs, names, share), "it")
     except Exception:
         return np.full(3, np.nan)
 
 
 # %% nbgrader={"grade": false, "grade_id": "paired-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _explain_paired(low, difference, high):
-    """Stop with a hint when the difference of the two methods, or its interval, is what a common slip gives."""
-    assert difference > 0, f"the difference is {difference:.4f}: a is better, and a - b is asked for"
-    mean = "that is the mean of the drives' differences. Sum the matrices first, as in task 3"
-    _explain("the difference is", difference, {0.0225: mean}, 2e-4)
+def _explain_paired(low, share, high):
+    """Stop with a hint when the share of saved errors, or its interval, is what a common slip gives."""
+    assert share > 0, f"the share is {share:.4f}: a is better, and saves errors of b"
+    middles = {
+        0.0667: "that is the difference of the two accuracies: divide it by the errors of b, 1 - metric(b)",
+        0.2542: "divide by the errors of b, not by those of a",
+        0.0993: "divide by what b calls wrong, 1 - metric(b), not by what it calls right",
+        0.7973: "that is the share of b's errors that a makes as well",
+        0.2509: "that is the mean of the drives' shares. Sum the matrices first, as in task 3",
+    }
+    _explain("the share is", share, middles, 5e-4)
     assert low <= high, "low is above high: the ends of two separate intervals can't simply be subtracted"
-    half = (high - low) / 2
-    other = "that is the interval of two methods on *different* drives: their variances are added. On the same drives what they share cancels"
-    added = "you add the two half-widths: on the same drives what they share cancels"
-    _explain("it reaches to each side by", half, {0.2650: other, 0.3748: added}, 1e-3)
-    taken = "you subtract the two half-widths: widths of intervals don't work like that. Look at the difference itself"
-    alone = "you use each drive's own difference. Use the difference of the scores *without* the drive"
-    _explain("it reaches to each side by", half, {0.0058: taken, 0.0080: alone}, 1e-4)
+    both = "leave the drive out of both methods, above and below the line"
+    halves = {
+        0.0570: "that is the interval of the difference: the share is another number",
+        0.1733: "you divide the interval of the difference by the errors in all drives: " + both,
+        0.6049: "you leave drives out of a alone: " + both,
+        0.3801: "you leave drives out of b alone: " + both,
+        0.7144: "that is the interval of two methods on *different* drives: on the same drives what they share cancels",
+        0.3833: "you use each drive's own share. Use the share *without* the drive",
+    }
+    _explain("it reaches to each side by", (high - low) / 2, halves, 1e-3)
 
 
 # %% nbgrader={"grade": true, "grade_id": "paired-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    a = _of_cells((90, 140, 40, 60), (100, 200, 50, 100))  # 330 of 450
-    b = _of_cells((88, 134, 39, 58), (100, 200, 50, 100))  # 319 of 450: the difference is 11/450 = 0.0244
+    a = _of_cells((92, 140, 40, 60), (100, 200, 50, 100))  # 118 of 450 wrong
+    b = _of_cells((80, 126, 38, 58), (100, 200, 50, 100))  # 148 of 450 wrong, so a saves 30/148 = 0.2027
     got = _three(paired_interval(a.copy(), b.copy(), pixel_accuracy), "paired_interval")
-    # By deviations from their mean, or from the score of all drives.
-    wanted = [[0.011275, 0.024444, 0.037614], [0.011145, 0.024444, 0.037744]]
-    if not any(np.allclose(got, one, rtol=0, atol=4e-5) for one in wanted):
+    # By deviations from their mean, or from the share in all drives.
+    wanted = [[-0.04005, 0.20270, 0.44545], [-0.04105, 0.20270, 0.44646]]
+    if not any(np.allclose(got, one, rtol=0, atol=8e-4) for one in wanted):
         # What is wrong in your task 3 has cost its points there, and costs none here.
         own = _by_own_jackknife(town_interval, a, b)
         if not np.allclose(got, own) or got[0] == got[2]:
             _explain_paired(*got)
-            right, half = np.isclose(got[1], 0.02444, atol=4e-5), (got[2] - got[0]) / 2
-            assert right, f"the difference is {got[1]:.4f}; by hand 11/450 = 0.0244"
-            assert np.isclose(half, 0.01317, rtol=0, atol=4e-5), f"it reaches {half:.5f} to each side; expected 0.01317"
-            assert np.allclose(got, wanted[0], rtol=0, atol=4e-5), "the interval isn't symmetric around the difference"
+            right, half = np.isclose(got[1], 0.2027, atol=4e-4), (got[2] - got[0]) / 2
+            assert right, f"the share is {got[1]:.4f}; by hand 30/148 = 0.2027"
+            assert np.isclose(half, 0.24275, rtol=0, atol=8e-4), f"it reaches {half:.4f} to each side; expected 0.2428"
+            assert np.allclose(got, wanted[0], rtol=0, atol=8e-4), "the interval isn't symmetric around the share"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import experiments
 
@@ -312,63 +338,64 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: expected calibration error (3 points)
+# ## Task 5: calibration, in groups of equal number (3 points)
 #
 # `probability` is `(N, C)`, one distribution per cell; `truth` is `(N,)`, the true class of each cell, or 255 where there is no label. A method calls a cell by its most
-# probable class, and is as *sure* as that probability says. Sort the labelled cells into `bins` groups of equal width by how sure it is: 0 to 0.1, 0.1 to 0.2, ... with 10
-# bins. A cell with probability 1 belongs to the last group. Then
+# probable class, and is as *sure* as that probability says. The lecture's groups are equally wide, and since a method is sure of most cells, one group holds nearly all of them. So let each group
+# hold the same number of cells: sort the labelled cells by how sure it is, the least sure first, and cut the row into `bins` groups. If the number doesn't divide, the first groups have a cell
+# more than the others (`np.array_split` cuts like that). Then
 #
-# $$ \text{ECE} = \sum_{b} \frac{n_b}{N} \left| \text{accuracy}_b - \text{confidence}_b \right| $$
+# $$ \text{error} = \sum_{b} \frac{n_b}{N} \left| \text{accuracy}_b - \text{confidence}_b \right| $$
 #
 # with $n_b$ the number of labelled cells in group $b$, $N$ that of all labelled cells, accuracy the share of the group's cells that are called right, and confidence the mean of
-# how sure it is of them. Empty groups add nothing.
+# how sure it is of them. No two cells are equally sure, and there are at least as many labelled cells as groups.
 #
-# Complete `calibration_error`: it returns the ECE.
+# Complete `calibration_error`: it returns this error.
 
 
 # %% nbgrader={"grade": false, "grade_id": "calibration", "locked": false, "schema_version": 3, "solution": true, "task": false}
 def calibration_error(probability, truth, bins=10):
-    """Return the expected calibration error over the labelled cells."""
+    """Return the calibration error over the labelled cells, in groups of equal number."""
     ### BEGIN SOLUTION
     labelled = truth != 255
     sure = probability[labelled].max(axis=1)
     right = probability[labelled].argmax(axis=1) == truth[labelled]
-    group = np.minimum((sure * bins).astype(int), bins - 1)
-    gaps = [(group == b).mean() * abs(right[group == b].mean() - sure[group == b].mean()) for b in np.unique(group)]
-    return float(np.sum(gaps))
+    groups = np.array_split(np.argsort(sure), bins)
+    return sum(len(group) / len(sure) * abs(right[group].mean() - sure[group].mean()) for group in groups)
     ### END SOLUTION
 
 
 # %% nbgrader={"grade": false, "grade_id": "calibration-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _CALIBRATION = {
-    0.2700: "you take the plain mean of the groups: weight each by its share of the cells",
-    0.0810: "you take the plain mean of ten groups, most of them empty: weight each by its share of the cells",
-    0.8100: "the gaps are added without weights: weight each by its share of the cells",
-    0.2271: "the gaps of the groups cancel: take the absolute value in each group, before you add up",
-    0.0835: "the gaps are squared: take their absolute values",
-    0.2929: "confidence is the mean of how sure the cells of the group are, not the middle of the group",
-    0.3067: "that is the largest gap, not their weighted sum",
-    0.4243: "you compare cell by cell. Compare the means of each group",
-    0.3214: "a cell with probability 1 has got a group of its own: it belongs to the last group",
-    0.1786: "a cell with probability 1 is in no group: it belongs to the last one",
-    0.3844: "cells without a label count as wrong: leave them out",
-    0.2233: "N is the number of labelled cells, not of all",
-    0.2014: "how sure a method is, is the probability of the class that it calls, not of the true class",
-    0.5129: "how sure a method is, is its largest probability, not that of the first class",
+    0.4378: "these groups are equally wide: here each group holds the same number of cells",
+    0.4125: "you take the plain mean of the groups: weight each by its share of the cells",
+    1.6500: "the gaps are added without weights: weight each by its share of the cells",
+    0.1733: "the gaps of the groups cancel: take the absolute value in each group, before you add up",
+    0.2472: "the gaps are squared: take their absolute values",
+    0.9550: "that is the largest gap, not their weighted sum",
+    0.5756: "you compare cell by cell. Compare the means of each group",
+    0.5000: "nine cells in four groups: the first group, that of the least sure, has three, the others two",
+    0.3889: "nine cells in four groups: the ninth is in none of yours, yet the first group has three",
+    0.3222: "sort the cells by how sure it is of them, before you cut",
+    0.3391: "cells without a label count as wrong: leave them out",
+    0.3073: "N is the number of labelled cells, not of all",
+    0.1867: "how sure a method is, is the probability of the class that it calls, not of the true class",
+    0.2911: "how sure a method is, is its largest probability, not that of the first class",
+    0.2744: "you count only where it is surer than right: where it is less sure, there is a gap as well",
 }
 
 
 # %% nbgrader={"grade": true, "grade_id": "calibration-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # Seven labelled cells. Sure by 0.62, 0.64, 0.66: one is right. 0.79: right. 0.92, 0.96, 1: two are right.
-    first = np.array([0.62, 0.66, 0.21, 0.55, 0.96, 1.0, 0.08, 0.64, 0.9])
-    probability, truth = np.stack([first, 1 - first], axis=1), np.array([1, 1, 1, 255, 0, 1, 1, 0, 255])
-    # By hand: 3/7 * |1/3 - 0.64| + 1/7 * |1 - 0.79| + 3/7 * |2/3 - 0.96| = (0.92 + 0.21 + 0.88) / 7 = 0.2871
-    got = answer_number(calibration_error(probability, truth), "calibration_error")
-    assert not np.isnan(got), "not a number: an empty group has no mean. It adds nothing"
+    # Nine labelled cells. Sure by 0.55 right, 0.59 right, 0.62 wrong | 0.66, 0.67 right | 0.72 right, 0.84 wrong | 0.91, 1 wrong.
+    first = np.array([0.28, 0.55, 0.55, 0.09, 0.9, 0.67, 0.34, 0.38, 0.41, 0.16, 0.0])
+    probability, truth = np.stack([first, 1 - first], axis=1), np.array([1, 0, 255, 0, 255, 0, 1, 0, 1, 0, 0])
+    # By hand: 3 * |2/3 - 0.5867| + 2 * |1 - 0.665| + 2 * |1/2 - 0.78| + 2 * |0 - 0.955| = 3.38, divided by 9 cells: 0.3756
+    got = answer_number(calibration_error(probability, truth, bins=4), "calibration_error")
+    assert not np.isnan(got), "not a number: is one of your groups empty?"
     assert got >= 0, f"{got:.4f} is negative: take the absolute value of the gap in each group, before you add up"
     _explain("", got, _CALIBRATION, 6e-4)
-    assert np.isclose(got, 0.2871, atol=1e-3), f"{got:.4f}; by hand 0.2871"
+    assert np.isclose(got, 0.3756, atol=1e-3), f"{got:.4f}; by hand 0.3756"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import experiments
 
