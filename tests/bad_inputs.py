@@ -7,6 +7,7 @@ run with a log; SAMPLES, a sample with its provenance. Where a command says that
 
 import json
 import os
+import shutil
 import socket
 from collections.abc import Callable
 from pathlib import Path
@@ -55,6 +56,12 @@ class Row(NamedTuple):
 
 def text(name: str, content: str) -> Spoil:
     return lambda root: (root / name).parent.mkdir(exist_ok=True, parents=True) or (root / name).write_text(content)
+
+
+def a_class(root: Path) -> None:
+    """Make what looks like a course with one exercise, and without a gradebook."""
+    text("CLASS/semgrid_course.json", "{}")(root)
+    (root / "CLASS" / "source" / "01_bayes").mkdir(parents=True)
 
 
 def change(name: str, old: str, new: str) -> Spoil:
@@ -644,6 +651,45 @@ COURSE = (
     Row("a class with fewer than no workers", "course grade TINY --workers 0", "Invalid value for '--workers'"),
     Row("a course over a file", "course build architecture.json", "architecture.json: expected a folder, found a file"),
     Row("an argument too many", "course check all", "unexpected extra argument"),
+    Row(
+        "a class and an unknown exercise",
+        "course grade CLASS 99_none",
+        "assignments: expected some of 01_bayes",
+        a_class,
+    ),
+    Row("a class in no time", "course grade CLASS --timeout 0", "Invalid value for '--timeout'", a_class),
+    Row("a class without memory", "course grade CLASS --memory 10", "Invalid value for '--memory'", a_class),
+    Row("a class with many workers", "course grade CLASS --workers 65", "Invalid value for '--workers'", a_class),
+    Row(
+        "a container's command that doesn't end",
+        'course grade CLASS --container "docker \'run"',
+        "--container: expected a command as a shell takes it, found docker 'run",
+        a_class,
+    ),
+    Row(
+        "a container that isn't there",
+        "course grade CLASS --container no-such-program",
+        "no-such-program: No such file",
+        a_class,
+    ),
+    Row(
+        "a course without exercises",
+        "course grade CLASS",
+        "CLASS/source: No such file",
+        lambda root: (a_class(root), shutil.rmtree(root / "CLASS" / "source")),
+    ),
+    Row(
+        "a course without its gradebook",
+        "course grade CLASS",
+        "gradebook.db: expected nbgrader's gradebook; .* found none",
+        a_class,
+    ),
+    Row(
+        "a gradebook that is another file",
+        "course grade CLASS",
+        "gradebook.db: expected nbgrader's gradebook; .* found another file",
+        lambda root: (a_class(root), text("CLASS/gradebook.db", "a,b\n")(root)),
+    ),
 )
 
 EXPERIMENTS = (

@@ -15,9 +15,15 @@ import semgrid_edu.datasets.index
 import semgrid_edu.training.run
 import semgrid_edu.workshop.paper.reports.reproduce
 from semgrid_edu.workshop import demo
+from semgrid_edu.workshop.commands.arguments import TOLD, tell
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.simulation import datasets
 from semgrid_edu.workshop.studies.training import overfit
+
+
+def test_one_doubt_too_many_is_told_as_such(capsys):
+    tell(["a doubt"] * (TOLD + 1))
+    assert capsys.readouterr().err.splitlines()[-1] == "semgrid-edu: doubtful: and 1 more"
 
 
 @pytest.mark.parametrize(

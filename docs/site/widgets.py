@@ -134,11 +134,8 @@ def values_of(control: Any) -> list:
     count = round((high - low) / step) + 1
     steps = low + step * np.unique(np.rint(np.linspace(0, count - 1, min(count, MOST_VALUES))))
     values = 10.0**steps if isinstance(control, ipywidgets.FloatLogSlider) else steps
-    return sorted(
-        {*values.round(6).tolist(), control.value}
-        if count > MOST_VALUES
-        else [*map(type(control.value), values.round(6))]
-    )
+    reached = {type(control.value)(value) for value in values.round(6)}
+    return sorted(reached | {control.value} if count > MOST_VALUES else reached)
 
 
 def shown(show: Callable, values: dict[str, Any]) -> tuple[Image.Image, str]:

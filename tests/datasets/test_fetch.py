@@ -219,5 +219,5 @@ def test_the_command_fetches_and_tells_the_licence(tmp_path, archives, monkeypat
     assert caught.value.code in (None, 0)
     printed = capsys.readouterr().out
     assert "forbids commercial use" in printed
-    assert "3 frames are in" in printed
+    assert "holds the drive, frames: 3;" in printed
     assert len(KittiRawDrive(tmp_path, DATE, "0001")) == 3

@@ -102,6 +102,14 @@ def test_the_estimate_adds_up_what_is_left(tmp_path):
     assert [cell.strip() for cell in cells] == ["note", "4", "0", "2", "1.0"]
 
 
+def test_one_run_of_one_minute_is_told_as_such(tmp_path, monkeypatch):
+    monkeypatch.setattr(Request, "plan", lambda _: [A])
+    told = []
+    request = Request(experiment="table1", scale="quick", runs=tmp_path / "runs", out=tmp_path / "out", workers=1)
+    reproduce(request, told.append, plan_only=True)
+    assert told[0].endswith("\n\nleft: 1 of 1 runs, about 1 min")
+
+
 def test_recorded_times_take_the_place_of_trials(tmp_path):
     claim_folder(A, tmp_path)
     (A.folder(tmp_path) / "ended.json").write_text(json.dumps({"seconds": 8}))

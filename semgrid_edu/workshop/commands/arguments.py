@@ -98,7 +98,7 @@ def tell(doubts: Iterable[str]) -> None:
     for doubt in doubts[:TOLD]:
         typer.echo(f"semgrid-edu: doubtful: {doubt}", err=True)
     if len(doubts) > TOLD:
-        typer.echo(f"semgrid-edu: doubtful: {len(doubts) - TOLD} things more", err=True)
+        typer.echo(f"semgrid-edu: doubtful: and {len(doubts) - TOLD} more", err=True)
 
 
 def chosen_drive(kitti: dict[str, object], pandaset: dict[str, object], camera: str | None) -> "FrameSequence | None":

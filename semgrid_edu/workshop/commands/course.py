@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.workshop.commands.data import report
 
 course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exercises, and grade them.")
@@ -87,7 +88,11 @@ def grade(
     from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, missing_limits
     from semgrid_edu.workshop.course.nbgrader.gradebook import misplaced, write_graded
 
-    settings = GradeSettings(timeout, memory, tuple(shlex.split(container)), seed_by_student)
+    try:
+        command = tuple(shlex.split(container))
+    except ValueError as error:
+        raise ArgumentError("--container", "a command as a shell takes it", f"{container} ({error})") from error
+    settings = GradeSettings(timeout, memory, command, seed_by_student)
     for path in misplaced(folder):
         typer.echo(f"not graded: expected submitted/STUDENT/EXERCISE/EXERCISE.ipynb, found {path}", err=True)
     if missing := missing_limits(settings):

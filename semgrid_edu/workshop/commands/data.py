@@ -62,7 +62,7 @@ def fetch(
         raise ArgumentError("name", "kitti or pandaset", repr(name))
     typer.echo(KITTI_LICENCE)
     fetched = fetch_kitti(folder, drive)
-    typer.echo(f"{len(fetched)} frames are in {fetched.folder}; the archives in {folder / 'archives'} may be deleted")
+    typer.echo(f"{fetched.folder} holds the drive, frames: {len(fetched)}; {folder / 'archives'} may be deleted")
 
 
 @data.command()

@@ -254,8 +254,20 @@ def open_gradebook(course: Path) -> Gradebook:
     ----------
     course : Path
         The course.
+
+    Raises
+    ------
+    DataError
+        When it has no gradebook, or another file in its place.
     """
-    return Gradebook(f"sqlite:///{course / 'gradebook.db'}")
+    path = course / "gradebook.db"
+    expected = "nbgrader's gradebook; `semgrid-edu course build` writes one if there is none"
+    if not path.is_file():
+        raise DataError(path, expected, "a folder" if path.exists() else "none")
+    with path.open("rb") as file:
+        if file.read(15) != b"SQLite format 3":
+            raise DataError(path, expected, "another file")
+    return Gradebook(f"sqlite:///{path}")
 
 
 def write_graded(course: Path) -> Path:

@@ -122,8 +122,7 @@ def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_
     plan = request.plan()
     estimated = estimate(plan, root)
     hours = plan_hours(estimated, request.workers or usable_cores())
-    minutes = round(60 * hours)
-    left = f"{len(estimated)} of {len(plan)} runs are left, about {minutes} minute{'s' * (minutes != 1)}"
+    left = f"left: {len(estimated)} of {len(plan)} runs, about {60 * hours:.0f} min"
     echo(f"{plan_table(plan, estimated)}\n\n{left}" + (" on this machine" if request.scheduler else ""))
     if plan_only:
         return ""
