@@ -681,13 +681,13 @@ COURSE = (
     Row(
         "a course without its gradebook",
         "course grade CLASS",
-        "gradebook.db: expected nbgrader's gradebook; .* found none",
+        "gradebook.db: No such file",
         a_class,
     ),
     Row(
         "a gradebook that is another file",
         "course grade CLASS",
-        "gradebook.db: expected nbgrader's gradebook; .* found another file",
+        "gradebook.db: expected nbgrader's gradebook, .* found another file",
         lambda root: (a_class(root), text("CLASS/gradebook.db", "a,b\n")(root)),
     ),
 )

@@ -258,15 +258,12 @@ def open_gradebook(course: Path) -> Gradebook:
     Raises
     ------
     DataError
-        When it has no gradebook, or another file in its place.
+        When another file stands in its place.
     """
     path = course / "gradebook.db"
-    expected = "nbgrader's gradebook; `semgrid-edu course build` writes one if there is none"
-    if not path.is_file():
-        raise DataError(path, expected, "a folder" if path.exists() else "none")
     with path.open("rb") as file:
         if file.read(15) != b"SQLite format 3":
-            raise DataError(path, expected, "another file")
+            raise DataError(path, "nbgrader's gradebook, as `semgrid-edu course build` writes it", "another file")
     return Gradebook(f"sqlite:///{path}")
 
 
