@@ -707,8 +707,9 @@ _ = interact(show, height=FloatSlider(value=0.0, min=-1.0, max=3.8, step=0.05, d
 # %% [markdown]
 # ## Where this breaks
 #
-# Equation (1) is exact about a camera that is where you think it is, and about a point that you know to be there. You
-# have seen the second fail. The first: the camera is turned by $\psi$ = 1°, and nobody has told the calibration.
+# Equation (1) is exact about a camera without lens distortion that is where you think it is, and about a point that
+# you know to be there. You have seen the second fail. The first: the camera is turned by $\psi$ = 1°, and nobody has
+# told the calibration.
 #
 # **Predict before you run.** In metres, 30 m ahead: how far is a cell off if the toy camera is turned to the side
 # (yaw)? And if it nods (pitch)? Row 48 + 300 / 30 = 58, where the ground at 30 m should be, then really looks where
@@ -785,7 +786,8 @@ Markdown(ledger_table(ledger("pixel") + ledger("height")))
 # 4. A wrong height moves a thing by $x\,(z - \delta) / (z_\text{cam} - z)$: 17 cm of sidewalk are half a metre on the map.
 # 5. In view is not yet seen: (1) cuts occlusion (0.83 instead of 0.23) and the height (1 instead of 0.03).
 #
-# **What you can now do**: lay any map over any calibrated image, and say how far off each cell may be, and why.
+# **What you can now do**: lay any map over any calibrated, undistorted image, and say how far off each cell may be,
+# and why.
 #
 # ## Further reading
 #
