@@ -76,7 +76,7 @@ class CellStory:
     >>> print(story)                                                                        # doctest: +SKIP
     Cell (101, 31), 20.2 m ahead and 0.2 m to the left.
     Called road (71 %), but it is car.
-    The mistake comes from the occupancy filter: it takes this cell for FREE. With the true state in every labelled cell, ...
+    The mistake comes from the occupancy filter: it takes this cell for FREE. With the true state in ...
     """
 
     cell: tuple[int, int]
