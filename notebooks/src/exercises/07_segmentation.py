@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 07: three networks for segmentation
 #
-# No function of this exercise stands in the lecture. You design a chain of layers, take pooling and atrous convolution a step further than the lecture's toy, find out
+# Each function here asks for more than the lecture gives. You design a chain of layers, take pooling and atrous convolution a step further than the lecture's toy, find out
 # which mechanism works inside a black box, repair a loss with four mistakes, and answer one question in words. About 100 minutes. The lecture is
 # [07: three networks for segmentation](../07_segmentation.ipynb).
 #
