@@ -127,12 +127,12 @@ plt.show()
 # what *conditional* means in the name. **Fully connected** means that *every* pair has a square, also two cells at
 # opposite ends of the map.
 #
-# **Predict before you run.** How many of the six pairs are independent when you know the two other labels? And which
-# edges does a model cut in which each square links two cells, and no square links three?
+# **Predict before you run.** How many of the six pairs are independent when you know the two other labels? And what
+# can a model not say whose squares link two cells, but never three?
 #
 # <details><summary>Answer</summary>
 #
-# None: each pair has a square of its own. What is cut are factors of three and more cells. So the model can say "these
+# None: each pair has a square of its own. Factors of three and more cells are missing. So the model can say "these
 # two should be alike", but not "a car is four metres long". That would take *higher-order potentials*, which the paper
 # leaves out to save time.
 #

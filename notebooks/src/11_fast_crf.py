@@ -945,8 +945,8 @@ print("\n".join(table))
 # %% [markdown]
 # For each of these widths, what a typical cell hears from all cells is between six and nine tenths of what it should be.
 # In each row the mean error, |dQ|, is larger without normalisation than with it. It hides the worst cell, for which that
-# isn't so in each row (columns "worst"). And one thing didn't happen: a width of 0.3 cells, far below a cell, does no harm, because
-# then the kernel is so narrow that cells hardly hear each other in either way.
+# isn't so in each row (columns "worst"). A width of 0.3 cells, far below a cell, does no harm here, because then the
+# kernel is so narrow that cells hardly hear each other in either way.
 #
 # **Many dimensions.** A cell has only $d + 1$ corners, but the kernel gets worse with each dimension, as you have seen
 # in the cloud. Three colours as further features would make eight dimensions. The package refuses more than eight.

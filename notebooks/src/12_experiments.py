@@ -638,7 +638,8 @@ for count in (1, 2, 3):
 # The rule is strict in both directions. A claim with six statements must pass six times, and a single interval on the
 # wrong side sinks it, be it by chance. **Holm's** correction is as safe as Bonferroni's and misses less. Each
 # statement has a one-sided *p-value*, 2.5 % when its interval lies on the wrong side and just ends at the limit, and
-# less the farther away it lies. Of $m$ statements, give up that with the smallest p-value if it is at most 2.5 % /
+# less the farther away it lies. Of $m$ statements, give up (*reject*) that with the smallest p-value if it is at most
+# 2.5 % /
 # $m$, then the next if at most 2.5 % / $(m - 1)$, and so on until one isn't given up.
 
 # %% tags=["holm"]

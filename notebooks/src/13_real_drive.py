@@ -366,7 +366,7 @@ if ours:
     assert in_file_order.max() < 1
 
 # %% [markdown]
-# Is this calibration wrong by more than two degrees? **Doubt the check before the data.** The contrast is below 1 at
+# Is this calibration wrong by three degrees? **Doubt the check before the data.** The contrast is below 1 at
 # *every* turn: these "borders" lie on smoother places of the image than average. So they are no borders. Why? The toy
 # said "neighbouring beams of a ring", and KITTI's files are written ring by ring. Are PandaSet's?
 

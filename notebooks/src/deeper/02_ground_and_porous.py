@@ -74,7 +74,7 @@ def believed(evidence):
 # <details><summary>Answer</summary>
 #
 # All from 8 m on: the bank and the person alike. The beam ends at its first obstacle, at 8 m. So the person is hit,
-# but in a meadow of hits.
+# but so is the whole bank.
 #
 # </details>
 #

@@ -117,8 +117,8 @@ for v in ([4, 0], [6, 0], [2, 0], [4, 2], [4, -2]):
     print(v, f"{changed[coarse.velocities.tolist().index(v)]:.4f}")
 
 # %% [markdown]
-# Zero is left out: what stands doesn't set off by accelerating a little. It *starts*, and for that there is the
-# transition matrix.
+# These jumps leave out the velocity zero: how likely a standing thing is to start moving stands in the transition
+# matrix.
 #
 # ## Less than a cell in a step
 #

@@ -656,10 +656,11 @@ print("worse, in per cent:", *lost, sep="\n  ")
 # ### Half a second, and at least three cells
 #
 # Why isn't half a second enough? A walker of 1.4 m/s covers 0.7 m in half a second, little more than one of these cells
-# of 0.5 m, and shows in two of them. So the origin may lie in a cell that the walker has hardly left, and that was taken
+# of 0.5 m, and can be seen in two cells at once. So the origin may lie in a cell that the walker has hardly left, and
+# that was taken
 # for STATIC while they were in it. Then the walker's own past speaks against them. With three cells the same walker is
-# followed for 1.5 m, which takes 1.1 s. Here three cells concern what is slower than 3 m/s, six cells what is slower
-# than 6 m/s.
+# followed for 1.5 m, which takes 1.1 s. With cells of 0.5 m, three cells matter for what is slower than 3 m/s, six
+# for what is slower than 6 m/s.
 #
 # **Predict before you run.** We let slow things look back over more and more cells. What becomes of the walkers that
 # are found? And what of the phantoms on our street with walls?
