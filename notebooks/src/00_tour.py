@@ -172,21 +172,21 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # | symbol | meaning | in code |
 # |---|---|---|
 # | $l$, $i$ | LIDAR points (N, 4): x, y, height, reflectance; image (3, h, w) | `frame.points`, `frame.image` |
-# | $m_k^t$ | state of cell $k$ at scan $t$: FREE, STATIC, DYNAMIC, UNKNOWN (in 02 free or occupied) | `State` |
+# | $m_k^t$ | state of cell $k$ at scan $t$: FREE, STATIC, DYNAMIC, UNKNOWN (in 02 free or occupied; in the graphs of 05 to 09 what stands there: road or car) | `State` |
 # | $n_t$ | place on the line, in 01; a plain $n$ elsewhere counts something | |
 # | $z_t$ | the scan at $t$, always with an index; $P(z_t \mid \cdot)$ is its evidence | `Evidence` |
 # | $b$ | belief: a probability for each state | `probability[:, r, c]` |
 # | $L$ | log-odds of a cell, $\log P / (1 - P)$ | `L` |
 # | $R, M$ | rates of change, 1/s; transition matrix $M = e^{R \Delta t}$ | `rates`, `transition_matrix` |
 # | $q$ | a particle, with place, velocity $v$ and weight $w$ | `Particles` |
-# | $a$; $a_j$ | probability that something arrives (03, 04); with an index, what pixel $j$ shows (from 05 on) | `arrives` |
+# | $a$; $a_j$ | probability that something arrives (03, 04); from 05 on the label of a pixel, $a_j$ of pixel $j$ | `arrives` |
 # | $e$ | an error that several readings share (01, 02) | |
 # | $\tau$; $T_b$ | memory of a cell (02); the time that the filter looks back | |
 # | $o$ | occupancy grid (4, H, W): the beliefs of all cells | `belief.probability` |
 # | $s$, $p$ | scores of pixels (C, h, w); scores resampled on planes (C, D, H, W) | `scores`, `planes` |
 # | $\delta_d$ | height of plane $d$ above the ground, metres | `heights` |
 # | $g$; $Q$ | semantic grid (C, H, W): a probability for each class; its mean-field refinement | `grid`, `refined` |
-# | $c$ | a class; $x_i$ is the class of cell $i$ in equations (3) and (4) | |
+# | $c$ | a class; $x_i$ is the class of cell $i$ in equations (3) and (4), of a pixel, a reading or a return in the graphs of 06, 07 and 09 | |
 # | $x, y$; $X, Y, Z$; $u, v$ | grid: forward, left; camera: right, down, ahead; pixel: right, down | `pixels` |
 # | $K$, $T$ | the camera's intrinsic matrix; rigid transform, read its name from right to left | `T_camera_from_grid` |
 # | $\sigma$ | a standard deviation; its index says of what | |
