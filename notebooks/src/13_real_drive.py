@@ -615,7 +615,7 @@ for k, frame in list(enumerate(FAULTS["LIDAR tilted"](frames)))[::4]:
 #
 # The geometry has passed, as far as this drive can tell. So the map can be judged. The excerpt has labels: the
 # classes of the LIDAR's returns, collected over some scans, say what stands in 27,445 cells in the camera's view, in ten
-# frames. (Lecture 10 took the 15,431 of them that are marked as seen in their own frame. There the network from simulated
+# frames. (Lecture 10 took some 15,400 of them, those marked as seen in their own frame. There the network from simulated
 # streets has 75 % right.) What should a map be compared with? With a map that never looks at the image: a **table** that
 # gives each cell the class that is most frequent in its occupancy state, learned from these very labels.
 #
