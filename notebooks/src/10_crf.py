@@ -1060,7 +1060,7 @@ Markdown("\n".join(lines))
 # For all three networks, in the paper as here, the CRF costs more than a point of class accuracy. With pixel accuracy
 # they differ: in the paper it rises a little for all three, here it rises for DeepLab, falls for FCN, and changes by less
 # than a tenth of a point for SegNet. Lecture 12
-# uses several seeds and LIDAR labels, as the paper does, and by those it rises for all three.
+# uses several seeds, and LIDAR labels like the paper; by those it rises for all three.
 #
 # What is missing is speed. All 2400 cells of this lecture make 2.9 million pairs; the paper's grid makes 1.5 billion.
 # Lecture 11 computes nearly the same sums without visiting the pairs.

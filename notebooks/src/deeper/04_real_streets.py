@@ -348,8 +348,8 @@ print(
 assert beside_a_wall > 5 * alone
 
 # %% [markdown]
-# One number stands for two very different ones. Then and now it is about twice too high away from walls, and about ten
-# times too low beside one.
+# One number stands for two very different ones. Then and now it is about twice the measured share away from walls, and
+# about a tenth of it beside one.
 #
 # ### As a graph
 #
