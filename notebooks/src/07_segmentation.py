@@ -97,10 +97,10 @@ NOW, CROP = 14, (slice(10, 82), slice(196, 236))  # the frame of all pictures; i
 # %% [markdown]
 # ## A sign moves by one pixel at a time
 #
-# Here are a road sign and a lamp post of the drive, as the labels of frame 14 have them. The sign's post is one or two
-# pixels wide. Each picture beside it was made smaller, to a quarter of its height and width, and then brought back to
-# full size, in one of six ways. Nothing is learnt here. Watch what happens as the street moves to the right, one pixel
-# a step:
+# Here are a road sign and a lamp post of the drive, as the labels of frame 14 have them. The sign's post is one or
+# two pixels wide. Each picture beside it was made smaller, to a quarter of its height and width (G was only blurred),
+# and then brought back to full size, in one of six ways. Nothing is learnt here. Watch what happens as the street
+# moves to the right, one pixel a step:
 
 # %% jupyter={"source_hidden": true} alt="animation: A, a sign on a thin post and a lamp post move to the right; B and C, brought back from maxima, the posts are wide and move in jumps of four pixels; D, indices, the posts are dotted lines in the right place; E, skips, a sharp post within a faint, wider one; F, strided, blurred, and the thin post changes its brightness and shape; G, atrous, blurred, and it moves evenly"
 
@@ -141,8 +141,9 @@ stage.draw(ax, highlight=["x3"])
 plt.show()
 
 # %% [markdown]
-# $x_1 \dots x_5$ are the labels of five pixels from top to bottom, $s_k$ the class that the scores prefer at pixel $k$,
-# right with probability 0.73. A neighbour has the same label with probability 0.8.
+# $x_1 \dots x_5$ are the labels of five pixels from top to bottom, $s_k$ the class that the scores prefer at pixel
+# $k$ (elsewhere $s$ are the scores themselves), right with probability 0.73. A neighbour has the same label with
+# probability 0.8.
 #
 # **Predict before you run.** The scores say post, post, *something else*, post, post. Is the third pixel a post? Then go
 # *across* a post that is one pixel wide: else, else, post, else, else. What does the same chain say of the third pixel
@@ -254,7 +255,7 @@ for lead in (0, 6, 12):
 # evidence was: leads of 6 and 12 both become nearly 1. And a gradient that comes back from the map would be multiplied by
 # the slope of the soft-max, so that hardly anything would get through a pixel that is sure.
 #
-# ### Their zero says "nobody looked"
+# ### On the planes a zero says "nobody looked"
 #
 # Under a soft-max any number may be added to all scores of a pixel. On the planes that is no longer free. A point that
 # no pixel shows gets zeros (lecture 06). So zero has a meaning there: *nobody looked*. By hand: one cell has points on
@@ -476,7 +477,7 @@ for image in (by_hand, rng.normal(size=(6, 10))):
     np.testing.assert_allclose(unpool(pooled, indices, image.shape), F.max_unpool2d(values, places, 2)[0, 0])
 
 # %% [markdown]
-# The indices cost two bits a window and no weights. On the drive, this is the channel of the trained SegNet, before its
+# The indices cost two bits a window and no weights. On the drive, take the channel of the trained SegNet, before its
 # first pooling, that answers most strongly to sign and lamp post. Pool it once, and bring it back in two ways:
 
 # %% jupyter={"source_hidden": true} alt="four pictures of sign and lamp post: A the image; B a channel of SegNet with thin bright lines; C the same after pooling and giving each value to four pixels, lines twice as wide and stepped; D after unpooling by indices, the lines dotted in their place"
@@ -903,7 +904,8 @@ plt.show()
 # comes back as dots on a lattice that isn't in the world. The decoder has to smooth it again.
 #
 # **The edge that was cut.** A soft-max per pixel doesn't keep neighbours together: SegNet's labels of the drive have
-# specks and gaps (C). Those of FCN and DeepLab are smooth, because they enlarge coarse scores, and lack the thin post.
+# specks and gaps (picture C of the drive's post). Those of FCN and DeepLab are smooth, because they enlarge coarse
+# scores, and lack the thin post.
 #
 # ## The ledger
 

@@ -364,7 +364,7 @@ plt.show()
 #
 # | cell | the ground plane says | $o$ says | truth |
 # |---|---|---|---|
-# | before the car | road | FREE | road |
+# | in front of the car | road | FREE | road |
 # | the car's rear | car | STATIC | car |
 # | in the car's shadow | car | UNKNOWN | unobserved |
 # | beside the road | sidewalk | FREE | sidewalk |

@@ -155,15 +155,16 @@ plt.show()
 # networks is that of their labels. With each of the seven made kinds the network stays 2 to 6 points below its labels,
 # with the true ones 32. So in the total made labels set a limit that this network nearly reaches.
 #
-# **Ten scans gain 6 points** by the true labels over cells with a class, and less than one over all cells, where not all
-# three intervals exclude zero. Judged by the usual labels over all cells, as in the paper, all three *lose* about 4
-# points, and the network with the true labels loses 15! Over the cells to which the usual labels give a class, they gain
-# 0.6 to 1.4 points in the mean, and it loses 6. A study that counts all cells by one kind of labels would have thrown the
-# better ones away.
+# **Ten scans gain 6 points** by the true labels over cells with a class, and less than one over all cells, where not
+# all three intervals exclude zero. Judged by the usual labels over all cells, as in the paper, all three *lose* about
+# 4 points, and the network with the true labels loses 15! Over the cells to which the usual labels give a class, they
+# gain 0.6 to 1.4 points on average, and it loses 6. A study that counts all cells by one kind of labels would have
+# thrown the better ones away.
 #
 # By the true labels and over the cells with a class, **no clean-up** costs 29 points (8 over all cells): only 18 % of
-# these labels are right. **Keeping only what the camera sees** costs 8, and over all cells nothing that these intervals
-# show. **De-skewing** changes pixel accuracy by less than half a point in the mean, in each of the four columns.
+# these labels are right. **Keeping only what the camera sees** costs 8, and over all cells nothing that these
+# intervals show. **De-skewing** changes pixel accuracy by less than half a point on average, in each of the four
+# columns.
 
 # %% jupyter={"source_hidden": true}
 right = [row["labels"]["semantic"]["pixel accuracy"]["mean"] for row in rows.values()]
