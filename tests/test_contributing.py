@@ -139,6 +139,13 @@ def test_what_the_documents_name_exists(folder):
         assert [name for name in names if not resolves(name)] == []
 
 
+def test_the_tests_that_hold_the_promises_exist():
+    text = (ROOT / "tests" / "graders" / "README.md").read_text(encoding="utf-8")
+    named = re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", text)
+    assert len(named) >= 38
+    assert [name for name in named if f"def {name[1]}".rstrip() not in (ROOT / name[0]).read_text()] == []
+
+
 def resolves(name):
     """Whether a dotted name below the package is a module's file, a module, or something in one."""
     try:

@@ -21,7 +21,7 @@ def glossary_page() -> str:
         *("", "| term | in the words of the lecture | lecture |", "|---|---|---|"),
     ]
     for term, name, number in sorted(entries, key=lambda entry: entry[0].lower()):
-        words = definition(texts(name), term, number).replace("|", "\\|")
+        words = definition(texts(name), term, number).rstrip(" ;:,").replace("|", "\\|")
         parts.append(f"| {term} | {words} | {link(name)} |")
     return "\n".join([*parts, "", "## One symbol, one meaning", "", *symbols()]) + "\n"
 

@@ -252,8 +252,10 @@ def write_reference(folder: Path) -> None:
         text += f"   :exclude-members: {', '.join(elsewhere)}\n" if elsewhere else ""
         (folder / "api" / f"{name}.rst").write_text(text, encoding="utf-8")
     names = "\n".join(f"api/{name}" for name in MODULES)
-    text = "# Reference\n\nThe modules of the book, from their docstrings.\n\n"
-    contents = f"```{{toctree}}\n:maxdepth: 1\n{names}\n```\n"
+    first = {name: import_module(f"semgrid_edu.{name}").__doc__.splitlines()[0] for name in MODULES}
+    lines = "\n".join(f"- [semgrid_edu.{name}](api/{name}.rst): {words}" for name, words in first.items())
+    text = f"# Reference\n\nThe modules of the book, from their docstrings.\n\n{lines}\n\n"
+    contents = f"```{{toctree}}\n:hidden:\n:maxdepth: 1\n{names}\n```\n"
     (folder / "api.md").write_text(text + contents, encoding="utf-8")
 
 
@@ -276,13 +278,25 @@ def write_gallery(folder: Path) -> None:
         outputs = [o for cell in nbformat.read(path, as_version=4).cells for o in cell.get("outputs", [])]
         figures = [output for output in outputs if "image/png" in output.get("data", {})]
         if figures:
-            parts += ["", f"## [{path.stem}]({path.relative_to(CLONE)})", ""]
+            parts += ["", f"## [{title(path)}]({path.relative_to(CLONE)})", ""]
         for number, figure in enumerate(figures, 1):
             name, words = f"{path.stem}-{number}.png", html.escape(alternative_text(figure))
             (pictures / name).write_bytes(base64.b64decode(figure.data["image/png"]))
             image = f'<img src="figures/{name}" alt="{words}" loading="lazy">'
             parts += [f'<figure><a href="figures/{name}">{image}</a><figcaption>{words}</figcaption></figure>', ""]
     (folder / "gallery.md").write_text("\n".join(parts), encoding="utf-8")
+
+
+def title(path: Path) -> str:
+    """Return the first heading of a notebook.
+
+    Parameters
+    ----------
+    path : Path
+        The notebook.
+    """
+    first = next(cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "markdown")
+    return first.splitlines()[0].lstrip("# ")
 
 
 def copy_demo(folder: Path) -> None:
