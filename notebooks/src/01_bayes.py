@@ -86,6 +86,7 @@ def ring_frames():
         belief = discrete_bayes.update(P_POLE if k in SAYS_POLE else 1 - P_POLE, prior)
         draw_ring(ax, prior, place, f"step {k}: predict")
         yield ax.figure
+        ax.figure.set_layout_engine("none")  # only the first frame is laid out
         draw_ring(ax, belief, place, f'step {k}: sensor says "{"pole" if k in SAYS_POLE else "nothing"}"')
         yield ax.figure
 

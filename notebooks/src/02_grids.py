@@ -123,6 +123,7 @@ def remembered():
             style = {"arrowstyle": "->", "color": "black", "linewidth": 1.2}
             axes[1].annotate(letter, at, text, fontsize=12, fontweight="bold", arrowprops=style)
         yield fig
+        fig.set_layout_engine("none")  # only the first frame is laid out
 
 
 alt = "red streaks grow in the map of all scans, behind an oncoming car at A and behind a car that drives off at B"
@@ -487,6 +488,7 @@ def thickening():
         ax.set_title(f"after {n + 1} scan" + "s" * (n > 0))
         ax.legend(loc="upper left", fontsize=9, frameon=False)
         yield fig
+        fig.set_layout_engine("none")  # only the first frame is laid out
 
 
 plotting.animate(
@@ -630,6 +632,7 @@ def two_memories():
                 size = car.y_max - car.y_min, car.x_max - car.x_min
                 ax.add_patch(plt.Rectangle((car.y_min, car.x_min), *size, fill=False, edgecolor="tab:red"))
         yield fig
+        fig.set_layout_engine("none")  # only the first frame is laid out
 
 
 plotting.animate(two_memories(), period=0.3, alt="the tail of the oncoming car grows, and fades where the grid forgets")

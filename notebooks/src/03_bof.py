@@ -101,6 +101,7 @@ def frames_of(scene):
         arrow.set_data(*(([], []) if cells is None else ([cells / 2 + 0.25], [1.12])))
         top.set_title(caption, loc="left", fontsize=11)
         yield fig
+        fig.set_layout_engine("none")  # only the first frame is laid out
 
 
 plotting.animate(frames_of(scene), 0.3, alt="a column of velocities is sheared, and returns pick one velocity")
@@ -566,6 +567,7 @@ def crossing():
         axes[0].set_title(f"log-odds grid, {k / 10:.1f} s")
         axes[1].set_title(f"BOF, {k / 10:.1f} s")
         yield fig
+        fig.set_layout_engine("none")  # only the first frame is laid out
 
 
 plotting.animate(crossing(), 0.2, alt="two boxes cross; the log-odds grid smears them, BOF colours them by heading")

@@ -101,6 +101,7 @@ def three_filters():
             for text, place in zip(texts, places, strict=True):
                 text.set(position=place, visible=0 < place[1] < 41)
         yield fig
+        fig.set_layout_engine("none")  # only the first frame is laid out
 
 
 plotting.animate(three_filters(), 0.2, alt="three filters on one street: A overtakes, B comes, C is left, D stands")

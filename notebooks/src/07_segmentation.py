@@ -716,11 +716,11 @@ _ = interact(draw_ways, column=IntSlider(9, 4, 16), width=IntSlider(1, 1, 6))
 #
 # **Predict before you run.** Order the six by how well they draw posts that they haven't seen (*intersection over
 # union*, IoU: pixels that are post and called post, over pixels that are one or the other). Will the last of them catch
-# up with eight times as many steps?
+# up with three times as many steps?
 #
 # <details><summary>Answer</summary>
 #
-# Strided is last, then nearest and bilinear, then indices; skips and atrous are best. With eight times the steps
+# Strided is last, then nearest and bilinear, then indices; skips and atrous are best. With three times the steps
 # strided has gained, and its IoU stays below a half.
 #
 # </details>
@@ -734,14 +734,14 @@ for way in MECHANISMS:
     got = reached[way] = score_poles(drawn[way], posts_of)
     width = f"{got.width:.1f} ({got.true_width:.1f})"
     print(f"{way:<11} {100 * got.iou:8.0f} {100 * got.missed:15.0f} {width:>23} {got.offset:18.2f}")
-longer = score_poles(train_pole_net("strided", steps=1200)(unseen).detach().argmax(dim=1), posts_of)
-print(f"strided, 1200 steps in place of 150: IoU {100 * longer.iou:.0f} %")
+longer = score_poles(train_pole_net("strided", steps=450)(unseen).detach().argmax(dim=1), posts_of)
+print(f"strided, 450 steps in place of 150: IoU {100 * longer.iou:.0f} %")
 assert reached["strided"].iou < min(reached["nearest"].iou, reached["bilinear"].iou)
 assert reached["indices"].iou < min(reached["skips"].iou, reached["atrous"].iou)
-assert reached["strided"].iou < longer.iou < 0.55
+assert reached["strided"].iou < longer.iou < 0.5
 assert sum(weights.numel() for weights in train_pole_net("atrous", steps=1).parameters()) == 3242
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three unseen pictures in rows, with truth and what the six networks draw: nearest and bilinear draw some posts too wide, indices one with a gap and a speck, skips and atrous whole posts, strided misses one and draws two as blobs"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three unseen pictures in rows, with truth and what the six networks draw: nearest and bilinear draw some posts too wide, indices one with a gap, and a speck beside another, skips and atrous whole posts, strided misses one and draws two as blobs"
 fig, axes = plt.subplots(3, 8, figsize=(8.8, 3.5), layout="constrained")
 for row, k in zip(axes, (1, 2, 4), strict=True):
     for ax, (name, pictures) in zip(row, drawn.items(), strict=True):
@@ -753,8 +753,8 @@ plt.show()
 # %% [markdown]
 # Each row is one unseen picture; the thin bar of the second column is the post, the other bar of the image is the wall.
 # The three ways that kept the column of the toy post are also the best three after learning (one training run each).
-# Atrous takes more time, because its maps keep all their pixels. Eight times the steps didn't repair what strides had
-# lost: after 1200 of them the strided network is still behind what indices have after 150.
+# Atrous takes more time, because its maps keep all their pixels. Three times the steps didn't repair what strides had
+# lost: after 450 of them the strided network is still behind what indices have after 150.
 #
 # ## A post of the drive
 #
@@ -791,10 +791,10 @@ for name, labels in called.items():
 # ## A real street
 #
 # The same three networks on a real image, from PandaSet. They have seen simulated streets only. Half of the image's
-# pixels have a label, from LIDAR returns that people have labelled. Let us train on some of them: 40 steps of gradient
-# descent on six frames, and on the points of the *left* half of the image alone. Then we judge two later frames, the
-# left half and the right half apart. The vehicle moves by a decimetre only, so the left half of the later frames is
-# nearly the image that was learnt; the right half is another part of the same street.
+# pixels have a label, from LIDAR returns that people have labelled. Let us train on some of them: 30 steps of gradient
+# descent, each on two of six frames, and on the points of the *left* half of the image alone. Then we judge two later
+# frames, the left half and the right half apart. The vehicle moves by a decimetre only, so the left half of the later
+# frames is nearly the image that was learnt; the right half is another part of the same street.
 #
 # **Predict before you run.** How will the accuracy change on the left half? On the right half? And if the networks learn
 # on the right half instead, what happens on the left?
@@ -802,9 +802,8 @@ for name, labels in called.items():
 # <details><summary>Answer</summary>
 #
 # The half that was learnt: all three networks reach more than nine of ten labelled pixels. The other half: learning on
-# the left, SegNet and FCN gain in pixel accuracy and DeepLab loses; SegNet and DeepLab lose ten points and more of class
-# accuracy, FCN hardly any. Learning on the right, SegNet falls from 81 to 25 % of the left half's pixels, while FCN stays
-# and gains class accuracy.
+# the left, SegNet and FCN gain in pixel accuracy and DeepLab loses; all three lose class accuracy, DeepLab the most.
+# Learning on the right, SegNet falls from 81 to 25 % of the left half's pixels, while FCN stays and gains class accuracy.
 #
 # </details>
 
@@ -817,13 +816,13 @@ way = np.linalg.norm(street[9].T_world_from_lidar[:3, 3] - street[0].T_world_fro
 print(f"{(real_truths != IGNORE).mean():.0%} of the pixels have a label; the vehicle has moved by {way:.1f} m")
 
 
-def after_learning(name, half, steps=40):
+def after_learning(name, half, steps=30):
     """Return an image network after some steps on the labelled points of one half of the first six frames."""
     net = load_net(sample_image_stage(name), street.camera).segmenter.train()
     x, labels = as_input(real_images), torch.from_numpy(labels_of[half]).long()
     descent, chosen = torch.optim.SGD(net.parameters(), lr=0.02, momentum=0.9), np.random.default_rng(0)
     for _ in range(steps):
-        k = chosen.choice(6, 3, replace=False)
+        k = chosen.choice(6, 2, replace=False)
         descent.zero_grad()
         F.cross_entropy(net(x[k]), labels[k], ignore_index=IGNORE).backward()
         descent.step()
@@ -852,8 +851,9 @@ for view in views.values():
     before, left, right = (view[key][1] for key in ("before", "left", "right"))  # rows: halves; pixel, class accuracy
     assert left[0, 0] > max(90, before[0, 0])
     assert right[1, 0] > max(90, before[1, 0])
-for name in ("segnet", "deeplab"):
-    assert views[name]["left"][1][1, 1] < views[name]["before"][1][1, 1] - 5
+lost = {name: view["before"][1][1] - view["left"][1][1] for name, view in views.items()}  # pixel, class accuracy
+assert [name for name in NAMES if lost[name][0] > 0] == ["deeplab"]
+assert 0 < min(lost["segnet"][1], lost["fcn"][1]) < 10 < lost["deeplab"][1]
 assert views["segnet"]["right"][1][0, 0] < 50 < views["segnet"]["before"][1][0, 0]
 assert views["fcn"]["right"][1][0, 1] > views["fcn"]["before"][1][0, 1]
 
@@ -876,7 +876,7 @@ plt.show()
 
 # %% [markdown]
 # The dotted line is the middle. Before, the networks have seen simulated streets only, and call more than half of the
-# labelled pixels right in each half. After 40 steps the left half agrees with its points. On the right half each of the
+# labelled pixels right in each half. After 30 steps the left half agrees with its points. On the right half each of the
 # three has lost class accuracy, and DeepLab pixel accuracy, too. That is **overfitting**: a network fits the view that it
 # learns better than the street. If you judge a network on the frames that it learnt, you measure its memory. Lecture
 # [13](13_real_drive.ipynb) comes back to it.

@@ -2,7 +2,6 @@
 
 import resource
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -95,16 +94,6 @@ def test_it_stops_when_nothing_changes_any_more():
     calm, sooner = (mean_field_accurate(unary, values, CrfParams(), 1000, tolerance) for tolerance in (1e-6, 1e-2))
     np.testing.assert_allclose(mean_field_accurate(unary, values, CrfParams(), 200), calm, atol=1e-4)
     assert np.abs(calm - sooner).max() > 1e-6
-
-
-def test_the_number_of_threads_changes_no_bit():
-    unary, values = street(1, (30, 20))
-    found = []
-    for threads in range(1, numba.config.NUMBA_NUM_THREADS + 1):
-        numba.set_num_threads(threads)
-        found.append(mean_field_accurate(unary, values, CrfParams(), 3))
-    for other in found[1:]:
-        np.testing.assert_array_equal(other, found[0])
 
 
 def test_a_grid_whose_matrix_would_not_fit_takes_little_memory():

@@ -6,7 +6,6 @@ import sys
 from dataclasses import replace
 
 import pytest
-import test_fair as fair
 import test_grader_01_bayes as catalogue
 import test_sound as sound
 from class_of import NAME, POINTS, REFERENCE, SETTINGS, handed_in, inside
@@ -27,13 +26,6 @@ def with_entries(entries):
     return handed_in(answers), 15 - sum(entry.loses for entry in entries)
 
 
-def changed(change):
-    """Return a right notebook after something happened to it."""
-    notebook = handed_in()
-    change(notebook)
-    return notebook, 15
-
-
 def students_of_each_kind():
     """Return each student's notebook and the points that it should earn: each kind, and each task right and wrong.
 
@@ -43,14 +35,12 @@ def students_of_each_kind():
     rights = {task: [e for e in entries if e.task == task and not e.loses] for task in tasks}
     wrongs = {task: [e for e in entries if e.task == task and e.loses and "timeout" not in e.says] for task in tasks}
     found = {"right-0": (handed_in(), 15), "untouched-0": (handed_in({}), 0)}
-    found |= {f"right-{k}": with_entries([ways[k - 1] for ways in rights.values()]) for k in (1, 2)}
-    for without in zip(tasks[::2], tasks[1::2], strict=True):
-        answers = {task: code for task, code in REFERENCE.items() if task not in without}
-        found[f"without-{'-'.join(without)}"] = handed_in(answers), 15 - sum(POINTS[task] for task in without)
-    found |= {f"wrong-{k}": with_entries([ways[k % len(ways)] for ways in wrongs.values()]) for k in range(3)}
-    found |= {"unlucky-split": changed(fair.split), "unlucky-exit": (handed_in(inside("predict", "exit()")), 12)}
-    hostile = ("transformer", "fake-module")
-    found |= {f"hostile-{k}": (handed_in(sound.EASIER, sound.EASY + sound.ATTACKS[k]), 0) for k in hostile}
+    found["right-1"] = with_entries([ways[0] for ways in rights.values()])
+    half = {task: code for task, code in REFERENCE.items() if task in tasks[::2]}
+    found["half"] = handed_in(half), sum(POINTS[task] for task in half)
+    found |= {f"wrong-{k}": with_entries([ways[k % len(ways)] for ways in wrongs.values()]) for k in range(2)}
+    found["unlucky-exit"] = handed_in(inside("predict", "exit()")), 12
+    found["hostile-transformer"] = handed_in(sound.EASIER, sound.EASY + sound.ATTACKS["transformer"]), 0
     return found
 
 

@@ -213,6 +213,18 @@ def bayes_update(belief, likelihood):
     return belief""",
         ),
         mistake(
+            "argument changed in place, but for small grids",
+            task="bayes-update",
+            loses=3,
+            says="on inputs you haven't seen: it changes an argument",
+            code="""
+def bayes_update(belief, likelihood):
+    after = belief.copy() if belief.size < 30 else belief
+    after *= likelihood
+    after /= after.sum(axis=0)
+    return after""",
+        ),
+        mistake(
             "only the grid of the visible test",
             task="bayes-update",
             loses=3,
@@ -536,6 +548,20 @@ def fm_iou(confusion):
     return (cells / cells.sum() * right / union).sum()""",
         ),
         mistake(
+            "the argument changed, but for few classes",
+            task="fmiou",
+            loses=3,
+            says="on inputs you haven't seen: it changes an argument",
+            code="""
+def fm_iou(confusion):
+    right = confusion.diagonal().copy()
+    cells = confusion.sum(axis=1)
+    union = np.maximum(cells + confusion[:, :-1].sum(axis=0) - right, 1)
+    if len(confusion) > 3:
+        confusion *= 0
+    return (cells / cells.sum() * right / union).sum()""",
+        ),
+        mistake(
             "cells without a claim left out",
             task="fmiou",
             loses=3,
@@ -674,5 +700,16 @@ def forgetting(joint):
     alone = -(seen * np.log(seen / seen.sum(0))).sum()
     joint /= joint.sum(0)
     return 0.2949, alone""",
+        ),
+        mistake(
+            "the argument changed, where something never happens",
+            task="forgetting",
+            loses=3,
+            says="on inputs you haven't seen: it changes an argument",
+            code="""
+def forgetting(joint):
+    joint[joint == 0] = 1e-300
+    seen = joint.sum(1)
+    return -(joint * np.log(joint / joint.sum(0))).sum(), -(seen * np.log(seen / seen.sum(0))).sum()""",
         ),
     )

@@ -93,6 +93,7 @@ def check_accuracies(accuracies: Callable) -> None:
 
 
 @hidden
+@keeping
 def check_fm_iou(fm_iou: Callable) -> None:
     """Random confusion: classes without truth, one of them claimed, one never found, and one that never occurs."""
     rng = generator(6)
@@ -101,15 +102,14 @@ def check_fm_iou(fm_iou: Callable) -> None:
         confusion[[2, 7, 13]] = 0
         confusion[:, 7] = 0
         confusion[4, 4] = 0
-        given = confusion.copy()
-        found = answer_array(fm_iou(given))
+        found = answer_array(fm_iou(confusion.copy()))
         square = np.zeros((15, 15), int)  # no claim as a class that no cell is of
         square[:14] = confusion
         assert close(found, frequency_weighted_iou(square)), "wrong FmIoU (some classes have no truth)"
-        assert np.array_equal(given, confusion), "the argument is changed"
 
 
 @hidden
+@keeping
 def check_forgetting(forgetting: Callable) -> None:
     """Random joint tables, with cases that never happen and two images that never follow each other."""
     rng = generator(7)
@@ -117,10 +117,8 @@ def check_forgetting(forgetting: Callable) -> None:
         joint = rng.dirichlet(np.full(3 * 4 * 5, 0.5)).reshape(3, 4, 5)
         joint[1, 2] = joint[:, 3, 4] = 0
         joint /= joint.sum()
-        given = joint.copy()
-        found = answer_array(forgetting(given))
+        found = answer_array(forgetting(joint.copy()))
         assert found.shape == (2,), "return two numbers"
-        assert np.array_equal(given, joint), "the argument is changed"
         assert np.isfinite(found).all(), "NaN or infinity: what never happens adds nothing"
         both = _entropy(joint) - _entropy(joint.sum(axis=0))
         present = _entropy(joint.sum(axis=1)) - _entropy(joint.sum(axis=(0, 1)))
