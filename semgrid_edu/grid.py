@@ -68,6 +68,11 @@ class GridSpec:
         """Rows and columns, (H, W)."""
         return round((self.x_max - self.x_min) / self.cell), round((self.y_max - self.y_min) / self.cell)
 
+    @property
+    def corner(self) -> tuple[float, float, float]:
+        """x_max, y_max and cell as floats: numba compiles a loop anew for each mixture of them with whole numbers."""
+        return float(self.x_max), float(self.y_max), float(self.cell)
+
     def centers(self) -> NDArray[np.float64]:
         """Return x and y of the centre of every cell in the grid frame, (H, W, 2), metres."""
         height, width = self.shape

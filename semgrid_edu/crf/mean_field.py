@@ -37,7 +37,8 @@ def mean_field(
     unary, values = check_inputs(unary, values)
     check_stop(iterations, tolerance)
     spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
-    return iterate(_above_best(unary), bilateral_kernel(values, params), spatial, iterations, tolerance)
+    phi = _above_best(np.require(unary, requirements="CW"))
+    return iterate(phi, bilateral_kernel(values, params), spatial, iterations, tolerance)
 
 
 def iterate(

@@ -73,7 +73,7 @@ class SeparableGaussian:
         values, out : (H W, K) float32
             One row per cell, cells counted row by row; `out` is overwritten.
         """
-        grid, filtered = (array.reshape(len(self.row_scale), -1) for array in (values, out))
+        grid, filtered = (array.reshape(len(self.row_scale), -1) for array in (np.ascontiguousarray(values), out))
         # Zeros give rows beyond the grid no weight, and make the number of taps even. The tap at distance 0 is halved,
         # because the loops add it twice, forward and backward.
         taps = np.append(self.taps, np.zeros(len(self.taps) % 2, np.float32))

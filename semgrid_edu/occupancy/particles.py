@@ -30,7 +30,7 @@ def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
     spec : GridSpec
         The cells, (H, W).
     """
-    return _cells_of(position.ravel(), spec.shape, spec.x_max, spec.y_max, spec.cell)
+    return _cells_of(position.ravel(), spec.shape, *spec.corner)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -128,8 +128,7 @@ def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float, 
         row * W + column; `OUTSIDE` for a particle that is outside the grid then, or in the same cell as now.
     """
     now = particles.position.ravel(), particles.velocity.ravel()
-    grid = spec.shape, spec.x_max, spec.y_max, spec.cell
-    return _cells_at(*now, cells, np.float32(time), np.float32(fewest * spec.cell), *grid)
+    return _cells_at(*now, cells, np.float32(time), np.float32(fewest * spec.cell), spec.shape, *spec.corner)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -185,8 +184,7 @@ def doubt_arrivals(
         How fast the vehicle drives.
     """
     now = particles.position.ravel(), particles.velocity.ravel(), particles.weight, cells
-    grid = spec.shape, spec.x_max, spec.y_max, spec.cell
-    return _doubt_arrivals(*now, doubt, ahead, mixed[STATIC], open_space(mixed), pace, *grid)
+    return _doubt_arrivals(*now, doubt, ahead, mixed[STATIC], open_space(mixed), pace, spec.shape, *spec.corner)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -275,7 +273,7 @@ def transform(particles: Particles, motion: PlanarMotion) -> Particles:
     motion : PlanarMotion
         Pose of the new frame in the old one, metres and radians.
     """
-    T = (motion.dx, motion.dy, np.cos(motion.dyaw), np.sin(motion.dyaw))
+    T = (float(motion.dx), float(motion.dy), np.cos(motion.dyaw), np.sin(motion.dyaw))
     position, velocity = _transform(particles.position.ravel(), particles.velocity.ravel(), *T)
     return Particles(position.reshape(-1, 2), velocity.reshape(-1, 2), particles.weight)
 

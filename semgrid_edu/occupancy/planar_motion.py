@@ -170,8 +170,8 @@ def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpe
     pose : PlanarMotion
         Pose of the frame of `target` in that of `source`, metres and radians.
     """
-    corners = (source.x_max, source.y_max, source.cell, target.x_max, target.y_max, target.cell)
-    return _look_up(np.ascontiguousarray(values), outside, *corners, target.shape, pose.dx, pose.dy, pose.dyaw)
+    grids = *source.corner, *target.corner, target.shape
+    return _look_up(np.ascontiguousarray(values), outside, *grids, float(pose.dx), float(pose.dy), float(pose.dyaw))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

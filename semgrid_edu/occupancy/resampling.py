@@ -166,7 +166,7 @@ def draw_newborn(
     """
     chosen = draw_indices(resampling, newborn.ravel(), count, rng)
     part = rng.random((len(chosen), 2), np.float32)
-    position = _positions(chosen, part, spec.shape[1], spec.x_max, spec.y_max, spec.cell)
+    position = _positions(chosen, part, spec.shape[1], *spec.corner)
     return Particles(position, draw_velocities(len(chosen), max_speed, rng), equal_weights(newborn, len(chosen)))
 
 

@@ -145,7 +145,7 @@ class Scan:
 
     def evidence(self, spec: GridSpec, pose: PlanarMotion) -> Evidence:
         """Look each cell up in its beam. Parameters and result are those of `Measurement.evidence`."""
-        grid = (spec.shape, spec.x_max, spec.y_max, spec.cell, pose.dx, pose.dy, pose.dyaw)
+        grid = (spec.shape, *spec.corner, float(pose.dx), float(pose.dy), float(pose.dyaw))
         obstacles, ground = count_returns(self.points, self.sensor.obstacle_min, self.sensor.obstacle_max, *grid)
         beyond = beyond_reach(self.reach, *grid)
         passed, under = beyond <= -spec.cell / 2, (beyond > spec.cell / 2) & (beyond < self.sensor.under)

@@ -77,7 +77,7 @@ class PermutohedralLattice:
         elevated = np.einsum("nd,jd->nj", features, elevation(dimensions))
         if np.abs(elevated).max() > 2**30:
             raise ArgumentError("features", "fewer standard deviations, or a larger sigma", np.abs(features).max())
-        origins, ranks, weights = enclosing_simplices(elevated)
+        origins, ranks, weights = enclosing_simplices(np.asfortranarray(elevated))
         vertices = number_vertices(origins, ranks)
         corners = vertices.simplices.take(vertices.members, axis=0)
         starts, members = sort_by_vertex(corners.ravel(), vertices.neighbours.shape[2])
@@ -134,7 +134,7 @@ class PermutohedralLattice:
             What each vertex holds; the last row is zero.
         """
         blurred, other = np.zeros((2, len(self.starts), values.shape[1]), np.float32)
-        _splat(values, self.starts, self.points, self.splats, blurred)
+        _splat(np.ascontiguousarray(values), self.starts, self.points, self.splats, blurred)
         for forward, backward in self.neighbours:
             _blur(blurred, forward, backward, other)
             blurred, other = other, blurred
