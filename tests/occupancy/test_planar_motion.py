@@ -1,5 +1,7 @@
 """Planar motion, against rigid transforms in space."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,7 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import rigid_transform
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion
+from semgrid_edu.occupancy.planar_motion import _look_up, look_up
 
 metres, radians = st.floats(-50, 50), st.floats(-3, 3)
 motions = st.builds(PlanarMotion, metres, metres, radians)
@@ -40,3 +44,14 @@ def test_a_motion_to_nowhere_is_refused(bad):
         PlanarMotion(bad, 0, 0)
     with pytest.raises(ArgumentError, match="T_world_from_now"):
         PlanarMotion.from_poses(np.eye(4), np.full((4, 4), bad))
+
+
+def test_whole_numbers_are_not_compiled_anew():
+    grids = [GridSpec(*map(kind, (0, 4, -2, 2, 1))) for kind in (float, int)]
+    motions = [PlanarMotion(*map(kind, (1, 0, 0))) for kind in (float, int)]
+    values, nothing = np.arange(16, dtype=np.float32).reshape(1, 4, 4), np.zeros(1, np.float32)
+    looked = look_up(values, nothing, grids[0], grids[0], motions[0])
+    compiled = len(_look_up.signatures)
+    for source, target, motion in itertools.product(grids, grids, motions):
+        np.testing.assert_array_equal(look_up(values, nothing, source, target, motion), looked)
+    assert len(_look_up.signatures) == compiled
