@@ -784,8 +784,8 @@ for name, labels in called.items():
     print(f"of the sign's post {thin.sum()} pixels of {(truths[NOW][CROP] == POST)[22:62, 12:18].sum()}")
 
 # %% [markdown]
-# No network draws the sign's post. And FCN, whose finest scores are at 1/8, finds more of sign and posts than SegNet with
-# its indices. So it isn't enough to keep *where*: a network must have learnt *what* as well. The
+# No network draws the sign's post. And FCN, whose finest scores are at 1/8, finds more of sign and posts here than
+# SegNet with its indices. So it isn't enough to keep *where*: a network must have learnt *what* as well. The
 # [companion](deeper/07_trained_networks.ipynb) has the networks' tables, fields and failures.
 #
 # ## A real street
@@ -876,10 +876,10 @@ plt.show()
 
 # %% [markdown]
 # The dotted line is the middle. Before, the networks have seen simulated streets only, and call more than half of the
-# labelled pixels right in each half. After 30 steps the left half agrees with its points. On the right half each of the
-# three has lost class accuracy, and DeepLab pixel accuracy, too. That is **overfitting**: a network fits the view that it
-# learns better than the street. If you judge a network on the frames that it learnt, you measure its memory. Lecture
-# [13](13_real_drive.ipynb) comes back to it.
+# labelled pixels right in each half. After 30 steps the left half mostly agrees with its points. On the right half
+# SegNet and FCN have gained pixel accuracy, too; but all three have lost class accuracy, and DeepLab both. That is
+# **overfitting**: a network comes to fit the view that it learns better than the street. If you judge a network on
+# the frames that it learnt, you measure its memory. Lecture [13](13_real_drive.ipynb) comes back to it.
 #
 # ## Where this breaks
 #
