@@ -112,6 +112,7 @@ def widget_of(path: Path, notebook: nbformat.NotebookNode) -> tuple[Callable, di
     asked, namespace = [], {"__name__": "__main__"}
     ipywidgets.interact = lambda show, **controls: asked.append((show, controls))
     plt.show = lambda: None  # pictures stay open, to be saved
+    sys.path.insert(0, str(path.parent))  # where a kernel looks for modules beside the notebook
     with contextlib.chdir(path.parent), contextlib.redirect_stdout(io.StringIO()):
         for cell in notebook.cells:
             if cell.cell_type == "code" and not asked:

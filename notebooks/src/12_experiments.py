@@ -1047,5 +1047,5 @@ for share in (0.8, 0.3, 0.1, 0.05):
 #
 # ## Exercise
 #
-# [Exercise 12](exercises/12_experiments.ipynb): scores of pooled frames, Holm's correction, drives that share a town, a
-# paired difference, and an expected calibration error.
+# [Exercise 12](exercises/12_experiments.ipynb): scores of pooled frames, a correction that goes the other way, drives that
+# share a town, the share of errors that a method saves, and calibration in groups of equal number.

@@ -24,15 +24,16 @@ def drive_scores(counts, drives, least=1):
     return {result}"""
 
 
-def holm(order="np.argsort(p_values)", limit="level / (m - place)", stop="break", keep="p_values[k] > "):
+def hochberg(order="np.argsort(p_values)[::-1]", limit="level / (place + 1)", given="order[place:]", compare="<="):
     """Return an answer to task 2 with these parts."""
     return f"""
 def given_up(p_values, level=0.025):
-    found, m = [False] * len(p_values), len(p_values)
-    for place, k in enumerate({order}):
-        if {keep}{limit}:
-            {stop}
-        found[k] = True
+    order, found = {order}, [False] * len(p_values)
+    for place, k in enumerate(order):
+        if p_values[k] {compare} {limit}:
+            for one in {given}:
+                found[one] = True
+            break
     return found"""
 
 
@@ -230,39 +231,71 @@ def drive_scores(counts, drives, least=1):
             code=pooled(score="f'{np.trace(total) / total.sum():.1%}'"),
         ),
         # ---- task 2
-        right("a loop with a break", task="given-up", code=holm()),
+        right("a loop with a break", task="given-up", code=hochberg()),
         right(
             "adjusted p-values",
             task="given-up",
             code="""
 def given_up(p_values, level=0.025):
     p = np.asarray(p_values)
-    order = p.argsort()
-    adjusted = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))
+    order = p.argsort()[::-1]
+    adjusted = np.minimum.accumulate(p[order] * np.arange(1, len(p) + 1))
     return (adjusted <= level)[np.argsort(order)]""",
         ),
-        mistake("uncorrected", task="given-up", loses=2, says="without a correction", code=holm(limit="level")),
-        mistake("Bonferroni", task="given-up", loses=2, says="Bonferroni's correction", code=holm(limit="level / m")),
+        right(
+            "all up to the largest that goes",
+            task="given-up",
+            code="""
+def given_up(p_values, level=0.025):
+    ranks = {p: sum(q >= p for q in p_values) for p in p_values}
+    most = max((p for p in p_values if p <= level / ranks[p]), default=-1)
+    return [p <= most for p in p_values]""",
+        ),
+        mistake("uncorrected", task="given-up", loses=2, says="without a correction", code=hochberg(limit="level")),
         mistake(
-            "goes on after the first that stays",
+            "Bonferroni",
             task="given-up",
             loses=2,
-            says="stop at the first",
-            code=holm(stop="continue"),
+            says="that is Holm's correction, or Bonferroni's",
+            code=hochberg(limit="level / len(p_values)"),
+        ),
+        mistake(
+            "the package's function, wrapped",
+            task="given-up",
+            loses=2,
+            says="that is Holm's correction, or Bonferroni's",
+            code="""
+def given_up(p_values, level=0.025):
+    from semgrid_edu.workshop.paper.reports.verdicts import holm
+    return holm(p_values, level)""",
+        ),
+        mistake(
+            "each against its own limit",
+            task="given-up",
+            loses=2,
+            says="so it goes as well",
+            code=hochberg(given="[k]").replace("            break\n", ""),
+        ),
+        mistake(
+            "the first that goes alone",
+            task="given-up",
+            loses=2,
+            says="all smaller ones go as well",
+            code=hochberg(given="[k]"),
         ),
         mistake(
             "the list's own order",
             task="given-up",
             loses=2,
-            says="0.004 is at most",
-            code=holm(order="range(m)"),
+            says="comes first and is above the level",
+            code=hochberg(order="list(range(len(p_values)))"),
         ),
         mistake(
-            "largest first",
+            "smallest first",
             task="given-up",
             loses=2,
-            says="0.004 is at most",
-            code=holm(order="np.argsort(p_values)[::-1]"),
+            says="comes first and is above the level",
+            code=hochberg(order="np.argsort(p_values)"),
         ),
         mistake(
             "in sorted order",
@@ -271,29 +304,29 @@ def given_up(p_values, level=0.025):
             says="not in sorted order",
             code="""
 def given_up(p_values, level=0.025):
-    p = np.sort(p_values)
-    return np.cumprod(p <= level / np.arange(len(p), 0, -1)).astype(bool)""",
+    p = np.sort(p_values)[::-1]
+    return np.maximum.accumulate(p <= level / np.arange(1, len(p) + 1))[::-1]""",
         ),
         mistake(
             "below, not at most",
             task="given-up",
             loses=2,
             says="equal to its limit",
-            code=holm(keep="p_values[k] >= "),
+            code=hochberg(compare="<"),
         ),
         mistake(
             "five at most",
             task="given-up",
             loses=2,
             says="on inputs you haven't seen",
-            code=holm(order="np.argsort(p_values)[:5]"),
+            code=hochberg(order="np.argsort(p_values)[::-1][:5]"),
         ),
         mistake(
             "the level by heart",
             task="given-up",
             loses=2,
             says="level 0.05",
-            code=holm(limit="0.025 / (m - place)"),
+            code=hochberg(limit="0.025 / (place + 1)"),
         ),
         # ---- task 3
         right("by the formula", task="towns", code=jackknife()),

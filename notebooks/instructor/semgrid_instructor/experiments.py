@@ -43,21 +43,22 @@ def check_drive_scores(drive_scores: Callable) -> None:
 
 @hidden
 def check_given_up(given_up: Callable) -> None:
-    """One to twelve statements, sure ones and doubtful ones, other levels."""
+    """One to twelve statements, sure ones and doubtful ones, and some that lie near their limits; other levels."""
     rng = generator(119)
     for count in rng.integers(1, 13, 60):
-        p_values = rng.beta(0.3, 3, count)
         for level in (0.025, 0.1):
-            wanted = _given_up(p_values, level)
-            got = answer_array(given_up(p_values.tolist(), level)).ravel().astype(bool)
-            right = got.shape == wanted.shape and (got == wanted).all()
-            assert right, "other statements are given up"
+            near = level / np.arange(1, count + 1) * rng.uniform(0.8, 1.3, count)
+            for p_values in (rng.beta(0.3, 3, count), rng.permutation(near)):
+                wanted = _given_up(p_values, level)
+                got = answer_array(given_up(p_values.tolist(), level)).ravel().astype(bool)
+                right = got.shape == wanted.shape and (got == wanted).all()
+                assert right, "other statements are given up"
 
 
 def _given_up(p_values: NDArray, level: float) -> NDArray[np.bool_]:
-    """Return what Holm's correction gives up, by adjusted p-values."""
-    order = np.argsort(p_values)
-    adjusted = np.maximum.accumulate(p_values[order] * (len(p_values) - np.arange(len(p_values))))
+    """Return what Hochberg's correction gives up, by adjusted p-values."""
+    order = np.argsort(p_values)[::-1]
+    adjusted = np.minimum.accumulate(p_values[order] * np.arange(1, len(p_values) + 1))
     found = np.zeros(len(p_values), np.bool_)
     found[order] = adjusted <= level
     return found

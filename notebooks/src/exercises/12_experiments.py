@@ -108,48 +108,54 @@ _test()
 # %% [markdown]
 # ## Task 2: which statements to give up (2 points)
 #
-# `p_values` holds the p-value of each statement of a claim, in the claim's own order. Holm's correction gives up statements like this: sort them, smallest p-value first. Of $m$ statements, give up
-# the first if its p-value is at most level / $m$, then the second if it is at most level / $(m - 1)$, then the third if it is at most level / $(m - 2)$, and so on. **Stop at the first one that isn't given up**: those
-# after it stay as well.
+# `p_values` holds the p-value of each statement of a claim, in the claim's own order. Holm's correction, the lecture's, goes from the smallest p-value upwards and stops at the first that isn't given up. **Hochberg's** goes
+# downwards, with the same limits. It gives up at least as many, and is as safe where statements are independent. Sort them, *largest* p-value first. If the first is at most level, give up all of them. Otherwise it stays; if the second is at
+# most level / 2, give up this one **and all smaller ones**. Otherwise it stays as well; then comes the third, against level / 3, and so on.
 #
-# Complete `given_up`: it returns for each statement, in the order of `p_values`, whether it is given up.
+# Complete `given_up`: it returns for each statement, in the order of `p_values`, whether Hochberg's correction gives it up.
 
 
 # %% nbgrader={"grade": false, "grade_id": "given-up", "locked": false, "schema_version": 3, "solution": true, "task": false}
 def given_up(p_values, level=0.025):
-    """Return whether Holm's correction gives up each statement."""
+    """Return whether Hochberg's correction gives up each statement."""
     ### BEGIN SOLUTION
-    found, m = [False] * len(p_values), len(p_values)
-    for place, k in enumerate(np.argsort(p_values)):
-        if p_values[k] > level / (m - place):
+    found, order = [False] * len(p_values), np.argsort(p_values)[::-1]
+    for place, k in enumerate(order):
+        if p_values[k] <= level / (place + 1):
+            for smaller in order[place:]:
+                found[smaller] = True
             break
-        found[k] = True
     return found
     ### END SOLUTION
 
 
 # %% nbgrader={"grade": true, "grade_id": "given-up-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # Sorted: 0.004, 0.008, 0.013, 0.0135, 0.02, against 0.005, 0.00625, 0.0083, 0.0125, 0.025. The second stops it.
-    p_values = [0.02, 0.004, 0.013, 0.008, 0.0135]
+    # Sorted: 0.03, 0.013, 0.008, 0.0065, 0.004, against 0.025, 0.0125, 0.00833, 0.00625, 0.005. The third goes, and those after it.
+    p_values = [0.013, 0.004, 0.03, 0.008, 0.0065]
     got = answer_array(given_up(list(p_values)), "given_up").ravel()
     assert got.shape == (5,), f"five statements, five answers; got {got.size}"
     slips = {
-        (1, 1, 1, 1, 1): "this is without a correction: each p-value is compared with the level itself",
-        (1, 1, 0, 0, 0): "stop at the first that isn't given up: 0.02 lies below its limit, but comes after it",
-        (1, 0, 0, 0, 0): "answer in the order of `p_values`, not in sorted order",
-        (0, 0, 0, 0, 0): "0.004 is at most 0.025 / 5: it is given up",
+        (1, 1, 0, 1, 1): "this is without a correction: each p-value is compared with the level itself",
+        (
+            0,
+            1,
+            0,
+            0,
+            0,
+        ): "that is Holm's correction, or Bonferroni's: begin with the largest p-value, and let its limit be the level",
+        (0, 1, 0, 1, 0): "0.0065 is above its own limit, but smaller than 0.008, which is given up: so it goes as well",
+        (0, 0, 0, 1, 0): "with the first that is at most its limit, all smaller ones go as well",
+        (1, 1, 1, 0, 0): "answer in the order of `p_values`, not in sorted order",
+        (1, 1, 1, 1, 1): "the largest, 0.03, comes first and is above the level: it stays",
+        (0, 0, 0, 0, 0): "0.008, the third of the largest, is at most 0.025 / 3: it is given up",
     }
     found = tuple(got.astype(bool).astype(int).tolist())
-    assert found == (0, 1, 0, 0, 0), (
-        f"got {found}: {slips.get(found, 'only 0.004 is given up; is the order that of p_values?')}"
+    assert found == (0, 1, 0, 1, 1), (
+        f"got {found}: {slips.get(found, '0.008 and what is smaller is given up; is the order that of p_values?')}"
     )
-    # 0.001 <= 0.025 / 3, 0.012 <= 0.025 / 2 and 0.02 <= 0.025: all go. Bonferroni would keep the last two.
     got = answer_array(given_up([0.012, 0.001, 0.02]), "given_up").ravel().astype(bool).tolist()
-    assert got != [False, True, False], (
-        "this is Bonferroni's correction: the limit grows from one statement to the next"
-    )
-    assert got == [True, True, True], f"expected all three to be given up, got {got}"
+    assert got == [True, True, True], f"0.02 is at most 0.025, so all three are given up, got {got}"
     equal = answer_array(given_up([0.05, 0.025], level=0.05), "given_up").ravel().astype(bool).tolist()
     assert equal == [True, True], f"*at most*: a p-value equal to its limit is given up, with level 0.05; got {equal}"
     ### BEGIN HIDDEN TESTS
