@@ -2,8 +2,9 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import softmax
 
-from semgrid_edu.memory.state import MOVES, STAYS, ClassMemory, Look, MemoryParams
+from semgrid_edu.memory.state import MOVES, STAYS, ClassMemory, Look, MemoryParams, standing
 from semgrid_edu.occupancy import N_STATES, State
 
 
@@ -47,15 +48,24 @@ def recall_classes_literal(
 
     Parameters and result are those of `recall_classes`.
     """
-    here = ClassMemory(memory.planes.reshape(len(memory.planes), -1)[:, places])
+    here = ClassMemory(np.array(memory.planes.reshape(len(memory.planes), -1)[:, places], np.float64))
+    movable = np.isin(np.arange(len(look.classes)), params.movable)
+    here.evidence[:, movable] += np.log(standing(occupancy))
     evidence, weight, seen = _joined(here, look, np.ones((2, 1, 1)), params)
     scores = np.maximum(weight, 1)[:, None] * evidence
-    belief = np.exp(scores - scores.max(axis=1, keepdims=True))
-    belief /= belief.sum(axis=1, keepdims=True)
+    belief = np.where((here.weight > 0)[:, None], _come_and_gone(scores, look, movable), look.classes)
     moving = occupancy[State.DYNAMIC]
     classes = (1 - moving) * seen[STAYS] * belief[STAYS] + moving * seen[MOVES] * belief[MOVES]
     never = np.stack([1 - seen[MOVES if state == State.DYNAMIC else STAYS] for state in range(N_STATES)])
     return np.concatenate([classes, occupancy * never])
+
+
+def _come_and_gone(scores: NDArray, look: Look, movable: NDArray) -> NDArray[np.float64]:
+    """Let the frame alone say, as far as it sees, what comes and goes; the other classes share what remains."""
+    comes = movable[:, None, None]
+    decided = look.sees * look.classes + (1 - look.sees) * softmax(scores, axis=1)
+    there = np.where(comes, decided, 0).sum(axis=1, keepdims=True)
+    return np.where(comes, decided, (1 - there) * softmax(np.where(comes, -np.inf, scores), axis=1))
 
 
 def learn_classes_literal(memory: ClassMemory, places: NDArray, look: Look, params: MemoryParams) -> ClassMemory:

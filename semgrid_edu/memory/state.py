@@ -39,8 +39,9 @@ class MemoryParams:
         Rates at which what stays and what moves becomes something else, 1/s: by default those at which, in the
         occupancy filter's `WorldModel`, a STATIC and a DYNAMIC cell change into another known state.
     movable : tuple of int
-        Numbers of the classes that come and go: by default KITTI-14's car, pedestrian and bicycle. Where a frame shows
-        one of them it counts fully, because an earlier frame is no witness against what came since.
+        Numbers of the classes that come and go: by default KITTI-14's car, pedestrian and bicycle. As far as the camera
+        sees a cell now, this frame alone says whether one of them is there, because an earlier frame is no witness of
+        what came or left since. Where it doesn't look, a remembered one counts with `standing`.
     least_moving : float
         Probability of DYNAMIC from which on a cell holds something that moves. The default lies above `first_sight`'s
         0.003 and far below the 0.5 at which the cell is called DYNAMIC.
@@ -159,3 +160,15 @@ class Look(NamedTuple):
     sees: NDArray[np.float32]
     exponent: NDArray[np.float32]
     moving: NDArray[np.float32]
+
+
+def standing(occupancy: NDArray) -> NDArray:
+    """Return the probability that something stands or moves in each cell: in an UNKNOWN one it is as likely as not.
+
+    Parameters
+    ----------
+    occupancy : (4, ...) float
+        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN.
+    """
+    o = np.asarray(occupancy)
+    return np.maximum(o[State.STATIC] + o[State.DYNAMIC] + o[State.UNKNOWN] / 2, 1e-3)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.memory.state import MOVES, STAYS, ClassMemory, Look, MemoryParams
+from semgrid_edu.memory.state import MOVES, STAYS, ClassMemory, Look, MemoryParams, standing
 from semgrid_edu.occupancy import N_STATES, State
 
 FAINT = 1e-3
@@ -143,7 +143,8 @@ def recall_classes(
     """Join memory and frame into a semantic grid; the memory stays as it is.
 
     The classes of what stays count with P(not DYNAMIC), those of what moves with P(DYNAMIC). Where nothing was ever
-    seen of a layer, the mass goes to the unknown classes of the occupancy states.
+    seen of a layer, the mass goes to the unknown classes of the occupancy states. Whether something movable is there,
+    the frame says where the camera sees; elsewhere the memory does, and the laser as a second witness (`standing`).
 
     Parameters
     ----------
@@ -156,7 +157,7 @@ def recall_classes(
     look : Look
         What the frame says of the vehicle's cells.
     params : MemoryParams
-        What all frames together may be worth.
+        What all frames together may be worth, and which classes are movable.
 
     Returns
     -------
@@ -168,12 +169,16 @@ def recall_classes(
     n = len(look.log_class)
     recalled = np.zeros((n + N_STATES, *look.sees.shape), np.float32)
     flat = memory.evidence.reshape(2, n, -1), memory.weight.reshape(2, -1), memory.seen.reshape(2, -1)
-    _recall(*flat, places, occupancy, *look[:-1], np.float32(params.most), recalled)
+    movable = np.isin(np.arange(n), params.movable)
+    laser = np.log(standing(occupancy)).astype(np.float32)
+    _recall(*flat, places, occupancy, *look[:-1], np.float32(params.most), movable, laser, recalled)
     return recalled
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _recall(evidence, weight, seen, places, occupancy, classes, log_class, sees, exponent, most, recalled):
+def _recall(
+    evidence, weight, seen, places, occupancy, classes, log_class, sees, exponent, most, movable, laser, recalled
+):
     """Row by row, with a class in the inner loops, so that memory is read in order."""
     n, height, width = log_class.shape
     scores = np.zeros((n, width), np.float32)
@@ -200,30 +205,40 @@ def _recall(evidence, weight, seen, places, occupancy, classes, log_class, sees,
             for k in range(n):
                 for c in range(width):
                     if mass[c] > 0:
-                        mean = evidence[layer, k, places[r, c]]
+                        mean = evidence[layer, k, places[r, c]] + (laser[r, c] if movable[k] else np.float32(0))
                         if new[c] > 0:
                             mean = (old[c] * mean + new[c] * log_class[k, r, c]) / (old[c] + new[c])
                         scores[k, c] = mean * max(old[c] + new[c], np.float32(1))
-            _add_softmax(scores, mass, recalled[:, r])
+            _add_beliefs(scores, mass, classes[:, r], sees[r], movable, recalled[:, r])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_softmax(scores, mass, row):
-    """Share the mass of each cell of a row among its classes in proportion to the exponentials."""
+def _add_beliefs(scores, mass, classes, sees, movable, row):
+    """Share the mass of each cell of a row: the frame says, as far as it sees, what comes and goes (`movable`)."""
     n, width = scores.shape
-    top, total = np.full(width, -np.inf, np.float32), np.zeros(width, np.float32)
+    top, sums = np.full((2, width), np.float32(-np.inf)), np.zeros((2, width), np.float32)  # others, movable
+    there, here = np.zeros(width, np.float32), np.zeros(width, np.float32)
     for k in range(n):
         for c in range(width):
-            top[c] = max(top[c], scores[k, c])
-    for k in range(n):
-        for c in range(width):
-            if mass[c] > 0:
-                scores[k, c] = np.exp(scores[k, c] - top[c])
-                total[c] += scores[k, c]
+            top[int(movable[k]), c] = max(top[int(movable[k]), c], scores[k, c])
     for k in range(n):
         for c in range(width):
             if mass[c] > 0:
-                row[k, c] += mass[c] / total[c] * scores[k, c]
+                scores[k, c] = np.exp(scores[k, c] - top[int(movable[k]), c])
+                sums[int(movable[k]), c] += scores[k, c]
+                there[c] += sees[c] * classes[k, c] if movable[k] else np.float32(0)
+    for c in range(width):
+        if mass[c] > 0:  # `here`: what one unit of the movable ones' exponentials is worth
+            most = max(top[0, c], top[1, c])
+            others, movers = sums[0, c] * np.exp(top[0, c] - most), np.exp(top[1, c] - most)
+            here[c] = (1 - sees[c]) * movers / (others + sums[1, c] * movers)
+            there[c] += here[c] * sums[1, c]
+    for k in range(n):
+        for c in range(width):
+            if mass[c] > 0 and movable[k]:
+                row[k, c] += mass[c] * (sees[c] * classes[k, c] + here[c] * scores[k, c])
+            elif mass[c] > 0:
+                row[k, c] += mass[c] * (1 - there[c]) * scores[k, c] / sums[0, c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -64,6 +64,8 @@ def test_counts_are_those_by_hand():
     p = np.array([[0.8, 0.5, 0.1], [0.2, 0.5, 0.9]])
     counted = count_cells(p, np.array([0, 1, 0], np.uint8))
     np.testing.assert_array_equal(counted.confusion, [[1, 1], [1, 0]])
+    unknown = np.eye(14)[[12, 0]].T + 0.1 * np.eye(14)[[3, 5]].T  # its most probable class is unknown, road
+    assert count_cells(unknown, np.array([3, 0], np.uint8)).forbidden[[3, 0], [3, 0]].tolist() == [1, 1]
     assert counted.brier == pytest.approx(2 * (0.2**2 + 0.5**2 + 0.9**2))
     cells, confidence, right = counted.by_confidence.sum(axis=1)
     assert (cells, confidence, right) == (3, pytest.approx(0.8 + 0.5 + 0.9), pytest.approx(1))
@@ -72,7 +74,7 @@ def test_counts_are_those_by_hand():
 def test_each_group_counts_its_own_cells_and_unlabelled_ones_nowhere():
     counts, frames = GainCounts(SPEC), [frame(0.0, 10), frame(2.0, 10)]
     frames[1].labels.birdseye[:, :155] = IGNORE
-    road, car = (np.eye(14)[c][:, None, None] * np.ones(SPEC.shape) for c in (0, 3))
+    road, car = (np.float32(np.eye(14)[c][:, None, None] * np.ones(SPEC.shape)) for c in (0, 3))
     counts.add(frames, [{"one frame": car, "memory": road}, {"one frame": road, "memory": road}])
     scores = counts.summary()
     half = SPEC.shape[1] / 2
@@ -83,6 +85,10 @@ def test_each_group_counts_its_own_cells_and_unlabelled_ones_nowhere():
     assert (one, memory) == (pytest.approx(seen[1] / sum(seen), rel=0.05), 1)
     assert scores["in view"]["gain"]["pixel accuracy"]["mean"] == pytest.approx(memory - one)
     assert scores["in view"]["methods"]["memory"]["Brier"] == pytest.approx(0)
+    last = scores["seen before"]["methods"]["last look"]["pixel accuracy"]["mean"]
+    assert last == 0  # the first frame, which called everything car, is where the camera last saw them
+    assert scores["seen before"]["gain over the last look"]["pixel accuracy"]["mean"] == pytest.approx(1)
+    assert scores["seen later"]["cells"] == 0
 
 
 def test_the_last_maps_are_averaged_and_multiplied():

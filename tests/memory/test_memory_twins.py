@@ -132,6 +132,28 @@ def test_a_car_that_comes_into_view_is_believed_at_once():
     assert recall_classes(memory, ONE, o, look_at(car, o, spec, params), params)[1, 0, 0] > 0.8
 
 
+@pytest.mark.parametrize(("o", "still_there"), [((1, 0, 0, 0), 0.01), ((0, 1, 0, 0), 0.9), ((0, 0, 0, 1), 0.8181818)])
+def test_a_remembered_car_is_there_only_as_far_as_something_stands(o, still_there):
+    """By hand: the memory says car with 0.9; FREE leaves 0.001 of it, UNKNOWN 1/2: 0.45 / (0.45 + 0.1)."""
+    params, spec = MemoryParams(movable=(1,)), GridSpec(0, 1, 0, 1, 1)
+    o = np.array(o, np.float32).reshape(4, 1, 1)
+    car = look_at(np.array([0.1, 0.9, 0, 0, 0, 0], np.float32).reshape(6, 1, 1), o, spec, params)
+    memory = learn_classes(ClassMemory.empty(2, spec), ONE, car, params)
+    blind = Look(*np.zeros((2, 2, 1, 1), np.float32), *np.zeros((3, 1, 1), np.float32))
+    assert recall_classes(memory, ONE, o, blind, params)[1, 0, 0] == pytest.approx(still_there, abs=1e-2)
+
+
+@TWINS
+@given(SEEDS, PARAMS)
+def test_where_the_camera_sees_the_frame_alone_says_what_comes_and_goes(seed, params):
+    rng = np.random.default_rng(seed)
+    memory, (g, o) = memories(rng, params), frame(rng)
+    g[S:] = 0
+    g[:S] = np.moveaxis(rng.dirichlet(np.ones(S), GRID.shape), -1, 0)
+    recalled = recall_classes(memory, SAME, o, look_at(g, o, GRID, params), params)
+    np.testing.assert_allclose(recalled[1], g[1], atol=1e-5)
+
+
 def test_ground_under_a_moving_car_isnt_learnt_as_car():
     params, spec = MemoryParams(movable=(1,)), GridSpec(0, 1, 0, 1, 1)
     g = np.array([0.05, 0.95, 0, 0, 0, 0], np.float32).reshape(6, 1, 1)

@@ -18,10 +18,14 @@ from semgrid_edu.workshop.scoring.confusions import BANDS, band_names
 from semgrid_edu.workshop.scoring.counting import distance_bands, reliability_of_sums
 from semgrid_edu.workshop.scoring.score_with_interval import compared, score_with_interval
 
-GROUPS = ("in view", "seen before", "never seen")
-"""The cells that the camera sees now, those that it saw before, and the others."""
-ONE, MEMORY = "one frame", "memory"
-"""What memory is compared with, and its own name."""
+GROUPS = ("in view", "seen before", "never seen", "seen later")
+"""The cells that the camera sees now, those that it saw before, the others, and those of them that it sees later."""
+ONE, LAST_LOOK, MEMORY, SMOOTHED = "one frame", "last look", "memory", "whole drive"
+"""What memory is compared with, its own name, and that of `smooth_drive`."""
+GAINS = {"gain": (MEMORY, ONE), "gain over the last look": (MEMORY, LAST_LOOK), "gain of smoothing": (SMOOTHED, MEMORY)}
+"""Which methods are compared, by name."""
+PIXEL, CLASS, FORBIDDEN = "pixel accuracy", "class accuracy", "unknown forbidden"
+"""The metrics; the last one is pixel accuracy when only semantic classes may be answered."""
 
 
 def frames_since_seen(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int64]:
@@ -44,6 +48,31 @@ def frames_since_seen(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int
     return since
 
 
+def last_looks(
+    frames: Sequence[Frame], maps: Sequence[NDArray], since: NDArray, spec: GridSpec
+) -> list[NDArray[np.float32]]:
+    """Return what one frame said of each cell when the camera last saw it, (C, H, W) for each frame.
+
+    Parameters
+    ----------
+    frames : sequence of F Frame
+        The frames, in the order of time.
+    maps : sequence of F (C, H, W) float32
+        The semantic grid of each frame alone. Cells in view, and those that were never seen, keep it.
+    since : (F, H, W) int
+        From `frames_since_seen`.
+    spec : GridSpec
+        The grid, (H, W) cells.
+    """
+    looks = [one.copy() for one in maps]
+    for now, look in enumerate(looks):
+        for ago in np.unique(since[now][since[now] > 0]):
+            motion = PlanarMotion.from_poses(frames[now - ago].T_world_from_lidar, frames[now].T_world_from_lidar)
+            then = look_up(maps[now - ago], np.zeros(len(look), np.float32), spec, spec, motion)
+            look[:, since[now] == ago] = then[:, since[now] == ago]
+    return looks
+
+
 class CellCounts(NamedTuple):
     """What is counted of some cells and one method.
 
@@ -51,6 +80,8 @@ class CellCounts(NamedTuple):
     ----------
     confusion : (C, C) int64
         One row per true class.
+    forbidden : (C, C) int64
+        The same when only semantic classes may be answered.
     by_confidence : (3, B) float64
         As `GridCounts.reliability`.
     brier : float
@@ -58,6 +89,7 @@ class CellCounts(NamedTuple):
     """
 
     confusion: NDArray[np.int64]
+    forbidden: NDArray[np.int64]
     by_confidence: NDArray[np.float64]
     brier: float
 
@@ -72,13 +104,13 @@ def count_cells(probability: NDArray, truth: NDArray) -> CellCounts:
     truth : (N,) uint8
         Their classes.
     """
-    n = len(probability)
-    confusion = confusion_matrix(truth, probability.argmax(axis=0), n)
+    n, semantic = len(probability), probability[: KITTI_14.n_semantic]
+    confusion, forbidden = (confusion_matrix(truth, of.argmax(axis=0), n) for of in (probability, semantic))
     if not len(truth):
-        return CellCounts(confusion, np.zeros((3, 15)), 0.0)
+        return CellCounts(confusion, forbidden, np.zeros((3, 15)), 0.0)
     diagram = reliability(probability, truth)
     sums = np.stack([diagram.cells, diagram.confidence * diagram.cells, diagram.accuracy * diagram.cells])
-    return CellCounts(confusion, sums, float(np.square(probability - np.eye(n)[:, truth]).sum()))
+    return CellCounts(confusion, forbidden, sums, float(np.square(probability - np.eye(n)[:, truth]).sum()))
 
 
 class GainCounts:
@@ -104,17 +136,19 @@ class GainCounts:
         grids : sequence of F dict of str to (C, H, W) float
             What the methods make of each, by name.
         """
-        since, truth = frames_since_seen(frames, self.spec), [one.labels.birdseye_on(self.spec) for one in frames]
-        truth = np.stack(truth)
-        for method in grids[0]:
-            said = np.stack([grid[method] for grid in grids], axis=1)
-            for name, cells in self._groups(since, truth != IGNORE).items():
+        since, until = frames_since_seen(frames, self.spec), frames_since_seen(frames[::-1], self.spec)[::-1]
+        truth = np.stack([one.labels.birdseye_on(self.spec) for one in frames])
+        looks = last_looks(frames, [grid[ONE] for grid in grids], since, self.spec)
+        groups = self._groups(since, until, truth != IGNORE)
+        for method in (*grids[0], LAST_LOOK):
+            said = np.stack(looks if method == LAST_LOOK else [grid[method] for grid in grids], axis=1)
+            for name, cells in groups.items():
                 counted = count_cells(said[:, cells], truth[cells])
                 self._counts.setdefault((name, method), []).append(counted)
 
-    def _groups(self, since: NDArray, labelled: NDArray) -> dict[str, NDArray[np.bool_]]:
+    def _groups(self, since: NDArray, until: NDArray, labelled: NDArray) -> dict[str, NDArray[np.bool_]]:
         """Return the cells of each group, and of the parts of the first two by distance and by time."""
-        seen = dict(zip(GROUPS, (since == 0, since > 0, since < 0), strict=True))
+        seen = dict(zip(GROUPS, (since == 0, since > 0, since < 0, (since < 0) & (until > 0)), strict=True))
         bands = {f"in view, {name}": seen["in view"] & (self._bands == k) for k, name in enumerate(band_names(BANDS))}
         times = {f"seen {k} to {k + 4} frames ago": (since >= k) & (since < k + 5) for k in (1, 6, 11)}
         return {name: cells & labelled for name, cells in (seen | bands | times).items()}
@@ -126,14 +160,20 @@ class GainCounts:
 
     def _scores(self, name: str) -> dict[str, object]:
         of = {method: counts for (group, method), counts in self._counts.items() if group == name}
-        of = of if name in GROUPS else {method: of[method] for method in (ONE, MEMORY)}
+        of = of if name in GROUPS else {method: of[method] for method in of if method in (ONE, MEMORY, SMOOTHED)}
         stacked = {method: np.stack([one.confusion for one in counts])[None] for method, counts in of.items()}
-        cells, metrics = int(stacked[ONE].sum()), ("pixel accuracy", "class accuracy")
+        forbidden = {method: np.stack([one.forbidden for one in counts])[None] for method, counts in of.items()}
+        cells = int(stacked[ONE].sum())
         if not cells:
             return {"cells": 0}
         scores = {"cells": cells, "methods": {method: _method(of[method], stacked[method]) for method in of}}
-        gain = {key: compared(stacked[MEMORY], stacked[ONE], METRICS[key]) for key in metrics}
-        return scores | {"gain": gain} if name in GROUPS else scores
+        return scores | {key: _gain(stacked, forbidden, *pair) for key, pair in GAINS.items() if set(pair) <= set(of)}
+
+
+def _gain(stacked: dict[str, NDArray], forbidden: dict[str, NDArray], better: str, base: str) -> dict[str, object]:
+    """Return what one method gains over another one, with intervals."""
+    gains = {key: compared(stacked[better], stacked[base], METRICS[key]) for key in (PIXEL, CLASS)}
+    return gains | {FORBIDDEN: compared(forbidden[better], forbidden[base], METRICS[PIXEL])}
 
 
 def _method(counts: Sequence[CellCounts], confusions: NDArray) -> dict[str, object]:
@@ -141,7 +181,8 @@ def _method(counts: Sequence[CellCounts], confusions: NDArray) -> dict[str, obje
     total, cells = confusions.sum(axis=(0, 1)), confusions.sum()
     of_class, sums = np.maximum(total.sum(axis=1), 1), sum(one.by_confidence for one in counts)
     return {
-        **{key: score_with_interval(confusions, METRICS[key]) for key in ("pixel accuracy", "class accuracy")},
+        **{key: score_with_interval(confusions, METRICS[key]) for key in (PIXEL, CLASS)},
+        FORBIDDEN: float(sum(np.trace(one.forbidden) for one in counts) / cells),
         "recall": {name: float(total[c, c] / of_class[c]) for c, name in enumerate(KITTI_14.names) if total[c].any()},
         "called unknown": float(total[:, KITTI_14.n_semantic :].sum() / cells),
         "ECE": expected_calibration_error(reliability_of_sums(sums)),

@@ -19,7 +19,7 @@ from semgrid_edu.datasets.samples import real_weights, sample_drive, sample_weig
 from semgrid_edu.errors import check_whole
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.memory import View
+from semgrid_edu.memory import View, smooth_drive
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.occupancy.planar_motion import look_up
@@ -28,7 +28,17 @@ from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent, shown
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD
-from semgrid_edu.workshop.studies.filter.memory_counts import GROUPS, MEMORY, ONE, GainCounts
+from semgrid_edu.workshop.studies.filter.memory_counts import (
+    CLASS,
+    FORBIDDEN,
+    GAINS,
+    GROUPS,
+    MEMORY,
+    ONE,
+    PIXEL,
+    SMOOTHED,
+    GainCounts,
+)
 from semgrid_edu.workshop.studies.filter.memory_worth import EDGES, WORTHS, worth_by_distance
 from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
 
@@ -113,7 +123,7 @@ def grids_of(frames: Sequence[Frame], weights: Path) -> tuple[list[View], list[d
     own = Stages.of(load_net(weights, frames[0].camera), memory=True)
     results = [result for (result,) in run_side_by_side(frames, own)]
     views = [View(result.frame, result.belief, result.grid) for result in results]
-    others = {name: list(remember(views, own.architecture.grid)) for name, remember in FIRST.items()}
+    others = {name: list(of(views, own.architecture.grid)) for name, of in (FIRST | {SMOOTHED: smooth_drive}).items()}
     return views, [
         {ONE: result.grid, MEMORY: result.remembered, f"{ONE} + CRF": result.refined}
         | {f"{MEMORY} + CRF": own.refine(np.log(np.maximum(result.remembered, 1e-6)), result.belief.probability)}
@@ -209,13 +219,15 @@ def memory_tables(result: dict) -> str:
 
 
 def _rows(groups: dict[str, dict]) -> list[list[str]]:
-    rows = [["cells", "method", "pixel accuracy", "class accuracy", "called unknown", "ECE", "Brier"]]
+    rows = [["cells", "method", PIXEL, CLASS, FORBIDDEN, "called unknown", "ECE", "Brier"]]
     for name in GROUPS:
         one = groups[name]
         for method, scores in one.get("methods", {}).items():
-            metrics = [shown(scores[key]) for key in ("pixel accuracy", "class accuracy")]
-            others = [per_cent(scores["called unknown"]), per_cent(scores["ECE"]), f"{scores['Brier']:.3f}"]
+            metrics = [shown(scores[key]) for key in (PIXEL, CLASS)]
+            others = [
+                *(per_cent(scores[key]) for key in (FORBIDDEN, "called unknown", "ECE")),
+                f"{scores['Brier']:.3f}",
+            ]
             rows.append([f"{name} ({one['cells']})", method, *metrics, *others])
-        if gain := one.get("gain"):
-            rows.append([name, "gain of memory", *(shown(gain[key]) for key in gain), "", "", ""])
+        rows += [[name, key, *map(shown, one[key].values()), "", "", ""] for key in GAINS if key in one]
     return rows
