@@ -6,8 +6,8 @@ by whole cells, as the occupancy filter's does. `stage_models.class_memory` is t
 
 from semgrid_edu.memory.class_map import ClassMap, View, remember_drive, smooth_drive
 from semgrid_edu.memory.literal import carry_classes_literal, learn_classes_literal, recall_classes_literal
-from semgrid_edu.memory.state import ClassMemory, Look, MemoryParams
-from semgrid_edu.memory.steps import carry_classes, learn_classes, look_at, recall_classes
+from semgrid_edu.memory.state import ClassMemory, Look, MemoryParams, look_at
+from semgrid_edu.memory.steps import carry_classes, learn_classes, recall_classes
 
 __all__ = [
     "ClassMap",

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.memory.state import ClassMemory, MemoryParams
-from semgrid_edu.memory.steps import carry_classes, learn_classes, look_at, recall_classes
+from semgrid_edu.memory.state import ClassMemory, MemoryParams, look_at
+from semgrid_edu.memory.steps import carry_classes, learn_classes, recall_classes
 from semgrid_edu.occupancy import N_STATES, Belief, State
 from semgrid_edu.occupancy.cmcdot import LIDAR_PERIOD
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll

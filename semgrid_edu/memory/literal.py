@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from semgrid_edu.memory.state import MOVES, STAYS, ClassMemory, Look, MemoryParams, standing
+from semgrid_edu.memory.state import FAINT, MOVES, STAYS, ClassMemory, Look, MemoryParams, standing
 from semgrid_edu.occupancy import N_STATES, State
 
 
@@ -76,6 +76,7 @@ def learn_classes_literal(memory: ClassMemory, places: NDArray, look: Look, para
     in_grid = places >= 0
     on_map = Look(*(part.reshape(*part.shape[:-2], -1)[..., places] * in_grid for part in look))
     share = np.stack([1 - on_map.moving, on_map.moving]).astype(np.float64)
+    share[share * on_map.sees < FAINT] = 0
     evidence, *others = _joined(memory, on_map, share, params)
     return ClassMemory(np.concatenate([evidence.reshape(-1, *in_grid.shape), *others, memory.offset]))
 

@@ -1,18 +1,23 @@
 """What is remembered of the classes of each cell, what one frame says of them, and what the memory assumes."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.errors import ArgumentError, check_fields, not_negative, types_named
+from semgrid_edu.errors import ArgumentError, check_fields, check_shape, not_negative, types_named
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.occupancy import State, WorldModel
+from semgrid_edu.occupancy import N_STATES, State, WorldModel
 
 STAYS, MOVES = 0, 1
 """The two layers of the memory: what lies and stands in a cell, and what moves through it."""
+
+FAINT = 1e-3
+"""Probability below which the camera doesn't see what a layer holds: nothing is learnt there."""
 
 
 def _leaving(state: State) -> float:
@@ -160,6 +165,58 @@ class Look(NamedTuple):
     sees: NDArray[np.float32]
     exponent: NDArray[np.float32]
     moving: NDArray[np.float32]
+
+
+def look_at(grid: NDArray, occupancy: NDArray, spec: GridSpec, params: MemoryParams) -> Look:
+    """Read one frame's semantic grid as evidence.
+
+    Parameters
+    ----------
+    grid : (C, H, W) float32
+        g: probabilities of the semantic classes, then of the four unknown ones. They sum to 1 in each cell.
+    occupancy : (4, H, W) float32
+        o, the occupancy grid of the same frame.
+    spec : GridSpec
+        Their cells, around the vehicle.
+    params : MemoryParams
+        How much the frame is worth at which distance.
+    """
+    check_shape("occupancy", occupancy, (N_STATES, *spec.shape))
+    if np.ndim(grid) != 3 or grid.shape[1:] != spec.shape or len(grid) <= N_STATES:
+        wanted = f"shape (C, {spec.shape[0]}, {spec.shape[1]}), the last {N_STATES} classes unknown"
+        raise ArgumentError("grid", wanted, f"shape {np.shape(grid)}")
+    classes, log_class, sees = _seen_classes(np.ascontiguousarray(grid, np.float32), len(grid) - N_STATES)
+    e, movable = _exponents(spec, params), list(params.movable)
+    if movable and not 0 <= min(movable) <= max(movable) < len(classes):
+        raise ArgumentError("movable", f"numbers of semantic classes, 0 to {len(classes) - 1}", params.movable)
+    exponent = e + (1 - e) * classes[movable].sum(axis=0)
+    return Look(classes, log_class, sees, exponent, np.clip(occupancy[State.DYNAMIC], 0, 1))
+
+
+@lru_cache(maxsize=8)
+def _exponents(spec: GridSpec, params: MemoryParams) -> NDArray[np.float32]:
+    """Return what one more frame is worth in each cell, (H, W)."""
+    return params.exponent(np.hypot(*np.moveaxis(spec.centers(), -1, 0))).astype(np.float32)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _seen_classes(grid, n):
+    """Divide the semantic classes by their sum; numpy would need five passes over the grid."""
+    height, width = grid.shape[1:]
+    classes, sees = np.zeros((n, height, width), np.float32), np.zeros((height, width), np.float32)
+    log_class = np.zeros((n, height, width), np.float32)
+    for r in range(height):
+        for k in range(n):
+            for c in range(width):
+                sees[r, c] += grid[k, r, c]
+        for k in range(n):
+            for c in range(width):
+                if sees[r, c] >= np.float32(FAINT):
+                    classes[k, r, c] = grid[k, r, c] / sees[r, c]
+                    log_class[k, r, c] = np.log(max(classes[k, r, c], np.float32(1e-6)))
+        for c in range(width):
+            sees[r, c] = min(sees[r, c], np.float32(1)) if sees[r, c] >= np.float32(FAINT) else np.float32(0)
+    return classes, log_class, sees
 
 
 def standing(occupancy: NDArray) -> NDArray:

@@ -1,70 +1,12 @@
 """The steps of the memory: carry what moves, recall what is known of a cell, learn from a frame (section 3)."""
 
-from functools import lru_cache
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError, check_shape
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.memory.state import MOVES, STAYS, ClassMemory, Look, MemoryParams, standing
-from semgrid_edu.occupancy import N_STATES, State
-
-FAINT = 1e-3
-"""Probability below which the camera doesn't see a cell: no evidence is computed there."""
-
-
-def look_at(grid: NDArray, occupancy: NDArray, spec: GridSpec, params: MemoryParams) -> Look:
-    """Read one frame's semantic grid as evidence.
-
-    Parameters
-    ----------
-    grid : (C, H, W) float32
-        g: probabilities of the semantic classes, then of the four unknown ones. They sum to 1 in each cell.
-    occupancy : (4, H, W) float32
-        o, the occupancy grid of the same frame.
-    spec : GridSpec
-        Their cells, around the vehicle.
-    params : MemoryParams
-        How much the frame is worth at which distance.
-    """
-    check_shape("occupancy", occupancy, (N_STATES, *spec.shape))
-    if np.ndim(grid) != 3 or grid.shape[1:] != spec.shape or len(grid) <= N_STATES:
-        wanted = f"shape (C, {spec.shape[0]}, {spec.shape[1]}), the last {N_STATES} classes unknown"
-        raise ArgumentError("grid", wanted, f"shape {np.shape(grid)}")
-    classes, log_class, sees = _seen_classes(np.ascontiguousarray(grid, np.float32), len(grid) - N_STATES)
-    e, movable = _exponents(spec, params), list(params.movable)
-    if movable and not 0 <= min(movable) <= max(movable) < len(classes):
-        raise ArgumentError("movable", f"numbers of semantic classes, 0 to {len(classes) - 1}", params.movable)
-    exponent = e + (1 - e) * classes[movable].sum(axis=0)
-    return Look(classes, log_class, sees, exponent, np.clip(occupancy[State.DYNAMIC], 0, 1))
-
-
-@lru_cache(maxsize=8)
-def _exponents(spec: GridSpec, params: MemoryParams) -> NDArray[np.float32]:
-    """Return what one more frame is worth in each cell, (H, W)."""
-    return params.exponent(np.hypot(*np.moveaxis(spec.centers(), -1, 0))).astype(np.float32)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _seen_classes(grid, n):
-    """Divide the semantic classes by their sum; numpy would need five passes over the grid."""
-    height, width = grid.shape[1:]
-    classes, sees = np.zeros((n, height, width), np.float32), np.zeros((height, width), np.float32)
-    log_class = np.zeros((n, height, width), np.float32)
-    for r in range(height):
-        for k in range(n):
-            for c in range(width):
-                sees[r, c] += grid[k, r, c]
-        for k in range(n):
-            for c in range(width):
-                if sees[r, c] >= np.float32(FAINT):
-                    classes[k, r, c] = grid[k, r, c] / sees[r, c]
-                    log_class[k, r, c] = np.log(max(classes[k, r, c], np.float32(1e-6)))
-        for c in range(width):
-            sees[r, c] = min(sees[r, c], np.float32(1)) if sees[r, c] >= np.float32(FAINT) else np.float32(0)
-    return classes, log_class, sees
+from semgrid_edu.errors import check_shape
+from semgrid_edu.memory.state import FAINT, MOVES, STAYS, ClassMemory, Look, MemoryParams, standing
+from semgrid_edu.occupancy import N_STATES
 
 
 def carry_classes(
@@ -93,13 +35,11 @@ def carry_classes(
     """
     check_shape("moving", moving, memory.weight.shape[1:])
     check_shape("velocity", velocity, (2, *moving.shape))
-    carried = ClassMemory(np.zeros_like(memory.planes))
+    carried = ClassMemory(np.empty_like(memory.planes))
     for name in ("evidence", "weight", "seen"):
         getattr(carried, name)[STAYS] = getattr(memory, name)[STAYS]
-    way = (np.nan_to_num(velocity) * dt).astype(np.float32)
-    _carry(
-        _moving_planes(memory), moving, way, np.float32(cell), np.float32(params.least_moving), _moving_planes(carried)
-    )
+    numbers = map(np.float32, (cell, dt, params.least_moving))
+    _carry(_moving_planes(memory), moving, velocity, *numbers, _moving_planes(carried))
     kept = params.kept(dt).astype(np.float32)[:, None, None]
     carried.weight[:] *= kept
     carried.seen[:] *= kept
@@ -111,15 +51,17 @@ def _moving_planes(memory: ClassMemory) -> tuple[NDArray, NDArray, NDArray, NDAr
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _carry(before, moving, way, cell, least, after):
+def _carry(before, moving, velocity, cell, dt, least, after):
     """Few cells hold something that moves, so each looks back by itself."""
     evidence, weight, seen, offset = before
     to_evidence, to_weight, to_seen, to_offset = after
+    to_evidence[:], to_weight[:], to_seen[:], to_offset[:] = 0, 0, 0, 0
     height, width = moving.shape
     for r in range(height):
         for c in range(width):
             if moving[r, c] >= least:
-                x, y = way[0, r, c], way[1, r, c]
+                x, y = velocity[0, r, c] * dt, velocity[1, r, c] * dt
+                x, y = (x if x == x else np.float32(0)), (y if y == y else np.float32(0))  # NaN
                 r0, c0 = _behind(r, c, x, y, cell, height, width)
                 r0, c0 = _behind(r, c, x + offset[0, r0, c0], y + offset[1, r0, c0], cell, height, width)
                 for k in range(len(evidence)):
@@ -179,66 +121,88 @@ def recall_classes(
 def _recall(
     evidence, weight, seen, places, occupancy, classes, log_class, sees, exponent, most, movable, laser, recalled
 ):
-    """Row by row, with a class in the inner loops, so that memory is read in order."""
+    """Row by row, without branches in the inner loops, so that the compiler takes several cells at once."""
     n, height, width = log_class.shape
-    scores = np.zeros((n, width), np.float32)
+    recalled[:n] = 0
+    old, new, mass, alone = np.empty((4, width), np.float32)
     for r in range(height):
+        alone[:] = 0
         for layer in range(2):
-            mass = np.zeros(width, np.float32)
-            old, new = np.zeros(width, np.float32), np.zeros(width, np.float32)
+            first, last = width, 0
             for c in range(width):
-                p = places[r, c]
-                share = occupancy[2, r, c] if layer == 1 else 1 - occupancy[2, r, c]
-                known = 1 - (1 - seen[layer, p]) * (1 - sees[r, c])
+                p, moving = places[r, c], occupancy[2, r, c]
+                unknown = (1 - seen[layer, p]) * (1 - sees[r, c])
+                mass[c] = (moving if layer == 1 else 1 - moving) * (1 - unknown)
                 old[c], new[c] = _parts(weight[layer, p], sees[r, c], exponent[r, c], most)
-                mass[c] = share * known
                 for state in range(4):
                     if (state == 2) == (layer == 1):
-                        recalled[n + state, r, c] = occupancy[state, r, c] * (1 - known)
+                        recalled[n + state, r, c] = occupancy[state, r, c] * unknown
+                if old[c] == 0:  # the frame alone
+                    alone[c], mass[c] = alone[c] + mass[c], 0
+                else:
+                    first, last = min(first, c), c + 1
+            here = r, first, last
+            scores = _scores(evidence[layer], places, log_class, old[first:last], new[first:last], movable, laser, here)
+            _add_beliefs(scores, mass[first:last], classes, sees, movable, recalled, here)
+        for k in range(n):
             for c in range(width):
-                if old[c] == 0 and mass[c] > 0:  # the frame alone
-                    for k in range(n):
-                        recalled[k, r, c] += mass[c] * classes[k, r, c]
-                    mass[c] = 0
-            if not mass.any():
-                continue
-            for k in range(n):
-                for c in range(width):
-                    if mass[c] > 0:
-                        mean = evidence[layer, k, places[r, c]] + (laser[r, c] if movable[k] else np.float32(0))
-                        if new[c] > 0:
-                            mean = (old[c] * mean + new[c] * log_class[k, r, c]) / (old[c] + new[c])
-                        scores[k, c] = mean * max(old[c] + new[c], np.float32(1))
-            _add_beliefs(scores, mass, classes[:, r], sees[r], movable, recalled[:, r])
+                recalled[k, r, c] += alone[c] * classes[k, r, c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_beliefs(scores, mass, classes, sees, movable, row):
+def _scores(evidence, places, log_class, old, new, movable, laser, here):
+    """Return the logarithm of what memory and frame say together of a row of cells, up to a number in each cell."""
+    r, first, last = here
+    scores, place, beam = np.empty((len(evidence), len(old)), np.float32), places[r][first:last], laser[r][first:last]
+    for c in range(len(old)):
+        total = max(old[c] + new[c], np.float32(1e-12))
+        old[c], new[c] = old[c] * max(1 / total, np.float32(1)), new[c] * max(1 / total, np.float32(1))
+    for k in range(len(scores)):
+        was, says, score, comes = evidence[k], log_class[k, r][first:last], scores[k], np.float32(movable[k])
+        for c in range(len(old)):
+            score[c] = old[c] * (was[place[c]] + comes * beam[c]) + new[c] * says[c]
+    return scores
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_beliefs(scores, mass, classes, sees, movable, recalled, here):
     """Share the mass of each cell of a row: the frame says, as far as it sees, what comes and goes (`movable`)."""
-    n, width = scores.shape
-    top, sums = np.full((2, width), np.float32(-np.inf)), np.zeros((2, width), np.float32)  # others, movable
-    there, here = np.zeros(width, np.float32), np.zeros(width, np.float32)
+    (n, width), (r, first, last) = scores.shape, here
+    top, sums = np.full((2, width), np.float32(-1e30)), np.zeros((2, width), np.float32)  # others, movable
+    look, seen, parts = sees[r][first:last], np.zeros(width, np.float32), np.empty((2, width), np.float32)
     for k in range(n):
+        of_group, score = top[int(movable[k])], scores[k]
         for c in range(width):
-            top[int(movable[k]), c] = max(top[int(movable[k]), c], scores[k, c])
+            of_group[c] = max(of_group[c], score[c])
     for k in range(n):
+        of_group, total, score, comes = top[int(movable[k])], sums[int(movable[k])], scores[k], np.float32(movable[k])
+        says = classes[k, r][first:last]
         for c in range(width):
-            if mass[c] > 0:
-                scores[k, c] = np.exp(scores[k, c] - top[int(movable[k]), c])
-                sums[int(movable[k]), c] += scores[k, c]
-                there[c] += sees[c] * classes[k, c] if movable[k] else np.float32(0)
+            score[c] = _exp(score[c] - of_group[c])
+            total[c] += score[c]
+            seen[c] += comes * look[c] * says[c]
     for c in range(width):
-        if mass[c] > 0:  # `here`: what one unit of the movable ones' exponentials is worth
-            most = max(top[0, c], top[1, c])
-            others, movers = sums[0, c] * np.exp(top[0, c] - most), np.exp(top[1, c] - most)
-            here[c] = (1 - sees[c]) * movers / (others + sums[1, c] * movers)
-            there[c] += here[c] * sums[1, c]
+        most = max(top[0, c], top[1, c])
+        others, movers = sums[0, c] * _exp(top[0, c] - most), _exp(top[1, c] - most)
+        each = (1 - look[c]) * movers / (others + sums[1, c] * movers)  # what one unit of the movable ones is worth
+        there = seen[c] + each * sums[1, c]
+        parts[0, c], parts[1, c] = mass[c] * (1 - there) / max(sums[0, c], np.float32(1e-12)), mass[c] * each
     for k in range(n):
+        part, score, says, comes = parts[int(movable[k])], scores[k], classes[k, r][first:last], np.float32(movable[k])
+        row = recalled[k, r][first:last]
         for c in range(width):
-            if mass[c] > 0 and movable[k]:
-                row[k, c] += mass[c] * (sees[c] * classes[k, c] + here[c] * scores[k, c])
-            elif mass[c] > 0:
-                row[k, c] += mass[c] * (1 - there[c]) * scores[k, c] / sums[0, c]
+            row[c] += part[c] * score[c] + comes * mass[c] * look[c] * says[c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _exp(x):
+    """Return e^x for x <= 0, a power of 2 times Taylor's series: the compiler takes eight at once, and np.exp one."""
+    y = max(x, np.float32(-87)) * np.float32(1 / np.log(2))
+    whole = np.floor(y + np.float32(0.5))
+    f, one = (y - whole) * np.float32(np.log(2)), np.float32(1)
+    a, b, c, d = np.float32(1 / 2), np.float32(1 / 6), np.float32(1 / 24), np.float32(1 / 120)
+    series = one + f * (one + f * (a + f * (b + f * (c + f * d))))
+    return series * np.int32((np.int32(whole) + np.int32(127)) << np.int32(23)).view(np.float32)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -284,7 +248,7 @@ def _learn(evidence, weight, seen, places, log_class, sees, exponent, moving, mo
                 p = places[r, c]
                 part = (moving[p] if layer == 1 else 1 - moving[p]) * sees[p] if p >= 0 else np.float32(0)
                 old[c], new[c] = np.float32(0), np.float32(0)
-                if part > 0:
+                if part >= np.float32(FAINT):
                     old[c], new[c] = _parts(weight[layer, r, c], part, exponent[p], most)
                     seen[layer, r, c] = 1 - (1 - seen[layer, r, c]) * (1 - part)
                     if new[c] > 0:
