@@ -122,9 +122,7 @@ def _places(source: GridSpec, target: GridSpec, pose: PlanarMotion) -> NDArray[n
     return look_up(numbers, np.array([-1], np.float32), source, target, pose)[0].astype(np.int32)
 
 
-def remember_drive(
-    views: Iterable[View], spec: GridSpec, params: MemoryParams | None = None
-) -> Iterator[NDArray[np.float32]]:
+def remember_drive(views: Iterable[View], spec: GridSpec, params: MemoryParams | None = None) -> Iterator[NDArray]:
     """Remember the classes of a drive, frame after frame: g -> g.
 
     Parameters
@@ -145,9 +143,7 @@ def remember_drive(
         yield grid
 
 
-def smooth_drive(
-    views: Sequence[View], spec: GridSpec, params: MemoryParams | None = None
-) -> Iterator[NDArray[np.float32]]:
+def smooth_drive(views: Sequence[View], spec: GridSpec, params: MemoryParams | None = None) -> Iterator[NDArray]:
     """Say what each cell is with the whole drive at hand: a memory of what came before, and one of what comes after.
 
     This is forward-backward: a second memory runs through the drive from its end, where everything moves the other way,
@@ -175,9 +171,7 @@ def smooth_drive(
         yield recall_classes(both, same, o, look_at(view.grid, o, spec, params), params)
 
 
-def _steps(
-    views: Iterable[View], spec: GridSpec, params: MemoryParams | None
-) -> Iterator[tuple[ClassMap, NDArray[np.float32]]]:
+def _steps(views: Iterable[View], spec: GridSpec, params: MemoryParams | None) -> Iterator[tuple[ClassMap, NDArray]]:
     """Yield the map after each frame, and what it returned."""
     class_map, before = None, None
     for view in views:

@@ -81,9 +81,7 @@ def learn_classes_literal(memory: ClassMemory, places: NDArray, look: Look, para
     return ClassMemory(np.concatenate([evidence.reshape(-1, *in_grid.shape), *others, memory.offset]))
 
 
-def _joined(
-    memory: ClassMemory, look: Look, share: NDArray, params: MemoryParams
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _joined(memory: ClassMemory, look: Look, share: NDArray, params: MemoryParams) -> tuple[NDArray, NDArray, NDArray]:
     """Return evidence, weight and seen with a frame added: its exponent is 1 at first, then what one more is worth."""
     sees, old = share * look.sees, memory.weight.astype(np.float64)
     new = np.maximum(look.exponent * sees, sees - old)

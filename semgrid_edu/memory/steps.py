@@ -5,7 +5,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import check_shape
-from semgrid_edu.memory.state import FAINT, MOVES, STAYS, ClassMemory, Look, MemoryParams, standing
+from semgrid_edu.memory.state import FAINT, MOVES, ClassMemory, Look, MemoryParams, standing
 from semgrid_edu.occupancy import N_STATES
 
 
@@ -35,9 +35,7 @@ def carry_classes(
     """
     check_shape("moving", moving, memory.weight.shape[1:])
     check_shape("velocity", velocity, (2, *moving.shape))
-    carried = ClassMemory(np.empty_like(memory.planes))
-    for name in ("evidence", "weight", "seen"):
-        getattr(carried, name)[STAYS] = getattr(memory, name)[STAYS]
+    carried = ClassMemory(memory.planes.copy())
     numbers = map(np.float32, (cell, dt, params.least_moving))
     _carry(_moving_planes(memory), moving, velocity, *numbers, _moving_planes(carried))
     kept = params.kept(dt).astype(np.float32)[:, None, None]
@@ -60,8 +58,7 @@ def _carry(before, moving, velocity, cell, dt, least, after):
     for r in range(height):
         for c in range(width):
             if moving[r, c] >= least:
-                x, y = velocity[0, r, c] * dt, velocity[1, r, c] * dt
-                x, y = (x if x == x else np.float32(0)), (y if y == y else np.float32(0))  # NaN
+                x, y = np.nan_to_num(velocity[0, r, c]) * dt, np.nan_to_num(velocity[1, r, c]) * dt
                 r0, c0 = _behind(r, c, x, y, cell, height, width)
                 r0, c0 = _behind(r, c, x + offset[0, r0, c0], y + offset[1, r0, c0], cell, height, width)
                 for k in range(len(evidence)):
@@ -118,9 +115,7 @@ def recall_classes(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _recall(
-    evidence, weight, seen, places, occupancy, classes, log_class, sees, exponent, most, movable, laser, recalled
-):
+def _recall(evidence, weight, seen, places, o, classes, log_class, sees, exponent, most, movable, laser, recalled):
     """Row by row, without branches in the inner loops, so that the compiler takes several cells at once."""
     n, height, width = log_class.shape
     recalled[:n] = 0
@@ -130,13 +125,13 @@ def _recall(
         for layer in range(2):
             first, last = width, 0
             for c in range(width):
-                p, moving = places[r, c], occupancy[2, r, c]
+                p, moving = places[r, c], o[2, r, c]
                 unknown = (1 - seen[layer, p]) * (1 - sees[r, c])
                 mass[c] = (moving if layer == 1 else 1 - moving) * (1 - unknown)
                 old[c], new[c] = _parts(weight[layer, p], sees[r, c], exponent[r, c], most)
                 for state in range(4):
                     if (state == 2) == (layer == 1):
-                        recalled[n + state, r, c] = occupancy[state, r, c] * unknown
+                        recalled[n + state, r, c] = o[state, r, c] * unknown
                 if old[c] == 0:  # the frame alone
                     alone[c], mass[c] = alone[c] + mass[c], 0
                 else:
@@ -145,8 +140,7 @@ def _recall(
             scores = _scores(evidence[layer], places, log_class, old[first:last], new[first:last], movable, laser, here)
             _add_beliefs(scores, mass[first:last], classes, sees, movable, recalled, here)
         for k in range(n):
-            for c in range(width):
-                recalled[k, r, c] += alone[c] * classes[k, r, c]
+            recalled[k, r] += alone * classes[k, r]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -188,10 +182,8 @@ def _add_beliefs(scores, mass, classes, sees, movable, recalled, here):
         there = seen[c] + each * sums[1, c]
         parts[0, c], parts[1, c] = mass[c] * (1 - there) / max(sums[0, c], np.float32(1e-12)), mass[c] * each
     for k in range(n):
-        part, score, says, comes = parts[int(movable[k])], scores[k], classes[k, r][first:last], np.float32(movable[k])
-        row = recalled[k, r][first:last]
-        for c in range(width):
-            row[c] += part[c] * score[c] + comes * mass[c] * look[c] * says[c]
+        row, comes, says = recalled[k, r][first:last], np.float32(movable[k]), classes[k, r][first:last]
+        row += parts[int(movable[k])] * scores[k] + comes * mass * look * says
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -14,13 +14,7 @@ from semgrid_edu.crf import CrfParams, exact_marginals, mean_field_naive
 from semgrid_edu.graphical.exact import eliminate
 from semgrid_edu.occupancy import State
 from semgrid_edu.stage_models.beam import BeamWorld
-from semgrid_edu.stage_models.bof import (
-    HEAD_ON,
-    STANDING_OR_DRIVING,
-    TOWARDS_A_FENCE,
-    bof_beliefs,
-    expected_things,
-)
+from semgrid_edu.stage_models.bof import HEAD_ON, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, expected_things
 from semgrid_edu.stage_models.cells_in_a_row import DT, Cell, CellsInARow
 from semgrid_edu.stage_models.class_memory import memory_price
 from semgrid_edu.stage_models.cmcdot import LEFT_OR_RIGHT, sampling_error

@@ -14,14 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.graphical.factor import Factor, product
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import total_variation
-from semgrid_edu.occupancy import (
-    LogOddsParams,
-    SensorModel,
-    log_odds,
-    probability,
-    scan_evidence,
-    update_log_odds,
-)
+from semgrid_edu.occupancy import LogOddsParams, SensorModel, log_odds, probability, scan_evidence, update_log_odds
 from semgrid_edu.stage_models.beam import BINS_PER_CELL, BeamWorld, beam_likelihood
 
 CELL, NEAREST = 0.2, 3.0

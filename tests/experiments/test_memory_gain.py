@@ -18,15 +18,15 @@ from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.scoring.statistics import MIN_DRIVES
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.studies.filter import memory_gain
-from semgrid_edu.workshop.studies.filter.memory_counts import GROUPS, GainCounts, count_cells, frames_since_seen
-from semgrid_edu.workshop.studies.filter.memory_gain import (
-    LAST,
-    mean_in_place,
-    mean_moved,
+from semgrid_edu.workshop.studies.filter.memory_counts import (
+    GROUPS,
+    GainCounts,
+    count_cells,
+    frames_in_view,
+    frames_since_seen,
     memory_tables,
-    product_moved,
-    real_blocks,
 )
+from semgrid_edu.workshop.studies.filter.memory_gain import FIRST, LAST, real_blocks
 from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
 
 SPEC = GridSpec(0, 71, -15.5, 15.5, 1.0)
@@ -60,6 +60,15 @@ def test_cells_know_how_many_frames_ago_they_were_seen():
     np.testing.assert_array_equal(now, np.broadcast_to(expected[:, None], SPEC.shape))
 
 
+def test_cells_know_in_how_many_frames_they_were_seen():
+    """As above: what is farther than 10 m now was in view in all four frames, what is nearer in the earlier ones."""
+    count = frames_in_view([frame(2.0 * k, 10) for k in range(4)], SPEC)[-1]
+    x = SPEC.centers()[:, 0, 0]
+    reach = np.select([x < 65, x < 67, x < 69], [4, 3, 2], 1)  # the farthest cells entered the grid only later
+    expected = np.minimum(np.select([x > 10, x > 8, x > 6, x > 4], [4, 3, 2, 1], 0), reach)
+    np.testing.assert_array_equal(count, np.broadcast_to(expected[:, None], SPEC.shape))
+
+
 def test_counts_are_those_by_hand():
     p = np.array([[0.8, 0.5, 0.1], [0.2, 0.5, 0.9]])
     counted = count_cells(p, np.array([0, 1, 0], np.uint8))
@@ -89,16 +98,18 @@ def test_each_group_counts_its_own_cells_and_unlabelled_ones_nowhere():
     assert last == 0  # the first frame, which called everything car, is where the camera last saw them
     assert scores["seen before"]["gain over the last look"]["pixel accuracy"]["mean"] == pytest.approx(1)
     assert scores["seen later"]["cells"] == 0
+    in_one_frame, in_two = (scores[f"in view, frames {a} to {b}"]["cells"] for a, b in ((1, 1), (2, 5)))
+    assert (in_one_frame > 0, in_one_frame + in_two) == (True, scores["in view"]["cells"])
 
 
 def test_the_last_maps_are_averaged_and_multiplied():
     called = (0, 0, 0, 1, 1, 1)
-    mean = list(mean_in_place(views(*called), SPEC))[-1]
+    mean = list(FIRST["mean of five maps, not moved"](views(*called), SPEC))[-1]
     np.testing.assert_allclose(mean[[0, 1], 5, 5], [2 / LAST, 3 / LAST])
-    moved = list(mean_moved(views(*called), SPEC))[-1]
+    moved = list(FIRST["mean of five maps"](views(*called), SPEC))[-1]
     np.testing.assert_allclose(moved[[0, 1], -3, 5], [2 / LAST, 3 / LAST])
     np.testing.assert_allclose(moved[:2, 0, 5], [0, 1])  # what is farthest ahead lies in the newest map alone
-    product = list(product_moved(views(*called), SPEC))[-1]
+    product = list(FIRST["product of five maps"](views(*called), SPEC))[-1]
     np.testing.assert_allclose(product[0, -3, 5] / product[1, -3, 5], 1e-4, rtol=1e-3)  # three against two
     np.testing.assert_allclose(product.sum(axis=0), 1, atol=1e-5)
 

@@ -218,7 +218,7 @@ _test()
 # %% [markdown]
 # ## Task 4: the laser corrects the memory (3 points)
 #
-# The lecture's last ghosts are cells that the memory calls *car* while the scan says FREE. Let the two talk. `p` is what the memory says of C classes, `(C, H, W)`; it sums to
+# The lecture's last ghosts are cells that the memory calls *car* though the scan says FREE. The package lets the laser speak of cars, people and bicycles; here it speaks of all that stands. `p` is what the memory says of C classes, `(C, H, W)`; it sums to
 # 1 in each cell. `o` is the occupancy grid, `(4, H, W)`, in the order FREE, STATIC, DYNAMIC, UNKNOWN. `standing` lists the numbers of the classes that stand up, such as car
 # and building. A standing thing can't be in a free cell, so its probability is multiplied by 1 - P(FREE); a class of the ground keeps its own. Then each cell is divided by
 # its sum.

@@ -14,11 +14,7 @@ from semgrid_edu.crf.params import CrfParams
 
 
 def check(
-    unary: ArrayLike,
-    values: ArrayLike,
-    params: CrfParams,
-    refined: ArrayLike | None = None,
-    cell: float | None = None,
+    unary: ArrayLike, values: ArrayLike, params: CrfParams, refined: ArrayLike | None = None, cell: float | None = None
 ) -> Findings:
     """Say what is probably wrong when a CRF doesn't do what it should.
 

@@ -7,12 +7,7 @@ from semgrid_edu.networks.backbones.segmenter import Segmenter
 from semgrid_edu.networks.backbones.segnet import SegNet
 from semgrid_edu.networks.backbones.unet import UNet
 
-SEGMENTERS: dict[str, type[Segmenter]] = {
-    "segnet": SegNet,
-    "fcn": Fcn,
-    "deeplab": DeepLab,
-    "unet": UNet,
-}
+SEGMENTERS: dict[str, type[Segmenter]] = {"segnet": SegNet, "fcn": Fcn, "deeplab": DeepLab, "unet": UNet}
 """Every image network by its name. `build_segmenter`, the command line, the ImageNet loader, the experiments, the
 benchmarks and the tests all look here, so that a new network needs one line here and its own module."""
 

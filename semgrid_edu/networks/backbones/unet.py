@@ -40,10 +40,7 @@ class UNet(Segmenter):
     Ronneberger, Fischer, Brox: U-Net: Convolutional Networks for Biomedical Image Segmentation. MICCAI 2015.
     """
 
-    PRESETS: ClassVar = {
-        "compact": {"widths": (8, 16, 32, 64, 128)},
-        "paper": {"widths": (64, 128, 256, 512, 1024)},
-    }
+    PRESETS: ClassVar = {"compact": {"widths": (8, 16, 32, 64, 128)}, "paper": {"widths": (64, 128, 256, 512, 1024)}}
 
     def build(self, n_classes: int, widths: tuple[int, ...]) -> None:
         """Make encoder, up-convolutions, decoder (its finest stage first) and the final 1x1 convolution.

@@ -182,9 +182,9 @@ def memory(
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("memory.json"),
 ) -> None:
     """Score the memory of classes on fresh simulated streets and on a real scene (lecture 14)."""
-    from semgrid_edu.workshop.studies.filter.memory_gain import measure_memory, memory_tables
+    from semgrid_edu.workshop.studies.filter import memory_counts, memory_gain
 
-    keep_result(out, lambda: measure_memory(pandaset, scene, seed, drives), memory_tables)
+    keep_result(out, lambda: memory_gain.measure_memory(pandaset, scene, seed, drives), memory_counts.memory_tables)
 
 
 @reproduce.command()
@@ -238,8 +238,7 @@ def _command(experiment: str) -> Callable[..., None]:
         runs: Runs,
         out: Annotated[Path, typer.Option(help="Takes the results: JSON, Markdown and pictures.")],
         scale: Annotated[
-            str,
-            typer.Option(help="quick (minutes), reduced (hours) or paper (GPU); quick+unet adds U-Net to Table 1."),
+            str, typer.Option(help="quick (minutes), reduced (hours) or paper (GPU); quick+unet adds U-Net to Table 1.")
         ] = "quick",
         seeds: Annotated[int | None, typer.Option(min=1, max=1000, help="Seeds; by default the scale's own.")] = None,
         workers: Annotated[int | None, typer.Option(help="Runs at a time; one per core by default.")] = None,

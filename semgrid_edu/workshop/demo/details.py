@@ -78,10 +78,7 @@ class StoryMaps(NamedTuple):
 
 
 def frame_details(
-    result: FrameResult,
-    net: SemanticGridNet,
-    truth: NDArray | None,
-    past: Sequence[tuple[Frame, NDArray]] = (),
+    result: FrameResult, net: SemanticGridNet, truth: NDArray | None, past: Sequence[tuple[Frame, NDArray]] = ()
 ) -> StoryMaps:
     """Collect what the page tells of the cells of a frame.
 

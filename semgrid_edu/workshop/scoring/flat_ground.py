@@ -47,9 +47,7 @@ def ground_pixels(spec: GridSpec, camera: Camera) -> NDArray[np.int64]:
     return places
 
 
-def inverse_perspective(
-    labels: NDArray, places: NDArray, occupancy: NDArray, observed_only: bool = False
-) -> NDArray[np.uint8]:
+def inverse_perspective(labels: NDArray, places: NDArray, occupancy: NDArray, observed_only: bool = False) -> NDArray:
     """Carry image labels to the grid as if all that the camera sees were flat ground: inverse perspective mapping.
 
     No depth is used, so whatever stands above the ground is smeared away from the camera, over all cells that it hides.

@@ -20,12 +20,7 @@ from typing import Any
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.course.sandbox.limits import MEGABYTE, PARTS, Limits
-from semgrid_edu.workshop.course.sandbox.surroundings import (
-    PREPARED,
-    files_beside,
-    keep_compiled,
-    worker_environment,
-)
+from semgrid_edu.workshop.course.sandbox.surroundings import PREPARED, files_beside, keep_compiled, worker_environment
 from semgrid_edu.workshop.course.sandbox.taken import (
     Sampled,
     count_tasks,

@@ -136,12 +136,7 @@ def accuracy_result(
     unknown = dict.fromkeys(METRICS)
     return {
         "rows": [
-            {
-                "network": name,
-                "CRF": crf,
-                "paper": paper.get((name, crf), unknown),
-                **_counted(scored, counted, method),
-            }
+            {"network": name, "CRF": crf, "paper": paper.get((name, crf), unknown), **_counted(scored, counted, method)}
             for name, scored in runs.items()
             for crf, method in ((False, NETWORK), (True, WITH_CRF))
         ],

@@ -26,9 +26,7 @@ _NEGLIGIBLE = 1e-10
 """Eigenvalues of the landmarks' kernel below this share of the largest are rounding errors and are left out."""
 
 
-def visit_labellings(
-    unary: NDArray, values: NDArray, params: CrfParams
-) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
+def visit_labellings(unary: NDArray, values: NDArray, params: CrfParams) -> tuple[NDArray, NDArray]:
     """Sum over every labelling, and find the best: the 43 million of 16 cells of three classes take seconds.
 
     Parameters

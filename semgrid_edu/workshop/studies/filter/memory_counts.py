@@ -1,6 +1,6 @@
 """Counts of semantic grids by when the camera last saw a cell: now, before, or never (section 3)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,12 +16,20 @@ from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.workshop.scoring.confusions import BANDS, band_names
 from semgrid_edu.workshop.scoring.counting import distance_bands, reliability_of_sums
-from semgrid_edu.workshop.scoring.score_with_interval import compared, score_with_interval
+from semgrid_edu.workshop.scoring.score_with_interval import (
+    compared,
+    markdown_table,
+    per_cent,
+    score_with_interval,
+    shown,
+)
 
 GROUPS = ("in view", "seen before", "never seen", "seen later")
 """The cells that the camera sees now, those that it saw before, the others, and those of them that it sees later."""
 ONE, LAST_LOOK, MEMORY, SMOOTHED = "one frame", "last look", "memory", "whole drive"
 """What memory is compared with, its own name, and that of `smooth_drive`."""
+TIMES = ((1, 1), (2, 5), (6, 10), (11, 20))
+"""Parts of the cells in view: by the number of frames that saw them, from and to."""
 GAINS = {"gain": (MEMORY, ONE), "gain over the last look": (MEMORY, LAST_LOOK), "gain of smoothing": (SMOOTHED, MEMORY)}
 """Which methods are compared, by name."""
 PIXEL, CLASS, FORBIDDEN = "pixel accuracy", "class accuracy", "unknown forbidden"
@@ -38,19 +46,36 @@ def frames_since_seen(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int
     spec : GridSpec
         The grid, (H, W) cells.
     """
-    visible = [frame.labels.visible_on(spec)[None].astype(np.float32) for frame in frames]
     since = np.full((len(frames), *spec.shape), -1)
-    for now, frame in enumerate(frames):
-        for then in range(now + 1):
-            motion = PlanarMotion.from_poses(frames[then].T_world_from_lidar, frame.T_world_from_lidar)
-            seen = look_up(visible[then], np.zeros(1, np.float32), spec, spec, motion)[0] > 0
-            since[now, seen] = now - then
+    for now, ago, seen in _seen_then(frames, spec):
+        since[now, seen & (since[now] < 0)] = ago
     return since
 
 
-def last_looks(
-    frames: Sequence[Frame], maps: Sequence[NDArray], since: NDArray, spec: GridSpec
-) -> list[NDArray[np.float32]]:
+def frames_in_view(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int64]:
+    """Return in how many frames up to each one the camera saw each cell, (F, H, W).
+
+    Parameters
+    ----------
+    frames, spec : sequence of F Frame, GridSpec
+        As `frames_since_seen` takes them.
+    """
+    count = np.zeros((len(frames), *spec.shape), int)
+    for now, _, seen in _seen_then(frames, spec):
+        count[now] += seen
+    return count
+
+
+def _seen_then(frames: Sequence[Frame], spec: GridSpec) -> Iterator[tuple[int, int, NDArray[np.bool_]]]:
+    """Yield for each frame and each one up to it: its number, how many frames ago, and the cells seen."""
+    visible = [frame.labels.visible_on(spec)[None].astype(np.float32) for frame in frames]
+    for now, frame in enumerate(frames):
+        for ago in range(now + 1):
+            motion = PlanarMotion.from_poses(frames[now - ago].T_world_from_lidar, frame.T_world_from_lidar)
+            yield now, ago, look_up(visible[now - ago], np.zeros(1, np.float32), spec, spec, motion)[0] > 0
+
+
+def last_looks(frames: Sequence[Frame], maps: Sequence[NDArray], since: NDArray, spec: GridSpec) -> list[NDArray]:
     """Return what one frame said of each cell when the camera last saw it, (C, H, W) for each frame.
 
     Parameters
@@ -139,24 +164,23 @@ class GainCounts:
         since, until = frames_since_seen(frames, self.spec), frames_since_seen(frames[::-1], self.spec)[::-1]
         truth = np.stack([one.labels.birdseye_on(self.spec) for one in frames])
         looks = last_looks(frames, [grid[ONE] for grid in grids], since, self.spec)
-        groups = self._groups(since, until, truth != IGNORE)
+        groups = self._groups(since, until, frames_in_view(frames, self.spec), truth != IGNORE)
         for method in (*grids[0], LAST_LOOK):
             said = np.stack(looks if method == LAST_LOOK else [grid[method] for grid in grids], axis=1)
             for name, cells in groups.items():
-                counted = count_cells(said[:, cells], truth[cells])
-                self._counts.setdefault((name, method), []).append(counted)
+                self._counts.setdefault((name, method), []).append(count_cells(said[:, cells], truth[cells]))
 
-    def _groups(self, since: NDArray, until: NDArray, labelled: NDArray) -> dict[str, NDArray[np.bool_]]:
+    def _groups(self, since: NDArray, until: NDArray, count: NDArray, labelled: NDArray) -> dict[str, NDArray]:
         """Return the cells of each group, and of the parts of the first two by distance and by time."""
         seen = dict(zip(GROUPS, (since == 0, since > 0, since < 0, (since < 0) & (until > 0)), strict=True))
         bands = {f"in view, {name}": seen["in view"] & (self._bands == k) for k, name in enumerate(band_names(BANDS))}
-        times = {f"seen {k} to {k + 4} frames ago": (since >= k) & (since < k + 5) for k in (1, 6, 11)}
-        return {name: cells & labelled for name, cells in (seen | bands | times).items()}
+        times = {f"in view, frames {a} to {b}": seen["in view"] & (count >= a) & (count <= b) for a, b in TIMES}
+        ago = {f"seen {k} to {k + 4} frames ago": (since >= k) & (since < k + 5) for k in (1, 6, 11)}
+        return {name: cells & labelled for name, cells in (seen | bands | times | ago).items()}
 
     def summary(self) -> dict[str, object]:
         """Return the scores of each group, and what memory gains over one frame, with intervals over the drives."""
-        names = dict.fromkeys(name for name, _ in self._counts)
-        return {name: self._scores(name) for name in names}
+        return {name: self._scores(name) for name in dict.fromkeys(name for name, _ in self._counts)}
 
     def _scores(self, name: str) -> dict[str, object]:
         of = {method: counts for (group, method), counts in self._counts.items() if group == name}
@@ -188,3 +212,25 @@ def _method(counts: Sequence[CellCounts], confusions: NDArray) -> dict[str, obje
         "ECE": expected_calibration_error(reliability_of_sums(sums)),
         "Brier": sum(one.brier for one in counts) / float(cells),
     }
+
+
+def memory_tables(result: dict) -> str:
+    """Return a table for each street: the methods by group of cells and by part of a group, per cent, and gains.
+
+    Parameters
+    ----------
+    result : dict
+        From `measure_memory`, or from the JSON file that it was written to.
+    """
+    return "\n\n".join(f"{street}\n\n{markdown_table(_rows(groups))}" for street, groups in result["scores"].items())
+
+
+def _rows(groups: dict[str, dict]) -> list[list[str]]:
+    rows = [["cells", "method", PIXEL, CLASS, FORBIDDEN, "called unknown", "ECE", "Brier"]]
+    for name, one in groups.items():
+        for method, scores in one.get("methods", {}).items():
+            metrics = [shown(scores[key]) for key in (PIXEL, CLASS)]
+            others = [per_cent(scores[key]) for key in (FORBIDDEN, "called unknown", "ECE")]
+            rows.append([f"{name} ({one['cells']})", method, *metrics, *others, f"{scores['Brier']:.3f}"])
+        rows += [[name, key, *map(shown, one[key].values()), "", "", ""] for key in GAINS if key in one]
+    return rows

@@ -6,6 +6,7 @@ Simulated streets have true labels in every cell; the labelled returns of a real
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -25,20 +26,9 @@ from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.pipeline import Stages, run_side_by_side
 from semgrid_edu.storage.provenance import made_by
-from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent, shown
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD
-from semgrid_edu.workshop.studies.filter.memory_counts import (
-    CLASS,
-    FORBIDDEN,
-    GAINS,
-    GROUPS,
-    MEMORY,
-    ONE,
-    PIXEL,
-    SMOOTHED,
-    GainCounts,
-)
+from semgrid_edu.workshop.studies.filter.memory_counts import MEMORY, ONE, SMOOTHED, GainCounts
 from semgrid_edu.workshop.studies.filter.memory_worth import EDGES, WORTHS, worth_by_distance
 from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
 
@@ -56,33 +46,18 @@ FAINTEST = 1e-4
 """Probability that a product takes in place of a smaller one, so that one frame alone can't forbid a class for ever."""
 
 
-def mean_in_place(views: Iterable[View], spec: GridSpec) -> Iterator[NDArray]:
-    """Average the last maps, cell number by cell number, as if the vehicle stood still.
+def last_maps(views: Iterable[View], spec: GridSpec, join: Callable, moved: bool = True) -> Iterator[NDArray]:
+    """Join the last maps, as one would try first.
 
     Parameters
     ----------
-    views : iterable of View
+    views, spec : iterable of View, GridSpec
         As `Stages.remember` takes them.
-    spec : GridSpec
-        The grid, (H, W) cells.
+    join : callable
+        What to make of the last maps, (K, C, H, W), in the cells of now; NaN where a map didn't reach.
+    moved : bool
+        Whether each is looked up where the vehicle was then. Otherwise cell number by cell number, as if it stood.
     """
-    return _joined(views, spec, _mean, moved=False)
-
-
-def mean_moved(views: Iterable[View], spec: GridSpec) -> Iterator[NDArray]:
-    """Average the last maps, each looked up where the vehicle was then. Parameters are those of `mean_in_place`."""
-    return _joined(views, spec, _mean)
-
-
-def product_moved(views: Iterable[View], spec: GridSpec) -> Iterator[NDArray]:
-    """Multiply the last maps, each looked up where the vehicle was then. Parameters are those of `mean_in_place`."""
-    return _joined(views, spec, _product)
-
-
-def _joined(
-    views: Iterable[View], spec: GridSpec, join: Callable[[NDArray], NDArray], moved: bool = True
-) -> Iterator[NDArray]:
-    """Yield what `join` makes of the last maps, (K, C, H, W), in the cells of now; NaN where a map didn't reach."""
     last: deque[View] = deque(maxlen=LAST)
     for view in views:
         last.append(view)
@@ -94,18 +69,17 @@ def _seen_from(now: View, earlier: View, spec: GridSpec) -> NDArray:
     return look_up(earlier.grid, np.full(len(earlier.grid), np.nan, np.float32), spec, spec, motion)
 
 
-def _mean(maps: NDArray) -> NDArray:
-    return np.nanmean(maps, axis=0)
-
-
 def _product(maps: NDArray) -> NDArray:
     return softmax(np.nansum(np.log(np.maximum(maps, FAINTEST)), axis=0), axis=0)
 
 
+CRF = " + CRF"
+"""What is added to the name of a method when the CRF comes after it."""
+
 FIRST = {
-    "mean of five maps, not moved": mean_in_place,
-    "mean of five maps": mean_moved,
-    "product of five maps": product_moved,
+    "mean of five maps, not moved": partial(last_maps, join=partial(np.nanmean, axis=0), moved=False),
+    "mean of five maps": partial(last_maps, join=partial(np.nanmean, axis=0)),
+    "product of five maps": partial(last_maps, join=_product),
 }
 """What one would try first, by name."""
 
@@ -123,13 +97,14 @@ def grids_of(frames: Sequence[Frame], weights: Path) -> tuple[list[View], list[d
     own = Stages.of(load_net(weights, frames[0].camera), memory=True)
     results = [result for (result,) in run_side_by_side(frames, own)]
     views = [View(result.frame, result.belief, result.grid) for result in results]
-    others = {name: list(of(views, own.architecture.grid)) for name, of in (FIRST | {SMOOTHED: smooth_drive}).items()}
-    return views, [
-        {ONE: result.grid, MEMORY: result.remembered, f"{ONE} + CRF": result.refined}
-        | {f"{MEMORY} + CRF": own.refine(np.log(np.maximum(result.remembered, 1e-6)), result.belief.probability)}
-        | {name: maps[k] for name, maps in others.items()}
-        for k, result in enumerate(results)
-    ]
+    methods = {MEMORY: [result.remembered for result in results]}
+    methods |= {name: list(of(views, own.architecture.grid)) for name, of in (FIRST | {SMOOTHED: smooth_drive}).items()}
+    found = [{ONE: result.grid, f"{ONE}{CRF}": result.refined} for result in results]
+    for name, maps in methods.items():
+        for of_frame, view, one in zip(found, views, maps, strict=True):
+            of_frame[name] = one
+            of_frame[f"{name}{CRF}"] = own.refine(np.log(np.maximum(one, 1e-6)), view.belief.probability)
+    return views, found
 
 
 def measure_memory(pandaset: str | Path, scene: str = "002", seed: int = 0, drives: int = 20) -> dict[str, object]:
@@ -164,8 +139,8 @@ def measure_memory(pandaset: str | Path, scene: str = "002", seed: int = 0, driv
     }
     worth = _worth(views, spec)
     command = f"semgrid-edu reproduce memory --scene {scene} --seed {seed} --drives {drives}"
-    minutes = round((perf_counter() - began) / 60, 1)
     made = made_by(command, "numpy", "torch", "numba", "embreex", "trimesh")
+    minutes = round((perf_counter() - began) / 60, 1)
     return {"scores": scores, "worth": worth, "drives": drives, "minutes": minutes, **made}
 
 
@@ -205,29 +180,3 @@ def _worth(drives: Sequence[Sequence[View]], spec: GridSpec) -> dict[str, object
     found = worth_by_distance(drives, spec)
     loss = {str(worth): row.tolist() for worth, row in zip(WORTHS, found.log_loss, strict=True)}
     return {"edges": list(EDGES), "log loss": loss, "cells": found.cells.tolist(), "best": found.best.tolist()}
-
-
-def memory_tables(result: dict) -> str:
-    """Return a table for each street: the methods by group of cells, per cent, and what memory gains.
-
-    Parameters
-    ----------
-    result : dict
-        From `measure_memory`, or from the JSON file that it was written to.
-    """
-    return "\n\n".join(f"{street}\n\n{markdown_table(_rows(groups))}" for street, groups in result["scores"].items())
-
-
-def _rows(groups: dict[str, dict]) -> list[list[str]]:
-    rows = [["cells", "method", PIXEL, CLASS, FORBIDDEN, "called unknown", "ECE", "Brier"]]
-    for name in GROUPS:
-        one = groups[name]
-        for method, scores in one.get("methods", {}).items():
-            metrics = [shown(scores[key]) for key in (PIXEL, CLASS)]
-            others = [
-                *(per_cent(scores[key]) for key in (FORBIDDEN, "called unknown", "ECE")),
-                f"{scores['Brier']:.3f}",
-            ]
-            rows.append([f"{name} ({one['cells']})", method, *metrics, *others])
-        rows += [[name, key, *map(shown, one[key].values()), "", "", ""] for key in GAINS if key in one]
-    return rows

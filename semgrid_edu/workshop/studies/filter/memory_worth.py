@@ -57,15 +57,10 @@ def worth_by_distance(
         params = MemoryParams(worth=worth, reach=1e9)
         for views in drives:
             for view, remembered in zip(views, remember_drive(views, spec, params), strict=True):
-                truth, seen = _truth(view, spec)
+                truth = view.frame.labels.birdseye_on(spec)
+                seen = view.frame.labels.visible_on(spec) & (truth != IGNORE)
                 surprise = -np.log(np.maximum(remembered[truth[seen], *np.nonzero(seen)], 1e-4))
                 loss[k] += np.histogram(distance[seen], edges, weights=surprise)[0]
                 cells += np.histogram(distance[seen], edges)[0] if k == 0 else 0
     loss /= np.maximum(cells, 1)
     return WorthByDistance(loss, cells, np.array(worths)[loss.argmin(axis=0)])
-
-
-def _truth(view: View, spec: GridSpec) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
-    """Return the true class of each cell, and which cells are labelled and in view."""
-    truth = view.frame.labels.birdseye_on(spec)
-    return truth, view.frame.labels.visible_on(spec) & (truth != IGNORE)
