@@ -57,7 +57,7 @@ def ours():
     """This process and all that it has started, and what else works in a folder for answers."""
     found = {one.pid: one for one in [psutil.Process(), *psutil.Process().children(recursive=True)]}
     for one in psutil.process_iter():
-        with suppress(psutil.Error):
+        with suppress(psutil.Error, OSError):  # a folder may be deeper than a path can say
             if one.cwd().startswith(tempfile.gettempdir()):
                 found[one.pid] = one
     return list(found.values())
