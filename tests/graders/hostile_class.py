@@ -4,7 +4,7 @@ It says which grades aren't as they should be, and what the grader held of disk,
 and after.
 """
 
-import os
+import subprocess
 import sys
 import tempfile
 import threading
@@ -74,12 +74,9 @@ def held(folder):
 
 def disk(folder):
     """Megabytes of files in a folder."""
-    size = 0
-    for place_of, _, names in os.walk(folder):  # what is deleted meanwhile counts as nothing
-        for name in names:
-            with suppress(OSError):
-                size += Path(place_of, name).lstat().st_blocks * 512 / 1e6
-    return size
+    # Unlike Python's own ways, du goes as deep as students dare; what is deleted meanwhile counts as nothing.
+    said = subprocess.run(["du", "-sk", folder], capture_output=True, text=True, check=False).stdout
+    return int(said.split()[0]) * 1024 / 1e6
 
 
 def fits(result, wanted):
