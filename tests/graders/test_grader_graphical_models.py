@@ -910,7 +910,7 @@ def eliminate(factors, order, seen, best=()):
             "used factors kept",
             task="eliminate",
             loses=3,
-            says="take the factors you have used out of the list",
+            says="take used factors out of the list",
             code=ELIMINATE.replace("[f for f in factors if name not in f.names] + [taken", "factors + [taken"),
         ),
         mistake(

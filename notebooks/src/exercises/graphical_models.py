@@ -403,15 +403,12 @@ def _test():
     result = got[0] if isinstance(got, tuple | list) else got
     assert isinstance(result, Factor), f"the first thing must be a Factor, got {type(result).__name__}"
     assert result.names, "nothing is left: put each sum back among the factors, it is multiplied later"
-    assert result.names == ("m1",), (
-        f"m1 alone must be left, not {result.names}: take the factors you have used out of the list"
-    )
+    assert result.names == ("m1",), f"m1 alone must be left, not {result.names}: take used factors out of the list"
     _explain(result.table, {(12, 4): "multiply first, then sum: a sum of products isn't the product of the sums"})
-    share = result.table[0] / result.table.sum()
-    assert np.isclose(result.table.sum(), 1) or not np.isclose(share, 0.75), "right up to a factor: normalise nowhere"
-    np.testing.assert_allclose(
-        result.table, [0.75, 0.25], atol=1e-9, err_msg="P(m1): the mean of 0.9, 0.1 and 0.6, 0.4"
-    )
+    share = result.table[0] / (total := result.table.sum())
+    assert np.isclose(total, 1) or not np.isclose(share, 0.75), "right up to a factor: normalise nowhere"
+    mean = "P(m1): the mean of 0.9, 0.1 and 0.6, 0.4"
+    np.testing.assert_allclose(result.table, [0.75, 0.25], atol=1e-9, err_msg=mean)
 
     got = eliminate(list(_STAR), ["m3", "m4", "street"], {"m2": 1})
     result = got[0] if isinstance(got, tuple | list) else got
@@ -422,8 +419,7 @@ def _test():
     got = eliminate(list(_ROW), ["m2"], {})
     result = got[0] if isinstance(got, tuple | list) else got
     assert sorted(result.names) == ["m1", "m3"], f"m1 and m3 are left, your result is over {result.names}"
-    total = result.table.sum()
-    assert np.isclose(total, 32), f"the weights must sum to Z = 32, not {total:.3g}: don't normalise"
+    assert np.isclose(total := result.table.sum(), 32), f"weights must sum to Z = 32, not {total:.3g}: don't normalise"
     np.testing.assert_allclose(np.diag(result.table), [10, 10], err_msg="m1 = m3: 3 * 3 + 1 * 1")
 
     got = eliminate(list(_ROW), ["m2"], {}, best=["m2"])
