@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 06: sampling that learns
 #
-# Eight small functions: equation (2), a mean over a cell, two black boxes, a camera that learns; and one question in words. Between 75 and 120 minutes. The lecture is [06: sampling that learns](../06_planes.ipynb).
+# Eight small functions: equation (2), a mean over a cell, two black boxes, a camera that learns; and one question in words. About 100 minutes. The lecture is [06: sampling that learns](../06_planes.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
