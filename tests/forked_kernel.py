@@ -10,7 +10,6 @@ import signal
 from importlib.metadata import EntryPoint
 
 import matplotlib as mpl
-from ipykernel.kernelapp import launch_new_instance
 from jupyter_client.provisioning import KernelProvisionerFactory, LocalProvisioner
 
 LIBRARIES = ["ipykernel.kernelapp", "semgrid_edu.plotting", "semgrid_edu.networks", "semgrid_edu.crf"]
@@ -20,6 +19,9 @@ FORKS.set_forkserver_preload(LIBRARIES)
 
 def run_kernel(arguments, folder, environment):
     """Be a kernel: what the forked process does."""
+    # tqdm takes a process that has loaded this for a notebook, so the tests' own processes must not.
+    from ipykernel.kernelapp import launch_new_instance
+
     os.setpgrp()  # what is sent to the group of a kernel doesn't reach the tests
     os.environ.update(environment, JPY_PARENT_PID=str(os.getppid()))  # it ends when the process that forked it has
     os.chdir(folder)
