@@ -30,7 +30,7 @@ class Page(HTMLParser):
         """Note what a tag says."""
         given = dict(attrs)
         self.anchors |= {given[name] for name in ("id", "name") if given.get(name)}
-        beneath = given.get("data-image") == "photo"  # the demo's photograph, whose words stand with what is drawn on it
+        beneath = given.get("data-image") == "photo"  # the demo describes what is drawn on it
         self.without_words += tag == "img" and not given.get("alt") and not beneath
         if address := given.get(FETCHED.get(tag, "href")):
             (self.links if tag == "a" else self.fetched).add(address)
