@@ -122,7 +122,9 @@ def _places(source: GridSpec, target: GridSpec, pose: PlanarMotion) -> NDArray[n
     return look_up(numbers, np.array([-1], np.float32), source, target, pose)[0].astype(np.int32)
 
 
-def remember_drive(views: Iterable[View], spec: GridSpec, params: MemoryParams | None = None) -> Iterator[NDArray]:
+def remember_drive(
+    views: Iterable[View], spec: GridSpec, params: MemoryParams | None = None
+) -> Iterator[NDArray[np.float32]]:
     """Remember the classes of a drive, frame after frame: g -> g.
 
     Parameters
@@ -143,7 +145,9 @@ def remember_drive(views: Iterable[View], spec: GridSpec, params: MemoryParams |
         yield grid
 
 
-def smooth_drive(views: Sequence[View], spec: GridSpec, params: MemoryParams | None = None) -> Iterator[NDArray]:
+def smooth_drive(
+    views: Sequence[View], spec: GridSpec, params: MemoryParams | None = None
+) -> Iterator[NDArray[np.float32]]:
     """Say what each cell is with the whole drive at hand: a memory of what came before, and one of what comes after.
 
     This is forward-backward: a second memory runs through the drive from its end, where everything moves the other way,

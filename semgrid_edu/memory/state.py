@@ -34,8 +34,8 @@ class MemoryParams:
     worth : float
         Exponent of the evidence of one more frame, seen from close by: 1 if frames were independent witnesses. Measured
         on simulated drives other than the shipped one (`worth_by_distance`), when `movable` classes were remembered in
-        view too; since then smaller ones are better in view, by
-        0.02 nats at most.
+        view too; since then smaller ones are better in view, by 0.02 nats
+        at most.
     reach : float
         Distance from the vehicle, metres, over which the exponent falls by a factor e, because a near view is a better
         witness than a far one. Measured on the same drives.
@@ -182,6 +182,16 @@ def look_at(grid: NDArray, occupancy: NDArray, spec: GridSpec, params: MemoryPar
         Their cells, around the vehicle.
     params : MemoryParams
         How much the frame is worth at which distance.
+
+    Returns
+    -------
+    Look
+        What the frame says of each cell, in the vehicle's grid.
+
+    Raises
+    ------
+    ArgumentError
+        When the shapes don't belong to the cells, or `params.movable` names a class that the grid lacks.
     """
     check_shape("occupancy", occupancy, (N_STATES, *spec.shape))
     if np.ndim(grid) != 3 or grid.shape[1:] != spec.shape or len(grid) <= N_STATES:
@@ -228,6 +238,11 @@ def standing(occupancy: NDArray) -> NDArray:
     ----------
     occupancy : (4, ...) float
         Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN.
+
+    Returns
+    -------
+    (...) float
+        The probability, at least 0.001, so that a mistaken FREE can be put right later.
     """
     o = np.asarray(occupancy)
     return np.maximum(o[State.STATIC] + o[State.DYNAMIC] + o[State.UNKNOWN] / 2, 1e-3)

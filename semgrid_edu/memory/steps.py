@@ -172,29 +172,18 @@ def _add_beliefs(scores, mass, classes, sees, movable, recalled, here):
         of_group, total, score, comes = top[int(movable[k])], sums[int(movable[k])], scores[k], np.float32(movable[k])
         says = classes[k, r][first:last]
         for c in range(width):
-            score[c] = _exp(score[c] - of_group[c])
+            score[c] = np.exp(score[c] - of_group[c])
             total[c] += score[c]
             seen[c] += comes * look[c] * says[c]
     for c in range(width):
         most = max(top[0, c], top[1, c])
-        others, movers = sums[0, c] * _exp(top[0, c] - most), _exp(top[1, c] - most)
+        others, movers = sums[0, c] * np.exp(top[0, c] - most), np.exp(top[1, c] - most)
         each = (1 - look[c]) * movers / (others + sums[1, c] * movers)  # what one unit of the movable ones is worth
         there = seen[c] + each * sums[1, c]
         parts[0, c], parts[1, c] = mass[c] * (1 - there) / max(sums[0, c], np.float32(1e-12)), mass[c] * each
     for k in range(n):
         row, comes, says = recalled[k, r][first:last], np.float32(movable[k]), classes[k, r][first:last]
         row += parts[int(movable[k])] * scores[k] + comes * mass * look * says
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _exp(x):
-    """Return e^x for x <= 0, a power of 2 times Taylor's series: the compiler takes eight at once, and np.exp one."""
-    y = max(x, np.float32(-87)) * np.float32(1 / np.log(2))
-    whole = np.floor(y + np.float32(0.5))
-    f, one = (y - whole) * np.float32(np.log(2)), np.float32(1)
-    a, b, c, d = np.float32(1 / 2), np.float32(1 / 6), np.float32(1 / 24), np.float32(1 / 120)
-    series = one + f * (one + f * (a + f * (b + f * (c + f * d))))
-    return series * np.int32((np.int32(whole) + np.int32(127)) << np.int32(23)).view(np.float32)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -228,7 +228,7 @@ def test_true_claims_are_rarely_refuted_however_many_statements_they_have():
 
     The share of such claims that are called not reproduced stays at 2.5 %; uncorrected, it would be several times that.
     """
-    rng, claims, corrected, single = np.random.default_rng(0), 200, 0, 0
+    rng, claims, corrected, single = np.random.default_rng(0), 400, 0, 0
     for _ in range(claims):
         drives, seeds = rng.normal(0, 2, (8, 1, 15)), rng.normal(0, 0.5, (8, 4, 1))
         right = 50 + drives + seeds + rng.normal(0, 1, (8, 4, 15))
