@@ -20,7 +20,7 @@ from PIL import Image
 from safetensors.torch import load_file, save_file
 from tiny_drive import DATE
 
-from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.files import sole_writer
 from semgrid_edu.storage.provenance import write_provenance
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 

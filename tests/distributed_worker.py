@@ -12,7 +12,7 @@ from torch import nn
 from semgrid_edu.networks import build_net
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training import loop as training
-from semgrid_edu.training.distributed import first_process_first, process_group, rank, shared_batch_norm, world_size
+from semgrid_edu.training.devices import first_process_first, process_group, rank, shared_batch_norm, world_size
 
 RUNS = {
     "end-to-end": TrainingParams(image_iterations=3, grid_iterations=5, batch_size=4),

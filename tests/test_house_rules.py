@@ -31,7 +31,7 @@ SHARED_OPTIONS = ("Force", "Resume", "Runs")
 """Options of several commands, which declare their help text once."""
 
 
-MOST_MODULES, MOST_LINES = {"book": 174, "workshop": 134}, {"book": 12_700, "workshop": 11_570}
+MOST_MODULES, MOST_LINES = {"book": 160, "workshop": 133}, {"book": 12_630, "workshop": 11_560}
 """The limits of CONTRIBUTING for each storey."""
 
 

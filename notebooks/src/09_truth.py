@@ -40,7 +40,7 @@ from semgrid_edu.datasets.ground_truth import drive_truth, flawed_drive, gather_
 from semgrid_edu.datasets.readers.project_lidar import closest_returns
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.graphical.dashed import Dashed
+from semgrid_edu.graphical.drawing import Dashed
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.stage_models import LabelWorld, ledger, ledger_table, lidar_label_stage, wrong_label
 from semgrid_edu.stage_models.ground_truth_label import STATE_GIVEN_CONTENT

@@ -39,7 +39,7 @@ from semgrid_edu.crf import most_likely, pair_weights, unary_from_probability
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.graphical import GraphicalModel, d_separated, draw
-from semgrid_edu.graphical.dashed import CUT_COLOUR
+from semgrid_edu.graphical.drawing import CUT_COLOUR
 from semgrid_edu.stage_models import crf_stage, ledger, ledger_table
 from semgrid_edu.stage_models.crf import UNDECIDED, all_free, coupled, two_classes
 from semgrid_edu.stage_models.crf import coupling_sweep, critical_coupling

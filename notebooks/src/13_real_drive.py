@@ -70,7 +70,7 @@ from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive,
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
-from semgrid_edu.graphical.dashed import Dashed
+from semgrid_edu.graphical.drawing import Dashed
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import load_net

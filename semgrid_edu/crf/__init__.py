@@ -3,8 +3,7 @@
 from semgrid_edu.crf.accurate import WindowedGaussian, mean_field_accurate
 from semgrid_edu.crf.doctor.check import check
 from semgrid_edu.crf.doctor.finding import Finding, Findings
-from semgrid_edu.crf.energy import energy, free_energy
-from semgrid_edu.crf.exact import crf_model, exact_marginals, log_partition, most_likely
+from semgrid_edu.crf.exact import crf_model, energy, exact_marginals, free_energy, log_partition, most_likely
 from semgrid_edu.crf.kernel import gram_matrix, pair_weights
 from semgrid_edu.crf.lattice.lattice import PermutohedralLattice
 from semgrid_edu.crf.lattice.literal import enclosing_simplex_literal, lattice_literal

@@ -25,9 +25,9 @@ from semgrid_edu.datasets.label_policies import LidarTruth, drive_labels
 from semgrid_edu.datasets.readers.frames import LabelledDrive
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.code_hash import code_hash
 from semgrid_edu.storage.compiled import cache_folder
 from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.provenance import code_hash
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 from semgrid_edu.storage.workplace import worker_pool

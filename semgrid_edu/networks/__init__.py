@@ -1,6 +1,5 @@
 """The networks: i -> s and (p, o) -> g, each by itself and joined (paper, sections 3.1 and 3.4)."""
 
-from semgrid_edu.networks.architecture import Architecture
 from semgrid_edu.networks.backbones.deeplab import DeepLab
 from semgrid_edu.networks.backbones.fcn import Fcn
 from semgrid_edu.networks.backbones.registry import SEGMENTERS, build_segmenter
@@ -8,9 +7,8 @@ from semgrid_edu.networks.backbones.segmenter import Segmenter, unit_image
 from semgrid_edu.networks.backbones.segnet import SegNet
 from semgrid_edu.networks.build import build_net
 from semgrid_edu.networks.fusion import FusionNet
-from semgrid_edu.networks.imagenet import load_imagenet
-from semgrid_edu.networks.semantic_grid import SemanticGridNet
-from semgrid_edu.networks.weights import IMAGE_STAGE, WEIGHTS, load_net, save_net
+from semgrid_edu.networks.semantic_grid import Architecture, SemanticGridNet
+from semgrid_edu.networks.weights import IMAGE_STAGE, WEIGHTS, load_imagenet, load_net, save_net
 
 __all__ = [
     "IMAGE_STAGE",

@@ -9,9 +9,8 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
-from semgrid_edu.networks.architecture import Architecture
 from semgrid_edu.networks.backbones.registry import build_segmenter
-from semgrid_edu.networks.semantic_grid import SemanticGridNet
+from semgrid_edu.networks.semantic_grid import Architecture, SemanticGridNet
 from semgrid_edu.planes import PlaneOperator, PlaneSampler, plane_pixels
 from semgrid_edu.planes.pixels import check_heights
 

@@ -5,7 +5,7 @@ through them and checks what each hands to the next, and `load_stages` reads a s
 """
 
 from semgrid_edu.pipeline.checks import StageError
-from semgrid_edu.pipeline.from_file import load_stages
+from semgrid_edu.pipeline.hints import load_stages
 from semgrid_edu.pipeline.run import FrameResult, network_image, run_pipeline, run_side_by_side
 from semgrid_edu.pipeline.stages import REMEMBER, STAGES, Stages
 

@@ -2,8 +2,7 @@
 
 from importlib import import_module
 
-from semgrid_edu.planes.literal import sample_planes_naive
-from semgrid_edu.planes.pixels import plane_heights, plane_pixels
+from semgrid_edu.planes.pixels import plane_heights, plane_pixels, sample_planes_naive
 
 __all__ = [
     "PlaneOperator",

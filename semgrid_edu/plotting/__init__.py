@@ -6,7 +6,14 @@ numbers fall from left to right. Arrays are never flipped: row 0 is the farthest
 """
 
 from semgrid_edu.plotting.animations import MAX_ANIMATION_BYTES, Animation, animate
-from semgrid_edu.plotting.charts import confusion, training_curves, velocity_ellipse, velocity_spread
+from semgrid_edu.plotting.charts import (
+    confusion,
+    coupling_errors,
+    error_against_time,
+    training_curves,
+    velocity_ellipse,
+    velocity_spread,
+)
 from semgrid_edu.plotting.colours import (
     DEPTH_RANGE,
     HEADING_COLOURS,
@@ -21,7 +28,6 @@ from semgrid_edu.plotting.colours import (
 )
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
-from semgrid_edu.plotting.inference import coupling_errors, error_against_time
 from semgrid_edu.plotting.lattice import draw_lattice_frame, draw_triangles, lattice_story, vertex_places
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel

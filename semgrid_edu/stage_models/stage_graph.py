@@ -11,8 +11,7 @@ from typing import NamedTuple
 from matplotlib.axes import Axes
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical.dashed import Dashed
-from semgrid_edu.graphical.drawing import draw
+from semgrid_edu.graphical.drawing import Dashed, draw
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.model import GraphicalModel
 

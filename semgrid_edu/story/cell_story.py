@@ -16,10 +16,9 @@ from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.pipeline import FrameResult, Stages
 from semgrid_edu.planes import plane_pixels
-from semgrid_edu.story.cell_evidence import CellMemory, CellScan, cell_memory, cell_scan, place_history
+from semgrid_edu.story.cell_evidence import CellMemory, CellScan, cell_memory, cell_scan, classes_at, place_history
 from semgrid_edu.story.contributions import Contributions, cell_contributions
 from semgrid_edu.story.crf_messages import NeighbourPull, neighbour_pull
-from semgrid_edu.story.pixel_classes import classes_at
 from semgrid_edu.story.what_if import what_if
 from semgrid_edu.story.words import FAULTS, faults, story_text
 

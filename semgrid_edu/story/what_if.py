@@ -11,7 +11,7 @@ from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
 from semgrid_edu.pipeline import FrameResult, Stages
-from semgrid_edu.story.pixel_classes import pixel_truth
+from semgrid_edu.story.cell_evidence import pixel_truth
 
 NO_IMAGE, NO_OCCUPANCY = "no image", "no occupancy"
 TRUE_IMAGE, TRUE_OCCUPANCY, TRUE_BOTH = "true image", "true occupancy", "both true"

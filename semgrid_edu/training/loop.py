@@ -16,12 +16,13 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
 from semgrid_edu.networks.build import plane_sampler
 from semgrid_edu.occupancy import N_STATES
-from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.files import sole_writer
 from semgrid_edu.training.batches import Batch, draw_batch, share_of_batch
 from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder, load_checkpoint, save_checkpoint
-from semgrid_edu.training.devices import keep_freed_memory, mixed_precision
-from semgrid_edu.training.distributed import (
+from semgrid_edu.training.devices import (
     in_parallel,
+    keep_freed_memory,
+    mixed_precision,
     process_total,
     rank,
     shared_batch_norm,

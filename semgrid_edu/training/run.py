@@ -19,7 +19,7 @@ from semgrid_edu.networks.weights import read_architecture
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import write_provenance
 from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder
-from semgrid_edu.training.distributed import first_process_first, process_group, rank, world_size
+from semgrid_edu.training.devices import first_process_first, process_group, rank, world_size
 from semgrid_edu.training.loop import train
 from semgrid_edu.training.params import TrainingParams
 

@@ -8,7 +8,7 @@ import pytest
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthFlaws, flawed_drive
 from semgrid_edu.datasets.ground_truth.flaws import flawed_frame, flawed_labels, miscalibrated
-from semgrid_edu.datasets.ground_truth.sweep import EgoVelocity, skew_scan
+from semgrid_edu.datasets.ground_truth.window import EgoVelocity, skew_scan
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import IGNORE, KITTI_14

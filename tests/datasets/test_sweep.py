@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from semgrid_edu.datasets.ground_truth.sweep import EgoVelocity, deskew_scan, ego_velocity, skew_scan, sweep_times
+from semgrid_edu.datasets.ground_truth.window import EgoVelocity, deskew_scan, ego_velocity, skew_scan, sweep_times
 from semgrid_edu.errors import ArgumentError
 
 VELOCITY = EgoVelocity(forward=12.0, left=0.5, turn=0.4)

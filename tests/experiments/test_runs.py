@@ -17,7 +17,7 @@ from tiny_runs import results, tiny_training_runs
 from semgrid_edu.datasets import training_cache
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import WEIGHTS
-from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.files import sole_writer
 from semgrid_edu.storage.workplace import Workplace, workplace
 from semgrid_edu.training.log import LOG, read_log
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS

@@ -11,7 +11,7 @@ from random_models import chain, one_of_you, random_directed, random_undirected
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Factor, GraphicalModel, draw, in_rows
-from semgrid_edu.graphical.dashed import Dashed, curve
+from semgrid_edu.graphical.drawing import Dashed, curve
 from semgrid_edu.graphical.layout import NODE
 
 ROWS = in_rows(["m1", "m2"], ["z"])

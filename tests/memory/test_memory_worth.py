@@ -10,7 +10,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.memory import View
 from semgrid_edu.occupancy import Belief
-from semgrid_edu.workshop.studies.filter.memory_worth import worth_by_distance
+from semgrid_edu.workshop.studies.filter.memory_gain import worth_by_distance
 
 SPEC = GridSpec(0, 71, -15.5, 15.5, 1.0)
 

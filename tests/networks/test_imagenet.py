@@ -5,7 +5,7 @@ from safetensors.torch import load_file, save_file
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import SEGMENTERS, build_segmenter, load_imagenet
-from semgrid_edu.networks.imagenet import imagenet_tensors
+from semgrid_edu.networks.weights import imagenet_tensors
 
 WIDTHS = (2, 3, 4, 5, 5)
 TINY = {

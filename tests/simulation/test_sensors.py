@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, project, rigid_transform, transform_points
-from semgrid_edu.datasets.ground_truth.sweep import EgoVelocity, deskew_scan, sweep_times
+from semgrid_edu.datasets.ground_truth.window import EgoVelocity, deskew_scan, sweep_times
 from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.camera import take_picture

@@ -15,8 +15,7 @@ from semgrid_edu.datasets import KittiRawDrive, load_index
 from semgrid_edu.datasets.readers.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.storage.files import sha256
-from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.files import sha256, sole_writer
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.workshop.simulation import datasets, writer
 from semgrid_edu.workshop.simulation.datasets import RECIPES, DatasetRecipe, Route, make_dataset, make_from_recipe

@@ -8,7 +8,7 @@ import pytest
 import semgrid_edu
 from semgrid_edu.datasets import label_policies, training_arrays
 from semgrid_edu.datasets.readers import kitti_raw
-from semgrid_edu.storage.code_hash import ROOT, code_hash, import_closure
+from semgrid_edu.storage.provenance import ROOT, code_hash, import_closure
 
 PACKAGE = Path(semgrid_edu.__file__).parent
 ARRAYS = [Path(module.__file__).relative_to(ROOT) for module in (training_arrays, kitti_raw)]

@@ -9,11 +9,11 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.files import sole_writer
 
 HOLDS = """
 import sys, time
-from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.files import sole_writer
 with sole_writer(sys.argv[1]):
     print("held", flush=True)
     time.sleep(600)

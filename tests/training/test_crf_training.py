@@ -10,7 +10,7 @@ from scipy.special import log_softmax
 from semgrid_edu.crf import CrfParams
 from semgrid_edu.crf.layer import CrfLayer, load_crf, save_crf
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.files import sole_writer
 from semgrid_edu.storage.tensors import write_tensors
 from semgrid_edu.training import CHECKPOINT, loop, weighted_cross_entropy
 from semgrid_edu.training.crf import CRF_TRAINING, CrfObjective, GridBatch, train_crf

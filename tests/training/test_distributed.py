@@ -13,7 +13,7 @@ from safetensors.torch import load_file
 
 from semgrid_edu.training import loop as training
 from semgrid_edu.training import train
-from semgrid_edu.training.distributed import process_group, rank, world_size
+from semgrid_edu.training.devices import process_group, rank, world_size
 
 
 def _two_processes(folder, *tasks):

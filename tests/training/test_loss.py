@@ -13,7 +13,7 @@ from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import build_net
 from semgrid_edu.training import Objective, median_frequency_weights, weighted_cross_entropy
 from semgrid_edu.training.batches import draw_batch, grid_logits, image_scores
-from semgrid_edu.training.distributed import shared_mean
+from semgrid_edu.training.devices import shared_mean
 from semgrid_edu.training.loss import class_frequencies, cross_entropy_sums
 
 

@@ -18,7 +18,7 @@ from semgrid_edu.datasets.training_set import Mixture
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.networks import SEGMENTERS, SemanticGridNet, build_net
-from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.files import sole_writer
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 from semgrid_edu.training import TrainingParams, checkpoint, train
 from semgrid_edu.training import loop as training

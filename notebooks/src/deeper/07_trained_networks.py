@@ -33,7 +33,7 @@ from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import build_segmenter, load_net
-from semgrid_edu.networks.imagenet import imagenet_tensors
+from semgrid_edu.networks.weights import imagenet_tensors
 from semgrid_edu.plotting.images import draw_image
 
 # %% jupyter={"source_hidden": true}

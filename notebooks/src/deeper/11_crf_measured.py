@@ -30,7 +30,7 @@ from semgrid_edu.crf import CrfParams, free_energy, gram_matrix, log_partition, 
 from semgrid_edu.workshop.studies.crf.crf_coupling import COUPLINGS, random_crf
 from semgrid_edu.workshop.studies.crf.crf_error import crf_error_tables
 from semgrid_edu.stage_models.crf import all_free, coupled
-from semgrid_edu.plotting.inference import coupling_errors, error_against_time
+from semgrid_edu.plotting.charts import coupling_errors, error_against_time
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 results = Path("../../docs/results")

@@ -13,7 +13,7 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter, label
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import Camera, rigid_transform
-from semgrid_edu.datasets.ground_truth.sweep import EgoVelocity, ego_velocity, skew_scan
+from semgrid_edu.datasets.ground_truth.window import EgoVelocity, ego_velocity, skew_scan
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import IGNORE, LabelSet

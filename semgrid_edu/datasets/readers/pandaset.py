@@ -17,10 +17,9 @@ from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_tran
 from semgrid_edu.datasets.readers import pandaset_files as files
 from semgrid_edu.datasets.readers.calibration import camera_from
 from semgrid_edu.datasets.readers.cuboids import LabelledScan, put_together
-from semgrid_edu.datasets.readers.depth_points import birdseye_votes
 from semgrid_edu.datasets.readers.drive_doubts import scans_again
 from semgrid_edu.datasets.readers.frames import FrameSequence, nothing_known
-from semgrid_edu.datasets.readers.project_lidar import cells_in_view, closest_returns, unhidden
+from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, cells_in_view, closest_returns, unhidden
 from semgrid_edu.errors import ArgumentError, DataError, check_whole
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec

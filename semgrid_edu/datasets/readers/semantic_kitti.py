@@ -22,9 +22,8 @@ from semgrid_edu.datasets.readers.calibration import (
     read_benchmark_calibration,
 )
 from semgrid_edu.datasets.readers.class_tables import ClassTable
-from semgrid_edu.datasets.readers.depth_points import birdseye_votes
 from semgrid_edu.datasets.readers.frames import FrameSequence, count_frames, nothing_known, read_scan
-from semgrid_edu.datasets.readers.project_lidar import seen_returns
+from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, seen_returns
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
 from semgrid_edu.datasets.readers.calibration import camera_from, check_rotation
 from semgrid_edu.datasets.readers.class_tables import ClassTable
-from semgrid_edu.datasets.readers.depth_points import birdseye_votes, depth_scan, points_from_depth
 from semgrid_edu.datasets.readers.frames import FrameSequence, count_frames, error_of
+from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, depth_scan, points_from_depth
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import IGNORE, SYNTHIA_10

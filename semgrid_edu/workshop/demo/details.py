@@ -20,10 +20,9 @@ from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.plotting import STATE_COLOURS
 from semgrid_edu.story import ContributionMaps, contribution_maps, last_sight, scan_maps, what_if
-from semgrid_edu.story.cell_evidence import VERDICTS
+from semgrid_edu.story.cell_evidence import VERDICTS, classes_at
 from semgrid_edu.story.cell_story import label_and_rival
 from semgrid_edu.story.crf_messages import beliefs_before_last_update, neighbour_messages, strongest_neighbours
-from semgrid_edu.story.pixel_classes import classes_at
 from semgrid_edu.story.what_if import CHANGES
 from semgrid_edu.story.words import FAULTS, SENTENCES, faults
 

@@ -13,8 +13,7 @@ from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.readers.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError, check_whole
 from semgrid_edu.labels import LABEL_SETS
-from semgrid_edu.storage.files import table_beside, write_json
-from semgrid_edu.storage.locking import LOCK, sole_writer
+from semgrid_edu.storage.files import LOCK, sole_writer, table_beside, write_json
 from semgrid_edu.storage.provenance import versions, write_provenance
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.workplace import check_workers, workplace

@@ -21,8 +21,7 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.occupancy.ground import height_above_ground
 from semgrid_edu.occupancy.polar import beams_of
-from semgrid_edu.storage.files import write_json, write_text
-from semgrid_edu.storage.locking import LOCK, sole_writer
+from semgrid_edu.storage.files import LOCK, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import write_provenance
 from semgrid_edu.workshop.simulation.sensors.gps import Geodesy, oxts_packet
 from semgrid_edu.workshop.simulation.writer import WrittenFrame, write_calibration, write_frames

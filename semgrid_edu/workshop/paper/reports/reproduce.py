@@ -9,8 +9,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.storage.files import atomic_path, check_ours, write_json, write_text
-from semgrid_edu.storage.locking import sole_writer
+from semgrid_edu.storage.files import atomic_path, check_ours, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import versions
 from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
 from semgrid_edu.training.devices import choose_device

@@ -18,7 +18,7 @@ from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.tensors import read_tensors
 from semgrid_edu.training import Objective, TrainingParams, train
 from semgrid_edu.training.batches import Batch
-from semgrid_edu.training.distributed import first_process_first, process_group
+from semgrid_edu.training.devices import first_process_first, process_group
 from semgrid_edu.training.loop import learn
 from semgrid_edu.training.run import architecture, training_params
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
