@@ -84,7 +84,8 @@ assert story.pull.messages.argmax() == CAR
 assert story.pull.before[CAR] > 0.99
 
 # %% [markdown]
-# Read it from A to G. You needn't understand any panel yet: the rest of this page explains one after the other.
+# Read it from A to G, one column after the other. You needn't understand any panel yet: the rest of this page explains
+# them.
 #
 # - **A** The dots are points above the cell, one every 20 cm from the ground up, drawn where the camera sees them. The
 #   lower ones fall on a parked car, the upper ones on a tree. So the image alone doesn't say what stands in this cell.
@@ -447,7 +448,9 @@ assert parts["occupancy"] > 0
 
 # %% jupyter={"source_hidden": true} alt="two label maps of the real street: semantic grid, and labels, which have gaps; road in the middle, a row of parked cars, trees and a building on the right"
 truth = grid_truth(now.frame.labels, now.belief.probability, spec)
-plotting.label_maps(spec, {"semantic grid $g$": now.grid.argmax(axis=0), "labels": truth}, KITTI_14)
+plotting.label_maps(
+    spec, {"semantic grid $g$": now.grid.argmax(axis=0), "labels; outside the view, states": truth}, KITTI_14
+)
 plt.show()
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
@@ -571,7 +574,8 @@ def draw(result, axes):
     plotting.occupancy(spec, result.belief.probability, ax=axes[0], legend=False)
     plotting.velocity(spec, result.belief.probability, result.belief.velocity, ax=axes[0])
     plotting.grid_labels(spec, result.refined.argmax(axis=0), KITTI_14, ax=axes[1], legend=False)
-    axes[0].set_title(f"{result.frame.time:.1f} s")
+    axes[0].set_title(f"{result.frame.time:.1f} s: states")
+    axes[1].set_title("refined classes")
 
 
 def show(k):

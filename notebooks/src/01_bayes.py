@@ -301,6 +301,7 @@ np.testing.assert_array_equal(places, TRIP)
 np.testing.assert_array_equal(np.flatnonzero(says_pole), SAYS_POLE)
 fig, axes = plt.subplots(2, 1, figsize=(7, 4.2), sharex=True, layout="constrained")
 plotting.belief_history(np.array(history), ax=axes[0], truth=places).set(xlabel="")
+fig.colorbar(axes[0].images[0], ax=axes, label="probability", shrink=0.46, anchor=(0, 1))
 axes[1].plot(np.repeat(np.arange(25), 2) + np.tile([-0.25, 0.0], 25), bits, "-", color="0.6")
 axes[1].plot(np.arange(25) - 0.25, bits[::2], "o", color="#0072b2", markersize=4, label="after predict")
 axes[1].plot(bits[1::2], "s", color="#d55e00", markersize=4, label="after update")
@@ -566,6 +567,7 @@ for ax, name, table in zip(axes, names, (seen, smooth(seen, heard), path), stric
         f"{name}: right in {np.sum(row == TRIP)} of 25 steps", fontsize=10
     )
     ax.label_outer()
+fig.colorbar(axes[0].images[0], ax=axes, label="probability (circle: truth)")
 plt.show()
 
 # %% [markdown]
@@ -901,7 +903,7 @@ def show(hit, slip, ax=None):
 sliders = {"hit": FloatSlider(value=0.8, min=0.1, max=0.99, step=0.01), "slip": FloatSlider(value=0.2, min=0, max=0.9)}
 _ = interact(lambda hit, slip: (show(hit, slip), plt.show())[1], **sliders)
 
-# %% jupyter={"source_hidden": true} alt="three tables of belief over 40 steps: with the numbers of this page blurred stripes that mostly follow the truth; with a good sensor and good odometry sharp stripes on the truth from step 5 on, but for a slip at step 12; with a good sensor and bad odometry blurred stripes, sharp only near poles; with a bad sensor and good odometry pale stripes beside each other, of which one follows the truth"
+# %% jupyter={"source_hidden": true} alt="four tables of belief over 40 steps: with the numbers of this page blurred stripes that mostly follow the truth; with a good sensor and good odometry sharp stripes on the truth from step 5 on, but for a slip at step 12; with a good sensor and bad odometry blurred stripes, sharp only near poles; with a bad sensor and good odometry pale stripes beside each other, of which one follows the truth"
 fig, axes = plt.subplots(2, 2, figsize=(9, 4.6), sharex=True, sharey=True, layout="constrained")
 SETTINGS = {"C": (0.8, 0.2), "D": (0.99, 0.02), "E": (0.99, 0.6), "F": (0.3, 0.02)}
 shown = {}
@@ -909,6 +911,7 @@ for ax, (letter, setting) in zip(axes.ravel(), SETTINGS.items(), strict=True):
     shown[letter] = show(*setting, ax)
     ax.set_title(f"{letter}  {ax.get_title()}", fontsize="medium")
     ax.label_outer()
+fig.colorbar(axes[0, 0].images[0], ax=axes, label="probability (circle: truth)")
 plt.show()
 places, favourites = shown["D"]
 np.testing.assert_array_equal(np.flatnonzero(places[5:] != favourites[5:]) + 5, [12, 13])

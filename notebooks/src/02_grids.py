@@ -624,6 +624,7 @@ for points in toy_scans:
 def two_memories():
     """Draw the grid that never forgets beside the one that does."""
     fig, axes = plt.subplots(1, 2, figsize=(5.8, 5), layout="compressed")
+    fig.supxlabel("red: where the cars are", fontsize=10)
     for k in range(0, 25, 2):
         for ax, p, title in zip(axes, (toy_maps[k], faded[k]), ("never forgets", "memory 0.5 s"), strict=True):
             ax.clear()

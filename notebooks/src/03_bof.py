@@ -87,6 +87,7 @@ picture = top.imshow(
 )
 top.set(ylabel="velocity [m/s]", yticks=range(-4, 5, 2))
 low.set(xlabel="place [m]", ylabel="P(occupied)", ylim=(0, 1.25), yticks=(0, 0.5, 1))
+fig.colorbar(picture, ax=(top, low), label="probability", ticks=(0, 0.1, 0.3, 1), shrink=0.65, anchor=(0, 1))
 bars = low.bar(np.arange(0.25, 20, 0.5), np.zeros(40), width=0.5, color="tab:blue")
 (arrow,) = low.plot([], [], "v", color="#c04000", markersize=9)
 
@@ -921,7 +922,7 @@ assert along[:3].max() < 0.1
 # %% jupyter={"source_hidden": true} alt="left, a bus from above: a yellow front with arrows towards us and a dark flank behind it; right, P(DYNAMIC) falls from one at the front to zero a few metres behind it"
 fig, axes = plt.subplots(1, 2, figsize=(9, 3.8), layout="compressed", width_ratios=[1, 2])
 mean, _ = bof_velocity(passing)
-plotting.velocity_wheel(ahead, passing.probability, mean, ax=axes[0], legend=False)
+plotting.velocity_wheel(ahead, passing.probability, mean, ax=axes[0])
 plotting.velocity(ahead, passing.probability, mean, axes[0])
 axes[1].plot(ahead.centers()[flank, 0, 0] - 8, along, "o", color="0.2")
 axes[1].set(xlabel="behind the front of the bus [m]", ylabel="P(DYNAMIC), where it is occupied", ylim=(-0.05, 1.05))

@@ -36,6 +36,8 @@ from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.plotting.colours import HEADING_COLOURS, colour_patches
+from semgrid_edu.plotting.grids import draw_map
 from semgrid_edu.plotting.moving import wheel_colours
 from semgrid_edu.stage_models import cmcdot_stage, ledger, ledger_table
 from semgrid_edu.stage_models.bof import bof_beliefs
@@ -94,7 +96,7 @@ def three_filters():
         pictures = [plotting.occupancy_colours(plotting.binary_states(by_log_odds[k]))]
         pictures += [wheel_colours(spec, b[k].probability, b[k].velocity) for b in (by_bof, by_cmcdot)]
         b, d = 38.3 - 1.72 * k, 36.5 - 0.86 * k
-        places = (0.4, 0.42 * k + 1), (4.2, b), (4.2, b + 5), (12.5, d)
+        places = (0.4, 0.42 * k + 1), (4.2, b), (4.2, b + 5), (13.3, d)
         for ax, picture, name, texts in zip(axes, pictures, ("log-odds grid", "BOF", "CMCDOT"), letters, strict=True):
             ax.images[-1].set_data(picture)
             ax.set_title(f"{name}, {k / 10:.1f} s", fontsize=10)
@@ -281,14 +283,15 @@ assert came_in[loop_alone].mean() > 0.8
 # Watch the overtaking car A go through one round:
 
 
-# %% jupyter={"source_hidden": true} alt="seven small pictures of the overtaking car: the old belief, the car orange; after move all has slid down by a cell; after predict the orange has flown ahead and is paler; the scan, with hit cells black and passed cells pink; after update the orange is sharp again; its particles before step 4, mostly pale, and after it, all alike"
+# %% jupyter={"source_hidden": true}
 def crop(ax, title):
     """Show the surroundings of the overtaking car."""
-    ax.set(xlim=(8, -1), ylim=(2, 15), title=title, xlabel="y [m]", ylabel="x [m]" if ax is axes[0] else "")
-    ax.set(xticks=(0, 5), yticks=(5, 10, 15))
+    ax.set(xlim=(8, -1), ylim=(2, 15), xticks=(0, 5), yticks=(5, 10, 15), title=title)
+    ax.set(xlabel="y, to the left [m]", ylabel="x, forward [m]" if ax is axes[0] else "")
 
 
-fig, axes = plt.subplots(1, 7, figsize=(10.4, 2.9), layout="compressed")
+# %% jupyter={"source_hidden": true} alt="seven small pictures of the overtaking car: the old belief, the car orange; after move all has slid down by a cell; after predict the orange has flown ahead and is paler; the scan, with hit cells black and passed cells pink; after update the orange is sharp again; its particles before step 4, mostly pale, and after it, all alike"
+fig, axes = plt.subplots(1, 7, figsize=(10.4, 3.0), layout="compressed")
 for k, state, title in (
     (0, old, "before"),
     (1, moved, "1 move"),
@@ -298,13 +301,18 @@ for k, state, title in (
     plotting.occupancy(spec, state.probability, ax=axes[k], legend=False)
     crop(axes[k], title)
 says = np.log10(evidence.occupied / evidence.free)
-plotting.grid_values(spec, says, "", ax=axes[3], cmap="RdGy", vmin=-1, vmax=1).images[0].colorbar.remove()
+scan = draw_map(spec, says, axes[3], cmap="RdGy", vmin=-1, vmax=1).images[0]
 crop(axes[3], "the scan")
 for ax, state, title in ((axes[5], updated, "before 4"), (axes[6], resampled, "4 resample")):
     plotting.particles(
         spec, state.particles, plotting.occupancy(spec, np.eye(4)[:, [FREE]][..., None] + 0 * says, ax, False)
     )
     crop(ax, title)
+scan_colours = [scan.to_rgba(value, bytes=True)[:3] for value in (says.max(), says.min(), 0)]
+named = colour_patches(plotting.STATE_NAMES, plotting.STATE_COLOURS)
+named += colour_patches(("hit", "passed", "not seen"), scan_colours)
+named += colour_patches(("particle: our way", "towards us"), HEADING_COLOURS[::2])
+fig.legend(handles=named, loc="outside lower center", ncols=9, fontsize="small", frameon=False)
 plt.show()
 
 # %% [markdown]
@@ -497,7 +505,7 @@ def bars(ax, b, title, names=True):
 
 
 fig, axes = plt.subplots(1, 2, figsize=(9.5, 2.4), layout="constrained")
-bars(axes[0], b, "before: four particles", names=False)
+bars(axes[0], b, "before: four particles; arrows: 0.1 s of flight", names=False)
 bars(axes[1], after, "0.1 s later")
 arrow = {"arrowstyle": "->", "color": "#6a1b9a"}
 for p, w, speed in zip(x, weight, v, strict=True):
@@ -949,7 +957,8 @@ settings = ((300, 0.4), (3000, 0.4), (30_000, 0.4), (30_000, 2.0))
 for setting, ax in zip(settings, axes, strict=True):
     play(*setting, ax, legend=ax is axes[-1])
     ax.label_outer()
-    ax.set_xlabel("y, to the left [m]" + "\narrows: distance covered in 0.5 s" * (ax is axes[1]))
+    ax.set_xlabel("y, to the left [m]")
+fig.supxlabel("arrows: distance covered in 0.5 s", fontsize="medium")
 plt.show()
 
 # %% [markdown]

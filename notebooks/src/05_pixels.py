@@ -93,6 +93,17 @@ def read_at(height):
     return read, red
 
 
+def draw_read(height, ax):
+    """Draw the map that a plane reads, and mark the cells that read the red car and its true place."""
+    read, red = read_at(height)
+    plotting.grid_labels(spec, read, KITTI_14, ax=ax)
+    ax.plot(*spec.centers()[red][:, ::-1].T, "s", color="tab:red", markersize=1.8, label="the red car")
+    ax.plot(*car[::60, 1::-1].T, "k.", markersize=3, label="its true place")
+    ax.set_ylim(0, 45)
+    named, style = ax.get_legend().legend_handles + ax.get_lines(), {"fontsize": "small", "frameon": False}
+    ax.legend(handles=named, loc="upper left", bbox_to_anchor=(1.02, 1), markerscale=3, **style)
+
+
 # %% jupyter={"source_hidden": true} alt="animation: A, a sheet of coloured dots rises through the camera image of a street with one car marked in red, and becomes a line at the camera's height; B, seen from the side, it cuts through the red car; C, the map of classes read on the sheet, with red dots where a cell reads the red car: a long smear from its place outwards on the ground plane, and a shorter one on both sides of its place at 0.8 m"
 
 
@@ -106,11 +117,7 @@ def raised():
         axes["B"].scatter(*car[::7, [0, 2]].T, s=1, color="tab:red")
         axes["B"].plot([0, 40], [height] * 2, "C0", eye[0], z_cam, "ks")
         axes["B"].set(xlim=(-1, 41), ylim=(-1.2, 3.2), xlabel="x, forward [m]", ylabel="height [m]")
-        read, red = read_at(height)
-        plotting.grid_labels(spec, read, KITTI_14, ax=axes["C"])
-        axes["C"].plot(*spec.centers()[red][:, ::-1].T, "s", color="tab:red", markersize=1.8)
-        axes["C"].plot(*car[::60, 1::-1].T, "k.", markersize=3)
-        axes["C"].set_ylim(0, 45)
+        draw_read(height, axes["C"])
         for letter, ax in axes.items():
             ax.set_title(f"A: plane at {height:.1f} m" if letter == "A" else letter, fontsize="medium")
         yield fig
@@ -673,8 +680,8 @@ for x in (15, 20, 30, 40, 50):
 
 # %% jupyter={"source_hidden": true} alt="a real street with LIDAR returns on it, coloured by depth, that follow the cars' outlines; below it the dots of the ground plane, which lie on the road and also over the cars"
 fig, axes = plt.subplots(2, 1, figsize=(5.6, 4), layout="constrained")
-plotting.points_on_image(real, axes[0], size=2, colour_bar=False)
-plotting.plane_on_image(coarse, 0.0, paled(real), ax=axes[1], size=4, colour_bar=False)
+plotting.points_on_image(real, axes[0], size=2)
+plotting.plane_on_image(coarse, 0.0, paled(real), ax=axes[1], size=4)
 axes[0].set_title("A: LIDAR returns", fontsize="medium")
 axes[1].set_title("B: centres of cells of 1 m on the ground plane", fontsize="medium")
 fig.supxlabel(real_drive().credit, fontsize=8)

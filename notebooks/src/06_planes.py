@@ -380,6 +380,7 @@ weight = np.ma.masked_equal(scores.grad[0, 0].numpy(), 0)
 _, ax = plt.subplots(figsize=(7.5, 2.4), layout="constrained")
 style = {"norm": LogNorm(0.1, 1000), "cmap": "viridis", "interpolation": "nearest"}
 plotting.image_values(weight, "sum of weights", ax=ax, **style)
+ax.set(xlabel="u [pixels]", ylabel="v [pixels]", xticks=range(0, 320, 50), yticks=range(0, 96, 20))
 plt.show()
 print(f"{100 * weight.mask.mean():.0f} % of the pixels are read by no point, so they never learn from the map")
 left, middle, right = np.split(scores.grad[0, 0, round(camera.K[1, 2])].numpy(), (107, 213))  # the horizon's row

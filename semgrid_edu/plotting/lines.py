@@ -104,7 +104,7 @@ def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | Non
     belief : (T, N) float
         The belief at each step, one row per step; each row sums to 1.
     ax : Axes, optional
-        Axes to draw into.
+        Axes to draw into. A new figure, which is made when it is left out, has a colour bar.
     truth : (T,) int, optional
         The right cell at each step, which a circle marks.
 
@@ -117,7 +117,9 @@ def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | Non
         raise ArgumentError("belief", "one row per step, shape (T, N)", f"shape {np.shape(belief)}")
     if truth is not None and np.shape(truth) != (len(belief),):
         raise ArgumentError("truth", f"one cell for each of {len(belief)} steps", f"shape {np.shape(truth)}")
-    ax = ax or plt.subplots(figsize=(6, 2.6), layout="constrained")[1]
+    if ax is None:
+        ax = plt.subplots(figsize=(6, 2.6), layout="constrained")[1]
+        ax.figure.colorbar(plt.cm.ScalarMappable(cmap="Blues"), ax=ax, label="probability")
     ax.imshow(np.transpose(belief), cmap="Blues", vmin=0, vmax=1, origin="lower", aspect="auto")
     if truth is not None:
         ax.plot(np.arange(len(belief)), truth, "o", markersize=4, markerfacecolor="none", color="#d55e00")

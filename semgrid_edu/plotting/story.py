@@ -71,9 +71,10 @@ def _draw_states(story: "CellStory", steps: Axes, past: Axes) -> None:
     _stack(past, [f"{time:.1f} s" for time in story.times], story.history)
     steps.set_title("states, step by step", loc="left", fontsize="medium")
     past.set_title("states of the place, scan by scan", loc="left", fontsize="medium")
-    past.set_xlabel("probability", fontsize="small")
+    for ax in (steps, past):
+        ax.set_xlabel("probability", fontsize="small")
     colour_legend(
-        past, STATE_NAMES, STATE_COLOURS, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=4, columnspacing=0.8
+        past, STATE_NAMES, STATE_COLOURS, loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=4, columnspacing=0.8
     )
 
 
@@ -100,7 +101,7 @@ def _draw_parts(story: "CellStory", kinds: Axes, classes: Axes, planes: Axes) ->
     )
     classes.set_title("image, by class", loc="left", fontsize="medium")
     planes.set_title("image, by plane", loc="left", fontsize="medium")
-    for ax in (classes, planes):
+    for ax in (kinds, classes, planes):
         ax.set_xlabel("part of the difference of scores", fontsize="small")
 
 

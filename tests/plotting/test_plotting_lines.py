@@ -60,6 +60,15 @@ def test_a_belief_has_a_column_for_each_step_with_cell_0_at_the_bottom_and_a_cir
     assert not plotting.belief_history(belief).lines
 
 
+def test_a_table_of_belief_in_a_figure_of_its_own_has_a_colour_bar():
+    belief = np.array([[0.25, 0.75], [0.5, 0.5]])
+    alone = plotting.belief_history(belief).figure
+    assert [ax.get_ylabel() for ax in alone.axes] == ["cell", "probability"]
+    figure, ax = plt.subplots()
+    plotting.belief_history(belief, ax)
+    assert figure.axes == [ax]
+
+
 def test_a_band_is_as_thick_as_its_probability():
     probability = np.array([[0.5, 0.25], [0.2, 0.5], [0.2, 0.25], [0.1, 0.0]])
     ax = plotting.state_history(np.array([0.0, 0.1]), probability)

@@ -463,7 +463,7 @@ assert sampled.to_bof[-1] < 0.3 * sampled.to_bof[0]
 # ### Play with it
 #
 # How few particles are enough on the ring road? (Without a running kernel there is no slider; the figure shows three
-# settings; the darker, the more probable.)
+# settings.)
 
 
 # %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
@@ -480,6 +480,7 @@ fig, axes = plt.subplots(1, 3, figsize=(10, 2.5), sharey=True, layout="constrain
 for ax, n in zip(axes, (5, 50, 5000), strict=True):
     show(n, ax)
     ax.label_outer()
+fig.colorbar(axes[0].images[0], ax=axes, label="probability")
 plt.show()
 
 # %% [markdown]

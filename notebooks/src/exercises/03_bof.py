@@ -229,14 +229,14 @@ def _test():
     mean = answer_array(got[0], "the mean")
     assert mean.shape == (2, 1, 3), f"the mean has a plane for x and one for y, shape (2, 1, 3), got {mean.shape}"
     slips = {
-        (0.8, -0.2): "you weigh by P(occupied, v): given that something moves means divided by P(it moves)",
+        (0.8, -0.2): "you weight by P(occupied, v): given that something moves means divided by P(it moves)",
         (8.5 / 7, -2.5 / 7): "what stands doesn't move: leave the bins that aren't faster than `slow` out of both sums",
         (1.7, -0.5): "only the zero velocity is left out: what moves at 0.7 m/s isn't faster than `slow` either",
         (0.1, -1.3): "you leave the first bin out: here the bins stand in any order, so look at their speeds",
         (-0.5, 2.0): "x and y are swapped: velocities[:, 0] is x, the first plane of the mean",
-        (4 / 3, -4 / 3): "every velocity counts the same: weigh each by what the cell believes of it",
-        (0.9, -0.9): "every velocity counts the same: weigh each by what the cell believes of it",
-        (4.0, 2.0): "that is the most probable velocity: the mean weighs all of them",
+        (4 / 3, -4 / 3): "every velocity counts the same: weight each by what the cell believes of it",
+        (0.9, -0.9): "every velocity counts the same: weight each by what the cell believes of it",
+        (4.0, 2.0): "that is the most probable velocity: the mean weights all of them",
     }
     for slip, hint in slips.items():
         assert not np.allclose(mean[:, 0, 0], slip), hint
@@ -301,14 +301,14 @@ def _test():
         "that is the mean of v v^T: take the mean velocity off first": [[16, -2], [-2, 11]],
         "the two components vary together: the off-diagonal isn't zero": [[12, 0], [0, 10.75]],
         "x and y are swapped": [[10.75, -1], [-1, 12]],
-        "you weigh by P(occupied, v): divide by P(it moves)": [[4.8, -0.4], [-0.4, 4.3]],
+        "you weight by P(occupied, v): divide by P(it moves)": [[4.8, -0.4], [-0.4, 4.3]],
         "what stands doesn't move: leave what isn't faster than `slow` out": np.cov(
             velocities.T, aweights=[2, 2, 1, 1, 1], ddof=0
         ),
-        "every velocity counts the same: weigh each by what the cell believes of it": np.cov(
+        "every velocity counts the same: weight each by what the cell believes of it": np.cov(
             velocities[[0, 2, 3]].T, ddof=0
         ),
-        "every velocity counts the same: weigh each by what the cell believes": np.cov(velocities[[0, 2, 3]].T),
+        "every velocity counts the same: weight each by what the cell believes": np.cov(velocities[[0, 2, 3]].T),
         "these are standard deviations, m/s: a covariance is in m^2/s^2": np.diag(np.sqrt([12, 10.75])),
     }
     for hint, slip in slips.items():
