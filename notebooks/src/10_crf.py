@@ -145,8 +145,8 @@ for a, b in combinations(names, 2):
 print("cells that one square links, at most:", max(len(factor.names) for factor in stage.model.factors))
 
 # %% [markdown]
-# The dashed curve stands for the edges that *mean field* cuts. Its price comes from an example further down, in which
-# mean field says 0.998 and the exact probability is 0.52.
+# *Mean field* cuts all six links; the dashed curve marks one of them. Its price comes from an example further down, in
+# which mean field says 0.998 and the exact probability is 0.52.
 #
 # ## Two cells by hand
 #
@@ -922,7 +922,8 @@ for ax, (name, labels) in zip(axes, tried.items(), strict=True):
     plotting.grid_labels(spec, labels[shown], KITTI_14, ax=ax, legend=False)
     ax.set_title(f"{name}\n{score[name][0]:.1f} %, class {score[name][1]:.1f} %", fontsize=10)
     for letter, (x, y) in (("A", spec.centers()[A]), ("B", spec.centers()[B])):
-        ax.annotate(letter, (y, x), (y, x + 1.5), color="w", ha="center", fontweight="bold")
+        arrow = {"arrowstyle": "->", "color": "white", "linewidth": 1.2}
+        ax.annotate(letter, (y, x), (y + 5, x + 3), color="w", ha="center", fontweight="bold", arrowprops=arrow)
     ax.set(ylabel="" if ax is not axes[0] else "x, forward [m]")
 plotting.class_legend(axes[-1], KITTI_14, np.stack([labels[shown] for labels in tried.values()]))
 plt.show()
@@ -1011,7 +1012,9 @@ states = np.stack([cells.argmax(axis=0) for _, cells, _ in grids])[on_sidewalk]
 print(f"of the sidewalk's cells {(states == State.FREE).mean():.0%} are FREE")
 
 # %% jupyter={"source_hidden": true} alt="three maps of a real street: the network's has a strip of sidewalk one cell wide along its left border, the refined one has only a few cells of it left, the labels show the strip too"
-plotting.label_maps(whole, {"network": both[0][9], "after the CRF": both[1][9], "labels": labels[9]}, KITTI_14)
+plotting.label_maps(
+    whole, {"network": both[0][9], "after the CRF": both[1][9], "labels (white: none)": labels[9]}, KITTI_14
+)
 plt.gcf().supxlabel(street.credit, fontsize=8)
 plt.show()
 

@@ -347,14 +347,14 @@ _test()
 # ## Task 5: calibration, in groups of equal number (3 points)
 #
 # `probability` is `(N, C)`, one distribution per cell; `truth` is `(N,)`, the true class of each cell, or 255 where there is no label. A method calls a cell by its most
-# probable class, and is as *sure* as that probability says. The lecture's groups are equally wide, and since a method is sure of most cells, one group holds nearly all of them. So let each group
-# hold the same number of cells: sort the labelled cells by how sure it is, the least sure first, and cut the row into `bins` groups. If the number doesn't divide, the first groups have a cell
+# probable class, and that probability is its *confidence*. The lecture's groups are equally wide, and since the confidence is high in most cells, one group holds nearly all of them. So let each group
+# hold the same number of cells: sort the labelled cells by the method's confidence, the least confident first, and cut the row into `bins` groups. If the number doesn't divide, the first groups have a cell
 # more than the others (`np.array_split` cuts like that). Then
 #
 # $$ \text{error} = \sum_{b} \frac{n_b}{N} \left| \text{accuracy}_b - \text{confidence}_b \right| $$
 #
-# with $n_b$ the number of labelled cells in group $b$, $N$ that of all labelled cells, accuracy the share of the group's cells that are called right, and confidence the mean of
-# how sure it is of them. No two cells are equally sure, and there are at least as many labelled cells as groups.
+# with $n_b$ the number of labelled cells in group $b$, $N$ that of all labelled cells, accuracy the share of the group's cells that are called right, and confidence the mean
+# confidence of its cells. No two cells have the same confidence, and there are at least as many labelled cells as groups.
 #
 # Complete `calibration_error`: it returns this error.
 
