@@ -248,12 +248,14 @@ assert brings_right < inside_map / 2
 # %% jupyter={"source_hidden": true} alt="part of the camera image with the labels laid over it and LIDAR returns as dots; those in white lie on what the pixel shows, red crosses lie behind it, most of them at the fence"
 numbers, uv = closest_returns(frame)
 hidden = hidden_returns(frame, numbers, uv)
-fig, ax = plt.subplots(figsize=(7.4, 3.4), layout="constrained")
+fig, ax = plt.subplots(figsize=(7.4, 3.6), layout="constrained")
 plotting.image_labels(frame.image, frame.labels.image, KITTI_14, ax, opacity=0.5)
 ax.plot(*uv[~hidden].T, ".", color="w", markersize=4, label="lies on what its pixel shows")
 ax.plot(*uv[hidden].T, "x", color="r", markersize=6, label="lies behind it")
 ax.set(xlim=(290, 620), ylim=(175, 55))
-ax.add_artist(ax.get_legend())
+classes = ax.get_legend()
+names = [text.get_text() for text in classes.get_texts()]
+fig.legend(classes.legend_handles, names, loc="outside lower center", ncols=5, fontsize="small")
 ax.legend(loc="upper left", facecolor="0.6", framealpha=0.9)
 plt.show()
 
@@ -308,10 +310,11 @@ print(f"; {100 * moved.mean():.0f} % land in another cell")
 # | 2 | road, road, sidewalk, sidewalk, sidewalk | sidewalk | sidewalk |
 # | 3 | sky | no label | no label |
 #
-# There are two rules. **Majority** takes the most frequent class. **Standing** lets what stands on the ground outvote
-# the ground, because a thin pole sends one return and the road around it ten. The true maps of this course follow the
-# second rule, so the paper's policy in this package does too. (The paper doesn't say which it uses.) *Sky* sends no
-# return, so a return with that label lies at an outline, and is dropped. With $x_k$ the class that return $k$ brings,
+# There are two rules. **Majority** takes the most frequent class. By **what stands wins** (`standing` in the code),
+# what stands on the ground outvotes the ground, because a thin pole sends one return and the road around it ten. The
+# true maps of this course follow the second rule, so the paper's policy in this package does too. (The paper doesn't
+# say which it uses.) *Sky* sends no return, so a return with that label lies at an outline, and is dropped. With $x_k$
+# the class that return $k$ brings,
 #
 # $$ y = \arg\max_{l \in L} \sum_k [x_k = l] $$
 #
@@ -336,7 +339,7 @@ for rule, by_hand in (("majority", [ROAD, SIDEWALK, None]), ("standing", [CAR, S
 # ### Which rule is better, and what can't be outvoted?
 #
 # That depends on the errors. Suppose that each return has the wrong class with probability 0.1, by itself. With three
-# returns, a majority is wrong if two or three are: $3 \cdot 0.1^2 \cdot 0.9 + 0.1^3 = 0.028$. With *standing*, a road
+# returns, a majority is wrong if two or three are: $3 \cdot 0.1^2 \cdot 0.9 + 0.1^3 = 0.028$. With *what stands wins*, a road
 # cell becomes a car as soon as *one* of the three says so: $1 - 0.9^3 = 0.271$. (And a car cell becomes road only if
 # all three say so: 0.001.)
 #
@@ -351,18 +354,18 @@ for rule, by_hand in (("majority", [ROAD, SIDEWALK, None]), ("standing", [CAR, S
 # `carry_labels`:
 
 # %% tags=["outvote"] jupyter={"outputs_hidden": true}
-print(f"majority of 3, independent errors:   {wrong_label(LabelWorld(3, outline=0.1, calibration=0)):.3f}")
+print(f"majority of 3, independent errors:         {wrong_label(LabelWorld(3, outline=0.1, calibration=0)):.3f}")
 for content, name in enumerate(("road", "car")):
     wrong = wrong_label(LabelWorld(3, outline=0.1, calibration=0, vote="standing"), content)
-    print(f"standing, 3 returns, a {name:<4} cell:    {wrong:.3f}")
+    print(f"what stands wins, 3 returns, a {name:<4} cell: {wrong:.3f}")
 for n in (3, 9):
-    print(f"majority of {n}, shared calibration:   {wrong_label(LabelWorld(n, outline=0, calibration=0.1)):.3f}")
+    print(f"majority of {n}, shared calibration:         {wrong_label(LabelWorld(n, outline=0, calibration=0.1)):.3f}")
 
-# %% jupyter={"source_hidden": true} alt="probability of a wrong label against the number of returns: a majority with independent errors falls to zero, with a calibration error too it stays above 0.1, and standing rises for road cells"
+# %% jupyter={"source_hidden": true} alt="probability of a wrong label against the number of returns: a majority with independent errors falls to zero, with a calibration error too it stays above 0.1, and with what stands wins it rises for road cells"
 counts = np.arange(1, 10, 2)
 fig, ax = plt.subplots(figsize=(7.5, 3.6), layout="constrained")
 lines = {
-    "standing, a road cell, outlines alone": ("s--", {"calibration": 0, "vote": "standing"}, 0),
+    "what stands wins, a road cell, outlines alone": ("s--", {"calibration": 0, "vote": "standing"}, 0),
     "majority, outlines and calibration": ("o-", {}, None),
     "majority, outlines alone": ("^-", {"calibration": 0}, None),
 }
@@ -375,7 +378,7 @@ plt.show()
 
 # %% [markdown]
 # With outlines alone (triangles) a majority soon is nearly always right. With the calibration as well (circles) it
-# sinks to 0.1 (dotted) and no further. Remember this line when we add up nineteen scans. *Standing* (squares) gets
+# sinks to 0.1 (dotted) and no further. Remember this line when we add up nineteen scans. *What stands wins* (squares) gets
 # worse for a road cell the more returns there are. (For a car cell it gets better; so it helps what is thin.)
 # ("Outlines" are the errors of people who draw outlines a little off, by themselves at each return.) Where all
 # returns of a cell bring one class, the two rules are the same. How often do they differ with one scan, and with
@@ -833,8 +836,8 @@ def windows_growing():
         for ax, movers in zip(axes, ("smeared", "carved", "carried"), strict=True):
             policy = replace(window, past=reach, future=reach, movers=movers)
             plotting.grid_labels(spec, drive_truth(moments, NOW, spec, policy), KITTI_14, ax, legend=False)
-            ax.set(title=movers, ylabel="", ylim=(0, 45))
-        fig.suptitle(f"{2 * reach + 1} scans", fontsize=11)
+            ax.set(title=movers, ylabel="x, forward [m]" if ax is axes[0] else "", ylim=(0, 45))
+        fig.suptitle(f"{2 * reach + 1} scan{'s' * (reach > 0)}", fontsize=11)
         for _ in range(3 if reach in (0, 9) else 1):
             yield fig
 
@@ -862,7 +865,7 @@ AROUND = "9 before and after"
 OWN, SIGHT = f"{AROUND}, own labels, movers", "visible to camera"
 policies = [
     ("one scan (the paper)", PAPER),
-    ("  without clean-up", "one scan, no clean-up"),
+    ("  no clean-up", "one scan, no clean-up"),
     ("  all classes spread alike", "one scan, all classes spread alike"),
     ("  majority", "one scan, majority of returns"),
     ("  de-skewed", "one scan, de-skewed"),
@@ -914,13 +917,22 @@ for text, (one, other) in pairs.items():
 assert min(extra[line] for line in "abcdefgk") > 0 > extra["h"]  # more wrong labels, and fewer
 assert max(abs(extra[line]) for line in "jlm") < 1
 
+# %% jupyter={"source_hidden": true}
+for rule, name in {"what stands wins": PAPER, "a majority": "one scan, majority of returns"}.items():
+    found = 100 * counts_of(result, name).shares(axis=0)["found"][KITTI_14.index("bicycle")]
+    print(f"one scan, {rule}: {found:.0f} % of the cells of bicycles found")
+
 # %% jupyter={"source_hidden": true} alt="bars of three kinds of error for fifteen policies: cells with another label, cells without a label, wrong labels; accumulated scans miss fewest cells and have more wrong labels, except where only what the camera sees is kept"
 chosen = {name: result["sums"][name] for _, name in policies}
-policy_errors(result | {"sums": chosen})
+fig, group, texts = policy_errors(result | {"sums": chosen}), "", []
+for text, _ in policies:  # the names of the table, each with its group
+    group = group if text.startswith(" ") else text.split(" (")[0].split(":")[0]
+    texts.append(f"{group}: {text.strip()}" if text.startswith(" ") else text)
+fig.axes[0].set_yticks(range(len(texts)), texts)
 plt.show()
 
 # %% [markdown]
-# In the bars look at the rows "9 before and after". Except for the last one, which keeps only what the camera sees,
+# In the bars look at the rows "19 scans". Except for the last one, which keeps only what the camera sees,
 # they are short in the middle panel (cells without a label) and longer than the first row in the right one (wrong
 # labels). The second table compares two policies drive by drive. In its lines:
 #
@@ -941,7 +953,7 @@ plt.show()
 #   taken. At the image's edge, 40° to the side, it is 0.1 s · 40 / 360 = 11 ms off, and at 10 m/s the vehicle moves by
 #   11 cm in that time, a fifth of a cell.
 #
-# The recipe without clean-up has the lowest share of wrong labels, and it also finds least. So no row is best in both.
+# One scan with no clean-up has the lowest share of wrong labels, and it also finds least. So no row is best in both.
 #
 # ### Nineteen scans and a wrong calibration
 #
@@ -991,7 +1003,7 @@ def draw_policy(policy, ax, title=""):
     plotting.grids.draw_map(spec, colours[difference_kinds(truth, grid, N_SEMANTIC)], ax)
     shares = TruthCounts.of_frame(grid, truth, standing, spec, KITTI_14).shares(axis=(0, 1))
     ax.set(title=title, ylabel="")
-    ax.set_xlabel(f"found {100 * shares['found']:.0f} %, wrong {100 * shares['wrong']:.0f} %")
+    ax.set_xlabel(f"{ax.get_xlabel()}\nfound {100 * shares['found']:.0f} %, wrong {100 * shares['wrong']:.0f} %")
 
 
 # %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
@@ -1016,9 +1028,9 @@ _ = interact(
 # %% jupyter={"source_hidden": true} alt="four maps of differences from the truth: one scan; one scan without clean-up; nineteen scans with their own labels; the same, only what the camera sees"
 four = {
     "one scan": TruthPolicy(),
-    "no clean-up": TruthPolicy(cleanup="none"),
-    "19 scans, carved": replace(window, movers="carved"),
-    "19 scans, camera only": replace(window, movers="carved", visible_to="camera"),
+    "one scan: no clean-up": TruthPolicy(cleanup="none"),
+    "19 scans: carved": replace(window, movers="carved"),
+    "19 scans: carved, only\nwhat the camera sees": replace(window, movers="carved", visible_to="camera"),
 }
 fig, axes = plt.subplots(1, 4, figsize=(12.5, 5.4), layout="compressed", sharey=True)
 for ax, (title, policy) in zip(axes, four.items(), strict=True):

@@ -44,7 +44,7 @@ SCENE = ("2011_09_26", "0013")  # date and number of the drive; of PandaSet the 
 # %% [markdown]
 # Every number and picture below is made from these lines. What the text says of them holds for the street that comes
 # with the course. Where yours differs, you have found something. Sentences that say *on drive 0013* are about two
-# stretches of a real drive of KITTI that we may not ship; their numbers are read from
+# stretches of a real drive of KITTI (frames 0 to 23 and 24 to 60) that we may not ship; their numbers are read from
 # [docs/results/real_drive.json](../docs/results/real_drive.json).
 
 # %% jupyter={"source_hidden": true}
@@ -730,10 +730,11 @@ shown = {
     for name in ("simulated streets", "taught here")
     if name in maps
 }
-fig, axes = plt.subplots(1, len(shown) + 1, figsize=(8.5, 4.4), layout="constrained", sharey=True)
+fig, axes = plt.subplots(1, len(shown) + 1, figsize=(9, 4.4), layout="constrained", sharey=True)
 for ax, (name, called) in zip(np.atleast_1d(axes), (shown | {"labels": truths[-1]}).items(), strict=True):
-    plotting.grid_labels(spec, called, KITTI_14, ax=ax, legend=name == "labels").set(ylim=(0, 60), title=name)
+    plotting.grid_labels(spec, called, KITTI_14, ax=ax, legend=False).set(ylim=(0, 60), title=name)
     ax.axvline(0, color="black", linestyle="--", linewidth=1)
+plotting.class_legend(ax, KITTI_14, np.stack([*shown.values(), truths[-1]]))
 plt.show()
 
 # %% [markdown]
@@ -800,8 +801,9 @@ for name, one in agreement.items():
 #
 # Data checked, network taught: what is left is the model. The paper's system cuts edges, and the course keeps a ledger
 # of their prices on toy worlds. On a labelled street two of them can be measured by paying them back. **Memory**
-# (lecture 14's edge, from the earlier semantic grid to the present one) joins what all earlier frames said of a cell.
-# The **CRF** of lecture 10 joins neighbouring cells, which the network names one by one.
+# (the edge from the earlier semantic grid to the present one, which lecture 00 prices and lecture 14 pays back) joins
+# what all earlier frames said of a cell. The **CRF** of lecture 10 joins neighbouring cells, which the network names
+# one by one.
 #
 # **Predict before you run.** Which of the two makes the map of this street better, for the network from simulated
 # streets? By how many points?

@@ -71,7 +71,7 @@ def oncoming(result):
 def draw_map(ax, grid, title, ring=None):
     """Draw the classes of a semantic grid up to 45 m ahead, with a ring around a place."""
     plotting.grid_labels(spec, grid.argmax(axis=0), KITTI_14, ax=ax, legend=False)
-    ax.set(ylim=(0, 45), xlabel="", ylabel="")
+    ax.set_ylim(0, 45)
     ax.set_title(title, fontsize="medium")
     if ring is not None:
         ax.plot(
@@ -83,7 +83,8 @@ def draw_map(ax, grid, title, ring=None):
 # %% jupyter={"source_hidden": true} alt="animation of a real street: A, the camera image; B, the map of one frame, in which the ringed oncoming car turns from car to unknown-dynamic as it leaves the image; C, the map with memory, in which it stays a car"
 def passing():
     """Yield image, map of one frame and map with memory, frame after frame."""
-    fig = plt.figure(figsize=(8.6, 4.1), layout="constrained")
+    fig = plt.figure(figsize=(9.6, 4.1), layout="constrained")
+    all_shown = np.stack([grid.argmax(axis=0) for result in street for grid in (result.grid, result.remembered)])
     for result in street:
         fig.clear()
         axes = fig.subplot_mosaic([["A", "B", "C"]], width_ratios=(2.2, 1, 1))
@@ -94,6 +95,8 @@ def passing():
         ring = oncoming(result)
         draw_map(axes["B"], result.grid, "B: one frame", ring)
         draw_map(axes["C"], result.remembered, "C: with memory", ring)
+        axes["C"].set_ylabel("")
+        plotting.class_legend(axes["C"], KITTI_14, all_shown)
         yield fig
 
 
@@ -575,17 +578,23 @@ def windows(results, sign, count=3, side=16):
 
 def show_windows(chosen, side=16):
     """Draw one frame, memory and truth of some squares, one column per square."""
-    _, axes = plt.subplots(3, len(chosen), figsize=(1.6 * len(chosen), 4.6), layout="constrained")
+    fig, axes = plt.subplots(3, len(chosen), figsize=(1.6 * len(chosen), 5.0), layout="constrained")
+    drawn = []
     for (results, (score, k, r, c)), column in zip(chosen, axes.T, strict=True):
         result = results[k]
         maps = result.grid.argmax(axis=0), result.remembered.argmax(axis=0), result.frame.labels.birdseye_on(spec)
         for ax, name, labels in zip(column, ("one frame", "memory", "truth"), maps, strict=True):
-            ax.imshow(KITTI_14.colours(labels[r : r + side, c : c + side]))
+            drawn.append(labels[r : r + side, c : c + side])
+            ax.imshow(KITTI_14.colours(drawn[-1]))
             ax.set(xticks=[], yticks=[])
             ax.set_ylabel(name if column[0] is axes[0, 0] else "")
         where = "real" if results is street else "simulated"
         x, y = spec.centers()[r + side // 2, c + side // 2]
         column[0].set_title(f"{where}, frame {k}\nx {x:.0f} m, y {y:.0f} m\n{score:+d} cells", fontsize=8)
+    occurring = [c for c in np.unique(drawn) if c < len(KITTI_14)]
+    names, colours = ([of[c] for c in occurring] for of in (KITTI_14.names, KITTI_14.rgb))
+    patches = plotting.colours.colour_patches(names, colours)
+    fig.legend(handles=patches, loc="outside lower center", ncols=7, fontsize="small", frameon=False)
     plt.show()
 
 

@@ -191,8 +191,8 @@ _MARKERS = "osD^vP*X"
 _FLOOR = 1e-7
 """Errors below this are rounding errors of single precision, and are drawn at it."""
 
-_NUMBERED = (1, 10, 100)
-"""Numbers of updates that are written beside the points."""
+_USUAL = 10
+"""The package's default number of updates, whose points are drawn large."""
 
 
 def error_against_time(result: Mapping, scene: str, of: str = "mean") -> Figure:
@@ -227,17 +227,18 @@ def error_against_time(result: Mapping, scene: str, of: str = "mean") -> Figure:
     whole = {"labels": "share of labels that differ"}.get(of, f"{of} total variation of a cell")
     axes[0].set_ylabel(whole)
     shape = " x ".join(map(str, result["scenes"][scene]["shape"][1:]))
-    figure.suptitle(f"{scene}, {shape} cells; the numbers beside points count updates", fontsize="medium")
+    counts = ", ".join(map(str, result["iterations"]))
+    figure.suptitle(f"{scene}, {shape} cells; points: {counts} updates, large: {_USUAL}", fontsize="medium")
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=8, fontsize="small")
     return figure
 
 
 def _points(ax: Axes, x: Sequence[float], y: Sequence[float], name: str, number: int, counts: Sequence[int]) -> None:
-    """Draw one way, with its numbers of updates beside some points."""
-    ax.plot(x, y, color=f"C{number}", marker=_MARKERS[number], markersize=4, linewidth=1, label=name)
-    for count, left, up in zip(counts, x, y, strict=True):
-        if count in _NUMBERED and up > _FLOOR:
-            ax.annotate(f"{count}", (left, up), (3, 3), textcoords="offset points", fontsize=8, color=f"C{number}")
+    """Draw one way, with a large point at the usual number of updates."""
+    style = {"color": f"C{number}", "marker": _MARKERS[number]}
+    ax.plot(x, y, markersize=4, linewidth=1, label=name, **style)
+    usual = np.equal(counts, _USUAL)
+    ax.scatter(np.array(x)[usual], np.array(y)[usual], s=70, edgecolor="black", zorder=3, **style)
 
 
 def coupling_errors(result: Mapping) -> Figure:

@@ -212,7 +212,7 @@ def lidar_label_stage(world: LabelWorld | None = None) -> StageGraph:
         equations={"m": "what stands there", "c": "calibration", "o": "occupancy", "y": "label"},
         labels={"c": r"$\kappa$", "neighbour": "$y'$"},
         cut=cut_edges("label"),
-        ghosts={"neighbour": (0.9 * world.returns - 0.5, -2.4)},
+        ghosts={"neighbour": (1.1 * world.returns - 0.5, -2.4)},
     )
 
 
@@ -251,7 +251,7 @@ def _voted(world: LabelWorld) -> NDArray[np.float64]:
 
 def _positions(n: int) -> dict[str, tuple[float, float]]:
     """Place the world above, what is measured below it, and the label at the bottom."""
-    places = {"m": (-0.2, 3.4), "c": (1.8 * n - 0.6, 3.4), "o": (-1.6, 0.0), "y": (0.9 * (n - 1) + 0.4, -1.2)}
+    places = {"m": (-0.2, 3.4), "c": (2.2 * n - 1.0, 3.4), "o": (-1.6, 0.0), "y": (1.1 * (n - 1) + 0.6, -1.2)}
     for k in range(n):
-        places |= {f"a{k + 1}": (1.8 * k, 1.2), f"d{k + 1}": (1.8 * k + 0.8, 1.2), f"x{k + 1}": (1.8 * k + 0.4, 0.0)}
+        places |= {f"a{k + 1}": (2.2 * k, 1.2), f"d{k + 1}": (2.2 * k + 1.2, 1.2), f"x{k + 1}": (2.2 * k + 0.6, 0.0)}
     return places

@@ -105,7 +105,7 @@ print(f"and {bad[0].sum() / bad.sum():.2f} are")
 #
 # The simulator knows the truth, so we can let it judge. SegNet learned from the same 142 training frames, each time
 # with other labels: those of the paper's recipe (*usual*); the true ones; those of one scan without clean-up, de-skewed,
-# or only where the camera sees; and those of ten scans with moving things smeared, carved or carried (lecture 09). Image
+# or only where the camera sees (*visible to camera*); and those of ten scans with moving things smeared, carved or carried (lecture 09). Image
 # stages, three seeds and steps are the same. Each was scored on 110 test drives (`semgrid-edu reproduce truth-costs`). All of
 # it is of an earlier version of the simulator, from before its LIDAR and its ground were made like KITTI's: it had a fifth of
 # KITTI's columns, and all roads lay in one plane.
@@ -193,7 +193,7 @@ assert all(abs(lost["de-skewed", *column]["mean"]) < 0.005 for column in product
 # How far ahead do the labels reach, and the networks that learned from them?
 
 # %% jupyter={"source_hidden": true} alt="three panels by distance: share of right cells of usual labels, of labels of ten scans and of true labels, dashed, and of the networks that learned from them, solid; usual ones fall to a tenth at 50 to 60 metres, those of ten scans to three tenths, the network with true labels to a half"
-shown_here = {"lidar": "usual", "accumulated-carved": "ten scans, movers carved", "true": "true labels"}
+shown_here = {truth: LEARNED_FROM[truth] for truth in ("lidar", "accumulated-carved", "true")}
 fig, axes = plt.subplots(1, 3, figsize=(12, 3.4), sharey=True, layout="constrained")
 for ax, (truth, title) in zip(axes, shown_here.items(), strict=True):
     bands = rows[truth]["distances"]
