@@ -22,6 +22,9 @@ from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 PAPERS = "#c0392b"
 """The colour of the paper's values; their marker differs from ours too."""
 
+UNITS = dict(zip(METRICS, ("per cent of all labelled cells", "per cent, mean of the classes", "per cent"), strict=True))
+"""What the numbers of each metric are."""
+
 
 def accuracy_picture(result: dict) -> Figure:
     """Draw Table 1 or 2: one panel per metric, one line per network, without and with the CRF.
@@ -38,7 +41,7 @@ def accuracy_picture(result: dict) -> Figure:
         draw_scores(ax, {name: row["scores"]["lidar"]["all"][metric] for name, row in rows.items()})
         papers = [100 * (row["paper"][metric] or np.nan) for row in rows.values()]
         ax.plot(papers, range(len(rows)), "X", color=PAPERS, label="the paper's", zorder=3)
-        ax.set(title=metric, xlabel="per cent of all labelled cells" if metric != "FmIoU" else "per cent")
+        ax.set(title=metric, xlabel=UNITS[metric])
     axes[0].invert_yaxis()
     figure.legend(*legend_entries(axes[0]), loc="outside lower center", ncols=4)
     return figure
