@@ -149,6 +149,7 @@ for step in range(41):
     optimiser.zero_grad()
     F.cross_entropy(grid_logits(learner, batch), two.truth.long(), weight=alpha, ignore_index=IGNORE).backward()
     optimiser.step()
+all_called = np.concatenate([part[0].ravel() for _, pixels, cells, _ in story for part in (pixels, cells)])
 
 # %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="animation: A, the classes of pixels, which begin as a tidy street of road, sidewalk, car and buildings, and get patches of wrong classes; B, the map, at first nearly all one wrong class, in which road, sidewalk and cars take shape; C, the true map; D, the share of right cells rises from near zero to about 90 per cent while that of pixels falls from about 85 to about 60"
 
@@ -162,7 +163,8 @@ def trained():
         axes = fig.subplot_mosaic([["A", "B", "C"], ["D", "B", "C"]], width_ratios=(2.3, 1, 1))
         draw_image(PALETTE[pixels[0]], axes["A"])
         plotting.grid_labels(spec, cells[0], KITTI_14, ax=axes["B"], legend=False)
-        plotting.grid_labels(spec, two.truth[0].numpy(), KITTI_14, ax=axes["C"])
+        plotting.grid_labels(spec, two.truth[0].numpy(), KITTI_14, ax=axes["C"], legend=False)
+        plotting.class_legend(axes["C"], KITTI_14, all_called)
         for name, right in (("cells", by_cell), ("pixels", by_pixel)):
             axes["D"].plot(steps[: now + 1], right[: now + 1], ".-" if name == "cells" else "x--", label=name)
         axes["D"].set(xlim=(-1, 41), ylim=(0, 100), xlabel="step", ylabel="right [%]")
@@ -170,8 +172,7 @@ def trained():
         names = {"A": f"A: pixels, step {step}", "B": "B: the map", "C": "C: the true map", "D": "D"}
         for letter, ax in axes.items():
             ax.set_title(names[letter], fontsize="medium")
-            if letter in "AC":
-                ax.set_ylabel("")
+        axes["C"].set_ylabel("")
         yield fig
 
 
@@ -271,7 +272,7 @@ for x, name in zip((6, 10, 14), "abc", strict=True):
         ax.plot(x, z, "o" if called == "car" else "s", color=colour, markersize=9, markeredgecolor="white", zorder=3)
 ax.plot(0, camera_height, "k>", markersize=9)
 ax.hlines([0, 1.4], 0, 20, color="0.6", linestyle=":", zorder=0)
-ax.set(xlim=(-0.5, 18), ylim=(-0.5, 2), xlabel="x, forward [m]", ylabel="z, up [m]")
+ax.set(xlim=(-0.5, 18), ylim=(-0.5, 2), xlabel="x, forward [m]", ylabel="z, up [m]", title="triangle: the camera")
 plt.show()
 
 # %% [markdown]
@@ -347,8 +348,9 @@ with torch.inference_mode():
 fig, axes = plt.subplots(1, 4, figsize=(8.2, 3.9), sharex=True, sharey=True, layout="compressed")
 for k, ax in zip((0, 4, 8, 12), axes, strict=True):
     brightest = float(reduced[k].quantile(0.98))
-    draw_map(spec, reduced[k], ax, cmap="gray", vmin=0, vmax=brightest).set_title(f"map {k}", fontsize="medium")
+    draw_map(spec, reduced[k] / brightest, ax, cmap="gray", vmin=0, vmax=1).set_title(f"map {k}", fontsize="medium")
     ax.set(xlabel="", ylabel="")
+fig.colorbar(axes[-1].images[0], ax=axes, label="value / 98 % quantile of its map", extend="max", shrink=0.6)
 fig.supxlabel("y, to the left [m]", fontsize="medium")
 axes[0].set_ylabel("x, forward [m]")
 plt.show()
@@ -794,7 +796,9 @@ cost = F.cross_entropy(net.fusion(net.sampler(leaf), o[shown, None])[:, :, row, 
 line = plane_pixels(spec, heights, drive.camera.resized(size))[0][:, row, col]
 fig, axes = plt.subplots(1, 2, figsize=(8.2, 3.2), layout="constrained")
 draw_image(resize_image(frames[shown].image, size), axes[0])
-draw_image(s_bar[0].abs().sum(dim=0).numpy() ** 0.5, axes[1], cmap="magma")
+strength = s_bar[0].abs().sum(dim=0).numpy()
+draw_image((strength / strength.max()) ** 0.5, axes[1], cmap="magma", vmin=0, vmax=1)
+fig.colorbar(axes[1].images[0], ax=axes[1], label="square root of |gradient| / largest", shrink=0.8)
 for ax, colour in zip(axes, ("#fc7200", "white"), strict=True):
     ax.plot(*line.T, "-", color=colour, linewidth=0.8)
     for d in (0, 5, 10, 15):
@@ -802,11 +806,10 @@ for ax, colour in zip(axes, ("#fc7200", "white"), strict=True):
         ax.annotate(f"{heights[d]:.0f} m", line[d], (6, 0), textcoords="offset points", color=colour, va="center")
     ax.set_xlim(max(line[0, 0] - 70, -0.5), line[0, 0] + 70)
 axes[0].set_title("A: the points above the cell", fontsize="medium")
-axes[1].set_title("B: size of the gradient, square root", fontsize="medium")
+axes[1].set_title("B: size of the gradient", fontsize="medium")
 plt.show()
 
 # %% jupyter={"outputs_hidden": true, "source_hidden": true}
-strength = s_bar[0].abs().sum(dim=0).numpy()
 print(f"{x[row, col]:.1f} m ahead, truth car, called {KITTI_14.names[whole[shown, row, col]]}")
 for name in ("vegetation", "car"):
     share = strength[pixel_truth[shown] == KITTI_14.index(name)].sum() / strength.sum()
@@ -820,7 +823,7 @@ print(f"{(strength > 0).mean():.0%} of the pixels get some")
 
 # %% jupyter={"source_hidden": true} alt="A, the true classes of a street's pixels; B, after the first stage the large parts are right, with ragged borders and without thin posts; C, after training end to end: road, sidewalk and cars are still recognised, and in place of the fence there are patches of building, car and pedestrian"
 before, after = (scores_of(each, image).argmax(dim=1).numpy() for each in (stage_one, net))
-fig, axes = plt.subplots(3, 1, figsize=(6.4, 6.2), layout="constrained")
+fig, axes = plt.subplots(3, 1, figsize=(6.4, 6.7), layout="constrained")
 for ax, (name, shown_labels) in zip(
     axes,
     {"A: truth": pixel_truth, "B: after stage one": before, "C: after training end to end": after}.items(),
@@ -828,6 +831,8 @@ for ax, (name, shown_labels) in zip(
 ):
     draw_image(PALETTE[shown_labels[shown]], ax)
     ax.set_title(name, fontsize="medium")
+all_shown = np.stack([labels[shown] for labels in (pixel_truth, before, after)])
+plotting.class_legend(axes[-1], KITTI_14, all_shown, loc="upper center", bbox_to_anchor=(0.5, 0), ncols=5)
 plt.show()
 
 # %%
@@ -933,13 +938,20 @@ use = real_truth != IGNORE
 real_columns = real_label[use], real_o.numpy().argmax(axis=1)[use], real_truth[use].astype(int)
 real_rows = compare(*real_columns, real_grid[use], fit_table(*real_columns))
 print(f"label and state share {shared(*real_columns):.2f} bits once the class is known")
+late_called = late(fit_table(*real_columns), *real_columns[:2]).argmax(axis=1)
+shares = zip(KITTI_14.names, found(late_called, real_columns[2]), strict=True)
+print("true cells that late fusion finds, %:", ", ".join(f"{name} {share:.0f}" for name, share in shares if share >= 0))
 assert 0 < real_rows["table of both"][0] - real_rows["late fusion"][0] < 1
 Markdown(as_table(real_rows))
 
 # %% jupyter={"source_hidden": true} alt="three maps of the real street: the network's classes; late fusion, with the road beyond 13 m and several cars and walls in place, more cars and walls than there are, and neither vegetation nor sidewalk; and the labels, which have gaps"
 late_grid = np.full(real_truth.shape, IGNORE)
-late_grid[use] = late(fit_table(*real_columns), *real_columns[:2]).argmax(axis=1)
-last_maps = {"A: the network": real_grid[-1], "B: late fusion": late_grid[-1], "C: labels": real_truth[-1]}
+late_grid[use] = late_called
+last_maps = {
+    "A: the network": real_grid[-1],
+    "B: late fusion": late_grid[-1],
+    "C: labels (white: none)": real_truth[-1],
+}
 fig = plotting.label_maps(spec, last_maps, KITTI_14)
 fig.supxlabel(street.credit, fontsize=7)
 plt.show()
@@ -1002,8 +1014,9 @@ _ = interact(show, pitch=FloatSlider(value=1.0, min=-3, max=3, step=0.25, descri
 # </details>
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="accuracy of three networks against the error of pitch and of yaw from minus two to two degrees: with pitch it falls steeply when the camera points too high and rises or stays when it points too low; with yaw it falls little on both sides"
+NAMES = {"segnet": "SegNet", "fcn": "FCN", "deeplab": "DeepLab v2"}
 angles = (-2, -1, -0.5, 0, 0.5, 1, 2)
-looks = {name: scores_of(load_net(sample_weights(name), drive.camera), image) for name in ("segnet", "fcn", "deeplab")}
+looks = {name: scores_of(load_net(sample_weights(name), drive.camera), image) for name in NAMES}
 curves = {
     (name, axis): [accuracies(map_with(name, s, turned(**{axis: angle})), truth)[0] for angle in angles]
     for name, s in looks.items()
@@ -1012,7 +1025,7 @@ curves = {
 fig, axes = plt.subplots(1, 2, figsize=(8.2, 3), sharey=True, layout="constrained")
 for (name, axis), curve in curves.items():
     style = {"segnet": "o-", "fcn": "s--", "deeplab": "^:"}[name]
-    axes[int(axis == "yaw")].plot(angles, curve, style, label=name, markersize=4)
+    axes[int(axis == "yaw")].plot(angles, curve, style, label=NAMES[name], markersize=4)
 axes[0].set(
     xlabel="pitch error [degrees]; positive: camera points higher", ylabel="semantic cells right [%]", ylim=(40, 85)
 )
@@ -1023,11 +1036,11 @@ plt.show()
 # %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
 print(f"{'semantic cells right, %':<26}" + "".join(f"{angle:>7}" for angle in angles), "degrees")
 for (name, axis), curve in curves.items():
-    print(f"{name + ', ' + axis:<26}" + "".join(f"{value:7.0f}" for value in curve))
+    print(f"{NAMES[name] + ', ' + axis:<26}" + "".join(f"{value:7.0f}" for value in curve))
 right = {"as trained": whole, "camera 2 degrees too low": map_with("segnet", scores, turned(-2))}
 for name, grid in right.items():
     near, far = (100 * (grid == truth)[semantic & side].mean() for side in (x < 20, x >= 30))
-    print(f"segnet, {name:<25} nearer than 20 m {near:.0f} %, beyond 30 m {far:.0f} %")
+    print(f"SegNet, {name:<25} nearer than 20 m {near:.0f} %, beyond 30 m {far:.0f} %")
 usual = {key: curve[3] for key, curve in curves.items()}
 assert all(3 < usual[n, "pitch"] - curves[n, "pitch"][5] < 15 for n in looks)
 assert all(curves[n, "pitch"][1] > usual[n, "pitch"] - 0.5 for n in looks)
@@ -1045,7 +1058,7 @@ assert all(abs(usual[n, "yaw"] - curves[n, "yaw"][k]) < 3.5 for n in looks for k
 for name in looks:
     dim = scores_of(load_net(sample_weights(name), drive.camera), image / 3)
     dark, bright = accuracies(map_with(name, dim, drive.camera), truth)[0], usual[name, "pitch"]
-    print(f"{name:<8} a third of the light: {bright:.0f} -> {dark:.0f} % of semantic cells")
+    print(f"{NAMES[name]:<11} a third of the light: {bright:.0f} -> {dark:.0f} % of semantic cells")
 
 # %% [markdown]
 # **What it makes up.** Where no beam has been and the camera doesn't see the cell either, the truth is
