@@ -146,13 +146,14 @@ for ax, letter, name in zip(axes, "ABC", TRAINED, strict=True):
     looked[name] = (*abs(reached - 227), np.ptp(half))
     can_see = receptive_field(CHAINS[name]) / 2
     assert abs(reached - 227).max() <= can_see
-    draw_image((slope / slope.max()).sqrt().mul(15).round(), ax=ax, cmap="magma")
+    draw_image((slope / slope.max()).sqrt().mul(15).round().div(15), ax=ax, cmap="magma", vmin=0, vmax=1)
     ax.plot(227, 60, "x", color="cyan")
     for columns, style in ((half, ":"), ((227 - can_see, 227 + can_see), "--")):
         for column in columns:
             ax.axvline(column, color="white", linewidth=1, linestyle=style)
     ax.set_xlim(-0.5, 319.5)
     ax.set_title(f"{letter}: {NAMES[name]}", fontsize="medium")
+fig.colorbar(axes[-1].images[0], ax=axes, label="square root of slope / largest", shrink=0.4)
 plt.show()
 for name, columns in looked.items():
     print("{:<11} columns reached to the left {}, to the right {}; middle half {}".format(NAMES[name], *columns))
