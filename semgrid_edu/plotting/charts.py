@@ -237,8 +237,7 @@ def _points(ax: Axes, x: Sequence[float], y: Sequence[float], name: str, number:
     """Draw one way, with a large point at the usual number of updates."""
     style = {"color": f"C{number}", "marker": _MARKERS[number]}
     ax.plot(x, y, markersize=4, linewidth=1, label=name, **style)
-    usual = np.equal(counts, _USUAL)
-    ax.scatter(np.array(x)[usual], np.array(y)[usual], s=70, edgecolor="black", zorder=3, **style)
+    ax.scatter(*np.compress(np.equal(counts, _USUAL), [x, y], axis=1), s=70, edgecolor="black", zorder=3, **style)
 
 
 def coupling_errors(result: Mapping) -> Figure:
