@@ -496,7 +496,9 @@ with torch.inference_mode():
 fig, axes = plt.subplots(1, 4, figsize=(8.4, 3.9), layout="constrained")
 draw_image(images[NOW][CROP], ax=axes[0]).set_title("A: part of frame 14", fontsize="medium")
 for ax, (name, way) in zip(axes[1:], ways.items(), strict=True):
-    draw_image(way[0, 0][CROP], ax=ax, cmap="magma").set_title(name, fontsize="medium")
+    shares = way[0, 0][CROP] / channel[0, 0][CROP].max()
+    draw_image(shares, ax=ax, cmap="magma", vmin=0, vmax=1).set_title(name, fontsize="medium")
+fig.colorbar(axes[-1].images[0], ax=axes, label="value / largest", shrink=0.6)
 plt.show()
 
 # %% [markdown]
@@ -628,10 +630,11 @@ for rates in ((1, 1, 1), (2, 2, 2), (1, 2, 4)):
     print(f"rates {rates}: field {np.ptp(columns) + 1} columns, {len(columns)} of them count")
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three squares of pixels that an output depends on: rates 1 1 1 a full square of 7, rates 2 2 2 a lattice of 7 by 7 dots with holes over 13, rates 1 2 4 a full square of 15"
-fig, axes = plt.subplots(1, 3, figsize=(8, 2.8), layout="constrained")
+fig, axes = plt.subplots(1, 3, figsize=(9, 2.8), layout="constrained")
 for ax, rates in zip(axes, ((1, 1, 1), (2, 2, 2), (1, 2, 4)), strict=True):
     paths = paths_of(rates)
-    ax.imshow(np.where(paths > 0, paths, np.nan), cmap="viridis", extent=(-9.5, 9.5, 9.5, -9.5))
+    shown = ax.imshow(np.where(paths > 0, paths, np.nan), cmap="viridis", extent=(-9.5, 9.5, 9.5, -9.5))
+    fig.colorbar(shown, ax=ax, shrink=0.7, label="ways" if ax is axes[-1] else None)
     ax.set(title=f"rates {rates}", xlabel="columns to the right [pixels]")
 axes[0].set_ylabel("rows down [pixels]")
 plt.show()
