@@ -48,6 +48,7 @@ from semgrid_edu.training.loss import class_weights
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 torch.set_num_threads(1)
 keep_freed_memory()
+NAMES = {"segnet": "SegNet", "fcn": "FCN", "deeplab": "DeepLab v2", "unet": "U-Net"}
 drive, spec, heights, few = sample_drive(), GridSpec.compact(), plane_heights(), sample_frames()
 frames = [drive[k] for k in range(len(drive))]
 beliefs = [belief.probability for belief in track_drive(frames, spec)]
@@ -172,14 +173,14 @@ plt.show()
 # %% jupyter={"source_hidden": true} alt="four curves of one parameter under the same noise: plain descent with rate 0.02 falls slowly over 120 steps; plain with 0.2 and momentum with 0.02 arrive early and keep wandering; momentum with a falling rate arrives early and comes to rest"
 noise = np.random.default_rng(0).normal(0, 0.5, 120)
 fig, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
-for name, rates, kappa, style in (
-    ("plain, rate 0.02", [0.02] * 120, 0.0, "0.65"),
-    ("plain, rate 0.2", [0.2] * 120, 0.0, "0.2"),
-    ("momentum 0.9, rate 0.02", [0.02] * 120, 0.9, "#1e6ee6"),
-    ("the same, cosine", cosine(0.02, 120), 0.9, "#fc7200"),
+for name, rates, kappa, style, line in (
+    ("plain, rate 0.02", [0.02] * 120, 0.0, "0.65", "-"),
+    ("plain, rate 0.2", [0.2] * 120, 0.0, "0.2", "-"),
+    ("momentum 0.9, rate 0.02", [0.02] * 120, 0.9, "#1e6ee6", "--"),
+    ("the same, cosine", cosine(0.02, 120), 0.9, "#fc7200", "-."),
 ):
     noisy = descend(1.0, lambda theta, k: theta + noise[k], rates, kappa)
-    ax.plot(noisy, color=style, linestyle="--" if kappa else "-", label=name)
+    ax.plot(noisy, color=style, linestyle=line, label=name)
 ax.axhline(0, color="0.8", zorder=0)
 ax.set(xlabel="step", ylabel=r"$\theta$; best is 0")
 ax.legend(frameon=False, fontsize="small", ncols=2)
@@ -291,7 +292,7 @@ assert right > 0.8
 by_network = json.loads(Path("../../docs/results/overfit.json").read_text(encoding="utf-8"))["networks"]
 lines = ["| image network | steps | cells right, of four frames [%] |", "|---|---|---|"]
 for name, run in by_network.items():
-    lines.append(f"| {name} | {run['iterations']} | {100 * run['pixel accuracy']['evaluation']:.1f} |")
+    lines.append(f"| {NAMES[name]} | {run['iterations']} | {100 * run['pixel accuracy']['evaluation']:.1f} |")
 Markdown("\n".join(lines))
 
 # %% [markdown]
@@ -470,7 +471,9 @@ for name in ("segnet", "fcn", "deeplab"):
     for keep, text in ((low | True, "all planes"), (low, "up to 1 m"), (~low, "above 1 m")):
         grids = heard(keep, their, other)
         by_class = found(grids)
-        rows.append([name, text, *accuracies(grids, truth), by_class[ROAD], by_class[SIDEWALK], by_class[BUILDING]])
+        rows.append(
+            [NAMES[name], text, *accuracies(grids, truth), by_class[ROAD], by_class[SIDEWALK], by_class[BUILDING]]
+        )
 all_planes, up_to_1_m, above_1_m = (np.array([row[2:] for row in rows[k::3]]) for k in range(3))
 assert (all_planes - up_to_1_m)[:, 0].max() < 5
 assert (all_planes - up_to_1_m)[:, 4].min() > 30
