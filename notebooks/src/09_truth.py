@@ -311,14 +311,14 @@ print(f"; {100 * moved.mean():.0f} % land in another cell")
 # | 3 | sky | no label | no label |
 #
 # There are two rules. **Majority** takes the most frequent class. By **what stands wins** (`standing` in the code),
-# what stands on the ground outvotes the ground, because a thin pole sends one return and the road around it ten. The
+# what rises from the ground outvotes the ground, because a thin pole sends one return and the road around it ten. The
 # true maps of this course follow the second rule, so the paper's policy in this package does too. (The paper doesn't
 # say which it uses.) *Sky* sends no return, so a return with that label lies at an outline, and is dropped. With $x_k$
 # the class that return $k$ brings,
 #
 # $$ y = \arg\max_{l \in L} \sum_k [x_k = l] $$
 #
-# where the bracket (Iverson's) is 1 when the equation in it holds and 0 otherwise, and $L$ holds all classes, or only those that stand if any of them has a vote. (Road, sidewalk and vegetation count
+# where the bracket (Iverson's) is 1 when the equation in it holds and 0 otherwise, and $L$ holds all classes, or only those that rise from the ground if any of them has a vote. (Road, sidewalk and vegetation count
 # as ground: vegetation is mostly lawn.)
 
 
@@ -846,7 +846,7 @@ plotting.animate(windows_growing(), period=0.6, alt="smearing, carving and carry
 
 # %% [markdown]
 # In the smeared map the car that overtakes us leaves a streak on the road, from 2 to 16 m ahead, and the oncoming cars
-# melt into one band on the left. Carving removes the streak, and nearly all of the car with it. Of the band it removes
+# melt into one band on the left (y from 5 to 10 m). Carving removes the streak, and nearly all of the car with it. Of the band it removes
 # only a part, because the filter doesn't take each of those cells for DYNAMIC at each instant. Carrying leaves a patch
 # where the overtaking car is. Otherwise it looks much like carving, with single cells of car strewn about, which were
 # carried to a wrong place. None of the three shows the oncoming cars as the truth does.

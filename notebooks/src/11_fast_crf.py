@@ -832,8 +832,8 @@ for infer in (mean_field_naive, mean_field_accurate, mean_field):
 # iteration brings us nearer to it. The lattice keeps up for about three iterations. At forty it has fallen behind, because
 # then its kernel error is larger than what is left to converge. At ten iterations both errors are below two thousandths,
 # and 97 % of the labels or more agree. So at the package's ten iterations neither spoils the map. How can the map be so good when the kernel is off by so
-# much more? Most of that is the diagonal, which is subtracted, and an error that all cells share is taken out by the
-# normalisation.
+# much more? Most of that is the diagonal, which is subtracted: what a cell hears from the others is off by a few per
+# cent only.
 #
 # **Time** (middle and right). Both axes of the middle picture are logarithmic. Twice the cells cost the lattice about
 # twice the time, and all pairs about four times. With the classes, time grows slowly: 48 of them cost two to four times
@@ -1013,9 +1013,9 @@ Markdown("\n".join(rows))
 
 # %% [markdown]
 # With the default weights pixel accuracy falls for FCN and rises for DeepLab; SegNet's interval holds both signs. So the
-# rise on our ten frames isn't the rule. Class accuracy falls for all three. Judged by labels made from LIDAR instead of true ones, pixel accuracy rises
-# for all three (lecture [12](12_experiments.ipynb)). So whether a CRF "helps" depends on the network, the metric and the
-# judge. Weights searched for pixel accuracy raise it for all three, and still cost class accuracy. The companion
+# rise on our ten frames isn't the rule. Class accuracy falls for all three. Where networks learn from LIDAR labels and
+# are judged by them, pixel accuracy rises for all three (lecture [12](12_experiments.ipynb)). So whether a CRF "helps"
+# depends on the network, the labels and the metric. Weights searched for pixel accuracy raise it for all three, and still cost class accuracy. The companion
 # [the CRF, measured](deeper/11_crf_measured.ipynb) shows the search, and weights that are learned.
 #
 # ## In five lines

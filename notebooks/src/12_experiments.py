@@ -396,7 +396,8 @@ for cells, (name, metric) in product(("all", "semantic"), METRICS.items()):
 # table.
 #
 # What follows? From Table 2 we conclude nothing about other routes, be it ours or the paper's. More frames of the two
-# routes would hardly help. More routes do: claim 3 below, which is about this table, is judged on twenty.
+# routes would hardly help. More routes do: claim 3 below, which is about this table, is judged on twenty (older ones, of
+# the earlier simulator).
 #
 # ## Differences should be paired
 #
@@ -839,11 +840,12 @@ assert min(crf_gains) > 0
 # eight drives give no interval, so the rule refuses, and it does so before it looks at the means. That is what it is
 # for: these means look as good as those of any published table. What a quick run does show is that every step works
 # on your machine. That its ranking isn't the one of the long runs has many possible reasons: fewer frames, fewer
-# steps, two seeds, other streets.
+# steps, two seeds, other streets, a newer simulator.
 #
 # ## What the scale permits
 #
-# Our experiments aren't the paper's. Every difference stands below every table:
+# Our experiments aren't the paper's. Each table lists its differences (this older one leaves out its simulator's coarser
+# scanner and flat roads):
 
 # %%
 for line in table1["deviations"]:
@@ -969,8 +971,8 @@ plt.show()
 # %% [markdown]
 # The two upper rows of each panel belong to the occupancy grid, the two lower ones to the planes. On the left stands
 # what you just made, with true labels to learn from; on the right the same comparison from the committed results,
-# with longer training, end to end, on more data, from LIDAR labels. Of the occupancy grid both panels say the same,
-# though by other amounts. Of the planes neither sees a difference, but the bars on the right are less than a fifth as
+# with longer training, end to end, on more data of the earlier simulator, from LIDAR labels. Of the occupancy grid both
+# panels say the same, though by other amounts. Of the planes neither sees a difference, but the bars on the right are less than a fifth as
 # long as those stored here on the left. If an interval contains zero, the honest sentence is: *this experiment cannot
 # tell*. That isn't a failure. It tells you how large an experiment would have to be: to halve a bar that drives
 # dominate, you need four times as many drives.

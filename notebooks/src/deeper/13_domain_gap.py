@@ -114,8 +114,9 @@ for name in (CALLED["stretch 1"], CALLED["stretch 2"]):
 # *Brightness* is the mean grey value, *contrast* its standard deviation, *saturation* the mean difference of the
 # largest and the smallest of red, green and blue, and *edges* the mean gradient. On drive 0013 contrast and edges are
 # larger than in the training images by 59 to 72 %: a black car, deep shadows of trees, and a white fence in
-# the sun in one image. The real street differs much less, in contrast, saturation and edges hardly at all. And yet the
-# map that the network makes of it is wrong in nearly half of the labelled cells (lecture 13).
+# the sun in one image. The real street is about as dark as drive 0013, but its contrast is larger by only an eighth, and
+# its saturation and edges hardly differ. And yet the map that the network makes of it is wrong in nearly half of the
+# labelled cells (lecture 13).
 #
 # ## Is the distance the damage?
 #
@@ -198,7 +199,8 @@ for name, one in drives.items():
 # %% [markdown]
 # It helps in one place and harms in another. With matched colours the lane agrees better on both stretches. The
 # standing things agree worse, much worse on the first stretch. (A network that simply said road more often would gain
-# on the lane and lose on what stands.) With the first number alone we would have called it a cure.
+# on the lane and lose on what stands.) With the lane's number alone we would have called it a cure. (*Entropy* tells how
+# evenly a pixel's probability is spread over the classes: 0 if one class has all of it, 1 if all have the same.)
 #
 # ## What one would do
 #
