@@ -104,7 +104,7 @@ plt.show()
 # %% [markdown]
 # At A the network leaves a hole, cells called *unknown*, in what is otherwise vegetation. There is vegetation all around,
 # so a person would correct it at once. We want a rule that does the same. The rule must also say when *not* to correct:
-# at B the network had found a part of a bicycle, a few cells that are really there, and the refined map has lost it.
+# at B the network had found a part of a bicycle, a few cells that are really there, and the refined map has lost some of them.
 #
 # A CRF writes such a rule as a list of prices. A label that the network thinks improbable costs something. Two cells
 # with different labels cost something too, and more when they are close together and alike in occupancy. The cheapest
@@ -173,7 +173,7 @@ print("cells that one square links, at most:", max(len(factor.names) for factor 
 # and the pair price is larger than the network's preference for car, log (0.6 / 0.4) = 0.41.</details>
 #
 # In symbols, $x_i$ is the label of cell $i$, $\phi_u(x_i) = -\log g_{x_i,i}$ its own price (the **unary** term), and
-# $\phi_p$ the price of a pair. This is the paper's equation (3), and beside it what makes a probability of it:
+# $\phi_p$ the price of a pair. This is the paper's equation (3), and beside it the probability, with the **partition function** $Z$:
 #
 # $$ E(x) = \sum_i \phi_u(x_i) + \sum_{i<j} \phi_p(x_i, x_j), \qquad P(x) = \frac{e^{-E(x)}}{Z}, \qquad Z = \sum_x e^{-E(x)} \tag{3} $$
 #

@@ -196,7 +196,7 @@ Markdown(crf_error_tables(error))
 # ## Can other weights and widths mend it?
 #
 # So far weights and widths were the package's defaults. Better ones must not be chosen on the test frames, because
-# whatever is chosen on some frames looks better on them than it is. Two ways were tried on 72 other simulated drives,
+# whatever is chosen on some frames looks better on them than it is. Two ways were tried with 72 other simulated drives,
 # from which no network has learned (*validation data*):
 #
 # - **Search** (`semgrid-edu search-crf`). First the scores are divided by a temperature, 1.16 for SegNet, chosen such
@@ -204,7 +204,8 @@ Markdown(crf_error_tables(error))
 #   and three widths are tried. The left picture shows them. None is best in both metrics, so two are chosen.
 # - **Learning** (`semgrid-edu reproduce learned-crf`). Five iterations of mean field are a chain of differentiable
 #   steps, so gradient descent can learn weights, widths and label costs like any other layer. Eight variants differ in
-#   what they learn, from which drives, and by which loss.
+#   what they learn, from which drives (*known* ones, from which the network has learned, or the 72 *new* ones), and by which
+#   loss (*plain* cross-entropy, or *balanced*, where rare classes weigh more).
 
 
 # %% jupyter={"source_hidden": true}
