@@ -114,11 +114,11 @@ if drive.credit:
 
 # %% jupyter={"source_hidden": true} alt="a street image with LIDAR points coloured by distance; A marks a white car just ahead, B parked cars to the right, C a house wall; below, the occupancy grid and the semantic grid of the same instant with the same letters"
 LETTERS = {"A": (246, 78, 11, 0.3), "B": (360, 84, 11, -3.4), "C": (465, 55, 14, -8.8)}
-fig = plt.figure(figsize=(6.2, 5.1), layout="constrained")
+fig = plt.figure(figsize=(6.6, 5.1), layout="constrained")
 top, bottom = fig.subfigures(2, 1, height_ratios=[2.1, 3.0])
 coarse = replace(frames[-1], image=frames[-1].need_image() // 8 * 8)  # fewer colours: a smaller file
 image_axes = plotting.points_on_image(coarse, ax=top.subplots(), size=0.8)
-axes = bottom.subplots(1, 2, sharey=True)
+axes = bottom.subplots(1, 2, sharey=True, gridspec_kw={"wspace": 0.08})
 plotting.occupancy(spec, results[-1].belief.probability, ax=axes[0]).set(ylim=(0, 45), title="occupancy grid")
 called = results[-1].grid.argmax(axis=0)
 plotting.grid_labels(spec, called, KITTI_14, ax=axes[1]).set(ylim=(0, 45), ylabel="", title="semantic grid")
@@ -731,7 +731,7 @@ shown = {
     if name in maps
 }
 fig, axes = plt.subplots(1, len(shown) + 1, figsize=(9, 4.4), layout="constrained", sharey=True)
-for ax, (name, called) in zip(np.atleast_1d(axes), (shown | {"labels": truths[-1]}).items(), strict=True):
+for ax, (name, called) in zip(np.atleast_1d(axes), (shown | {"labels (white: none)": truths[-1]}).items(), strict=True):
     plotting.grid_labels(spec, called, KITTI_14, ax=ax, legend=False).set(ylim=(0, 60), title=name)
     ax.axvline(0, color="black", linestyle="--", linewidth=1)
 plotting.class_legend(ax, KITTI_14, np.stack([*shown.values(), truths[-1]]))
