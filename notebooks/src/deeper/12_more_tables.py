@@ -29,7 +29,7 @@ from semgrid_edu import plotting
 from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.workshop.paper.reports.forest import draw_score
+from semgrid_edu.workshop.paper.reports.forest import draw_score, legend_entries
 from semgrid_edu.workshop.paper.reports.pictures import confusion_picture
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.scoring.score_with_interval import shown
@@ -157,6 +157,7 @@ fig, axes = plt.subplots(1, 2, figsize=(11, 4.8), sharey=True, layout="constrain
 for ax, metric in zip(axes, ("pixel accuracy", "class accuracy"), strict=True):
     chart(ax, {row["what"]: row["differences"]["true"]["all"][metric] for row in variants})
     ax.set(title=f"{metric}, all cells, true labels", xlabel="difference [points]")
+fig.legend(*legend_entries(axes[0]), loc="outside lower center", ncols=3)
 plt.show()
 for metric in METRICS:
     values = {row["what"]: row["differences"]["true"]["all"][metric] for row in variants}
@@ -270,7 +271,7 @@ for place, row in enumerate(ablations["distance"]):
     draw_score(axes[1], place, row["pixel accuracy"])
 axes[1].set_yticks(range(len(ablations["distance"])), [row["what"] for row in ablations["distance"]])
 axes[1].invert_yaxis()
-axes[1].set(title="semantic cells, true labels", xlabel="pixel accuracy [%]")
+axes[1].set(title="semantic cells, true labels", xlabel="pixel accuracy [%]", ylabel="distance")
 draw_reliability(axes[2])
 for ax in (axes[0], axes[2]):
     ax.legend(fontsize=8)
