@@ -23,7 +23,7 @@ def glossary_page() -> str:
     for term, name, number in sorted(entries, key=lambda entry: entry[0].lower()):
         words = definition(texts(name), term, number).rstrip(" ;:,").replace("|", "\\|")
         parts.append(f"| {term} | {words} | {link(name)} |")
-    return "\n".join([*parts, "", "## One symbol, one meaning", "", *symbols()]) + "\n"
+    return "\n".join([*parts, "", "## What the letters mean", "", *symbols()]) + "\n"
 
 
 def texts(name: str) -> list[str]:
@@ -81,6 +81,6 @@ def definition(cells: list[str], term: str, number: int = 1) -> str:
 
 def symbols() -> list[str]:
     """Return the lines of lecture 00 on symbols: the table of all, and what stands below it."""
-    (cell,) = (cell for cell in texts("00_tour") if "### One symbol, one meaning" in cell)
-    section = cell.partition("### One symbol, one meaning")[2].partition("\n## ")[0]
+    (cell,) = (cell for cell in texts("00_tour") if "### What the letters mean" in cell)
+    section = cell.partition("### What the letters mean")[2].partition("\n## ")[0]
     return section.strip().splitlines()

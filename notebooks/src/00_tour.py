@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Python with numpy; a matrix times a vector; conditional probability. No deep learning.
 #
-# **Time.** 63 minutes, of which the computer needs less than one.
+# **Time.** 64 minutes, of which the computer needs less than one.
 #
 # **Paper.** Erkent, Wolf, Laugier, *End-to-End Learning of Semantic Grid Estimation Deep Neural Network with
 # Occupancy Grids*, Unmanned Systems 7(3), 2019. Sections 3 and 4 from far above; equations (1) and (2), Bayes' rule of
@@ -166,9 +166,10 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # | [13](13_real_drive.ipynb) | all | your own street |
 # | [14](14_memory.ipynb) | $g_{t-1} \to g_t$ | memory for classes: a cut edge is put back |
 #
-# ### One symbol, one meaning
+# ### What the letters mean
 #
-# Graphs, formulas and code use the same letters in all lectures. Come back to this table; don't learn it by heart.
+# Most letters mean the same in all lectures; what stands below the table names the others. Come back to it; don't learn
+# it by heart.
 #
 # | symbol | meaning | in code |
 # |---|---|---|
@@ -193,7 +194,9 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # | $\sigma$ | a standard deviation; its index says of what | |
 #
 # H x W are cells, h x w pixels, C = 14 classes, D = 20 planes, N points. ($v$ is a velocity in 01 to 04 and a pixel's
-# row here and from 05 on; $K$ and $T$ also count cells and scans, before 05. A letter that isn't in this table means
+# row here and from 05 on; $w$ is a width, and in 04 and 14 a weight; $K$ and $T$ also count cells and scans, before
+# 05. From 05 on $z$ without a time is a height. In 05 $R$ is a rotation and $t$ a shift, in 06 $k$ is a kernel, in 06
+# and 07 $m$ below a sum counts columns, in 14 $z_t$ is what the camera says. A letter that isn't in this table means
 # something on its own page only.)
 #
 # ## A map with forward up

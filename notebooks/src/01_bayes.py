@@ -181,7 +181,7 @@ one_reading = update(P_POLE, nothing_known)
 np.testing.assert_allclose(one_reading, discrete_bayes.update(P_POLE, nothing_known))
 print("cell 3: {:.3f}   cell 5: {:.3f}".format(*one_reading[[3, 5]]))
 
-# %% jupyter={"source_hidden": true} alt="three rows of ten bars: the prior is 0.10 everywhere; the likelihood of pole is 0.80 in cells 2, 3 and 7 and 0.10 elsewhere; the posterior is 0.26 in those three cells and 0.03 elsewhere"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="three rows of ten bars: the prior is 0.10 everywhere; the likelihood of pole is 0.80 in cells 2, 3 and 7 and 0.10 elsewhere; the posterior is 0.26 in those three cells and 0.03 elsewhere"
 plotting.probability_lines({"prior": nothing_known, "likelihood of 'pole'": P_POLE, "posterior": one_reading})
 plt.show()
 

@@ -761,7 +761,7 @@ assert abs(right["two or more"] - right["one return"]) < 0.02
 assert right["two or more"] < 0.95
 assert kept < 75
 
-# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} tags=["nbval-ignore-output"]
 classes, others = class_of_kind(KITTI_14), []
 for seed in range(1, 6):
     drive, found = SimulatedDrive(seed, n_frames=16), []

@@ -392,7 +392,7 @@ two = np.zeros((3, 6))
 two[2, 1], two[1, 2] = 0.6, 0.5
 print("cell 2: velocity -1, 0, +1:", predict(two)[:, 2].round(3), "= 0, 2/7, 3/7")
 
-# %% jupyter={"source_hidden": true} alt="P(STATIC) after an arrival against its probability: the surer a thing stands, the later its curve falls; the dashed line, without the rule, falls at once"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="P(STATIC) after an arrival against its probability: the surer a thing stands, the later its curve falls; the dashed line, without the rule, falls at once"
 a = np.linspace(0, 0.999, 200)
 fig, ax = plt.subplots(figsize=(6, 3), layout="constrained")
 for static, grey in ((0.5, "0.7"), (0.9, "0.4"), (0.99, "0.0")):
@@ -573,7 +573,7 @@ def crossing():
 
 plotting.animate(crossing(), 0.2, alt="two boxes cross; the log-odds grid smears them, BOF colours them by heading")
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 print("smear after 2 s [m²]   log-odds {:.1f}   BOF {:.1f}".format(*total))
 (row,), (col,), _ = spec.cells(np.array([[12.2, 3.2]]))  # the front of the box that comes
 at_6 = coarse.velocities.tolist().index([-6, 0])

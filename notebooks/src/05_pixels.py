@@ -211,7 +211,7 @@ for name, point in {"10 m ahead": (0, -2, 10), "20 m ahead": (0, -2, 20), "toy, 
     np.testing.assert_allclose(pinhole(*point), package)
     print(f"top of the pole, {name}: {48 - package[1]:.0f} pixels above the axis")
 
-# %% jupyter={"source_hidden": true} alt="three poles seen from the side; the rays from the hole to the top of the pole ten metres ahead and of the toy one metre ahead are the same line"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="three poles seen from the side; the rays from the hole to the top of the pole ten metres ahead and of the toy one metre ahead are the same line"
 fig, ax = plt.subplots(figsize=(7.5, 2.4), layout="constrained")
 for Z, top, colour in ((10, 2.0, "tab:blue"), (20, 2.0, "tab:orange"), (1, 0.2, "tab:green")):
     ax.plot([0, Z], [0, top], color=colour, linewidth=0.8)

@@ -821,7 +821,7 @@ _ = interact(
 # %% [markdown]
 # ## Where this breaks
 #
-# **A slope is felt only near by.** The gradient in u and v knows four pixels. How far off may the calibration start, if
+# **A slope needs scores that change.** The gradient in u and v knows four pixels. How far off may the calibration start, if
 # the descent gets ninety steps?
 
 # %%
@@ -858,7 +858,7 @@ Markdown(ledger_table(ledger("planes")))
 #
 # 1. A point reads the four pixels around it; the weights are a kernel across times a kernel down, and sum to 1.
 # 2. That is one fixed sparse matrix. Its transpose, the adjoint, carries the gradient back, added up over readers.
-# 3. In u and v the gradient is a difference of neighbouring pixels: enough to learn a calibration from close by, if
+# 3. In u and v the gradient is a difference of neighbouring pixels: enough to learn a calibration from six degrees off, if
 #    the heights are right, and nothing at all if you read the nearest pixel.
 # 4. Half a pixel is 5 m of ground at 60 m. State where the centre of the first pixel is, and check it with a ramp.
 # 5. Cells that read one pixel share its error: 0.80, not 0.996.

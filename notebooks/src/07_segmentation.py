@@ -223,7 +223,7 @@ print("gradient", s.grad.numpy().round(2))
 # ## Why scores, not probabilities, go to the planes
 #
 # The paper hands the *scores* to the planes of lectures 05 and 06. Does it matter? Take two neighbouring pixels, and
-# post against everything else. In the left pixel post leads by 6, in the right one it trails by 1: nearly sure, and a
+# post against everything else. In the left pixel post leads by 6 (its *margin*), in the right one it trails by 1: nearly sure, and a
 # shrug. A point of a plane falls halfway between the two.
 #
 # **Predict before you run.** How probable is post at that point if you interpolate scores? If you interpolate
@@ -577,8 +577,8 @@ fig.colorbar(axes[0, 0].images[0], ax=axes, label="lead of signage", fraction=0.
 plt.show()
 
 # %% [markdown]
-# Orange is where signage leads. In A it leads in five large cells on the right, in B nowhere; only the last sum was
-# trained to be right. pool3 brings signage to the lamp post, a distant street lamp and the sign, and to some spots
+# Orange is where signage leads. In A it leads in five large cells on the right, in B nowhere; but only the last sum was
+# trained to be right, and a constant may sit in one part and be taken back by another. pool3 brings signage to the lamp post, a distant street lamp and the sign, and to some spots
 # without any. But the finest map has cells of 8 pixels, and the sign's post is one or two pixels wide: hardly any of it
 # is found. A skip gives back what its finest map holds, and no more.
 #

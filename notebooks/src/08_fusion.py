@@ -853,7 +853,7 @@ print(
 #
 # ## End to end, or in two stages?
 #
-# The authors' earlier system trained the image network first and froze it. What does the way back buy? Three seeds
+# The authors' earlier system trained the image network first, and then kept its weights fixed (*frozen*). What does the way back buy? Three seeds
 # each, on an earlier version of the simulator, judged on 110 frames; mean and range:
 
 # %% jupyter={"source_hidden": true}

@@ -126,7 +126,7 @@ assert ground_at == [0, 4, 6, 7, 8, 9, 10, 12]
 print("obstacles on flat ground at", *distance[h >= 0.3], "m; on the walked ground at 11 m alone")
 assert (distance[h - np.interp(distance, ground_at, ground) >= 0.3 - 1e-9] == 11).all()
 
-# %% jupyter={"source_hidden": true} alt="four panels of the same ten returns: 1 flat rule, all returns from 8 m on above a dashed line; 2 the three returns at 11 m are crossed out; 3 a green line climbs the bank, and a wedge at 10 m reaches the return at 12 m; 4 heights above that line, only the three returns of the person reach 0.3 m or more; legends: ground, obstacle, left out"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="four panels of the same ten returns: 1 flat rule, all returns from 8 m on above a dashed line; 2 the three returns at 11 m are crossed out; 3 a green line climbs the bank, and a wedge at 10 m reaches the return at 12 m; 4 heights above that line, only the three returns of the person reach 0.3 m or more; legends: ground, obstacle, left out"
 fig, axes = plt.subplots(1, 4, figsize=(12, 3), layout="constrained", sharex=True)
 above = h - np.interp(distance, ground_at, ground)
 person = distance == 11
@@ -363,7 +363,7 @@ for ax in axes:
     ax.text(-11.2, 9.7, "H", fontsize=12, color="tab:red", weight="bold")
 plt.show()
 
-# %% jupyter={"source_hidden": true}
+# %% jupyter={"outputs_hidden": true, "source_hidden": true}
 across = np.median(fence[:, 1]) / scan[:, 1]  # where, along each beam, the line of the fence is crossed
 high = scan[:, 2] * across + 1.73 * (1 - across)
 through = (scan[:, 1] < np.median(fence[:, 1]) - 0.3) & (high > sensor.obstacle_min) & (high < fence[:, 2].max())

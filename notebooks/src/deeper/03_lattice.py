@@ -161,7 +161,7 @@ print("cells shifted:", *shifts)
 print(f"in the right cell: {slow.occupied[forward, 5, 0]:.2f}, by interpolation {blurred[5]:.2f}")
 assert slow.occupied[forward, 5, 0] > 0.99
 
-# %% jupyter={"source_hidden": true} alt="probability over places after two seconds: one dark bar at 3.25 m, the truth, and a row of red bars from 2 to 5 m that interpolation leaves"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="probability over places after two seconds: one dark bar at 3.25 m, the truth, and a row of red bars from 2 to 5 m that interpolation leaves"
 x = road.centers()[:, 0, 0]
 fig, ax = plt.subplots(figsize=(6, 2.6), layout="constrained")
 ax.bar(x - 0.1, slow.occupied[forward, :, 0], width=0.2, color="0.2", label="whole cells, remainder kept")

@@ -84,7 +84,7 @@ post = np.eye(6)[3]
 print("0.5 m  ", shift_bilinear(post, 0.5))
 print("1.0 m  ", shift_bilinear(shift_bilinear(post, 0.5), 0.5))
 
-# %% jupyter={"source_hidden": true} alt="a post after fifty steps of 0.4 cells, drawn by three schemes: bilinear is a hill fifteen cells wide around the truth, nearest cell a sharp bar twenty cells away, scrolling a sharp bar at the truth"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="a post after fifty steps of 0.4 cells, drawn by three schemes: bilinear is a hill fifteen cells wide around the truth, nearest cell a sharp bar twenty cells away, scrolling a sharp bar at the truth"
 steps, f = 50, 0.4
 at = np.arange(60)
 bilinear, scrolled, nearest, remainder = np.eye(60)[40], np.eye(60)[40], np.eye(60)[40], 0.0
