@@ -14,9 +14,9 @@
 #
 # **Time.** 20 minutes, of which the computer needs less than one.
 #
-# All numbers are read from [docs/results/reduced](../../docs/results/reduced/), or come from code that you see. Those
-# results are of an earlier version of the simulator, from before its LIDAR and its ground were made like KITTI's: it
-# had a fifth of KITTI's columns, and all roads lay in one plane.
+# All numbers are read from [docs/results/reduced](../../docs/results/reduced/), or come from code that you see. What
+# this page reads there is of an earlier version of the simulator, from before its LIDAR and its ground were made like
+# KITTI's: it had a fifth of KITTI's columns, and all roads lay in one plane. (Table 2, which it doesn't read, is newer.)
 
 # %% jupyter={"source_hidden": true}
 import json
