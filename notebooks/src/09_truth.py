@@ -186,7 +186,7 @@ print({f"row {v}": "PQRS"[n] for (_, v), n in seen.items()})
 toy_frame = Frame(None, toy_points.astype(np.float32), toy_camera, np.eye(4), time=0.0)
 assert sorted(closest_returns(toy_frame)[0]) == sorted(seen.values())
 
-# %% jupyter={"source_hidden": true} alt="a street from the side: the LIDAR above the camera; returns P on the road, Q on the rear of a car, R and S on a wall behind it; the camera's rays to R and S end at the car"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="a street from the side: the LIDAR above the camera; returns P on the road, Q on the rear of a car, R and S on a wall behind it; the camera's rays to R and S end at the car"
 fig, ax = plt.subplots(figsize=(10, 2.9), layout="constrained")
 ax.add_patch(Rectangle((10, 0), 4, 1.1, color=np.divide(KITTI_14.rgb[CAR], 255), alpha=0.35))
 ax.add_patch(Rectangle((30, 0), 0.4, 2.2, color="0.5"))
@@ -361,7 +361,7 @@ for content, name in enumerate(("road", "car")):
 for n in (3, 9):
     print(f"majority of {n}, shared calibration:         {wrong_label(LabelWorld(n, outline=0, calibration=0.1)):.3f}")
 
-# %% jupyter={"source_hidden": true} alt="probability of a wrong label against the number of returns: a majority with independent errors falls to zero, with a calibration error too it stays above 0.1, and with what stands wins it rises for road cells"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="probability of a wrong label against the number of returns: a majority with independent errors falls to zero, with a calibration error too it stays above 0.1, and with what stands wins it rises for road cells"
 counts = np.arange(1, 10, 2)
 fig, ax = plt.subplots(figsize=(7.5, 3.6), layout="constrained")
 lines = {
@@ -524,7 +524,7 @@ print(f"P(road in cell 2): exact {road:.2f}, the clean-up {made_road:.2f}")
 np.testing.assert_allclose([road, made_road], [0.045 / 0.105, 1])
 assert not d_separated(neighbours, "m2", "o2", given=("y1",))
 
-# %% jupyter={"source_hidden": true} alt="a directed graph of two cells: what stands in cell 1 points to what stands in cell 2 and to the vote of cell 1; what stands in cell 2 points to its occupancy; the vote points to the finished label of cell 2; dashed, as cut, is the edge from the occupancy to the label, with the price .43 to 1.00"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="a directed graph of two cells: what stands in cell 1 points to what stands in cell 2 and to the vote of cell 1; what stands in cell 2 points to its occupancy; the vote points to the finished label of cell 2; dashed, as cut, is the edge from the occupancy to the label, with the price .43 to 1.00"
 places = {"m1": (0, 2.4), "m2": (4.5, 2.4), "y1": (0, 1.2), "o2": (4.5, 1.2), "t2": (2.2, 0)}
 _, ax = plt.subplots(figsize=(8, 3.6), layout="constrained")
 says = {"m2": "what stands in cell 2", "o2": "occupancy of cell 2", "t2": "its finished label", "y1": "vote of cell 1"}

@@ -605,12 +605,12 @@ def rivals_moving(updates=12):
             yield fig
 
 
-# %% jupyter={"source_hidden": true} alt="animation: free energy of two rivals as a map over P(road) of cell 1 and of cell 2; updated all at once, a square jumps between two corners in which they disagree; damped, a circle slides to the corner where both are road; one after the other, a triangle walks to the corner where both are car; a star marks the exact answer near the middle"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="animation: free energy of two rivals as a map over P(road) of cell 1 and of cell 2; updated all at once, a square jumps between two corners in which they disagree; damped, a circle slides to the corner where both are road; one after the other, a triangle walks to the corner where both are car; a star marks the exact answer near the middle"
 plotting.animate(
     rivals_moving(), period=0.5, alt="two rivals: all at once they swap for ever, the others find a valley"
 )
 
-# %% jupyter={"source_hidden": true} alt="free energy against the number of updates: all at once it climbs from 2.2 to 5.5 and keeps jumping, damped and one after the other it falls to about 1.5, above the grey line at -log Z"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="free energy against the number of updates: all at once it climbs from 2.2 to 5.5 and keeps jumping, damped and one after the other it falls to about 1.5, above the grey line at -log Z"
 fig, ax = plt.subplots(figsize=(6.5, 3.2), layout="constrained")
 looks = (("#d55e00", "s:"), ("#0072b2", "o-"), ("0.2", "^--"))
 for (name, values_of_F), (colour, style) in zip(F.items(), looks, strict=True):

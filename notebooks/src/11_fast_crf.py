@@ -431,7 +431,7 @@ for d in (2, 3, 5, 8):
         assert weights.min() >= 0
         assert enclosing_simplex_literal(y)[0] == [tuple(corner) for corner in corners.tolist()]
 
-# %% jupyter={"source_hidden": true} alt="a plane of triangles; two points in orange, the corners of their triangles marked with their coordinates and weights"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="a plane of triangles; two points in orange, the corners of their triangles marked with their coordinates and weights"
 fig, ax = plt.subplots(figsize=(7.5, 5), layout="constrained")
 plotting.draw_triangles((-1.2, 0.5), (2.9, 3.1), ax)
 for y, offset in (([4.2, -0.4, -3.8], (8, -16)), ([1.7, 1.6, -3.3], (-118, -4))):

@@ -235,7 +235,7 @@ holds = (found[..., 0] <= 0.75) & (found[..., 1] >= 0.75)
 for way, share in zip(("cells", "frames", "drives"), holds.mean(axis=0), strict=True):
     print(f"interval over {way:<6} contains the true value in {100 * share:4.0f} % of the experiments")
 
-# %% jupyter={"source_hidden": true} alt="three panels of thirty horizontal intervals each: over cells tiny intervals that nearly all miss the true value, over frames about half miss it, over drives nearly all contain it"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="three panels of thirty horizontal intervals each: over cells tiny intervals that nearly all miss the true value, over frames about half miss it, over drives nearly all contain it"
 fig, axes = plt.subplots(1, 3, figsize=(10.5, 3.6), sharex=True, sharey=True, layout="constrained")
 for k, (ax, way) in enumerate(zip(axes, ("cells", "frames", "drives"), strict=True)):
     for place, (low, high) in enumerate(100 * found[:30, k]):
@@ -429,7 +429,7 @@ for name, interval in {
 }.items():
     print(f"{name:<6}" + "{:6.1f} {:6.1f} {:6.1f}".format(*100 * np.array(interval)))
 
-# %% jupyter={"source_hidden": true} alt="left: the scores of methods M and N on four drives, joined by nearly parallel lines that all fall a little; right: two wide overlapping intervals for M and N, and a narrow interval above zero for their difference"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="left: the scores of methods M and N on four drives, joined by nearly parallel lines that all fall a little; right: two wide overlapping intervals for M and N, and a narrow interval above zero for their difference"
 fig, (left, right_ax) = plt.subplots(1, 2, figsize=(9.5, 2.9), layout="constrained", width_ratios=(1, 1.5))
 for v, pair in enumerate(zip((90, 70, 80, 60), (88, 67, 79, 58), strict=True)):
     left.plot([0, 1], pair, "o-", color="0.35")
@@ -955,7 +955,7 @@ for other in ("no occupancy grid", "10 planes"):
     for one in statements:
         print(f"    {one.what:<15} {shown(one.value, 1):<24} seeds {shown_seeds(one.value, 1)}")
 
-# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="two panels of paired differences with intervals and seeds, usual network minus the one without occupancy grid and minus the one with ten planes: live on the left, the committed results on the right"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} tags=["nbval-ignore-output"] alt="two panels of paired differences with intervals and seeds, usual network minus the one without occupancy grid and minus the one with ten planes: live on the left, the committed results on the right"
 fig, axes = plt.subplots(1, 2, figsize=(11, 2.6), layout="constrained", sharey=True)
 others = ("no occupancy grid", "10 planes")
 committed = {row["what"]: row["differences"]["true"]["all"] for row in ablations["variants"]}

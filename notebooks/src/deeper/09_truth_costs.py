@@ -135,7 +135,7 @@ for judge, name in JUDGES.items():
         lost = [shown(row["differences"][judge][cells]["pixel accuracy"]) for cells in CELLS]
         print(f"{LEARNED_FROM[truth]:<29}" + "".join(f"{one:<26}" for one in lost).rstrip())
 
-# %% jupyter={"source_hidden": true} alt="left: differences of seven networks from the usual one with intervals and seeds; right: the share of right cells of networks on test frames against that of their labels on training frames, with the diagonal"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="left: differences of seven networks from the usual one with intervals and seeds; right: the share of right cells of networks on test frames against that of their labels on training frames, with the diagonal"
 _, *others = rows
 fig, axes = plt.subplots(1, 2, figsize=(12.5, 4.6), layout="constrained", width_ratios=(1.4, 1))
 lost = {LEARNED_FROM[truth]: rows[truth]["differences"]["true"]["semantic"]["pixel accuracy"] for truth in others}

@@ -168,7 +168,7 @@ for k in (0, 1):  # nearer, and yet worse
 assert damage["noise"][1] == min(one[1] for one in damage.values())
 assert damage["colours matched"][0] == min(one[0] for one in damage.values())
 
-# %% jupyter={"source_hidden": true} alt="scatter of share of right pixels against colour distance for eight versions of the sample images; noise and warmer light lie low at small distances, half brightness lies higher at the largest distance"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="scatter of share of right pixels against colour distance for eight versions of the sample images; noise and warmer light lie low at small distances, half brightness lies higher at the largest distance"
 fig, ax = plt.subplots(figsize=(7.5, 3.2), layout="constrained")
 for name, (distance, accuracy, *_) in damage.items():
     ax.plot(distance, accuracy, "o", color="#d95f02")
