@@ -200,7 +200,7 @@ def load_imagenet(segmenter: Segmenter, path: str | Path) -> None:
 
 
 def imagenet_tensors(segmenter: Segmenter) -> dict[str, Tensor]:
-    """Return the network's own tensors that the file fills.
+    """Return the network's own tensors that a file of ImageNet weights fills.
 
     Parameters
     ----------

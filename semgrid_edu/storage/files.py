@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all, their checksums, and the tables that lie beside modules."""
+"""Files written whole or not at all, their checksums, tables beside modules, and one writer at a time in a folder."""
 
 import hashlib
 import json
@@ -10,8 +10,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-
-from filelock import FileLock, Timeout
 
 from semgrid_edu.errors import DataError
 
@@ -239,6 +237,8 @@ def sole_writer(folder: str | Path) -> Iterator[None]:
     ...     print("nobody else writes here")
     nobody else writes here
     """
+    from filelock import FileLock, Timeout  # takes longer to import than all else here, and few callers lock
+
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / LOCK)

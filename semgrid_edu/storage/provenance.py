@@ -15,7 +15,10 @@ from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.reading import read_json
 
 PACKAGE = Path(__file__).resolve().parents[1]
-"""The folder of the package."""
+"""The folder of the package, without symbolic links."""
+
+ROOT = Path(__file__).parents[2]
+"""The folder that holds the package, by the path that Python imports it from."""
 
 PROVENANCE = "provenance.json"
 """Name of the file in a folder of results that says how they were made."""
@@ -127,6 +130,16 @@ def provenance_problems(folder: str | Path) -> list[str]:
     return [f"{folder / name}: {how.get(name, 'missing')}" for name in changed]
 
 
+def _checksums(folder: Path) -> dict[str, str]:
+    files = {path.relative_to(folder): path for path in sorted(folder.rglob("*")) if path.is_file()}
+    left_out = (PROVENANCE, "cache")
+    return {
+        name.as_posix(): sha256(path)
+        for name, path in files.items()
+        if name.parts[0] not in left_out and not any(part.startswith(".") for part in name.parts)
+    }
+
+
 def shipped_folder(name: str) -> Path:
     """Return where a shipped folder is.
 
@@ -163,20 +176,6 @@ def short_path(weights: str | Path) -> str:
         Such as "segnet_compact/weights.safetensors".
     """
     return "/".join(Path(weights).resolve().parts[-2:])
-
-
-def _checksums(folder: Path) -> dict[str, str]:
-    files = {path.relative_to(folder): path for path in sorted(folder.rglob("*")) if path.is_file()}
-    left_out = (PROVENANCE, "cache")
-    return {
-        name.as_posix(): sha256(path)
-        for name, path in files.items()
-        if name.parts[0] not in left_out and not any(part.startswith(".") for part in name.parts)
-    }
-
-
-ROOT = Path(__file__).parents[2]
-"""The folder that holds the package."""
 
 
 def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:

@@ -18,23 +18,6 @@ from torch.nn.parallel import DistributedDataParallel
 
 from semgrid_edu.errors import ArgumentError
 
-M_TRIM_THRESHOLD, M_TOP_PAD, M_MMAP_MAX = -1, -2, -4
-"""Options of `mallopt`, as glibc's malloc.h numbers them."""
-
-
-def keep_freed_memory() -> None:
-    """Let this process keep the memory that it frees, for the next buffer of that size.
-
-    On Linux, glibc hands freed buffers above 32 MB back to the system at once, and the system clears every page of the
-    next such buffer anew when it is touched. The twenty planes of a batch are larger than that. At the paper's scale,
-    sampling them took 30 ms with glibc's defaults and 12 ms with kept memory. The price is that the process never
-    shrinks below its peak. On systems other than Linux with glibc nothing changes.
-    """
-    if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
-        libc.mallopt(M_MMAP_MAX, 0)
-        libc.mallopt(M_TRIM_THRESHOLD, 2**31 - 1)
-        libc.mallopt(M_TOP_PAD, 2**26)
-
 
 def choose_device(name: str = "auto", process: int = 0) -> torch.device:
     """Return the device that a command's option `--device` names.
@@ -93,6 +76,24 @@ def mixed_precision(device: torch.device) -> torch.autocast:
     """
     able = device.type == "cuda" and torch.cuda.is_bf16_supported(including_emulation=False)
     return torch.autocast(device.type, torch.bfloat16, enabled=able)
+
+
+M_TRIM_THRESHOLD, M_TOP_PAD, M_MMAP_MAX = -1, -2, -4
+"""Options of `mallopt`, as glibc's malloc.h numbers them."""
+
+
+def keep_freed_memory() -> None:
+    """Let this process keep the memory that it frees, for the next buffer of that size.
+
+    On Linux, glibc hands freed buffers above 32 MB back to the system at once, and the system clears every page of the
+    next such buffer anew when it is touched. The twenty planes of a batch are larger than that. At the paper's scale,
+    sampling them took 30 ms with glibc's defaults and 12 ms with kept memory. The price is that the process never
+    shrinks below its peak. On systems other than Linux with glibc nothing changes.
+    """
+    if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
+        libc.mallopt(M_MMAP_MAX, 0)
+        libc.mallopt(M_TRIM_THRESHOLD, 2**31 - 1)
+        libc.mallopt(M_TOP_PAD, 2**26)
 
 
 PATIENCE = timedelta(minutes=30)

@@ -57,16 +57,16 @@ def check(
 
 
 def _all(unary: object, values: object, params: object, refined: object, cell: float | None) -> Iterator[Finding]:
-    """Yield shapes first, then what the numbers mean, then kernels, then the result."""
+    """Yield what is wrong with shapes first, then with the numbers, the weights and widths, and the result."""
     phi, o = yield from _grids(unary, values)
     faults = [phi is not None and unary_fault(phi), o is not None and states_fault(o)]
     yield from filter(None, faults)
     if not isinstance(params, CrfParams):
         yield finding("no parameters", what=type(params).__name__)
     elif phi is not None or o is not None:
-        kernels = list(kernel_faults(params, (o if phi is None else phi).shape[1:], cell))
-        yield from kernels
-        if faults == [None, None] and not kernels:
+        of_params = list(kernel_faults(params, (o if phi is None else phi).shape[1:], cell))
+        yield from of_params
+        if faults == [None, None] and not of_params:
             yield from overwhelming(phi.astype(np.float64), o.astype(np.float64), params)
     if refined is not None:
         shown = yield from as_numbers("refined", refined)
@@ -86,56 +86,6 @@ def _grids(unary: object, values: object) -> Generator[Finding, None, tuple[NDAr
     if phi is not None:
         phi = yield from oriented_unary(phi, None if o is None else o.shape[1:])
     return phi, o
-
-
-FEW = 100
-"""Cells. A grid smaller than this, such as one computed by hand, may well get a single label."""
-
-
-def refined_fault(refined: NDArray, phi: NDArray) -> Finding | None:
-    """Find out what is wrong with a refined map.
-
-    Parameters
-    ----------
-    refined : (C, H, W) float or (H, W) int
-        Q, or a label for each cell.
-    phi : (C, H, W) float64
-        The costs of the classes.
-
-    Returns
-    -------
-    Finding or None
-        The first fault, if there is any.
-    """
-    if refined.shape not in (phi.shape, phi.shape[1:]):
-        return finding("refined has another shape", shape=refined.shape, right=phi.shape, grid=phi.shape[1:])
-    if refined.ndim == 2:
-        return next(_labels(refined, phi), None)
-    return next(chain(_distributions(refined, phi), _labels(refined.argmax(axis=0), phi)), None)
-
-
-def _distributions(Q: NDArray, phi: NDArray) -> Iterator[Finding]:
-    if not (np.isfinite(Q).all() and Q.min() >= 0 and np.abs(Q.sum(axis=0, dtype=np.float64) - 1).max() < 0.02):
-        low, high = np.fmin.reduce(Q, axis=None), np.fmax.reduce(Q, axis=None)
-        yield finding("refined holds no probabilities", low=low, high=high, nan=np.isnan(Q).sum(), size=Q.size)
-    if phi[0].size > 1 and not np.abs(Q - softmax(-phi, axis=0)).max() > 1e-6:
-        yield finding("refinement without effect")
-
-
-def _labels(labels: NDArray, phi: NDArray) -> Iterator[Finding]:
-    last = len(phi) - 1
-    outside = (labels < 0) | (labels > last) | (labels != np.rint(labels))
-    if outside.any():
-        few = ", ".join(f"{label:g}" for label in np.unique(labels[outside])[:5])
-        yield finding("ignore label/refined", outside=outside.sum(), size=labels.size, last=last, labels=few)
-    if labels.size < FEW:
-        return
-    if np.ptp(labels) == 0:
-        before = len(np.unique(phi.argmin(axis=0)))
-        yield finding("one label/before too" if before == 1 else "one label", label=labels.flat[0], before=before)
-    best, worst = np.mean(labels == phi.argmin(axis=0)), np.mean(labels == phi.argmax(axis=0))
-    if worst > best:
-        yield finding("refined prefers what costs most", best=best, worst=worst)
 
 
 REACH = {"sigma_alpha": "w_bilateral", "sigma_gamma": "w_spatial"}
@@ -239,3 +189,53 @@ def pair_sum(values: NDArray, params: CrfParams) -> float:
     few = slice(None, None, max(1, values[0].size // 50))
     bilateral, spatial = (kernel.sum(axis=1).mean() - 1 for kernel in kernels(values, params, few))
     return float(params.w_bilateral * bilateral + params.w_spatial * spatial)
+
+
+FEW = 100
+"""Cells. A grid smaller than this, such as one computed by hand, may well get a single label."""
+
+
+def refined_fault(refined: NDArray, phi: NDArray) -> Finding | None:
+    """Find out what is wrong with a refined map.
+
+    Parameters
+    ----------
+    refined : (C, H, W) float or (H, W) int
+        Q, or a label for each cell.
+    phi : (C, H, W) float64
+        The costs of the classes.
+
+    Returns
+    -------
+    Finding or None
+        The first fault, if there is any.
+    """
+    if refined.shape not in (phi.shape, phi.shape[1:]):
+        return finding("refined has another shape", shape=refined.shape, right=phi.shape, grid=phi.shape[1:])
+    if refined.ndim == 2:
+        return next(_refined_labels(refined, phi), None)
+    return next(chain(_refined_distributions(refined, phi), _refined_labels(refined.argmax(axis=0), phi)), None)
+
+
+def _refined_distributions(Q: NDArray, phi: NDArray) -> Iterator[Finding]:
+    if not (np.isfinite(Q).all() and Q.min() >= 0 and np.abs(Q.sum(axis=0, dtype=np.float64) - 1).max() < 0.02):
+        low, high = np.fmin.reduce(Q, axis=None), np.fmax.reduce(Q, axis=None)
+        yield finding("refined holds no probabilities", low=low, high=high, nan=np.isnan(Q).sum(), size=Q.size)
+    if phi[0].size > 1 and not np.abs(Q - softmax(-phi, axis=0)).max() > 1e-6:
+        yield finding("refinement without effect")
+
+
+def _refined_labels(labels: NDArray, phi: NDArray) -> Iterator[Finding]:
+    last = len(phi) - 1
+    outside = (labels < 0) | (labels > last) | (labels != np.rint(labels))
+    if outside.any():
+        few = ", ".join(f"{label:g}" for label in np.unique(labels[outside])[:5])
+        yield finding("ignore label/refined", outside=outside.sum(), size=labels.size, last=last, labels=few)
+    if labels.size < FEW:
+        return
+    if np.ptp(labels) == 0:
+        before = len(np.unique(phi.argmin(axis=0)))
+        yield finding("one label/before too" if before == 1 else "one label", label=labels.flat[0], before=before)
+    best, worst = np.mean(labels == phi.argmin(axis=0)), np.mean(labels == phi.argmax(axis=0))
+    if worst > best:
+        yield finding("refined prefers what costs most", best=best, worst=worst)

@@ -1,4 +1,4 @@
-"""Pixel and cell of each LIDAR return that the camera sees, and bird's-eye classes from labelled points (section 4)."""
+"""LIDAR returns that the camera sees, the class that labelled points give a cell, and points of depth images (4)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,12 +126,6 @@ CLEARANCE = 2.5
 """Metres above the lowest point of a cell from which on a point hangs over what stands there: the top of a vehicle,
 up to which `SensorModel` counts returns as obstacles too."""
 
-LIDAR_ROW_STEP, LIDAR_COL_STEP = 4, 2
-"""Every fourth row and every second column makes a depth image about as sparse as a LIDAR scan."""
-
-DEPTH_RANGE = 80.0
-"""Metres up to which a depth image is used: what a LIDAR reaches on most surfaces."""
-
 
 def birdseye_votes(
     points_grid: NDArray, classes: NDArray[np.uint8], spec: GridSpec, label_set: LabelSet
@@ -169,6 +163,13 @@ def birdseye_votes(
     return label_set.most_voted(votes.reshape(len(label_set), *spec.shape), otherwise=IGNORE)
 
 
+LIDAR_ROW_STEP, LIDAR_COL_STEP = 4, 2
+"""Every fourth row and every second column makes a depth image about as sparse as a LIDAR scan."""
+
+DEPTH_RANGE = 80.0
+"""Metres up to which a depth image is used: what a LIDAR reaches on most surfaces."""
+
+
 def points_from_depth(
     depth: NDArray, camera: Camera, row_step: int = 1, col_step: int = 1
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
@@ -194,8 +195,7 @@ def points_from_depth(
     sampled = depth[v, u]
     near = sampled < DEPTH_RANGE
     rays = np.stack([u[near], v[near], np.ones(near.sum())], axis=-1) @ np.linalg.inv(camera.K).T
-    T = invert_rigid(camera.T_camera_from_lidar)
-    points = (rays * sampled[near, None]) @ T[:3, :3].T + T[:3, 3]
+    points = transform_points(invert_rigid(camera.T_camera_from_lidar), rays * sampled[near, None])
     return points, v[near], u[near]
 
 

@@ -1,6 +1,7 @@
 """What the memory of classes gains, in cells that are in view, were seen before, or were never seen (section 3).
 
-Simulated streets have true labels in every cell; the labelled returns of a real scene are scored beside them.
+Simulated streets have true labels in every cell; the labelled returns of a real scene are scored beside them. The
+second part measures what one more frame is worth at each distance from the vehicle (`worth_by_distance`).
 """
 
 from collections import deque
@@ -35,8 +36,10 @@ from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
 
 HELD_OUT = 1400
 """Seed of the first drive for seed 0; each further seed adds 1000. The memory's parameters are from other drives."""
+
 FRAMES = 20
 """Number of frames of a simulated drive, 2 s."""
+
 BLOCK = 2.0
 """Seconds of one camera of the real scene that count as one drive: neighbouring frames look alike."""
 
