@@ -13,7 +13,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.memory.state import ClassMemory, MemoryParams, look_at
 from semgrid_edu.memory.steps import carry_classes, learn_classes, recall_classes
 from semgrid_edu.occupancy import N_STATES, Belief, State
-from semgrid_edu.occupancy.cmcdot import LIDAR_PERIOD
+from semgrid_edu.occupancy.cmcdot import motion_since
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
 
 
@@ -180,11 +180,8 @@ def _steps(views: Iterable[View], spec: GridSpec, params: MemoryParams | None) -
     class_map, before = None, None
     for view in views:
         class_map = class_map or ClassMap(spec, len(view.grid) - N_STATES, params)
-        motion, dt = PlanarMotion(), LIDAR_PERIOD
-        if before is not None:
-            motion = PlanarMotion.from_poses(before.T_world_from_lidar, view.frame.T_world_from_lidar)
-            dt = abs(view.frame.time - before.time)
-        yield class_map, class_map.step(view.grid, view.belief, motion, dt)
+        motion, dt = motion_since(before, view.frame)
+        yield class_map, class_map.step(view.grid, view.belief, motion, abs(dt))  # below 0 from the end of a drive
         before = view.frame
 
 

@@ -153,9 +153,20 @@ def track_drive(
     """
     tracker, before = Cmcdot(spec, params, seed, keep_steps), None
     for frame in frames:
-        motion, dt = PlanarMotion(), LIDAR_PERIOD
-        if before is not None:
-            motion = PlanarMotion.from_poses(before.T_world_from_lidar, frame.T_world_from_lidar)
-            dt = frame.time - before.time
-        yield tracker.step(frame.points_grid, motion, dt)
+        yield tracker.step(frame.points_grid, *motion_since(before, frame))
         before = frame
+
+
+def motion_since(before: Frame | None, now: Frame) -> tuple[PlanarMotion, float]:
+    """Return the motion of the vehicle from one frame to another, and the time between them, seconds.
+
+    Parameters
+    ----------
+    before : Frame or None
+        The earlier frame; None when `now` is the first: then nothing moves, and the time is `LIDAR_PERIOD`.
+    now : Frame
+        The later frame.
+    """
+    if before is None:
+        return PlanarMotion(), LIDAR_PERIOD
+    return PlanarMotion.from_poses(before.T_world_from_lidar, now.T_world_from_lidar), now.time - before.time

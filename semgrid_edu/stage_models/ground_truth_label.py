@@ -6,7 +6,6 @@ The second model is a cell of the ground truth, which gets its label by a vote o
 wrong pixels to all of them (lecture 09).
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -20,7 +19,7 @@ from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.stage_models.beam import BINS_PER_CELL, MARGIN, BeamWorld, range_bins, range_state, reflection
-from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
+from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed, with_gaps
 from semgrid_edu.stage_models.thick_walls import beam_beliefs, occupied, package_row, same_sensor
 
 
@@ -54,16 +53,11 @@ def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> Stag
         "One scan, one pose error",
         directed(factors),
         observed=measured,
-        positions=in_rows(world.cells, (), _apart(reflected), _apart(measured), ["e"]),
+        positions=in_rows(world.cells, (), with_gaps(reflected), with_gaps(measured), ["e"]),
         equations={reflected[-1]: "which cell reflects", measured[-1]: "range", "e": "pose error"},
         plates={"scans": (*reflected, *measured, "e")},
         cut=cut_edges("pose"),
     )
-
-
-def _apart(names: Sequence[str]) -> list[str | None]:
-    """Leave a gap between neighbours of a row."""
-    return [place for name in names for place in (name, None)][:-1]
 
 
 def _offsets(world: BeamWorld) -> NDArray[np.int64]:

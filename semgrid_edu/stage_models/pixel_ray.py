@@ -1,8 +1,8 @@
 """What pixels say of the cells that read them and of each other, and what the system makes of it (lectures 05 to 07).
 
 A camera sees the first thing on each ray. Equation (1) gives every cell a pixel, whatever stands in front of the cell,
-and a plane gives every pixel one height, whatever height the pixel shows. Cells that read one pixel
-share its error. And pixels along a post have one label, which a soft-max per pixel doesn't know.
+and a plane gives every pixel one height, whatever height the pixel shows. Cells that read one pixel share its error.
+And pixels along a post have one label, which a soft-max per pixel doesn't know.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from semgrid_edu.errors import ArgumentError, check_fields
 from semgrid_edu.graphical.exact import eliminate
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.layout import in_rows
-from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
+from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed, with_gaps
 
 CAR_HEIGHTS = (0.03, 0.18, 0.32, 0.47)
 """The shipped drive: shares of the pixels of cars, up to 45 m ahead, at 0, 0.35, 0.75, and 1.1 m or more above road."""
@@ -177,14 +177,13 @@ def shared_pixel(readers: int = 4, right: float = 0.8, prior: float = 0.5) -> St
     if not 1 <= readers <= 12:
         raise ArgumentError("readers", "from 1 to 12", readers)
     cells = [f"x{k}" for k in range(1, readers + 1)]
-    wide = [place for cell in cells for place in (cell, None)][:-1]  # room for the price between two arrows
     pixel = Factor(("m", "a"), [[right, 1 - right], [1 - right, right]])
     factors = [binary("m", prior), pixel, *(Factor(("a", cell), np.eye(2)) for cell in cells)]
     return StageGraph(
         f"{readers} cells read one pixel",
         directed(factors),
         observed=tuple(cells),
-        positions=in_rows(["m"], ["a"], wide),
+        positions=in_rows(["m"], ["a"], with_gaps(cells)),  # room for the price between two arrows
         equations={"m": "what lies there", "a": "the pixel", cells[-1]: "what the cells read"},
         cut=cut_edges("planes"),
     )

@@ -1,11 +1,9 @@
 """The graph of a stage: its model, how it is drawn, and the edges that the real system cuts."""
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 from typing import NamedTuple
 
 from matplotlib.axes import Axes
@@ -14,6 +12,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.drawing import Dashed, draw
 from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.storage.files import table_beside
 
 
 class Price(NamedTuple):
@@ -97,8 +96,8 @@ def measured_by(measure: str) -> Price:
     return Price(float(exact), float(system), unit)
 
 
-CATALOGUE = Path(__file__).with_name("cut_edges.toml")
-"""The cut edges of all stages, in the order of the pipeline, and the lecture that shows each stage."""
+CATALOGUE = table_beside(__file__, "cut_edges")
+"""The cut edges of each stage, and under "lectures" the lecture that shows it, in the order of the lectures."""
 
 
 def cut_edges(stage: str) -> tuple[CutEdge, ...]:
@@ -109,8 +108,7 @@ def cut_edges(stage: str) -> tuple[CutEdge, ...]:
     stage : str
         A key of `CATALOGUE`, such as "bof".
     """
-    edges = tomllib.loads(CATALOGUE.read_text(encoding="utf-8"))[stage]
-    return tuple(CutEdge(**edge | {"ends": tuple(edge.get("ends", ()))}) for edge in edges)
+    return tuple(CutEdge(**edge) for edge in CATALOGUE[stage])
 
 
 def directed(factors: Iterable[Factor]) -> GraphicalModel:
@@ -136,6 +134,17 @@ def binary(name: str, p: float) -> Factor:
         Its probability of being 1.
     """
     return Factor(name, [1 - p, p])
+
+
+def with_gaps(names: Iterable[str]) -> list[str | None]:
+    """Return a row for `in_rows` with a gap between neighbours.
+
+    Parameters
+    ----------
+    names : iterable of str
+        The nodes from left to right.
+    """
+    return [place for name in names for place in (name, None)][:-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +259,7 @@ def ledger(stage: str | None = None) -> tuple[LedgerLine, ...]:
     stage : str, optional
         A key of `CATALOGUE`; all stages when left out, which takes a few seconds.
     """
-    lectures = tomllib.loads(CATALOGUE.read_text(encoding="utf-8"))["lectures"]
+    lectures = CATALOGUE["lectures"]
     if stage is not None and stage not in lectures:
         raise ArgumentError("stage", f"one of {', '.join(lectures)}", stage)
     lines = []

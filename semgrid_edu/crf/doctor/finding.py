@@ -1,16 +1,16 @@
 """What a check of the CRF's input found, in the words in which one would search for it (findings.toml)."""
 
 import textwrap
-import tomllib
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 from numpy.typing import NDArray
+
+from semgrid_edu.storage.files import table_beside
 
 WIDTH = 110
 """Characters in a line of a printed finding."""
 
-TEXTS = tomllib.loads(Path(__file__).with_name("findings.toml").read_text(encoding="utf-8"))
+TEXTS = table_beside(__file__, "findings")
 """The sentences of each fault, by its name."""
 
 PHRASES: dict[str, str] = TEXTS.pop("phrases")
