@@ -211,8 +211,6 @@ def min_fill_order(model: GraphicalModel, keep: Iterable[str] = ()) -> tuple[str
 
     Examples
     --------
-    >>> import numpy as np
-    >>> from semgrid_edu.graphical.factor import Factor
     >>> chain = GraphicalModel([Factor(("a", "b"), np.ones((2, 2))), Factor(("b", "c"), np.ones((2, 2)))])
     >>> min_fill_order(chain)
     ('a', 'b', 'c')

@@ -33,9 +33,8 @@ class MemoryParams:
     ----------
     worth : float
         Exponent of the evidence of one more frame, seen from close by: 1 if frames were independent witnesses. Measured
-        on simulated drives other than the shipped one (`worth_by_distance`), when `movable` classes were remembered in
-        view too; since then smaller ones are better in view, by 0.02 nats
-        at most.
+        on simulated drives other than the shipped one (`worth_by_distance`), when `movable` classes were still
+        remembered in view. Now that they aren't, a smaller exponent is better in view, by 0.02 nats at most.
     reach : float
         Distance from the vehicle, metres, over which the exponent falls by a factor e, because a near view is a better
         witness than a far one. Measured on the same drives.
@@ -127,9 +126,10 @@ class ClassMemory:
 
     @property
     def weight(self) -> NDArray:
-        """(2, H, W): the sum of these exponents, from 0 to `MemoryParams.most`; the log of the belief is their product.
+        """(2, H, W): the sum of these exponents, from 0 to `MemoryParams.most`.
 
-        Evidence worth less than one frame counts as one: that little was seen stands in `seen`, and isn't said twice.
+        `evidence` times `weight` is the log of the belief, up to a constant in each cell. A weight below 1 counts as 1,
+        because `seen` says already that little was seen.
         """
         return self.planes[-6:-4]
 
@@ -157,7 +157,7 @@ class Look(NamedTuple):
     sees : (H, W) float32
         Probability that the camera sees what is in the cell: that its class isn't one of the unknown ones.
     exponent : (H, W) float32
-        What the frame is worth there beside others: `MemoryParams.exponent` e, and e + (1 - e) P(movable) in all.
+        What the frame is worth there beside others: e + (1 - e) P(movable), with e from `MemoryParams.exponent`.
     moving : (H, W) float32
         P(DYNAMIC).
     """

@@ -133,7 +133,7 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
 
 
 def origins(velocity: NDArray, spec: GridSpec, world: WorldModel, part: float = 1.0) -> NDArray[np.int64]:
-    """Return where mass of each velocity was, as seen from its cell, when it still took up another place.
+    """Return how many cells away mass of each velocity was some time ago, when it still took up another place.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def origins(velocity: NDArray, spec: GridSpec, world: WorldModel, part: float = 
     world : WorldModel
         How long ago: `clearing_time`, or for slow things the time that they need for `clearing_cells`.
     part : float
-        For the `HALT`: which part of `clearing_time` ago.
+        Which part of `clearing_time` ago: `HALT` for the halt on the way.
 
     Returns
     -------
@@ -242,7 +242,6 @@ class Bof:
 
     Examples
     --------
-    >>> import numpy as np
     >>> tracker = Bof(GridSpec.compact())
     >>> wall = np.array([[20.25, y, 1.0] for y in np.arange(-3, 3, 0.1)])
     >>> belief = tracker.step(wall, PlanarMotion(), dt=0.1)

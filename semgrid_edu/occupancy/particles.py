@@ -145,7 +145,7 @@ def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
 
 
 def keeps_pace(vx: NDArray, vy: NDArray, pace: Pace) -> NDArray[np.bool_]:
-    """Say of velocities whether they are at least as near to the vehicle's own as that of a standing thing is, (N,).
+    """Tell which velocities differ from the vehicle's by no more than that of a standing thing does, (N,).
 
     So the difference may be as large as the vehicle's speed.
 

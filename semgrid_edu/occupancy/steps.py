@@ -29,7 +29,9 @@ from semgrid_edu.occupancy.state import FilterState, Particles, State
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
+
 NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
+"""The four probabilities of a cell of which nothing is known: all UNKNOWN."""
 
 
 def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterState:

@@ -16,8 +16,9 @@ Rates = tuple[tuple[float, ...], ...]
 
 
 HALT = 0.4
-"""Part of `clearing_time` before which a particle's way is looked at as well: by default two turns of a LIDAR, because
-what seems to move has been seen at least there, where it seemed to start, and once on the way."""
+"""Besides `clearing_time` ago, a particle's place is also looked at this part of that time ago, at its halt: by default
+two turns of a LIDAR ago, because what seems to move has been seen at least where it seemed to start, and once on the
+way."""
 
 
 class Pace(NamedTuple):
@@ -28,9 +29,10 @@ class Pace(NamedTuple):
     speed : float
         Speed of the vehicle along the x axis of the map, m/s, negative backwards.
     least : float
-        Speed from which on something leaves its place before the halt, m/s. What is slower doesn't count.
+        The least speed at which something gets out of its place between the halt and now, m/s. Slower things can't
+        keep pace.
     halt : float
-        How long ago the way of a thing is looked at as well, seconds.
+        How long ago the halt is, seconds.
     """
 
     speed: float

@@ -2,9 +2,9 @@
 
 In the order of the lectures: `line` (01); `cell` (02, 04), `beam`, `thick_walls` (02); `cells_in_a_row`, `joint_row`,
 `bof` (03); `cmcdot`, `cmcdot_graph` (04); `pixel_ray` (05 to 07); `late_fusion` (08); `ground_truth_label` (09); `crf`
-(10); the whole, `system_world` and `system`; and `class_memory`, an edge that the whole cuts. `stage_graph` holds what
-each of them builds: a model, its drawing, and the edges that are cut, whose ledger it lists. `prices` measures what
-those cost.
+(10); the whole, `system_world` and `system`; and `class_memory`, an edge that the whole cuts. Each stage is a
+`StageGraph`: a model, its drawing, and the edges that are cut. `prices` measures what a cut costs, and
+`stage_graph.ledger` lists all of these prices.
 """
 
 from semgrid_edu.stage_models.beam import BeamWorld, beam_over_cells

@@ -101,7 +101,7 @@ def one_cell(
 
 
 def looking(world: WorldModel) -> NDArray[np.float64]:
-    """Return P(x | v, prior): the state stays as it is, but UNKNOWN becomes another state when a scan sees the cell.
+    """Return P(m | v, prior): the state stays as it is, but UNKNOWN becomes another state when a scan sees the cell.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def exact_cell(
     Returns
     -------
     CellBeliefs
-        The messages from P(prior t | x t-1) to prior t, and from x t to what follows it.
+        The messages from P(prior t | m t-1) to prior t, and from m t to what follows it.
     """
     beliefs = sum_product(one_cell(scans, dt, world, start).model, cell_given(scans))
     steps = range(1, len(check_scans(scans)) + 1)
