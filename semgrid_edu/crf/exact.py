@@ -163,9 +163,8 @@ def exact_marginals(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> N
     array([[0.8 , 0.78]])
     """
     model, shape = _tiny_model(unary, values, params)
-    joint = eliminate(model, model.names).normalised().table
-    cells = range(joint.ndim)
-    return np.stack([joint.sum(axis=tuple(o for o in cells if o != cell)) for cell in cells], axis=1).reshape(shape)
+    joint = eliminate(model, model.names).normalised()
+    return np.stack([joint.marginal(name).table for name in model.names], axis=1).reshape(shape)
 
 
 def most_likely(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> NDArray[np.int64]:

@@ -112,6 +112,17 @@ class Factor:
         """
         return self._reduce(np.sum, names)
 
+    def marginal(self, name: str) -> "Factor":
+        """Sum all variables out but one: f.marginal("x").
+
+        Parameters
+        ----------
+        name : str
+            The variable that stays.
+        """
+        check_name("name", name, self.names)
+        return self.sum(*(other for other in self.names if other != name))
+
     def max(self, *names: str) -> "Factor":
         """Maximise variables out: the largest entry over all their states.
 

@@ -95,7 +95,7 @@ def exact_beliefs(world: CellsInARow) -> NDArray[np.float64]:
         The distributions, with states in the order of `Cell`.
     """
     joints = [joint_belief(world, step) for step in range(1, len(world.scans) + 1)]
-    return np.array([[_marginal(joint, name) for name in joint.names] for joint in joints])
+    return np.array([[joint.marginal(name).table for name in joint.names] for joint in joints])
 
 
 def flight() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -158,7 +158,3 @@ def _slice(world: CellsInARow, k: int, step: int) -> list[Factor]:
         Factor((*before, f"one{k},{step}"), alone[inside]),
         Factor((f"m{k},{step}", f"z{k},{step}"), hit_probability(world.params.world.sensor)),
     ]
-
-
-def _marginal(joint: Factor, name: str) -> NDArray[np.float64]:
-    return joint.sum(*(other for other in joint.names if other != name)).table

@@ -91,8 +91,7 @@ def occupied(belief: Factor) -> NDArray[np.float64]:
     belief : Factor
         A distribution over K cells, each 0 (free) or 1 (occupied).
     """
-    tables = [belief.sum(*(other for other in belief.names if other != cell)).normalised() for cell in belief.names]
-    return np.array([table.table[1] for table in tables])
+    return np.array([belief.marginal(cell).normalised().table[1] for cell in belief.names])
 
 
 def _apart(one: Factor, other: Factor) -> float:

@@ -20,6 +20,7 @@ def test_a_product_by_hand():
 def test_sums_maxima_and_slices_by_hand():
     assert XY.sum("x").table.tolist() == [5, 7, 9]
     assert XY.sum("x", "y").table == 21
+    assert XY.marginal("y").table.tolist() == [5, 7, 9]
     assert XY.max("y").table.tolist() == [3, 6]
     assert XY.given(x=1).table.tolist() == [4, 5, 6]
     assert XY.given(x=1, y=2).table == 6
@@ -72,6 +73,7 @@ def test_bad_tables_are_refused(names, table, says):
         (lambda: XY * Factor("y", [1, 1]), "variable y: expected 3 states"),
         (lambda: Factor("x", [1e200]) * Factor("x", [1e200]), "finite .* found inf"),
         (lambda: XY.sum("w"), "w"),
+        (lambda: XY.marginal("w"), "w"),
         (lambda: XY.given(w=0), "w"),
         (lambda: XY.given(x=2), "given x: expected a state from 0 to 1, found 2"),
         (lambda: XY.given(x=-1), "found -1"),
