@@ -80,6 +80,10 @@ class GridSpec:
         y = self.y_max - (np.arange(width) + 0.5) * self.cell
         return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
 
+    def distances(self) -> NDArray[np.float64]:
+        """Return how far the centre of every cell is from the origin of the grid frame, (H, W), metres."""
+        return np.hypot(*np.moveaxis(self.centers(), -1, 0))
+
     def cells(self, xy: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
         """Find the cell that each point falls into.
 

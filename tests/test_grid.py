@@ -23,6 +23,11 @@ def test_the_papers_grid_is_31_by_71_metres_in_355_by_155_cells():
     assert (spec.x_max - spec.x_min, spec.y_max - spec.y_min, spec.cell) == (71, 31, 0.2)
 
 
+def test_distances_by_hand():
+    expected = [[6.5, 6.5], [2.5, 2.5], [0.5, 0.5]]
+    np.testing.assert_allclose(SPEC.distances() ** 2, expected)
+
+
 @pytest.mark.parametrize("spec", [SPEC, GridSpec.paper(), GridSpec.compact()])
 def test_the_centre_of_each_cell_falls_into_that_cell(spec):
     height, width = spec.shape

@@ -208,7 +208,7 @@ def look_at(grid: NDArray, occupancy: NDArray, spec: GridSpec, params: MemoryPar
 @lru_cache(maxsize=8)
 def _exponents(spec: GridSpec, params: MemoryParams) -> NDArray[np.float32]:
     """Return what one more frame is worth in each cell, (H, W)."""
-    return params.exponent(np.hypot(*np.moveaxis(spec.centers(), -1, 0))).astype(np.float32)
+    return params.exponent(spec.distances()).astype(np.float32)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

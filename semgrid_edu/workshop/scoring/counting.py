@@ -34,7 +34,7 @@ def distance_bands(spec: GridSpec, edges: Sequence[float]) -> NDArray[np.int64]:
     edges : sequence of B + 1 float
         Where the bands begin and end, metres, from near to far.
     """
-    return np.digitize(np.hypot(*np.moveaxis(spec.centers(), -1, 0)), edges[1:-1])
+    return np.digitize(spec.distances(), edges[1:-1])
 
 
 class GridCounts(NamedTuple):

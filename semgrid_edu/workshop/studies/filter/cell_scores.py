@@ -170,7 +170,7 @@ def hit_cell_groups(scene: KnownScene, spec: GridSpec) -> Iterator[tuple[str, ND
     cells : (H, W) bool
         Its cells.
     """
-    truth, distance = scene.truth, np.hypot(*np.moveaxis(spec.centers(), -1, 0))
+    truth, distance = scene.truth, spec.distances()
     found = [number for number, frames in scene.in_view.items() if frames * PERIOD >= FOUND_AFTER - 1e-6]
     moving = scene.hit & (truth.state == State.DYNAMIC) & np.isin(truth.instance, found)
     for kind, name in MOVERS.items():

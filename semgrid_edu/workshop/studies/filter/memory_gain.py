@@ -227,7 +227,7 @@ def worth_by_distance(
     edges : (B + 1,) float
         Distances between the bands, metres.
     """
-    distance = np.hypot(*np.moveaxis(spec.centers(), -1, 0))
+    distance = spec.distances()
     loss, cells = np.zeros((len(worths), len(edges) - 1)), np.zeros(len(edges) - 1, np.int64)
     for k, worth in enumerate(worths):
         params = MemoryParams(worth=worth, reach=1e9)

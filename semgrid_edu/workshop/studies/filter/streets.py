@@ -93,7 +93,7 @@ class StreetScores:
 
     def _add_moving(self, scene: KnownScene, moves: NDArray, velocity: NDArray) -> None:
         """Count what moves, and note the speed of each car."""
-        truth, distance = scene.truth, np.hypot(*np.moveaxis(self.spec.centers(), -1, 0))
+        truth, distance = scene.truth, self.spec.distances()
         moving = scene.hit & (truth.state == State.DYNAMIC) & (distance < FAR)
         cars, walkers = (moving & (truth.kind == kind) for kind in (Kind.CAR, Kind.PEDESTRIAN))
         self._count("moving cars", cars & np.isin(truth.instance, self.latency.in_view_for(scene, CARS_AFTER)), moves)
