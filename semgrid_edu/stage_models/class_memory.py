@@ -36,7 +36,8 @@ class MemoryWorld:
         way, or right again. With 0 the frames are independent witnesses, with 1 all say the same.
     street : SystemWorld
         The rates at which contents change, the time between frames, and how often the network is right, all frames
-        together: `change`, `dt` and `pixel_right`. `p_hit` of its scanner says how often a beam stops in the cell.
+        together: `change`, `dt` and `pixel_right`. `p_hit_occupied` and `p_hit_free` of its scanner say how often a
+        beam stops in the cell.
     """
 
     steps: int = 3

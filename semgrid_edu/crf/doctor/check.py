@@ -88,8 +88,8 @@ def _grids(unary: object, values: object) -> Generator[Finding, None, tuple[NDAr
     return phi, o
 
 
-REACH = {"sigma_alpha": "w_bilateral", "sigma_gamma": "w_spatial"}
-"""The widths in cells, and the weights of their kernels."""
+WEIGHT_OF = {"sigma_alpha": "w_bilateral", "sigma_gamma": "w_spatial"}
+"""The weight of the kernel that each width in cells belongs to."""
 
 LARGEST_WORLD = 100
 """Metres. A grid longer than this is rare: the LIDAR sees hardly anything there."""
@@ -116,7 +116,7 @@ def kernel_faults(params: CrfParams, shape: tuple[int, int], cell: float | None)
         yield finding("weights zero")
     metric = list(_in_metres(params, shape, cell))
     yield from metric or _of_other_cells(params, cell)
-    used = {name: getattr(params, name) for name, weight in REACH.items() if getattr(params, weight) > 0}
+    used = {name: getattr(params, name) for name, weight in WEIGHT_OF.items() if getattr(params, weight) > 0}
     for name, sigma in used.items():
         of_next = gaussian(1 / sigma**2)
         if of_next < 0.05 and not metric:
@@ -131,7 +131,7 @@ def kernel_faults(params: CrfParams, shape: tuple[int, int], cell: float | None)
 def _in_metres(params: CrfParams, shape: tuple[int, int], cell: float | None) -> Iterator[Finding]:
     """Suspect a width that has the number of the default in metres; it would be right for cells of a metre."""
     metres = CrfParams.for_cells(1.0)
-    same = [name for name in REACH if np.isclose(getattr(params, name), getattr(metres, name), rtol=0.05)]
+    same = [name for name in WEIGHT_OF if np.isclose(getattr(params, name), getattr(metres, name), rtol=0.05)]
     if same and (cell <= 0.7 if cell else max(shape) > LARGEST_WORLD):
         world = f"the cells are {cell:g} m" if cell else f"with cells of 1 m the grid would be {max(shape)} m long"
         widths = ", ".join(f"{name} = {getattr(params, name):g}" for name in same)
@@ -139,7 +139,7 @@ def _in_metres(params: CrfParams, shape: tuple[int, int], cell: float | None) ->
 
 
 def _of_other_cells(params: CrfParams, cell: float | None) -> Iterator[Finding]:
-    given, default = ([getattr(crf, name) for name in REACH] for crf in (params, CrfParams()))
+    given, default = ([getattr(crf, name) for name in WEIGHT_OF] for crf in (params, CrfParams()))
     if cell and given == default and not 0.75 < cell / PAPER_CELL < 1.34:
         numbers = {"given": params, "right": CrfParams.for_cells(cell), "reach": [sigma * cell for sigma in given]}
         yield finding("widths for another grid", paper=PAPER_CELL, cell=cell, **numbers)

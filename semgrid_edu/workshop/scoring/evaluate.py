@@ -51,7 +51,7 @@ def evaluate(
     Returns
     -------
     dict
-        What `evaluate_frames` returns, and what it was computed from; it can be written as JSON.
+        What `scores_of_counts` returns, and what it was computed from; it can be written as JSON.
 
     Raises
     ------
