@@ -11,6 +11,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from filelock import FileLock, Timeout
+
 from semgrid_edu.errors import DataError
 
 
@@ -237,8 +239,6 @@ def sole_writer(folder: str | Path) -> Iterator[None]:
     ...     print("nobody else writes here")
     nobody else writes here
     """
-    from filelock import FileLock, Timeout  # takes longer to import than all else here, and few callers lock
-
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / LOCK)
