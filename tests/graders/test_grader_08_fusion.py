@@ -552,6 +552,13 @@ def loss_back(logits, truth, alpha):
             code=back(m="0"),
         ),
         mistake(
+            "nothing subtracted, in long double",
+            task="loss-back",
+            loses=1,
+            says="on inputs you haven't seen",
+            code=back(m="np.longdouble(0)", result="(weight * (g - one_hot) / weight.sum()).astype(float)"),
+        ),
+        mistake(
             "one number subtracted from all cells",
             task="loss-back",
             loses=1,

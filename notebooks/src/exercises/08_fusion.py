@@ -328,7 +328,7 @@ _test()
 # $$ \text{loss} = -\frac{\sum_j \alpha_{c(j)} \log g_{c(j),j}}{\sum_j \alpha_{c(j)}} $$
 #
 # Complete `loss_back`: it returns the derivative of the loss with respect to each logit, `(C, H, W)`. (The derivative of $-\log g_{t}$ with respect to
-# logit $c$ is $g_c$, less 1 when $c = t$.) For one more point: logits may be 1000 or -1000, and $e^{1000}$ is more than a computer holds.
+# logit $c$ is $g_c$, less 1 when $c = t$.) For one more point: logits may be ten thousands, of either sign, and $e^{1000}$ is more than a computer holds.
 
 
 # %% nbgrader={"grade": false, "grade_id": "loss-back", "locked": false, "schema_version": 3, "solution": true, "task": false}
