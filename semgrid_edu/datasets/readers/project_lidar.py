@@ -178,7 +178,7 @@ def points_from_depth(
     Parameters
     ----------
     depth : (h, w) float
-        Metres along the optical axis; NaN where there is none.
+        Metres along the optical axis; NaN where it isn't known.
     camera : Camera
         The camera that took it, of this size.
     row_step, col_step : int
@@ -207,14 +207,7 @@ def depth_scan(
     As the paper says, this doesn't make it LIDAR data; it only reduces the amount of depth. By default every fourth row
     and every second column is kept, up to 80 m. The reflectance is 0, because a depth image has none.
 
-    Parameters
-    ----------
-    depth : (h, w) float
-        Metres along the optical axis; NaN where there is none.
-    camera : Camera
-        The camera that took it, of this size.
-    row_step, col_step : int
-        As `points_from_depth` takes them.
+    Parameters are those of `points_from_depth`.
 
     Returns
     -------
