@@ -905,8 +905,7 @@ def fields(drive, wanted):
 
 with tempfile.TemporaryDirectory() as folder:
     recipe = DatasetRecipe("live", "KITTI-14", (Route("test", 2, False),) * 10, rig=SAMPLE_RIG)
-    make_from_recipe(recipe, Path(folder), 12, workers=1)
-    index = load_index(Path(folder) / "live")
+    index = load_index(make_from_recipe(recipe, Path(folder), 12, workers=1))
     test = [fields(KittiRawDrive(index.root, *name), [1]) for name in index.frames_by_drive("test")]
 learn = fields(sample_drive(), range(len(sample_drive())))
 cells = np.concatenate([truth[truth != 255] for _, _, truth in test])
