@@ -91,9 +91,10 @@ assert story.pull.before[CAR] > 0.99
 #   lower ones fall on a parked car, the upper ones on a tree. So the image alone doesn't say what stands in this cell.
 # - **B**, **C** What the filter believes of the cell: after each of its steps within this scan (B; *shown* is what it
 #   passes on), and scan by scan (C). It is sure that something stands there: STATIC. *What* it is, no return says.
-# - **D**, **E**, **F** How much image and occupancy speak for *car* (violet) or for the runner-up, *road* (orange): by
-#   kind of input (D), by the score's class (E) and by height (F). Each pixel has a score for every class, and the
-#   network may use each of them: a score for *vegetation*, too, can speak for *car*.
+# - **D**, **E**, **F** How much image and occupancy speak for *car* (violet) or for the runner-up, *road* (orange; the
+#   maps below have other colours): by kind of input (D), by the score's class (E, the six largest) and by height (F).
+#   Each pixel has a score for every class, and the network may use each of them: a score for *vegetation*, too, can
+#   speak for *car*.
 # - **G** What the CRF makes of it. The neighbours' push is in brackets: it is largest for *car*, which was nearly
 #   certain before.
 #
@@ -114,26 +115,28 @@ plt.show()
 
 # %% [markdown]
 # At the top is the world: what the cells hold ($m_t$, $m'_t$), which sensors see but we don't. Below is what the paper
-# computes: there, information flows down, and from one instant to the next only inside $o$.
+# computes: there, information flows down to the map that we want ($g_t$, ringed), and from one instant to the next only
+# inside $o$.
 #
 # **Dashed edges are missing.** An exact answer would use what they carry. The system cuts them so that every stage is
 # small enough to compute at each scan. The numbers on a dashed edge are its **price** on this toy street, where the
 # exact answer can be computed by summing over everything that may happen. (Three dashed edges have no number, because
-# their price isn't measured on this street.) Prices here are mean surprise, $-\log P(\text{truth})$ in **nats**: first
-# the exact answer's, then the system's. On the edge from $g_{t-1}$ to $g_t$ the class of the far cell gets .62 nats if
-# the earlier image is used, and .72 if it is forgotten; in the geometric mean the truth then has the probability
-# $e^{-.62} = .54$ or $e^{-.72} = .49$. Where a dashed line runs beside a solid arrow, only a part is cut: from $s_t$ to
-# $p_t$ the scores do flow, but not the distance at which each thing was seen.
+# their price isn't measured on this street.) Prices here are mean surprise, $-\log P(\text{truth})$ in **nats**, the
+# unit of the natural logarithm: first the exact answer's, then the system's. On the edge from $g_{t-1}$ to $g_t$ the
+# class of the far cell gets .62 nats if the earlier image is used, and .72 if it is forgotten; in the geometric mean
+# the truth then has the probability $e^{-.62} = .54$ or $e^{-.72} = .49$. Where a dashed line runs beside a solid
+# arrow, only a part is cut: from $s_t$ to $p_t$ the scores do flow, but not the distance at which each thing was seen.
 #
 # **Predict before you run.** You know $o_t$ and $p_t$. Does the earlier map $g_{t-1}$ still tell you something about
 # $g_t$, as the system computes it? And does the earlier image $i_{t-1}$ tell you something about the *world* $m_t$,
-# given both scans and the present image?
+# given both scans and the present image? If so, along which path?
 #
 # <details><summary>Answer</summary>
 #
 # About $g_t$ nothing: it is computed from $o_t$ and $p_t$ alone, so once these are known every path to it is closed.
-# About the world, yes: a parked car that the camera recognised a moment ago is probably still there. The second answer
-# is what the system gives away; the dashed edge from $g_{t-1}$ to $g_t$ would bring it back.
+# About the world, yes, along $i_{t-1}$, $m_{t-1}$, $m_t$: a parked car that the camera recognised a moment ago is
+# probably still there. The second answer is what the system gives away; the dashed edge from $g_{t-1}$ to $g_t$ would
+# bring it back.
 #
 # </details>
 
@@ -176,7 +179,7 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # | $l$, $i$ | LIDAR points (N, 4): x, y, height, reflectance; image (3, h, w) | `frame.points`, `frame.image` |
 # | $m_k^t$ | state of cell $k$ at scan $t$: FREE, STATIC, DYNAMIC, UNKNOWN (in 02 free or occupied; in the graphs of 05 to 09 what stands there: road or car) | `State` |
 # | $n_t$ | place on the line, in 01; a plain $n$ elsewhere counts something | |
-# | $z_t$ | the scan at $t$, always with an index; $P(z_t \mid \cdot)$ is its evidence | `Evidence` |
+# | $z_t$ | the scan at $t$ (up to 04 also a plain $z$); $P(z_t \mid \cdot)$ is its evidence | `Evidence` |
 # | $b$ | belief: a probability for each state | `probability[:, r, c]` |
 # | $L$ | log-odds of a cell, $\log P / (1 - P)$ | `L` |
 # | $R, M$ | rates of change, 1/s; transition matrix $M = e^{R \Delta t}$ | `rates`, `transition_matrix` |
@@ -230,8 +233,8 @@ print("the paper's grid has", GridSpec.paper().shape, "cells, the course's", spe
 # *Problem: the LIDAR gives points, and each may be wrong. How sure may a cell be?*
 #
 # One cell, seen before: you believe FREE 0.6, STATIC 0.3, DYNAMIC 0.1. Now one LIDAR return comes back from inside
-# it. A return is likely from something that stands there (0.8, moving or not) and unlikely from free space (0.2: a ray
-# that grazes the ground may come back from it, for instance).
+# it. A return is likely from a thing in the cell (0.8, whether it stands or moves) and unlikely from free space (0.2: a
+# ray that grazes the ground may come back from it, for instance).
 #
 # **Predict before you run.** Is the cell occupied now, and how sure are you? Multiply the three pairs before you open
 # the answer.
@@ -239,9 +242,12 @@ print("the paper's grid has", GridSpec.paper().shape, "cells, the course's", spe
 # <details><summary>Answer</summary>
 #
 # 0.6 · 0.2 = 0.12, 0.3 · 0.8 = 0.24, 0.1 · 0.8 = 0.08. They sum to 0.44, so divide: FREE 0.27, STATIC 0.55,
-# DYNAMIC 0.18. STATIC and DYNAMIC keep their proportion of 3 to 1: one scan can't tell whether a thing moves.
+# DYNAMIC 0.18. So it is occupied with 0.73, instead of 0.4 before. STATIC and DYNAMIC keep their proportion of 3 to 1:
+# one scan can't tell whether a thing moves.
 #
 # </details>
+#
+# This is Bayes' rule; $m'$ runs over the four states (it isn't the far cell of the graph):
 #
 # $$ P(m \mid z_t) = \frac{P(z_t \mid m)\, P(m)}{\sum_{m'} P(z_t \mid m')\, P(m')} $$
 
@@ -445,9 +451,9 @@ assert parts["occupancy"] > 0
 
 # %% [markdown]
 # Both sensors speak for *car*; the constants, which come from the network's biases and from no sensor, speak for
-# *road*. The parts add up to the difference of the two scores, and by the soft-max $e^\text{difference}$ is the odds
-# of *car* against the runner-up. (A part isn't what would change without this input: lecture 08.) The map on the left
-# shows the most probable class of each cell:
+# *road*. The parts add up to the difference of the two scores, and by the soft-max $e^\text{difference}$ is the odds of
+# *car* against the runner-up. (A part isn't what would change without this input; lecture 08 measures that.) The map on
+# the left shows the most probable class of each cell:
 
 # %% jupyter={"source_hidden": true} alt="two label maps of the real street: semantic grid, and labels, which have gaps; road in the middle, a row of parked cars, trees and a building on the right"
 truth = grid_truth(now.frame.labels, now.belief.probability, spec)
@@ -465,10 +471,10 @@ for name in ("road", "car", "vegetation", "building"):
 
 # %% [markdown]
 # On the right, inside the camera's view, are labels that people gave to LIDAR returns; white cells have none. Where the
-# camera doesn't see, both maps show only the filter's states, as four more classes: *unknown-free*, *unknown-static*,
-# *unknown-dynamic* and *unknown-unobserved*. Of each of the four classes that are printed, most labelled cells are right.
-# But this network has learned from this very street, so the picture shows what the stages do, and not how well they would
-# do on yours. For that we need other streets, and an honest score, in a moment.
+# camera doesn't see, both maps show only the filter's states, the last four of the 14 classes: *unknown-free*,
+# *unknown-static*, *unknown-dynamic* and *unknown-unobserved*. Of each of the four classes that are printed, most
+# labelled cells are right. But this network has learned from this very street, so the picture shows what the stages do,
+# and not how well they would do on yours. For that we need other streets, and an honest score, in a moment.
 #
 # ## Stage 5: refinement by a CRF
 #
@@ -609,9 +615,9 @@ plt.show()
 #
 # Three failures on the simulated street, where we know the truth. None is repaired for this page.
 #
-# **What moves seems to stand, for a while.** In the last frame two cars come towards us on the left, 7 and 14 m ahead,
-# one behind the other. Follow them back in time through the truth. In each frame, take the cells that a car fills and
-# that the filter holds occupied: how much of them does it call DYNAMIC?
+# **What moves seems to stand, for a while.** In the last frame two cars come towards us on the left (arrows down), 7
+# and 14 m ahead, one behind the other. Follow them back in time through the truth. In each frame, take the cells that a
+# car fills and that the filter holds occupied: how much of them does it call DYNAMIC?
 
 
 # %% jupyter={"source_hidden": true}
@@ -689,7 +695,7 @@ print("height of a cell in the network's image:", ", ".join(f"{h:.2f} pixels at 
 
 # %% [markdown]
 # Near the vehicle most semantic cells are right, beyond 45 m far fewer. At 45 m more than a dozen cells share one row
-# of the network's pixels, and the LIDAR's rings lie metres apart.
+# of the network's pixels, and the rings that the LIDAR's beams draw on the ground lie metres apart.
 #
 # **Cars and pedestrians are missed.** Of all cells that truly hold a class, how many does the map call by this name?
 

@@ -118,7 +118,7 @@ plt.show()
 #
 # **Predict before you run.** You want to know $n_2$. Does the first reading $z_0$ help, as long as you don't know any
 # place? Does it still help if somebody tells you $n_1$? And which variables must you know so that nothing else tells
-# you anything about $n_1$?
+# you anything about $n_1$ (ringed)?
 #
 # <details><summary>Answer</summary>
 #
@@ -637,7 +637,7 @@ np.testing.assert_allclose(predict_states(one_reading, MOVE), predict(one_readin
 #
 # You tuned $M$ for a LIDAR with 10 scans a second. The new one makes 20. If you leave $M$ as it is, the filter forgets
 # twice as fast, because in each tenth of a second $M$ is applied twice. The matrix belongs to a time step. What belongs
-# to the world are *rates*: how often, a second, does a free cell become occupied?
+# to the world are *rates*: how often per second does a free cell become occupied?
 #
 # Give the rates $R_{ij}$ from state $i$ to $j$, in 1/s. In a very short time $\epsilon$ the belief changes by
 # $\epsilon\, b R$ (the diagonal of $R$ is what leaves, so rows of $R$ sum to zero). With two states we can solve this.
@@ -739,7 +739,7 @@ plt.show()
 # still behind us.
 #
 # `scan_evidence` turns a scan into two likelihoods for each cell, P(z | occupied) and P(z | free), as in the toy case
-# (lecture 02 shows how). Where a scan says nothing of a cell, they are equal. One letter a scan: `#` for a return,
+# (lecture 02 shows how). Where a scan says nothing of a cell, they are equal. One letter per scan: `#` for a return,
 # `.` for a beam that passes, a blank for nothing.
 
 # %% jupyter={"source_hidden": true}

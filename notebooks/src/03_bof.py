@@ -108,11 +108,12 @@ def frames_of(scene):
 plotting.animate(frames_of(scene), 0.3, alt="a column of velocities is sheared, and returns pick one velocity")
 
 # %% [markdown]
-# At **A** the place is known and the velocity isn't: the belief is a column. At **B** nobody has looked, but each row
-# has moved at its own speed, so the column is sheared: place and velocity, independent before, are tied together. At
-# **C** a beam comes back from one place (red mark). It says nothing of velocities. But it picks a column of the sheared
-# belief, and in that column only three velocities are left. After **D** and **E** one stands out, 2 m/s, with more than
-# 0.8. The price of this picture is size: 9 velocities for each cell of a line, 197 for each cell of a street.
+# At **A** the place is known to within three cells and the velocity isn't: the belief is a column. At **B** nobody has
+# looked, but each row has moved at its own speed, so the column is sheared: place and velocity, independent before, are
+# tied together. At **C** a beam comes back from one place (red mark). It says nothing of velocities. But it picks a
+# column of the sheared belief, and in that column only three velocities are left. After **D** and **E** one stands out,
+# 2 m/s, with more than 0.8. The price of this picture is size: 9 velocities for each cell of a line, 197 for each cell
+# of a street.
 #
 # ## The graph
 #
@@ -129,9 +130,9 @@ plt.show()
 
 # %% [markdown]
 # A chain of such slices is a **dynamic Bayesian network**: the same arrows again at each step. What is in cell 2 now
-# depends on the three cells from which something can have come, its **antecedents**. Each scan depends on its cell
-# alone. The nodes "≤ 1" are always observed: they say that two things can't come into one cell. (In code, cell 2 is
-# `m2,0` before and `m2,1` now, and the "≤ 1" above it is `one2,1`.)
+# (ringed) depends on the three cells from which something can have come, its **antecedents**. Each scan depends on its
+# cell alone. The nodes "≤ 1" are always observed: they say that two things can't come into one cell. (In code, cell 2
+# is `m2,0` before and `m2,1` now, and the "≤ 1" above it is `one2,1`.)
 #
 # **Predict before you run.** (a) Are cells 1 and 3, before the step, independent, if we knew nothing of the nodes
 # "≤ 1"? (b) And since we know that at most one thing came into cell 2? (c) Are cells 1 and 2 independent *after* the
@@ -300,9 +301,9 @@ assert abs(plain - 0.5).max() < 1e-9
 assert exact[-1] < 1e-6
 
 # %% [markdown]
-# After the first scan the exact answer is .059 and BOF's is .5. One thing is believed to be in two places, 1.5 things
-# in all. Does it help to see the cell that the thing has left? Take away the shadow and two cells, so that a beam
-# passes cell 1. This is the world whose price stands on the first dashed edge:
+# After the first scan the exact answer is .059 and BOF's is .5. After five, BOF believes one thing to be in two places:
+# 1.5 things in all. Does it help to see the cell that the thing has left? Take away the shadow and two cells, so that a
+# beam passes cell 1. This is the world whose price stands on the first dashed edge:
 
 # %%
 for name, belief in (("exact", exact_beliefs(STANDING_OR_DRIVING)), ("BOF", bof_beliefs(STANDING_OR_DRIVING))):
