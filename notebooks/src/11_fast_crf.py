@@ -102,7 +102,8 @@ assert cars > fewer > cars / 2
 # ## The graph, and a second graph that computes
 #
 # On the left is the model of lecture 10 for nine cells: every pair of cells shares a factor, drawn as a black square.
-# On the right you see, in advance, what this lecture will build: another graph, which computes the same sums.
+# (The nine squares outside are what the network says of each cell.) On the right you see, in advance, what this lecture
+# will build: another graph, which computes the same sums.
 
 # %% jupyter={"source_hidden": true} alt="left: nine cells on a circle, each pair joined through a black square; right: twelve dots in a plane of triangles, each joined to the three corners of its triangle"
 fig, axes = plt.subplots(1, 2, figsize=(11, 5.2), layout="constrained")
@@ -259,7 +260,7 @@ np.testing.assert_allclose(by_matrix, mean_field_naive(*small, params), atol=1e-
 
 # %% tags=["separable"] jupyter={"outputs_hidden": true}
 def blur_rows_and_columns(values, sigma):
-    """Return sum_j exp(-|c_i - c_j|^2 / 2 sigma^2) values_j for each cell i of a map (H, W), in two passes."""
+    """Return sum_j exp(-|r_i - r_j|^2 / 2 sigma^2) values_j for each cell i of a map (H, W), in two passes."""
     reach = int(np.ceil(5.3 * sigma))
     taps = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
     for _ in range(2):
@@ -357,9 +358,8 @@ print("\n".join(table))
 
 # %% [markdown]
 # Two things speak against this grid. The box around all features is nearly empty. And with each halving of `sigma_beta`
-# it gets about five times as large, because three of the five axes get longer. We could keep only the points that are
-# used.
-# Then the number of corners remains: $2^d$ of them for each cell, in $d$ dimensions, to write to and to read from. A
+# it gets five to six times as large, because three of the five axes get longer. We could keep only the points that are
+# used. Then the number of corners remains: $2^d$ of them for each cell, in $d$ dimensions, to write to and to read from. A
 # shape with fewer corners is the simplex: a triangle in two dimensions has 3, a tetrahedron 4, and in general there
 # are $d + 1$. In five dimensions that is 6 instead of 32. So we want a space that is filled with simplices.
 #
@@ -677,7 +677,7 @@ print(
 # So far we only know that the kernel is not quite a Gaussian. How far is it from one? We can look: put a 1 on one point of
 # a dense cloud, 0 on all others, and read the filter at every point.
 
-# %% jupyter={"source_hidden": true} alt="left and middle: two nearly round bright spots with contours, one slightly hexagonal and higher, one slightly triangular and lower; right: kernel values against distance scatter around a Gaussian"
+# %% jupyter={"source_hidden": true} alt="left and middle: two nearly round bright spots with contours over the triangles of the lattice, one slightly hexagonal and higher, one slightly triangular and lower; right: kernel values against distance scatter around a Gaussian"
 fig, axes = plt.subplots(1, 3, figsize=(12, 3.9), layout="constrained", width_ratios=(1, 1, 1.3))
 distance = np.linspace(0, 4.5, 100)
 everywhere = np.concatenate([dense, *special.values(), [[90.0, 0.0]]])
@@ -688,9 +688,9 @@ for ax, colour, (index, (name, at)) in zip(axes, ("#0072b2", "#d55e00"), enumera
     image = kernel.reshape(60, 60)
     extent = (dense[0, 0], dense[-1, 0], dense[0, 1], dense[-1, 1])
     ax.imshow(image, origin="lower", extent=extent, cmap="gray", vmin=0, vmax=1.15)
+    plotting.draw_triangles(at[0] - 4, at[0] + 4, ax).collections[0].set(alpha=0.4)
     ax.contour(image, [0.1, 0.5, 0.9], colors=colour, extent=extent)
-    ax.set(title=f"a point {name}", xlim=at[0, 0] + [-4, 4], ylim=at[0, 1] + [-4, 4])
-    ax.set(xlabel="first feature [widths]", ylabel="second feature [widths]")
+    ax.set(title=f"a point {name}", xlabel="first feature [widths]", ylabel="second feature [widths]")
     axes[2].plot(np.linalg.norm(dense - at, axis=1), kernel, ".", ms=3, color=colour, label=name, alpha=0.5)
 fig.colorbar(axes[1].images[0], ax=axes[:2], label="kernel", shrink=0.8)
 axes[2].plot(distance, np.exp(-0.5 * distance**2), "k", label="Gaussian")
@@ -701,7 +701,7 @@ plt.show()
 # %% [markdown]
 # Left and middle: the same filter around two points, with contours at 0.1, 0.5 and (on the left) 0.9. Right: every dot is
 # one point of the cloud. The dots don't lie on one curve, so the kernel depends on the direction and on where a point
-# lies in its triangle. Near the point itself it differs most from the Gaussian (black): 1.13 and 0.83 in place of 1.
+# lies in its triangle (thin lines). Near the point itself it differs most from the Gaussian (black): 1.13 and 0.83 in place of 1.
 # Beyond three widths both are nearly zero.
 #
 # A second error depends on the data. What the blur moves to a vertex that doesn't exist is lost. So a cell with few
@@ -909,7 +909,7 @@ for sigma_beta in (0.03, 0.2, 2.0):
 
 # %% [markdown]
 # From a third to a bit more than half of them are FREE themselves: cells that the network called car although a beam has
-# passed through them. With any width, the cells similar to these are free ones. So the width explains only a part.
+# passed through them. With any width, free neighbours count as similar to these. So the width explains only a part.
 #
 # ## Where this breaks
 #
@@ -1013,9 +1013,10 @@ Markdown("\n".join(rows))
 
 # %% [markdown]
 # With the default weights pixel accuracy falls for FCN and rises for DeepLab; SegNet's interval holds both signs. So the
-# rise on our ten frames isn't the rule. Class accuracy falls for all three. Where networks learn from LIDAR labels and
-# are judged by them, pixel accuracy rises for all three (lecture [12](12_experiments.ipynb)). So whether a CRF "helps"
-# depends on the network, the labels and the metric. Weights searched for pixel accuracy raise it for all three, and still cost class accuracy. The companion
+# rise on our ten frames isn't the rule. Class accuracy falls for all three. Where networks learn from LIDAR labels,
+# on today's simulator, pixel accuracy rises for all three, by LIDAR labels and by true ones (lecture
+# [12](12_experiments.ipynb)). So whether a CRF "helps" depends on the metric, on the network, and on the labels or the
+# streets. Weights searched for pixel accuracy raise it for all three, and still cost class accuracy. The companion
 # [the CRF, measured](deeper/11_crf_measured.ipynb) shows the search, and weights that are learned.
 #
 # ## In five lines

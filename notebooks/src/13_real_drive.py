@@ -455,7 +455,7 @@ for name, one in real.items():
 
 # %% [markdown]
 # On this street the lane rises to the left by 2.4 degrees, far more than on drive 0013, and the same in all frames.
-# This is reading G of the graph. Fifteen metres to the left a plane with this slope is 0.6 m higher. A filter that
+# This is reading G of the graph. (`roll` is the same slope, `pitch` that ahead, both in degrees.) Fifteen metres to the left a plane with this slope is 0.6 m higher. A filter that
 # takes all returns above 0.3 m for obstacles would call such ground occupied from 7 m on. So: does the LIDAR lean, or
 # does the street slope? We need W. There is a house wall to the right (C). `wall_lean` fits a plane to it, and gives
 # the angle by which the LIDAR leans if the wall is upright.
@@ -556,7 +556,9 @@ assert motion_verdict(real["stretch 1"]["axes"]) is True
 # ## Which check sees which fault?
 #
 # The numbers of the first section were made up. Now we measure: damage the drive in seven ways, one at a time, and read
-# all checks, here and on the simulated drive. Look for rows that are nearly equal to the first one.
+# all checks, here and on the simulated drive. `yaw` is the best turn of check 3, `tilt` the rise ahead of check 4;
+# `motion` says by how much some other motion fits better than the poses', and `colours` how unlike the colours of the
+# training images these are (0 to 1). "!" is an alarm. Look for rows that are nearly equal to the first one.
 
 # %%
 known = mean_histograms(training_images())
@@ -602,7 +604,7 @@ for k, frame in list(enumerate(FAULTS["LIDAR tilted"](frames)))[::4]:
 # %% [markdown]
 # Right, on a drive with motion: *camera turned* and *images late* raise the same alarm, `yaw`, and one reading names
 # the symptom and not the cause. (On drive 0013 late images read +3.00. That is the end of the search, so it means
-# *can't tell*, here a question mark.) *Poses mirrored* and *red and blue swapped* raise none; a street is mostly grey.
+# *can't tell*, "?" in the picture.) *Poses mirrored* and *red and blue swapped* raise none; a street is mostly grey.
 #
 # Left, on our real street: late images and poses that run backwards raise no alarm of their own, because the vehicle
 # stands. `colours` alarms in every row: these images aren't those that the network learned from. And the tilted LIDAR

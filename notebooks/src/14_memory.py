@@ -128,7 +128,9 @@ plt.show()
 # that the network names. So far this is lecture 01's chain, with two sensors. What is new is the row below: $e_t$ is
 # the network's *error*. It is either "none", or "says building, whatever it sees", and so on. Errors last: the
 # shadow that made the network wrong is mostly still there a tenth of a second later. In this toy world an error
-# stays with probability $r = 0.6$, and is otherwise drawn anew; by itself each frame is right with 0.8.
+# stays with probability $r = 0.6$, and is otherwise drawn anew; by itself each frame is right with 0.8. Dashed is what
+# the memory of this lecture will cut: the chain of errors, at a price that you will compute, and what laser and camera
+# tell each other about the content, because each of them keeps a belief of its own.
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph of three frames: contents m0 to m2 in a row, above them scans, below them the classes named, which also depend on a row of errors e0 to e2; a dashed arc below the last two errors has the price .34 to .38, and another one joins scan l1 and class named z1"
 world = MemoryWorld(steps=3, repeats=0.6)
@@ -603,7 +605,7 @@ def show_windows(chosen, side=16):
 show_windows([(results, one) for results in (simulated, street) for one in windows(results, 1)])
 
 # %% [markdown]
-# White cells of the truth are those that nobody labelled. In the simulated squares unknown cells become what they
+# Forward is up. White cells of the truth are those that nobody labelled. In the simulated squares unknown cells become what they
 # are: vegetation, road, car. On the real street two of the three squares show the oncoming car of the opening;
 # the third gains three cells.
 #

@@ -77,7 +77,8 @@ assert (messages[:, : at[2] + 1] <= settled[:, : at[2] + 1] + 1e-9).all()
 assert max(v[:, : at[1] + 1].max() for v in variation.values()) < 0.01
 
 # %% [markdown]
-# **Marginals (above).** The columns of the table are couplings of 1, 2, 3 and 4. Up to 1, every way is within 1 % of
+# **Marginals (above).** *Total variation* is half the sum over the classes of the absolute differences; the coloured
+# bands hold the middle half of the draws. The columns of the table are couplings of 1, 2, 3 and 4. Up to 1, every way is within 1 % of
 # the exact marginals. At each size and each coupling, converged mean field is at least as far off as mean field stopped
 # after ten updates. A likely reason: the stopped one isn't yet so sure. Messages (loopy
 # sum-product) are nearer than converged mean field up to a coupling of 2; at 4 they are wrong by 10 to 15 %, because
@@ -180,7 +181,7 @@ Markdown(crf_error_tables(error))
 # a factor of two between them says nothing.
 #
 # **On these maps the lattice's kernel costs less than stopping early.** On the crops, its kernel error is 0.2 % and its convergence
-# error 1.4 %; on the compact grid 0.3 % and 0.4 %. The two don't add up to the total, because some errors cancel. So
+# error 1.4 %; on the compact grid 0.3 % and 0.4 %. The two needn't add up to the total, because each has a reference of its own. So
 # the exact kernel alone, in the same ten updates, makes the map only little better. It helps together with more updates.
 # (On the present sample drive it is the other way round: lecture 11 finds a kernel error of 0.0006 and a convergence error of
 # 0.0004, as mean differences of probabilities.)
@@ -224,11 +225,11 @@ def points(scores):
     return [100 * (scores["all"][metric] - search["unrefined"]["all"][metric]) for metric in METRIC_NAMES]
 
 
-def cross(ax, gains, mark, color, label=None):
+def cross(ax, gains, mark, color, label=None, size=6):
     """Draw mean gains with their intervals: of class accuracy to the side, of pixel accuracy upward."""
     low, (x, y), high = 100 * np.array([gains[m] for m in METRIC_NAMES]).T
     (left, down), (right, up) = (x, y) - low, high - (x, y)
-    ax.errorbar(x, y, [[down], [up]], [[left], [right]], fmt=mark, color=color, ms=6, lw=1, label=label)
+    ax.errorbar(x, y, [[down], [up]], [[left], [right]], fmt=mark, color=color, ms=size, lw=1, label=label)
 
 
 # %% jupyter={"source_hidden": true}
@@ -247,19 +248,26 @@ def draw_search(ax):
     )
 
 
+# %% jupyter={"source_hidden": true}
 def draw_test(ax):
-    """Draw default, searched and learned CRFs, on the test frames."""
-    for color, (name, file) in zip(("C0", "C1", "C2"), FILES.items(), strict=True):
-        gains = kept(file)["test"]["gains"]
-        cross(ax, gains["CRF"], "s", color, f"{name}, marks as on the left")
-        for goal, mark in MARKS.items():
-            cross(ax, gains[f"calibrated, CRF for {goal}"], mark, color)
-    for k, name in enumerate(learned["learnt"]):
-        cross(ax, learned["gains"][name], "o", "C3", None if k else "SegNet, learned in eight ways")
+    """Draw default, searched and learned CRFs, on the test frames, and once more, enlarged, those close to zero."""
+    close = ax.inset_axes((0.34, 0.27, 0.52, 0.31), xlim=(-0.17, 0.31), ylim=(-0.19, 0.13))
+    for on, size in ((ax, 6), (close, 3.5)):
+        for k, name in enumerate(learned["learnt"]):
+            cross(on, learned["gains"][name], "o", "C3", None if k else "SegNet, learned in eight ways", size)
+        for color, (name, file) in zip(("C0", "C1", "C2"), FILES.items(), strict=True):
+            gains = kept(file)["test"]["gains"]
+            cross(on, gains["CRF"], "s", color, f"{name}, marks as on the left", size)
+            for goal, mark in MARKS.items():
+                cross(on, gains[f"calibrated, CRF for {goal}"], mark, color, None, size)
+        on.axhline(0, color="0.7", lw=0.8)
+        on.axvline(0, color="0.7", lw=0.8)
+    close.tick_params(labelsize=8)
+    ax.indicate_inset_zoom(close, edgecolor="0.3")
     ax.set(title="110 test frames, 95 % intervals over drives", xlim=(-9, 1), ylim=(-1.3, 1.3))
 
 
-# %% jupyter={"source_hidden": true} alt="left: settings of the search as dots, change in pixel accuracy against change in class accuracy; those above zero in pixel accuracy lie left of zero in class accuracy. Right: default, chosen and learned CRFs on test frames, with intervals; none gains in both"
+# %% jupyter={"source_hidden": true} alt="left: settings of the search as dots, change in pixel accuracy against change in class accuracy; those above zero in pixel accuracy lie left of zero in class accuracy. Right: default, chosen and learned CRFs on test frames, with intervals; none gains in both; an inset enlarges the eleven that lie close to zero"
 search, learned = kept("crf_search"), kept("learned_crf")
 fig, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="compressed", sharex=True, sharey=True)
 for ax, draw_on in zip(axes, (draw_search, draw_test), strict=True):
@@ -285,6 +293,7 @@ for name, values in learned["learnt"].items():
     print(f"{name.replace('learnt', 'learned').replace(', ', ' · '):<57}{row}{values['w1']:8.2f}{values['w2']:8.2f}")
 
 # %% [markdown]
+# (The box in the right picture shows what lies at zero, enlarged.)
 # **A searched CRF gains pixel accuracy and still costs class accuracy.** Chosen for pixel accuracy, it gains 0.4 to 0.7
 # points of it for each of the three networks, and loses 2.2 to 3.4 points of class accuracy, a third to a bit more than
 # half of what the default loses. Chosen for class accuracy, it hardly does anything: all changes are below 0.1 point,
