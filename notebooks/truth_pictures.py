@@ -27,7 +27,7 @@ lightness too."""
 CHARTED = {
     "mistaken": "seen, another label",
     "missed": "seen, no label",
-    "wrong": "labelled, but something\nelse stands there",
+    "wrong": "labelled, but something\nelse is there",
 }
 """The shares of `TruthCounts.shares` that `truth_errors` draws, and their titles."""
 _MARKERS = "osD^vP*Xhp"

@@ -2,8 +2,8 @@
 # # 09 · Where truth comes from, and how wrong it is
 #
 # **In one sentence.** The maps that a network learns from are made from labelled images and LIDAR returns, in five
-# steps; each step makes errors of its own, and on a simulated street, where you know what really stands there, you can
-# count them.
+# steps; each step makes errors of its own, and on a simulated street, where you know what is really there, you can count
+# them.
 #
 # **You will be able to**
 # - make a semantic grid from an image's labels and one LIDAR scan, step by step, as the paper does;
@@ -103,7 +103,7 @@ assert 0.5 < right < 0.7
 # Before any step, let us draw what the label of a cell depends on. Take a cell at the outline of a car, and three
 # returns that were measured in it.
 
-# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: what stands in the cell and the calibration point to the image labels of three returns; image label and depth point to what each return brings; those and the occupancy state point to the label; dashed, as cut, are the edges from the calibration and from the occupancy state, one between pixel and depth, and one to the label of a neighbour"
+# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: what is in the cell and the calibration point to the image labels of three returns; image label and depth point to what each return brings; those and the occupancy state point to the label; dashed, as cut, are the edges from the calibration and from the occupancy state, one between pixel and depth, and one to the label of a neighbour"
 graph = lidar_label_stage()
 _, ax = plt.subplots(figsize=(9.5, 5), layout="constrained")
 graph.draw(ax, highlight=("c", "y"))
@@ -115,7 +115,7 @@ assert not d_separated(graph.model, "x1", "x2", given=("m",))
 # Shaded nodes are what the recipe gets to see; orange rims mark the two nodes that this part is about, and dashed lines
 # are edges that the recipe cuts. Read the graph from the top:
 #
-# - $m$ is what stands in the cell, road or car. Nobody sees it directly.
+# - $m$ is what is in the cell, road or car. Nobody sees it directly.
 # - $a_k$ is the label that a person drew at the pixel on which return $k$ falls. It depends on $m$. It also depends on
 #   the **calibration** $\kappa$ (`c` in the code), because a camera that looks elsewhere than we think shows us the pixel of something else.
 # - $d_k$ says whether that pixel has a depth: without a return it can't be carried anywhere.
@@ -124,13 +124,13 @@ assert not d_separated(graph.model, "x1", "x2", given=("m",))
 #   which kind of *unknown* the cell is.
 #
 # An error can enter at each arrow. The two assertions tell you which independence matters. When the calibration is
-# known, returns are independent witnesses of what stands there: besides the path through $m$, only the one through $\kappa$
+# known, returns are independent witnesses of what is there: besides the path through $m$, only the one through $\kappa$
 # is **open** from $x_1$ to $x_2$, that is, lets information pass. (Those through $y$ are closed, because $y$ is their common effect and isn't given.) The
 # calibration is *not* known, so they all share one error. Soon we shall see what that does to a vote.
 #
 # The recipe also leaves edges out. It counts votes as if $\kappa$ were known (dashed, with its price: a vote of nine
-# returns is wrong with probability 0.10, where independent errors would leave .012). It doesn't ask $o$ once there is
-# a vote. It joins the labels of neighbours $y'$ only in the clean-up, without asking what else is known of them. And
+# returns is wrong with probability 0.10, where independent errors of the same size would leave 0.012). It doesn't ask
+# $o$ once there is a vote. It joins the labels of neighbours $y'$ only in the clean-up, without asking what else is known of them. And
 # it takes a return to lie on the very thing that its pixel shows (dashed, from $a_1$ to $d_1$). We begin with that
 # one.
 #
@@ -143,20 +143,20 @@ assert not d_separated(graph.model, "x1", "x2", given=("m",))
 #
 # | return | where | row |
 # |---|---|---|
-# | P | road, 6.15 m ahead, height 0 | 50 + 100 · 1.23 / 6.15 = **70** |
-# | Q | rear of a car, 10 m ahead, height 1.03 m | 50 + 100 · 0.20 / 10 = **52** |
-# | R | wall, 30 m ahead, height 0.63 m | 50 + 100 · 0.60 / 30 = **52** |
+# | E | road, 6.15 m ahead, height 0 | 50 + 100 · 1.23 / 6.15 = **70** |
+# | F | rear of a car, 10 m ahead, height 1.03 m | 50 + 100 · 0.20 / 10 = **52** |
+# | G | wall, 30 m ahead, height 0.63 m | 50 + 100 · 0.60 / 30 = **52** |
 #
-# Q and R share a pixel. The paper says: "For the pixels with more than one depth value, we select the depth value that
+# F and G share a pixel. The paper says: "For the pixels with more than one depth value, we select the depth value that
 # is closest to the image plane since the other one is probably occluded by this pixel." So the label of row 52, *car*,
-# goes to Q, and R is dropped.
+# goes to F, and G is dropped.
 #
-# **Predict before you run.** A fourth return, S, hits the same wall a little higher, at 0.93 m. On which row does it
+# **Predict before you run.** A fourth return, H, hits the same wall a little higher, at 0.93 m. On which row does it
 # fall? Which label does it take? (The car is 1.1 m high and ends 14 m ahead.)
 #
-# <details><summary>Answer</summary>On row 50 + 100 · 0.30 / 30 = 51. No other return falls there, so the rule keeps S. But
+# <details><summary>Answer</summary>On row 50 + 100 · 0.30 / 30 = 51. No other return falls there, so the rule keeps H. But
 # the camera's ray through row 51 sinks by 1 cm per metre: 14 m ahead it is at 1.23 - 0.14 = 1.09 m, below the roof.
-# The pixel shows the car. So S carries the label *car* to a cell 30 m ahead, where the wall stands.</details>
+# The pixel shows the car. So H carries the label *car* to a cell 30 m ahead, where the wall stands.</details>
 
 
 # %% tags=["nearest"]
@@ -179,22 +179,22 @@ def nearest_on_each_pixel(points, K, size):
 # %% jupyter={"outputs_hidden": true}
 T_camera_from_lidar = np.array([[0.0, -1, 0, 0], [0, 0, -1, -0.5], [1, 0, 0, 0], [0, 0, 0, 1]])
 toy_camera = Camera(np.array([[100.0, 0, 50], [0, 100, 50], [0, 0, 1]]), T_camera_from_lidar, size=(101, 101))
-x_and_height = np.array([[6.15, 0.0], [10, 1.03], [30, 0.63], [30, 0.93]])  # P, Q, R, S
+x_and_height = np.array([[6.15, 0.0], [10, 1.03], [30, 0.63], [30, 0.93]])  # E, F, G, H
 toy_points = np.column_stack([x_and_height[:, 0], np.zeros(4), x_and_height[:, 1] - 1.73])  # in the LIDAR frame
 seen = nearest_on_each_pixel(transform_points(T_camera_from_lidar, toy_points), toy_camera.K, toy_camera.size)
-print({f"row {v}": "PQRS"[n] for (_, v), n in seen.items()})
+print({f"row {v}": "EFGH"[n] for (_, v), n in seen.items()})
 toy_frame = Frame(None, toy_points.astype(np.float32), toy_camera, np.eye(4), time=0.0)
 assert sorted(closest_returns(toy_frame)[0]) == sorted(seen.values())
 
-# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="a street from the side: the LIDAR above the camera; returns P on the road, Q on the rear of a car, R and S on a wall behind it; the camera's rays to R and S end at the car"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="a street from the side: the LIDAR above the camera; returns E on the road, F on the rear of a car, G and H on a wall behind it; the camera's rays to G and H end at the car"
 fig, ax = plt.subplots(figsize=(10, 2.9), layout="constrained")
 ax.add_patch(Rectangle((10, 0), 4, 1.1, color=np.divide(KITTI_14.rgb[CAR], 255), alpha=0.35))
 ax.add_patch(Rectangle((30, 0), 0.4, 2.2, color="0.5"))
-for (x, z), name, ends in zip(x_and_height, "PQRS", (6.15, 10, 10, 13), strict=True):
+for (x, z), name, ends in zip(x_and_height, "EFGH", (6.15, 10, 10, 13), strict=True):
     ax.plot([0, x], [1.73, z], color="0.6", linewidth=0.9)
     ax.plot([0, ends], [1.23, 1.23 + (z - 1.23) * ends / x], color="#d95f02", linewidth=1.3, linestyle="--")
     ax.plot(x, z, "ok", markersize=6)
-    ax.annotate(name, (x, z), xytext=(7, 5), textcoords="offset points")
+    ax.annotate(name, (x, z), xytext=(7, 10), textcoords="offset points")
 ax.plot(0, 1.73, "s", color="0.3", markersize=9)
 ax.plot(0, 1.23, ">", color="#d95f02", markersize=9)
 ax.annotate("LIDAR (grey rays)", (0, 1.73), xytext=(8, 8), textcoords="offset points")
@@ -205,7 +205,7 @@ ax.set(xlim=(-1, 33), ylim=(0, 2.35), xlabel="x, forward [m]", ylabel="height [m
 plt.show()
 
 # %% [markdown]
-# See the two grey rays that pass over the car to R and S, and the two dashed ones of the camera that end at the car.
+# See the two grey rays that pass over the car to G and H, and the two dashed ones of the camera that end at the car.
 # The rule can only catch what shares its pixel with something closer. How often is that the case? The simulator knows
 # the depth of each pixel, so we can count the returns that lie more than half a metre behind what their pixel shows.
 
@@ -264,13 +264,13 @@ plt.show()
 # seldom meet on one pixel. On the one scan of an HDL-64E that we tried, with twice as many returns in view, it still
 # leaves more than four in five. Not every hidden return does harm: a quarter of them bring their cell's true label
 # all the same (last line), as grass behind grass does. In the picture, most hidden returns (red crosses) are at the
-# fence, others at the poles, the bicycle and far down the road. The LIDAR looks between the pales and over them onto
-# the grass and the house, and the pixel shows a pale. That is the patch **A** of the opening picture.
+# fence, others at the poles, the bicycle and far down the road. The LIDAR looks between the pickets and over them
+# onto the grass and the house, and the pixel shows a picket. That is the patch **A** of the opening picture.
 #
 # ## Step 2: from the pixel back to the grid
 #
 # Now each kept pixel $(u, v)$ has a label and a depth $Z$. Equation (1) tells how a point gets to its pixel. With the
-# depth known it can be turned around. By hand, for Q: row 52 and depth 10 m. Two rows below the level one are $2 \cdot
+# depth known it can be turned around. By hand, for F: row 52 and depth 10 m. Two rows below the level one are $2 \cdot
 # 10 / 100 = 0.20$ m below the camera, so its height is 1.23 - 0.20 = 1.03 m. It lies 10 m ahead, in the middle of the
 # image. In general
 #
@@ -286,7 +286,7 @@ def back_project(uv, Z, camera):
     return transform_points(invert_rigid(camera.T_camera_from_grid), Z[:, None] * rays)
 
 
-print("Q:", back_project(np.array([[50, 52]]), np.array([10.0]), toy_camera).round(2) + 0.0)
+print("F:", back_project(np.array([[50, 52]]), np.array([10.0]), toy_camera).round(2) + 0.0)
 Z = transform_points(frame.camera.T_camera_from_lidar, frame.points[numbers, :3])[:, 2]
 back, own = back_project(uv, Z, frame.camera), frame.points_grid[numbers, :3]
 off = np.linalg.norm(back - own, axis=1)
@@ -302,7 +302,7 @@ print(f"; {100 * moved.mean():.0f} % land in another cell")
 #
 # ## Step 3: votes in a cell
 #
-# A cell of 0.5 m holds several returns, and they need not agree. Take three cells:
+# A cell of 0.5 m may hold several returns, and they need not agree. Take three cells:
 #
 # | cell | its returns bring | the most frequent | what stands wins |
 # |---|---|---|---|
@@ -325,8 +325,8 @@ print(f"; {100 * moved.mean():.0f} % land in another cell")
 # %% tags=["votes"]
 def vote(classes, rule="standing"):
     """Return the class that a cell takes from its returns, or None; of equally frequent ones the first."""
-    kept = [c for c in classes if c not in (IGNORE, SKY)]
-    stands = [c for c in kept if KITTI_14.names[c] not in KITTI_14.flat]
+    kept = [label for label in classes if label not in (IGNORE, SKY)]
+    stands = [label for label in kept if KITTI_14.names[label] not in KITTI_14.flat]
     voters = stands if rule == "standing" and stands else kept
     return max(sorted(set(voters)), key=voters.count) if voters else None
 
@@ -338,13 +338,13 @@ for rule, by_hand in (("majority", [ROAD, SIDEWALK, None]), ("standing", [CAR, S
 # %% [markdown]
 # ### Which rule is better, and what can't be outvoted?
 #
-# That depends on the errors. Suppose that each return has the wrong class with probability 0.1, by itself. With three
-# returns, a majority is wrong if two or three are: $3 \cdot 0.1^2 \cdot 0.9 + 0.1^3 = 0.028$. With *what stands wins*, a road
-# cell becomes a car as soon as *one* of the three says so: $1 - 0.9^3 = 0.271$. (And a car cell becomes road only if
-# all three say so: 0.001.)
+# That depends on the errors. Suppose that each return has the wrong class with probability 0.1, by itself, as when
+# outlines are drawn a little off. With three returns, a majority is wrong if two or three are:
+# $3 \cdot 0.1^2 \cdot 0.9 + 0.1^3 = 0.028$. With *what stands wins*, a road cell becomes a car as soon as *one* of the
+# three says so: $1 - 0.9^3 = 0.271$. (And a car cell becomes road only if all three say so: 0.001.)
 #
 # **Predict before you run.** Now let each return be right, but let the calibration be off with probability 0.1, so
-# that all returns of our cell fall on the pixels of what stands beside it. How often is a majority of three wrong? Of
+# that all returns of our cell fall on the pixels of what is beside it. How often is a majority of three wrong? Of
 # nine?
 #
 # <details><summary>Answer</summary>0.1 in both cases. When the calibration is off, all returns are wrong together, however
@@ -377,12 +377,11 @@ ax.legend(frameon=False)
 plt.show()
 
 # %% [markdown]
-# With outlines alone (triangles) a majority soon is nearly always right. With the calibration as well (circles) it
-# sinks to 0.1 (dotted) and no further. Remember this line when we add up nineteen scans. *What stands wins* (squares) gets
-# worse for a road cell the more returns there are. (For a car cell it gets better; so it helps what is thin.)
-# ("Outlines" are the errors of people who draw outlines a little off, by themselves at each return.) Where all
-# returns of a cell bring one class, the two rules are the same. How often do they differ with one scan, and with
-# nineteen?
+# With errors of outlines alone (triangles) a majority soon is nearly always right. With those of the calibration as well
+# (circles) its error sinks to 0.1 (dotted) and no further. Remember this line when we add up nineteen scans. *What stands
+# wins* (squares) gets worse for a road cell the more returns there are. (For a car cell it gets better; so it helps what
+# is thin.) Where all returns of a cell bring one class, the two rules are the same. How often do they differ with one
+# scan, and with nineteen?
 #
 # ## Step 4: what has no label
 #
@@ -409,7 +408,7 @@ votes = vote_map(cells, classes, o)
 np.testing.assert_array_equal(votes, carry_labels(classes, np.arange(len(cells)), cells, o))
 labelled = votes < N_SEMANTIC
 print(f"{labelled.sum()} of {votes.size} cells have a label; in {(votes != standing)[labelled].sum()} of them", end=" ")
-print("something else stands")
+print("something else is there")
 
 
 # %% jupyter={"source_hidden": true}
@@ -475,9 +474,10 @@ def clean_up(votes, cell):
     distance, nearest = distance_transform_edt(~np.isin(votes, flat), sampling=cell, return_indices=True)
     made = np.where(free_to_take & (distance <= 3), votes[tuple(nearest)], votes)
     reach = round(1 / cell)
-    for c in set(range(N_SEMANTIC)) - set(flat):
-        closed = binary_closing(np.pad(votes == c, reach), np.ones((2 * reach + 1,) * 2))[reach:-reach, reach:-reach]
-        made[free_to_take & closed] = c
+    for label in set(range(N_SEMANTIC)) - set(flat):
+        mask = np.pad(votes == label, reach)
+        closed = binary_closing(mask, np.ones((2 * reach + 1,) * 2))[reach:-reach, reach:-reach]
+        made[free_to_take & closed] = label
     return made
 
 
@@ -487,7 +487,7 @@ np.testing.assert_array_equal(clean_up(votes, spec.cell), close_and_spread(votes
 # ### The graph of the clean-up
 #
 # Below we shall see that most wrong labels come from this step, so let us draw it as well. Cell 1 has a vote, cell 2 has
-# none. What stands in two neighbours is usually the same, say with probability 0.9. The finished label $t_2$ of cell 2 is
+# none. Two neighbours usually hold the same, say with probability 0.9. The finished label $t_2$ of cell 2 is
 # the neighbour's vote $y_1$, if that is ground and cell 2 was observed at all. Which of the four states $o_2$ is the most
 # probable, FREE or STATIC, the clean-up doesn't ask: this edge is cut.
 #
@@ -524,11 +524,11 @@ print(f"P(road in cell 2): exact {road:.2f}, the clean-up {made_road:.2f}")
 np.testing.assert_allclose([road, made_road], [0.045 / 0.105, 1])
 assert not d_separated(neighbours, "m2", "o2", given=("y1",))
 
-# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="a directed graph of two cells: what stands in cell 1 points to what stands in cell 2 and to the vote of cell 1; what stands in cell 2 points to its occupancy; the vote points to the finished label of cell 2; dashed, as cut, is the edge from the occupancy to the label, with the price .43 to 1.00"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="a directed graph of two cells: what is in cell 1 points to what is in cell 2 and to the vote of cell 1; what is in cell 2 points to its occupancy; the vote points to the finished label of cell 2; dashed, as cut, is the edge from the occupancy to the label, with the price .43 to 1.00"
 places = {"m1": (0, 2.4), "m2": (4.5, 2.4), "y1": (0, 1.2), "o2": (4.5, 1.2), "t2": (2.2, 0)}
 _, ax = plt.subplots(figsize=(8, 3.6), layout="constrained")
-says = {"m2": "what stands in cell 2", "o2": "occupancy of cell 2", "t2": "its finished label", "y1": "vote of cell 1"}
-price = Dashed(("o2", "t2"), f"{road:.2f} -> {made_road:.2f}")
+says = {"m2": "what is in cell 2", "o2": "occupancy of cell 2", "t2": "its finished label", "y1": "vote of cell 1"}
+price = Dashed(("o2", "t2"), f"{road:.2f} → {made_road:.2f}")
 draw(neighbours, ax, positions=places, observed=("y1", "o2"), highlight="t2", equations=says, dashed=[price])
 plt.show()
 
@@ -570,11 +570,11 @@ plt.show()
 #
 # ## How wrong is it?
 #
-# Six cells of a street, and for each what stands there, whether the camera sees it, and what the recipe made:
+# Six cells of a street, and for each what is there, whether the camera sees it, and what the recipe made:
 #
 # | cell | 1 | 2 | 3 | 4 | 5 | 6 |
 # |---|---|---|---|---|---|---|
-# | stands there | road | road | road | car | car | road |
+# | is there | road | road | road | car | car | road |
 # | camera sees it | yes | yes | yes | yes | no | no |
 # | made | road | road | unknown-free | road | car | car |
 #
@@ -789,9 +789,9 @@ for movers in ("smeared", "carved", "carried"):
 def earlier_returns(then, belief, movers):
     """Return the labelled returns of an earlier scan in the LIDAR frame of now, (N, 3)."""
     points = then.points[closest_returns(then)[0], :3]
-    r, c, inside = spec.cells(points)
-    dynamic = inside & (belief.probability[State.DYNAMIC] > belief.probability[State.STATIC])[r, c]
-    velocity, seconds = belief.velocity[:, r, c].T, frame.time - then.time
+    rows, cols, inside = spec.cells(points)
+    dynamic = inside & (belief.probability[State.DYNAMIC] > belief.probability[State.STATIC])[rows, cols]
+    velocity, seconds = belief.velocity[:, rows, cols].T, frame.time - then.time
     heights = treat_movers(points[:, 2:].repeat(2, axis=1), dynamic, 0 * velocity, 0, movers)[:, :1]
     xyz = np.column_stack([treat_movers(points[:, :2], dynamic, velocity, seconds, movers), heights])
     return transform_points(invert_rigid(frame.T_world_from_lidar) @ then.T_world_from_lidar, xyz)
@@ -832,11 +832,12 @@ plt.show()
 def windows_growing():
     """Yield the three maps for windows of 1, 3, ... 19 scans."""
     for reach in range(10):
-        fig, axes = plt.subplots(1, 3, figsize=(7, 4.6), dpi=plotting.FIGURE_DPI, layout="constrained", sharey=True)
+        fig, axes = plt.subplots(1, 3, figsize=(8.6, 4), dpi=plotting.FIGURE_DPI, layout="constrained", sharey=True)
         for ax, movers in zip(axes, ("smeared", "carved", "carried"), strict=True):
             policy = replace(window, past=reach, future=reach, movers=movers)
             plotting.grid_labels(spec, drive_truth(moments, NOW, spec, policy), KITTI_14, ax, legend=False)
             ax.set(title=movers, ylabel="x, forward [m]" if ax is axes[0] else "", ylim=(0, 45))
+        plotting.class_legend(axes[-1], KITTI_14, np.stack([truth, made]))
         fig.suptitle(f"{2 * reach + 1} scan{'s' * (reach > 0)}", fontsize=11)
         for _ in range(3 if reach in (0, 9) else 1):
             yield fig
@@ -845,9 +846,9 @@ def windows_growing():
 plotting.animate(windows_growing(), period=0.6, alt="smearing, carving and carrying as the window grows")
 
 # %% [markdown]
-# In the smeared map the car that overtakes us leaves a streak on the road, from 2 to 16 m ahead, and the oncoming cars
-# melt into one band on the left (y from 5 to 10 m). Carving removes the streak, and nearly all of the car with it. Of the band it removes
-# only a part, because the filter doesn't take each of those cells for DYNAMIC at each instant. Carrying leaves a patch
+# In the smeared map the car that overtakes us leaves a streak on the road, up to 16 m ahead, and the oncoming cars
+# melt into one band on the left (5 to 10 m beside us). Carving removes the streak, and nearly all of the car with it. Of
+# the band it removes only a part, because the filter doesn't take each of those cells for DYNAMIC at each instant. Carrying leaves a patch
 # where the overtaking car is. Otherwise it looks much like carving, with single cells of car strewn about, which were
 # carried to a wrong place. None of the three shows the oncoming cars as the truth does.
 #
@@ -1108,7 +1109,7 @@ plt.show()
 # On these ten frames one degree to either side raises wrong labels from 22 % to 28 %. One degree of nodding raises
 # them to 25 or 48 %, depending on its sign. With a positive sign each return takes the label of a pixel *above* its
 # own: the far road gets the labels of trees, cars and sidewalk (right map). With a negative sign it takes the label
-# of a pixel below, and below the road there is mostly road. So a shift by this sign, 18 cells at 20 m, spoils little
+# of a pixel below, and below the road there is mostly road. So a shift by this sign, 18 cells of 0.2 m at 20 m, spoils little
 # of the map: a label that moves from road to road does no harm. The harm is at the outlines.
 #
 # **Where no beam went.** A recipe can only carry what was measured. Of the cells that the camera sees, how many were

@@ -184,7 +184,7 @@ def lidar_label_stage(world: LabelWorld | None = None) -> StageGraph:
     Returns
     -------
     StageGraph
-        Variables m (what stands there: 0 road, 1 car), c (calibration: 0 right, 1 off), for each return a1, a2, ...
+        Variables m (what is there: 0 road, 1 car), c (calibration: 0 right, 1 off), for each return a1, a2, ...
         (class of its pixel: 0 road, 1 car), d1, d2, ... (0 it has a depth, 1 none) and x1, x2, ... (what it brings to
         the cell: 0 road, 1 car, 2 nothing), o (FREE, STATIC, DYNAMIC, UNKNOWN), and y (the label, one of `MADE`).
     """
@@ -203,7 +203,7 @@ def lidar_label_stage(world: LabelWorld | None = None) -> StageGraph:
         directed(factors),
         observed=("o", *(f"{name}{k}" for k in range(1, world.returns + 1) for name in "ad")),
         positions=_positions(world.returns),
-        equations={"m": "what stands there", "c": "calibration", "o": "occupancy", "y": "label"},
+        equations={"m": "what is there", "c": "calibration", "o": "occupancy", "y": "label"},
         labels={"c": r"$\kappa$", "neighbour": "$y'$"},
         cut=cut_edges("label"),
         ghosts={"neighbour": (1.1 * world.returns - 0.5, -2.4)},

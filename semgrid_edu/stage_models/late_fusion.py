@@ -15,7 +15,7 @@ from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.stage_models.stage_graph import StageGraph, binary, cut_edges, directed
 
 ROAD, CAR = range(2)
-"""What stands in the cell, and what its pixel shows."""
+"""What is in the cell, and what its pixel shows."""
 
 FREE, OCCUPIED, UNKNOWN = range(3)
 """What the occupancy grid says of the cell."""
@@ -62,7 +62,7 @@ def late_fusion(world: TwoSensors | None = None) -> StageGraph:
     Returns
     -------
     StageGraph
-        Variables m (what stands in the cell: 0 road, 1 car), hid (1 when it is hidden), a (label of its pixel, like m)
+        Variables m (what is in the cell: 0 road, 1 car), hid (1 when it is hidden), a (label of its pixel, like m)
         and o (0 FREE, 1 occupied, 2 UNKNOWN).
     """
     world = world or TwoSensors()
@@ -73,7 +73,7 @@ def late_fusion(world: TwoSensors | None = None) -> StageGraph:
         directed(factors),
         observed=("a", "o"),
         positions={"m": (0.0, 0.0), "hid": (3.0, 0.0), "a": (0.0, -1.4), "o": (3.0, -1.4)},
-        equations={"m": "what stands there", "hid": "hidden or not", "a": "the pixel's label", "o": "occupancy state"},
+        equations={"m": "what is there", "hid": "hidden or not", "a": "the pixel's label", "o": "occupancy state"},
         cut=cut_edges("fusion"),
     )
 

@@ -62,7 +62,7 @@ def test_a_point_is_a_share_and_small_numbers_have_none():
     assert lines["seen, no label"][0].get_xdata().tolist() == [5, 20]
     np.testing.assert_allclose(lines["seen, no label"][0].get_ydata(), [30, 70])
     np.testing.assert_allclose(lines["seen, another label"][0].get_ydata(), [10, 10])
-    (wrong,) = lines["labelled, but something\nelse stands there"]
+    (wrong,) = lines["labelled, but something\nelse is there"]
     np.testing.assert_allclose(wrong.get_ydata(), [25, np.nan])  # 10 labelled cells are too few
     with pytest.raises(ArgumentError, match="edges: expected 3 distances"):
         truth_errors(counts(), (0, 10), KITTI_14)
