@@ -217,8 +217,8 @@ np.testing.assert_allclose(log_partition(two, free, priced(1)), log_Z)
 #
 # ## The price of a pair: equation (4)
 #
-# Two cells should cost a lot when we expect them to show the same thing. We expect that when they are near each other,
-# and even more when the occupancy grid says that they are in the same state. Take three cells in a row: FREE, FREE,
+# Different labels should cost a lot where we expect two cells to show the same. We expect that when they are near each
+# other, and even more when the occupancy grid says that they are in the same state. Take three cells in a row: FREE, FREE,
 # STATIC, each for sure. Between cells 2 and 3 something begins to stand, so a border between labels is plausible
 # there. The paper's price has two terms. The first one (the *bilateral* kernel) asks for both nearness and the same
 # state, the second one (the *spatial* kernel) for nearness alone. With the package's parameters for the paper's grid
@@ -314,26 +314,29 @@ np.testing.assert_array_equal(best, most_likely(four, values, params).ravel())
 
 # %% jupyter={"source_hidden": true}
 PLACES = {f"x{n + 1}": (3.0 * (n % 2), -2.2 * (n // 2)) for n in range(4)}
+BESIDE = ((0, 0.3, "center"), (-0.2, 0, "right"), (-0.2, -0.25, "right"))  # of a pair's square, its price: x, y, side
+BESIDE += tuple((-x, y, {"right": "left"}.get(side, side)) for x, y, side in reversed(BESIDE))
 
 
 def square_graph(ax, cut=False):
     """Draw four cells with their prices; with `cut`, without the squares of pairs, and the cut links dashed."""
-    model, places, says = crf_model(four, values, params), dict(PLACES), {}
+    model, places = crf_model(four, values, params), dict(PLACES)
     pairs = {f"f({a}, {b})": (a, b) for a, b in combinations(PLACES, 2)}
     for name, (x, y) in PLACES.items():
         places[f"f({name})"] = (x - 0.9 if x == 0 else x + 0.9, y)
+    if cut:
+        model = GraphicalModel([factor for factor in model.factors if len(factor.names) == 1])
     for n, (label, (a, b)) in enumerate(pairs.items()):
         part = 0.33 if n in (2, 3) else 0.5  # the diagonals' squares don't meet in the middle
-        places[label] = tuple((1 - part) * np.array(PLACES[a]) + part * np.array(PLACES[b]))
-        says[label] = f"{k[int(a[1]) - 1, int(b[1]) - 1]:.2f}"
-    if cut:
-        own = GraphicalModel([factor for factor in model.factors if len(factor.names) == 1])
-        draw(own, ax, positions={name: at for name, at in places.items() if name not in pairs})
-        for label, (a, b) in pairs.items():
+        place = (1 - part) * np.array(PLACES[a]) + part * np.array(PLACES[b])
+        price, (*apart, side) = f"{k[int(a[1]) - 1, int(b[1]) - 1]:.2f}", BESIDE[n]
+        if cut:
             ax.plot(*zip(PLACES[a], PLACES[b], strict=True), "--", color=CUT_COLOUR, linewidth=1.5, zorder=0)
-            ax.text(*places[label], says[label], color=CUT_COLOUR, fontsize=9, backgroundcolor="w", ha="center")
-    else:
-        draw(model, ax, positions=places, equations=says)
+            ax.text(*place, price, color=CUT_COLOUR, backgroundcolor="w", ha="center", va="center")
+        else:
+            places[label] = tuple(place)
+            ax.text(*place + apart, price, ha=side, va="center")
+    draw(model, ax, positions=places)
 
 
 # %% jupyter={"source_hidden": true} alt="factor graph of four cells in a square: the four pairs side by side have the price 0.50, the two diagonal pairs 0.30"
@@ -415,7 +418,7 @@ assert all(d_separated(alone, a, b) for a, b in combinations(PLACES, 2))  # in Q
 # How does a cell hear from the others, then? It pays for each neighbour *on average*. If cell $j$ has label $l$ with
 # probability $Q_j(l)$, then choosing $l$ in cell $i$ costs $k_{ij}$ with probability $1 - Q_j(l)$. So the average
 # price of label $l$ is $\phi_u(l) + \sum_{j \neq i} k_{ij} (1 - Q_j(l))$, and turning prices into probabilities as
-# before gives the update
+# before, with $Z_i$ for the sum, gives the update
 #
 # $$ Q_i(l) \;\leftarrow\; \frac{1}{Z_i} \exp\!\Big(\!-\phi_u(l) - \sum_{j \neq i} k_{ij}\,\big(1 - Q_j(l)\big)\Big) $$
 #
@@ -526,7 +529,7 @@ for i in range(4):
 # <details><summary>Answer</summary>
 #
 # Cell 1 hears "car" and turns to car, cell 2 hears "road" and turns to road. Now they disagree again, the other way
-# round, so they swap back, surer each time. They never agree, and the free energy rises. Exactly, "both road" weighs
+# round, so they swap back, surer each time. They never agree, and the free energy ends far above its beginning. Exactly, "both road" weighs
 # 0.245 and "both car" 0.195, so both cells are road with about 0.56: they agree, and it is nearly open on what.
 #
 # </details>
@@ -668,8 +671,9 @@ assert F_of[0] - F_of[10] > 0.9 * (F_of[0] - F_of[60])
 def updates_moving(shown_updates=(0, 1, 2, 3, 5, 10, 20)):
     """Yield a frame for each update shown."""
     for n in shown_updates:
-        fig, axes = plt.subplots(1, 2, figsize=(7, 4.6), dpi=plotting.FIGURE_DPI, layout="constrained")
+        fig, axes = plt.subplots(1, 2, figsize=(8.6, 4.2), dpi=plotting.FIGURE_DPI, layout="constrained")
         plotting.grid_labels(spec, states[n].argmax(axis=0), KITTI_14, ax=axes[0], legend=False)
+        plotting.class_legend(axes[0], KITTI_14, np.stack([states[k].argmax(axis=0) for k in shown_updates]))
         plotting.grid_values(spec, states[n].max(axis=0), "largest probability", axes[1], vmin=0.3, vmax=1)
         axes[0].set_title(f"update {n}: labels")
         axes[1].set_title("how sure", fontsize=11)
@@ -848,7 +852,7 @@ critical = critical_coupling(2, all_free((3, 3)))
 fig, axes = plt.subplots(1, 2, figsize=(10.5, 3.6), layout="constrained")
 looks = {"exact": ("0.2", "-"), "mean field": ("#d55e00", "s-."), "loopy": ("#0072b2", "o--")}
 for method, (colour, style) in looks.items():
-    name = {"loopy": "messages (loopy sum-product)", "mean field": "mean field, settled"}.get(method, method)
+    name = {"loopy": "messages (loopy sum-product)", "mean field": "mean field, 200 sweeps"}.get(method, method)
     axes[0].plot(sweep.couplings, centre[method], style, color=colour, label=name, markersize=4)
     if method != "exact":
         axes[1].semilogy(sweep.couplings[1:], sweep.errors[method][1:], style, color=colour, label=name, markersize=4)
