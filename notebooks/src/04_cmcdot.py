@@ -66,7 +66,7 @@ frames = [drive[k] for k in range(len(drive))]
 #
 # The log-odds grid of lecture 02 can't say that anything moves. The BOF of lecture 03 can, but it stores a whole
 # lattice of velocities in every cell. This lecture builds a third filter, CMCDOT. Here are all three on the sample
-# drive, with the same scans:
+# drive:
 
 
 # %% jupyter={"source_hidden": true}
@@ -127,8 +127,8 @@ assert held["CMCDOT"] < 0.08 < 0.2 < held["log-odds grid"]
 # %% [markdown]
 # **A** overtakes us, **B** comes towards us, **D** is parked. Look at **C**, the road that B has just left. The
 # log-odds grid still holds it occupied (dark), because it believes that nothing ever changes. The two other filters
-# have nearly cleared it, and they say what moves where: blue drives our way, yellow comes towards us. By the lines
-# above, 1.6 s after the start the log-odds grid holds 30 % of the free road in B's lane occupied, CMCDOT 4 %.
+# have nearly cleared it, and they say what moves where: blue drives our way, yellow comes towards us. After 1.6 s the
+# log-odds grid holds 30 % of the free road in B's lane occupied, CMCDOT 4 %.
 #
 # So CMCDOT does what BOF does. Why do we want another filter?
 #
@@ -162,7 +162,7 @@ print(f"CMCDOT: {cells:,} cells x 4, and {params.n_particles:,} particles x 5 = 
 # | FREE | nothing | still nothing, here | one number per cell |
 # | STATIC | something that stands | still here | one number per cell |
 # | DYNAMIC | something that moves | **elsewhere** | particles: place, velocity, weight |
-# | UNKNOWN | no scan has said anything, or not for long | still unknown, here | one number per cell |
+# | UNKNOWN | no scan has said anything, or none for some time | still unknown, here | one number per cell |
 #
 # Only DYNAMIC leaves its cell. So only DYNAMIC needs velocities, and these need no lattice: a sample will do, as large
 # as you can pay for, wherever something may move. The sample consists of **particles** $q$. Each has a place, a
@@ -279,8 +279,8 @@ assert came_in[loop_alone].mean() > 0.8
 
 # %% [markdown]
 # The package's `Cmcdot` is this loop with a margin around its map, so that the map may turn. At 1.6 s the two agree in
-# more than nine cells of ten. Most others came in at the far end, UNKNOWN to the loop, seen before in the package's margin.
-# Watch the overtaking car A go through one round:
+# more than nine cells of ten. Most others came in at the far end, where only the package's margin had seen them.
+# Watch the overtaking car A (in the middle; top left is B) go through one round:
 
 
 # %% jupyter={"source_hidden": true}
@@ -316,13 +316,13 @@ fig.legend(handles=named, loc="outside lower center", ncols=9, fontsize="small",
 plt.show()
 
 # %% [markdown]
-# 1. *Move*: our vehicle has driven on, so the map slides down by a cell. Nothing else happens.
+# 1. *Move*: our vehicle has driven on, so the map slides down by a cell.
 # 2. *Predict*: a tenth of a second passes. The orange mass flies ahead, and pales where its particles don't agree about
 #    the velocity.
 # 3. *The scan* (black: hit, pink: passed, white: not seen) is all one colour for whatever stands in its way. *Update*
 #    keeps the orange where there was a hit and wipes it out where beams passed.
 # 4. *Resample*: the same mass on new particles, whose weights differ much less. Before, most carried next to nothing
-#    and are pale. (Particles have the colour of their velocity: blue drives our way.)
+# and are pale.
 #
 # Now each step by hand, on a line of six cells of one metre, listed from the vehicle outward.
 #
@@ -398,7 +398,7 @@ np.testing.assert_array_equal(got[UNKNOWN], 1 - got[STATIC])  # what enters is U
 # By the default rates a free cell that no scan sees turns UNKNOWN 0.3 times a second, a moving thing 0.5 times, a
 # standing thing 0.1 times. UNKNOWN has no way back: only a scan reveals what is there (step 3). And a sliver of FREE
 # and of STATIC turns DYNAMIC, 0.01 times a second: it is **born**. Newborn mass has no velocity yet; step 4 gives it
-# some.
+# some. (On the right, DYNAMIC also turns STATIC, and FREE, 0.1 times a second each.)
 
 # %% jupyter={"source_hidden": true} alt="three charts of a cell that no scan sees for ten seconds: once free, about half unknown after two seconds; once static, about half static after five; once dynamic, nearly gone after four"
 times = np.linspace(0, 10, 101)
@@ -428,7 +428,8 @@ plt.show()
 # DYNAMIC     0    0.6    0    0.5    0     0
 # ```
 #
-# 10 m/s in 0.1 s is one cell, so 0.4 leaves cell 1 for cell 2. It leaves FREE behind: *nothing stands where something
+# 10 m/s in 0.1 s is one cell (the package adds a small random acceleration), so 0.4 leaves cell 1 for cell 2. It
+# leaves FREE behind: *nothing stands where something
 # moved*. So cell 1 is FREE 0.8, DYNAMIC 0.2, and cell 2, which was free, is DYNAMIC 0.4. So far this is bookkeeping.
 # But what of cell 4? The fence says "I stand here", and the particle says "I arrive here".
 #
@@ -564,13 +565,14 @@ np.testing.assert_allclose(after_ten_scans(params.stop_rate), 0.5 * np.exp(-para
 # | times the evidence | 0.5 · 0.2 = 0.10 | 0.35 · 0.8 = 0.28 | 0.15 · 0.8 = 0.12 | 0 |
 # | divided by 0.5 | 0.20 | 0.56 | 0.24 | 0 |
 #
-# **Predict before you run.** STATIC to DYNAMIC was 7 to 3 before the evidence. What is it after this scan? After ten
-# more like it?
+# **Predict before you run.** Which line of the table changes the ratio of STATIC to DYNAMIC? What is the ratio after
+# ten
+# more scans like this one?
 #
 # <details><summary>Answer</summary>
 #
-# 7 to 3, and 7 to 3. Both share P(z | occupied): one scan can't tell what moves, and ten scans that do nothing but
-# multiply can't either.
+# Only *shared out*: 2 to 1 becomes 7 to 3. After the scan it is 7 to 3, and after ten more. Both share P(z | occupied),
+# so no number of scans that only multiply can tell what moves.
 #
 # </details>
 #
@@ -680,7 +682,7 @@ assert params.birth_share == 0.3
 # %% [markdown]
 # ## What tells STATIC from DYNAMIC
 #
-# No scan does, and Bayes' rule keeps their ratio. So what does? Take a world that is known to the last digit: a wall,
+# No scan does, and Bayes' rule keeps their ratio. So what does? Take a world that is known exactly: a wall,
 # a parked car, and a car that comes towards us at 8 m/s. We drive at 5 m/s, so to the LIDAR *everything* moves. Two
 # parts of the filter could decide:
 #
@@ -811,8 +813,8 @@ assert sampled[0, Cell.LEFT] > 4 * exact[0, Cell.LEFT]
 #
 # <details><summary>Answer</summary>
 #
-# The sampling error by about four (4.5 before rounding), from 0.010 to 0.002. The error to the exact answer stays at
-# 0.05, because the bias is nearly all of it already.
+# The sampling error by four in theory, and by 4.5 as measured, from 0.010 to 0.002. The error to the exact answer stays
+# at 0.05, because the bias is nearly all of it already.
 #
 # </details>
 
@@ -837,8 +839,8 @@ ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.02, 1))
 plt.show()
 
 # %% [markdown]
-# More particles bring CMCDOT to BOF, not to the truth. So on this page "accurate" has two meanings, and you should
-# always ask: against which answer? Here is the ledger's line for each cut:
+# More particles bring CMCDOT to BOF, not to the truth. So always ask of "accurate":
+# against which answer? Here is the ledger's line for each cut:
 
 # %% jupyter={"source_hidden": true}
 lines = ledger("cmcdot")
@@ -847,7 +849,7 @@ Markdown(ledger_table(lines))
 
 # %% [markdown]
 # The third line is about the look-back rules: where a thing either stands in cell 1 or drives towards cells that
-# nobody has seen, exact inference expects it in the next cell with 0.50, and the filter with 0.41. It takes
+# no scan has seen, exact inference expects it in the next cell with 0.50, and the filter with 0.41. It takes
 # "something stands at the origin" as independent of "something has left from there", although it is one thing that
 # did either.
 
@@ -1011,9 +1013,11 @@ plt.show()
 # This is lecture 03's **aperture problem**: through the hole of one cell, a long smooth side that slides past looks like
 # a wall, and STATIC predicts its returns as well as motion does. What the bus filled when the filter began was called STATIC at
 # first sight (G), and no later return contradicts that. The front came into cells that had been seen to be free (H).
-# So one bus is half dark and half orange. Couldn't what moves claim the dark cells, too? No, because step 2 strikes
-# out whatever arrives where something stands. That rule keeps a fence in its place beside a moving vehicle. The same rule
-# keeps the rear half of the bus STATIC.
+# So one bus is half dark and half orange. (No
+# particle comes out of a dark cell, so what the orange leaves turns dark too: at 1.5 s the border is at 8 m, not at
+# 4.) Nor can what
+# moves claim the dark cells, because step 2 strikes out whatever arrives where something stands. The rule that keeps a
+# fence in its place beside a moving vehicle also keeps the rear half of the bus STATIC.
 #
 # **A car that drives away from us.** F on the real street rolled at 2.4 m/s for 1.8 s, and the filter hardly noticed.
 # Why? We see only its rear. So the rear leaves cells that were called STATIC at first sight, and what it arrives in
@@ -1040,7 +1044,7 @@ assert as_it_is < 20 < 30 < min(without_rules, even_odds) < max(without_rules, e
 # %% [markdown]
 # In the last scan 13 % of F's hit cells are DYNAMIC as the filter is, 47 % without the rules, 40 % with even odds at
 # first sight, and 60 % with both changes. So both are causes, and they don't explain all of it: 40 % aren't DYNAMIC
-# even then. This is what the rules cost on a real street, and it hurts: a vehicle that starts when the car ahead is
+# even then. This cost hurts: a vehicle that starts when the car ahead is
 # DYNAMIC would start late. The rules are there because without them walls that come into view are called DYNAMIC, as
 # the companion [phantoms on real streets](deeper/04_real_streets.ipynb) shows.
 #
@@ -1051,7 +1055,7 @@ assert as_it_is < 20 < 30 < min(without_rules, even_odds) < max(without_rules, e
 #    be: an arrival where something stands. Update: share UNKNOWN out, then Bayes' rule. Resample: one comb over the
 #    weights.
 # 3. Evidence keeps the ratio of DYNAMIC to STATIC. First sight sets it, and arriving particles change it.
-# 4. Three edges are cut: between cells, between velocities, between a thing and its origin. More particles remove the
+# 4. Three edges are cut: between cells, from a thing to its next place, to its origin. More particles shrink the
 #    second error, like $N_p^{-1/2}$, and leave the first: $\text{error}^2 \approx \text{bias}^2 + \text{sampling}^2$.
 # 5. It fails in the middle of a long side, where STATIC predicts as well as motion does, and on a car that drives away
 #    into UNKNOWN cells.

@@ -110,7 +110,7 @@ def draw_read(height, ax):
 def raised():
     """Yield the figure with the plane at each height."""
     fig = plt.figure(figsize=(8.4, 4.3), layout="constrained")
-    for height in np.linspace(-1, 3, 11):
+    for height in (-1, -0.5, 0, 0.4, 0.8, 1.2, z_cam, 2, 2.5, 3):
         fig.clear()
         axes = fig.subplot_mosaic([["A", "C"], ["B", "C"]], width_ratios=(2.7, 1), height_ratios=(1.6, 1))
         plotting.plane_on_image(coarse, height, pale, ax=axes["A"], size=2, colour_bar=False)
@@ -138,13 +138,27 @@ plotting.animate(
 #
 # ### The graph
 #
-# Here is the situation as a graphical model. Four cells lie in a row, straight ahead: $m_1$ to $m_4$, each road or car.
-# $a_j$ is the label of the pixel that looks at the *ground* in cell $j$. This ray passes over all cells before it, so
-# a car in any of them blocks it: the pixel sees the first thing. Equation (1) knows of one arrow only, $m_j \to a_j$:
+# As a graphical model: four cells lie in a row, straight ahead: $m_1$ to $m_4$, each road or car.
+# $a_j$ is the label of the pixel that looks at the *ground* in cell $j$. Its ray passes over all cells before it: on
+# the
+# left, the car in cell 3 also blocks the ray to cell 4 (blue pixels say *car*). Equation (1) knows of one arrow only,
+# $m_j \to a_j$:
 
-# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: four cells m1 to m4 above, four observed pixels a1 to a4 below; each pixel has arrows from its own cell and from all nearer ones"
-stage = pixel_ray()
-fig, ax = plt.subplots(figsize=(6.4, 3.4), layout="constrained")
+# %% tags=["graph"] jupyter={"source_hidden": true} alt="left, a sketch from the side: a camera, its four pixels, and their rays to the ground in four cells; a car in cell 3 blocks the rays to cells 3 and 4; right, a directed graph: four cells m1 to m4 above, four observed pixels a1 to a4 below; each pixel has arrows from its own cell and from all nearer ones"
+stage, colours = pixel_ray(), KITTI_14.colours(np.array([ROAD, ROAD, CAR, CAR])) / 255
+fig, (side, ax) = plt.subplots(1, 2, figsize=(9.4, 3.2), layout="constrained", width_ratios=(1, 1.3))
+side.add_patch(plt.Rectangle((7.1, 0), 1.8, 1.3, color=colours[2], alpha=0.4))
+for j, (x, colour) in enumerate(zip((4, 6, 8, 10), colours, strict=True), start=1):
+    stop = np.array([0, min(x, 7.1), x])  # camera, first thing, ground
+    side.plot(stop[:2], 3 - 3 * stop[:2] / x, color=colour, linewidth=1.2)
+    side.plot(stop[1:], 3 - 3 * stop[1:] / x, ":", color="0.4", linewidth=1.2)
+    side.plot(2.8, 3 - 3 * 2.8 / x, "s", color=colour, markersize=6)
+    side.text(2.8, 3 - 3 * 2.8 / x + (0.35 if j == 4 else -0.1), f"$a_{j}$", ha="center", va="top", fontsize=9)
+    side.plot([x - 0.9, x + 0.9], [0, 0], color="black", linewidth=3, solid_capstyle="butt")
+    side.text(x, -0.15, f"$m_{j}$", ha="center", va="top")
+side.plot(0, 3, "ks")
+side.set(xlim=(-0.4, 11), ylim=(-0.6, 3.2), title="A car in cell 3, from the side")
+side.axis("off")
 stage.draw(ax)
 plt.show()
 
@@ -179,16 +193,16 @@ assert not d_separated(stage.model, "m1", "m3", given=("a3",))
 #
 # ## Two similar triangles
 #
-# Now the geometry, from nothing. Take a box with a tiny hole in front and a film 200 pixels behind the hole (its focal
+# Now the geometry. Take a box with a tiny hole in front and a film 200 pixels behind the hole (its focal
 # length, measured in the film's own pixels). Ten metres ahead stands a pole, 2 m tall. Light runs straight through the
-# hole, so the pole and its picture are two triangles of the same shape: 200 · 2 / 10 = 40 pixels.
+# hole, so the pole and its picture (upside down) are two triangles of the same shape: 200 · 2 / 10 = 40 pixels.
 #
-# **Predict before you run.** How tall is the picture when the pole is 20 m away? And that of a toy pole of 20 cm, 1 m
+# **Predict before you run.** How tall is the picture when the pole is 20 m away? And that of a pole of 20 cm, 1 m
 # away?
 #
 # <details><summary>Answer</summary>
 #
-# 20 pixels: twice as far, half as tall. The toy: 200 · 0.2 / 1 = 40 pixels, the same as the real pole at 10 m. A
+# 20 pixels: twice as far, half as tall. The small one: 200 · 0.2 / 1 = 40 pixels, the same as the real pole at 10 m. A
 # picture cannot tell a small thing nearby from a big one far away.
 #
 # </details>
@@ -206,12 +220,12 @@ def pinhole(X, Y, Z, f_u=200, f_v=200, c_u=160, c_v=48):
 
 
 K = np.array([[200.0, 0, 160], [0, 200, 48], [0, 0, 1]])
-for name, point in {"10 m ahead": (0, -2, 10), "20 m ahead": (0, -2, 20), "toy, 1 m": (0, -0.2, 1)}.items():
+for name, point in {"10 m ahead": (0, -2, 10), "20 m ahead": (0, -2, 20), "20 cm, 1 m": (0, -0.2, 1)}.items():
     package, _ = project(np.array(point, float), Camera(K, np.eye(4), size=(96, 320)))
     np.testing.assert_allclose(pinhole(*point), package)
     print(f"top of the pole, {name}: {48 - package[1]:.0f} pixels above the axis")
 
-# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="three poles seen from the side; the rays from the hole to the top of the pole ten metres ahead and of the toy one metre ahead are the same line"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="three poles seen from the side; the rays from the hole to the top of the pole ten metres ahead and of the small one one metre ahead are the same line"
 fig, ax = plt.subplots(figsize=(7.5, 2.4), layout="constrained")
 for Z, top, colour in ((10, 2.0, "tab:blue"), (20, 2.0, "tab:orange"), (1, 0.2, "tab:green")):
     ax.plot([0, Z], [0, top], color=colour, linewidth=0.8)
@@ -288,7 +302,8 @@ ax.set(xlim=(270, 610), ylim=(187, 60), xlabel="u [pixels]", ylabel="v [pixels]"
 plt.show()
 
 # %% [markdown]
-# A fits within a few pixels. B doesn't: 8 m ahead it misses the edge by 24 pixels, half a metre. The calibration is
+# The cross is the vanishing point. A fits within a few pixels. B doesn't: 8 m ahead it misses the edge by 24 pixels,
+# half a metre. The calibration is
 # right and so is the code. What is wrong is "on the ground": A runs at the foot of the kerb, but the sidewalk lies *on*
 # it. The miss even tells how high, by similar triangles: the ray through the edge meets the ground farther out than the
 # edge is.
@@ -346,7 +361,7 @@ np.testing.assert_allclose(resize(320 / w, 96 / h) @ camera.K, camera.resized((9
 
 # %% [markdown]
 # Is it true of pictures, too? Paint a soft dot on a black image at the pixel of a place 15 m ahead. Cut off the first
-# column, halve the rest, and ask where the dot's middle is now. (This cell is folded; read what it prints.)
+# column, halve the rest, and ask where the dot's middle is now.
 
 # %% jupyter={"source_hidden": true}
 place = transform_points(camera.T_camera_from_grid, np.array([15.0, 2.0, 1.0]))
@@ -508,7 +523,8 @@ print(f"of the course's grid {100 * ground.mean():.0f} % is in view on the groun
 
 # %% [markdown]
 # So a point is **in view** if it lies in front of the camera *and* its pixel lies between the outermost *centres* of
-# the image's pixels, $0 \le u \le w - 1$, $0 \le v \le h - 1$, since equation (2) interpolates between centres. The
+# the image's pixels, $0 \le u \le w - 1$, $0 \le v \le h - 1$, since equation (2) of lecture 06 interpolates between
+# centres. The
 # code calls this `visible`; it says nothing about what stands in between.
 #
 # ## The wrong height
@@ -574,8 +590,8 @@ axes[2].legend(markerscale=6, fontsize="small")
 plt.show()
 
 # %% [markdown]
-# A, from the side: the pixels of the car, coloured by height, and where the flat world puts three of them (crosses). The
-# black square is the camera. B and C, from above: the true places, black, and the drawn ones, red. On the plane at 0.8 m what is lower lies
+# A, from the side: the pixels of the car, coloured by height, and where the flat world puts three of them (crosses).
+# B and C, from above: the true places, black, and the drawn ones, red. On the plane at 0.8 m what is lower lies
 # too near, what is higher too far. Even if someone chose the best plane for each pixel, four in ten would be off by
 # more than a cell, because near the camera's own height a ray is nearly level: there 10 cm of height are metres of
 # road. The planes only make sure that better answers are among those offered. The choice is left to what is learnt.
@@ -590,7 +606,7 @@ height_stage.draw(ax, highlight=["h"])
 plt.show()
 
 # %% [markdown]
-# How high above the road are the pixels of cars on the drive, up to 45 m ahead? (The cell is folded.)
+# How high above the road are the pixels of cars on the drive, up to 45 m ahead?
 
 # %% jupyter={"source_hidden": true}
 counts = np.zeros(4)
@@ -603,7 +619,8 @@ print("lowest, about 0.35 m, 0.75 m, 1.1 m or higher:", *(f"{share:.0%}" for sha
 np.testing.assert_allclose(counts / counts.sum(), CAR_HEIGHTS, atol=0.01)
 
 # %% [markdown]
-# For a ray that meets the toy's ground at 30 m, these four heights are places at 30, 23, 15 and 8 m. So, given a pixel
+# For a ray of the toy camera that meets the ground at 30 m, these four heights are places at 30, 23, 15 and 8 m. So,
+# given a pixel
 # that says car, the exact answer spreads over four places, and the flat world is sure of the least likely one: P(30 m)
 # = 1 instead of 0.03. The twenty planes don't infer the height either: they keep all places, without probabilities.
 #
@@ -616,7 +633,7 @@ np.testing.assert_allclose(counts / counts.sum(), CAR_HEIGHTS, atol=0.01)
 #
 # <details><summary>Answer</summary>
 #
-# In more than half, 55 %; over the whole drive it is 52 to 67 %. And here is a surprise: another 32 % read something
+# In more than half, 55 %; over the whole drive it is 52 to 67 %. But another 32 % read something
 # *behind* the cell. The road has a crest. In this frame the ground 40 m ahead lies 0.7 m lower than below the
 # vehicle, so the ray through the plane's cell passes above the road there and meets something farther away, lower
 # than the plane. Only 13 % read something at the cell's own distance, to within a tenth.
@@ -654,7 +671,8 @@ fig.axes[0].contourf(
 plt.show()
 
 # %% [markdown]
-# Left: the *true* labels of the image, laid on the ground by equation (1); right: the true map. Hatched: the pixel
+# Left: the *true* labels of the image, laid on the ground by equation (1); right: the true map. White: out of view.
+# Hatched: the pixel
 # shows something nearer, which is drawn out, often to the edge of the grid. No camera model repairs that. The LIDAR
 # knows which cells are hidden, and the occupancy grid calls them UNKNOWN: one reason to use both sensors. Far ahead,
 # what the map lacks is the road's own shape: there a plane *below* zero would be right.
@@ -778,7 +796,7 @@ plt.show()
 #
 # ## The ledger
 #
-# Two edges are cut here, with their prices on the toy worlds:
+# Two edges are cut here, with their prices in the worlds of the two graphs:
 
 # %% jupyter={"source_hidden": true}
 Markdown(ledger_table(ledger("pixel") + ledger("height")))

@@ -174,7 +174,8 @@ print(f"beside it with {beside:.2f}")
 
 # %% [markdown]
 # So one strength for both directions is wrong for signage: it needs a stronger edge along a post than across. The
-# networks of this lecture cut all these edges. Lecture [10](10_crf.ipynb) puts such edges back, on the map.
+# networks of this lecture cut all four arrows between labels (the dashed curve stands for one of them). Lecture
+# [10](10_crf.ipynb) puts such edges back, on the map.
 #
 # ## What comes out: a score for each class
 #
@@ -201,7 +202,7 @@ print(f"beside it with {beside:.2f}")
 # $$ P(c) = \frac{e^{s_c}}{\sum_{c'} e^{s_{c'}}}, \qquad \text{loss} = -\log P(c^*), \qquad
 #    \frac{\partial\,\text{loss}}{\partial s_c} = P(c) - [c = c^*] $$
 #
-# ($s_c$: the score of class $c$ at one pixel; $c^*$: its true class.)
+# ($s_c$: the score of class $c$ at one pixel; $c^*$: its true class; $[\ldots]$ is 1 if true, else 0.)
 
 
 # %% tags=["segmentation"] jupyter={"outputs_hidden": true}
@@ -223,8 +224,9 @@ print("gradient", s.grad.numpy().round(2))
 # ## Why scores, not probabilities, go to the planes
 #
 # The paper hands the *scores* to the planes of lectures 05 and 06. Does it matter? Take two neighbouring pixels, and
-# post against everything else. In the left pixel post leads by 6 (its *margin*), in the right one it trails by 1: nearly sure, and a
-# shrug. A point of a plane falls halfway between the two.
+# post against everything else. In the left pixel post leads by 6 (its *margin*), in the right one it trails by 1:
+# nearly sure, and
+# undecided. A point of a plane falls halfway between the two.
 #
 # **Predict before you run.** How probable is post at that point if you interpolate scores? If you interpolate
 # probabilities?
@@ -754,7 +756,8 @@ for ax, name in zip(axes[0], drawn, strict=True):
 plt.show()
 
 # %% [markdown]
-# Each row is one unseen picture; the thin bar of the second column is the post, the other bar of the image is the wall.
+# Each row is one unseen picture; the thin bar of the second column is the post, the other bar is the wall. (In the
+# table a row is missed if no pixel of it is called post; the error is that of the post's middle.)
 # The three ways that kept the column of the toy post are also the best three after learning (one training run each).
 # Atrous takes more time, because its maps keep all their pixels. Three times the steps didn't repair what strides had
 # lost: after 450 of them the strided network is still behind what indices have after 150.
@@ -908,7 +911,7 @@ plt.show()
 #
 # **The edge that was cut.** A soft-max per pixel doesn't keep neighbours together: SegNet's labels of the drive have
 # specks and gaps (picture C of the drive's post). Those of FCN and DeepLab are smooth, because they enlarge coarse
-# scores, and lack the thin post.
+# scores. None of the three has the thin post.
 #
 # ## The ledger
 
