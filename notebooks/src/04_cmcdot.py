@@ -322,7 +322,7 @@ plt.show()
 # 3. *The scan* (black: hit, pink: passed, white: not seen) is all one colour for whatever stands in its way. *Update*
 #    keeps the orange where there was a hit and wipes it out where beams passed.
 # 4. *Resample*: the same mass on new particles, whose weights differ much less. Before, most carried next to nothing
-# and are pale.
+#    and are pale.
 #
 # Now each step by hand, on a line of six cells of one metre, listed from the vehicle outward.
 #

@@ -492,7 +492,7 @@ for metric in METRICS:
 # With each of the networks, the CRF adds about a point of pixel accuracy and costs about two of class accuracy: the
 # paper's signs. Its FmIoU rises with all three; in the paper it falls with SegNet and FCN. FCN is better than DeepLab v2,
 # as in the paper, though by less. But FCN is also better than SegNet, and in the paper it is worse. (By true labels all
-# fifteen differences have the same signs, and none of their intervals contains zero: the cell asserts it.)
+# fifteen differences over all cells have the same signs, and none of their intervals contains zero: the cell asserts it.)
 #
 # Two things to notice about the *kind* of evidence. First, the paper's column has no interval, so a difference of 0.1
 # or 0.2 points there may be anything. Second, the metrics may disagree, because they ask different questions. Take 90

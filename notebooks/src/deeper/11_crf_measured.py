@@ -294,6 +294,7 @@ for name, values in learned["learnt"].items():
 
 # %% [markdown]
 # (The box in the right picture shows what lies at zero, enlarged.)
+#
 # **A searched CRF gains pixel accuracy and still costs class accuracy.** Chosen for pixel accuracy, it gains 0.4 to 0.7
 # points of it for each of the three networks, and loses 2.2 to 3.4 points of class accuracy, a third to a bit more than
 # half of what the default loses. Chosen for class accuracy, it hardly does anything: all changes are below 0.1 point,

@@ -83,7 +83,7 @@ plt.show()
 # other wrong class. In ours that is *vegetation*, in all rows but its own: 72 % of the building cells are called so, 77 %
 # of the sidewalk, even 30 % of the road, where *road* itself gets 20 %. No cell at all is called building or lane.
 # As in the paper, ours learned on one street and is tried on another. What fails there? A table of the occupancy state
-# alone gets 49.5 % of the cells right ([table3.md](../../docs/results/reduced/table3.md)); one of image label and state
+# alone gets 49.5 % of the cells right; one of image label and state
 # 47.8 % with our network's labels, and 70.4 % with true ones. So on the new street its image labels don't help that table,
 # though right ones would. And SegNet's 50.1 % (47.4 to 52.1 by seed) is hardly more than the state alone gives.
 #
@@ -97,7 +97,7 @@ for whose, matrix in (("paper", np.array(table3["paper"]["matrix"])), ("ours ", 
     most = [table3["classes"][k] for k in wrong.argmax(axis=1)]
     print(f"{whose}: what each thing is called most when it is called wrong: {', '.join(most)}")
     assert [most.count(n) for n in ("void", "vegetation", "road")] == ([8, 0, 1] if whose == "paper" else [1, 8, 0])
-TABLES = ("table of label and state", "table of true label and state")
+TABLES = ("occupancy alone", "table of label and state", "table of true label and state")
 called = np.array(table3["confusion"]) / np.sum(table3["confusion"], axis=1, keepdims=True)
 building, road, sidewalk, vegetation, lane = map(
     table3["classes"].index, ("building", "road", "sidewalk", "vegetation", "lane")
@@ -183,8 +183,8 @@ for metric in METRICS:
 #   below prints both.
 # - **Reduction.** Without it all seeds are worse, by very different amounts, and class accuracy is clearly worse.
 # - **Balancing** costs half a point of pixel accuracy and brings twelve of class accuracy.
-# - **True labels to learn from** bring 11 points of pixel accuracy and 18 of class accuracy, more than any two rows of
-#   Table 1 differ (today's, by true labels).
+# - **True labels to learn from** bring 11 points of pixel accuracy and 18 of class accuracy, more than any two
+#   networks of Table 1 differ, with or without the CRF (today's table, by true labels).
 # - **A quarter of the frames**, each network against itself with all. If few frames favour SegNet, as claim 1's reason
 #   says, it should lose least. In the mean FCN does, though the losses differ by less than half a point. By LIDAR
 #   labels SegNet loses least class accuracy, FCN least in the other two.
