@@ -44,8 +44,8 @@ assert round(np.exp(-0.7), 1) == 0.5  # what is left of what moves after a secon
 # ## Three ways to move a map
 #
 # The vehicle drives, and the map must follow. Take a line of six cells, one metre each, listed from the vehicle
-# outward, and a post in cell 3. We drive 0.5 m, and then 0.5 m again. Where a new cell lies across two old ones, half
-# in each, it could take half of each:
+# outward, and a post in cell 3 (counted from 0). We drive 0.5 m, and then 0.5 m again. Where a new cell lies across two
+# old ones, half in each, it could take half of each:
 #
 # ```
 # before          0    0    0    1    0    0
@@ -106,8 +106,9 @@ plt.show()
 # Three posts: one smeared over about fifteen cells, one twenty cells from the truth, one where it should be. The third
 # scrolls by whole cells and keeps the remainder, as the filter does.
 #
-# Real vehicles turn, too. Here a map is carried through a bend to the left for five seconds while nothing is seen: drops
-# of ink, one cell of 0.2 m each, that should stay where they fell, and a chequerboard of certain cells.
+# Real vehicles turn, too. Here a map is carried through a bend to the left for five seconds while nothing is seen:
+# drops of ink, one cell of 0.2 m each, that should stay where they fell, and a chequerboard of certain cells. How far
+# is the ink from its place (root mean square, left)? And how uncertain has a cell become (entropy, right)?
 
 # %% jupyter={"source_hidden": true} alt="two charts over five seconds: displacement of the ink and entropy; bilinear grows in both, nearest grows in displacement alone, scrolling stays below 0.2 m and without entropy"
 fig, axes = plt.subplots(1, 2, figsize=(9.5, 2.5), layout="constrained")
@@ -124,17 +125,18 @@ assert max(blurs[scheme].entropy.max() for scheme in ("nearest", "scrolling")) <
 assert min(blurs[scheme].displacement.max() for scheme in ("nearest", "bilinear")) > 0.7
 
 # %% [markdown]
-# Bilinear mixing loses certainty at every step (right), and with it the place (left). Looking up the nearest cell at
-# every step keeps certainty (its line lies under the dashed one), but the ink moves by up to a metre. Scrolling keeps
-# both. Only when the vehicle has turned by two degrees does the map turn with it, by one look-up, so the ink stays
-# within a cell (0.2 m) of its place.
+# Bilinear mixing loses certainty at every step, and with it the place. Looking up the nearest cell at
+# every step keeps certainty (its line lies under the dashed one), but the ink is up to a metre off. Scrolling keeps
+# both. Only when the vehicle has turned by two degrees does the map turn with it, by one look-up, so the ink
+# is less than a cell (0.2 m) off.
 #
 # ## Towards BOF, not towards the truth
 #
 # Lecture 04 measured the filter's error on four cells, where the exact answer is known: a bias that stays and a
 # sampling error that falls like $N_p^{-1/2}$. On a whole map there is no exact answer to compare with, because joint
 # inference over all cells is out of reach. But BOF is there, the limit of very many particles. Two cars pass each
-# other, and the velocities of all particles lie on BOF's lattice:
+# other, and the velocities of all particles lie on BOF's lattice. How far are the two filters apart (root mean
+# square)?
 
 # %% jupyter={"source_hidden": true} alt="two log-log charts of CMCDOT's difference to BOF against the number of particles, in P(DYNAMIC) and in velocity; both follow a dotted line of slope minus one half"
 result = measure_convergence([2000, 8000, 32_000, 128_000], seeds=range(2))
@@ -203,9 +205,9 @@ for number in (100, 1000, 30_000):
     assert spread > 15 if number == 100 else spread < 30
 
 # %% [markdown]
-# With 100 particles the share of the car that is found differs by tens of per cent from one seed to the next, and the
-# person isn't found in any of the four runs. With 30,000 about the same share of the car is found with every seed, and most of the person. (The
-# default is 200,000, for a larger map.)
+# With 100 particles the share of the car that is found lies between 6 and 40 per cent, depending on the seed, and the
+# person isn't found in any of the four runs. With 30,000 about the same share of the car is found with every seed, and
+# most of the person. (The default is 200,000, for a larger map.)
 #
 # ## Three filters on twenty drives
 #
@@ -234,34 +236,36 @@ print(f"recall {both / np.sum(truth == DYNAMIC):.2f}, precision {both / np.sum(c
 # %% [markdown]
 # Now the filters of lectures 02, 03 and 04, on twenty simulated drives that none of them was tuned on, where the
 # truth of every cell is known. The scanner is KITTI's, the grid the paper's, and the roads have crowns and grades.
-# `semgrid-edu reproduce occupancy` takes about half an hour; its result lies in the repository.
+# The result lies in the repository; `semgrid-edu reproduce occupancy`, which made it, took 45 minutes.
 
 # %% jupyter={"source_hidden": true}
 result = json.loads(Path("../../docs/results/occupancy.json").read_text(encoding="utf-8"))
 Markdown(occupancy_table(result, "HDL-64E", "paper"))
 
 # %% [markdown]
-# The first five rows are about cells; so is "left, still occupied": of the cells that something moving has left, how
-# many are still held occupied? The rows below take only cells with returns: movers that have been in view for 1.5 s,
-# and what stands. Banks are free ground that is hit because it rises beside the road; the last row of per cents tells
-# how often they are held occupied.
+# The first five rows count cells with and without returns; the third is the recall of DYNAMIC, the fifth its precision.
+# "left, still occupied" counts such cells too: of those that something moving has left, how many are still held
+# occupied? The rows below take only cells with returns: movers that have been in view for 1.5 s, and what stands. Banks
+# are free ground that is hit because it rises beside the road; the last row of per cents tells how often they are held
+# occupied.
 #
 # Four lessons.
 #
 # 1. **A binary grid can't say DYNAMIC, and pays twice.** It also leaves the smear of lecture 02: of the cells that
 #    were left, several times as many are still occupied.
-# 2. **Particles cost little.** BOF and CMCDOT stand for the same model, and most of their rows differ by a few per
-#    cent. But BOF stores 799 numbers per cell, 44 million, on a lattice that ends at 16 m/s; CMCDOT keeps 1.2 million
+# 2. **Particles cost little.** BOF and CMCDOT stand for the same model, and most of their rows differ by less than four
+#    points. But BOF stores 799 numbers per cell, 44 million, on a lattice that ends at 16 m/s; CMCDOT keeps 1.2 million
 #    in all. Over all cells BOF finds somewhat more of what moves; of walking pedestrians CMCDOT finds more, above all
 #    of far ones.
-# 3. **Time in view decides.** Of all observed cells that move, CMCDOT calls 61.6 per cent DYNAMIC. Of those with returns,
-#    up to 25 m away and in view for 1.5 s, it finds more than 96 per cent. Of what stands, less than 1 per cent is called
-#    DYNAMIC, whether car, wall, fence, foliage or pole. Nearly four in five of the cells that are called DYNAMIC by mistake
-#    are FREE. Among those with returns banks are the worst: 8.9 per cent.
+# 3. **What has been in view for a while is found.** Of all observed cells that move, CMCDOT calls 61.6 per cent
+#    DYNAMIC. Of those with returns, up to 25 m away and in view for 1.5 s, it finds more than 96 per cent. (Which of
+#    the three conditions counts most, the table doesn't say.) Of what stands, less than 1 per cent is called DYNAMIC,
+#    whether car, wall, fence, foliage or pole. Nearly four in five of the cells that are called DYNAMIC by mistake are
+#    FREE. Among those with returns banks are the worst: 8.9 per cent.
 # 4. **A first hit isn't enough.** Of STATIC cells the log-odds grid finds 89 per cent, the others 82; nearly all that
-#    is missed they call FREE. A hit multiplies the odds of occupied to FREE by 0.8 / 0.05 = 16. In a cell that is
-#    seen for the first time they become 16 · 0.045 / 0.952 = 0.76 : 1, so the cell is still called FREE. The log-odds
-#    grid starts from even odds, and believes the first hit.
+#    is missed they call FREE. Here is one reason. A hit multiplies the odds of occupied to FREE by 0.8 / 0.05 = 16. In
+#    a cell that is seen for the first time they become 16 · 0.045 / 0.952 = 0.76 : 1, so the cell is still called FREE.
+#    The log-odds grid starts from even odds, and believes the first hit.
 
 # %% jupyter={"source_hidden": true}
 scores = result["scores"]["HDL-64E"]["paper"]
@@ -339,11 +343,11 @@ for width in (3.5, 6):
     )
 
 # %% [markdown]
-# At 1.4 m/s the person is called STATIC for about a second. What counts is the distance: at 1.4, 2.8 and 5 m/s alike the
-# filter needs about 1.5 m, which are three cells. In the cell where the person stood, STATIC predicts the returns as well
-# as any particle does. Only in new cells, which were free, do particles that go along with the person predict the scans
-# better than STATIC does. A stroller at 0.7 m/s isn't found in three seconds. A vehicle that brakes for pedestrians only
-# when they are DYNAMIC brakes late.
+# At 1.4 m/s the person is called STATIC for about a second. What counts is the distance: at 1.4, 2.8 and 5 m/s alike
+# the filter needs about 1.5 m, which are three cells. In the cell where the person stood, STATIC predicts the returns
+# as well as any particle does. Only in new cells, which were free, do particles that go along with the person predict
+# the scans better than STATIC does. A stroller at 0.7 m/s isn't found in three seconds, although that is 2.1 m. A
+# vehicle that brakes for pedestrians only when they are DYNAMIC brakes late.
 #
 # Behind the narrow van the car's particles fly on unseen, and when the car comes out it is expected: mostly DYNAMIC
 # at once. Behind the wide van they fade, by half in about each second, because a DYNAMIC cell that no scan sees changes
@@ -385,9 +389,9 @@ print(f"after the first second, {share:.1f} % of its cells are more DYNAMIC than
 assert share < 5
 
 # %% [markdown]
-# This one holds, on a simulated bush. It doesn't hold for all that is porous: in a hedge along which we drive fast, a
-# cell that one scan passes and calls FREE is hit by the next, and an arrival in a FREE cell counts. The companion
-# [phantoms on real streets](04_real_streets.ipynb) is about such streets.
+# So this simulated bush is taken for standing. That doesn't hold for all that is porous: in a hedge along which we
+# drive fast, a cell that one scan passes and calls FREE is hit by the next, and an arrival in a FREE cell counts. The
+# companion [phantoms on real streets](04_real_streets.ipynb) is about such streets.
 #
 # ## What this does not show
 #

@@ -2,8 +2,8 @@
 # # Phantoms on real streets: an assumption that breaks, and its mend
 #
 # **In one sentence.** A filter that takes each newly seen cell as independent of its neighbour believes that a wall
-# moves while the wall comes into view; three **look-back rules** ask what moves where it comes from and where it goes, and mend a
-# part of it, at a price.
+# moves while the wall comes into view; three **look-back rules** ask of whatever moves where it comes from and where it
+# goes, and they mend a part of the error, at a price.
 #
 # **You will be able to**
 # - find the cause of an error by switching one suspect off at a time;
@@ -87,7 +87,8 @@ print("speed of our vehicle [m/s]:", round(scenes[20].motion.dx / 0.1, 1))
 print("things that move on this street:", len(drive.moving))
 
 # %% [markdown]
-# Nothing moves on this street but our own vehicle.
+# Nothing moves on this street but our own vehicle. So we count as phantoms the cells that stand and give returns, and
+# in which P(DYNAMIC) exceeds both P(STATIC) and 0.3.
 #
 # **Predict before you run.** The filter knows how the vehicle moves. Nothing else moves. Where, if anywhere, could it
 # see something move? Think of what *does* move in the picture from above although no thing does.
@@ -217,15 +218,15 @@ Markdown(markdown_table(rows) + "\n\n" + source)
 # Read each line against the first, *as it was*. A suspect that is a cause makes the number fall when it is switched
 # off. Opaque mesh and exact poses hardly change anything on either street: these bets are lost. Without pillars almost
 # all phantoms on the street with mesh and hedge are gone, because there the pillars alone throw shadows on the fence.
-# On the street with walls fewer go, since the gaps throw shadows too. So the LIDAR isn't the cause: **the phantoms need
-# the edge of a shadow that moves along something that stands.**
+# On the street with walls fewer go, since the gaps throw shadows too. So neither transparency nor pose noise is the
+# cause: **the phantoms need the edge of a shadow that moves along something that stands.**
 #
 # Births at first sight are a cause on one of the two streets only. They are where many phantoms begin; but a phantom
 # that has begun, however small, needs no more births to grow.
 #
 # In the filter, the last line says what carries them: particles that arrive in UNKNOWN cells, that is, in cells just
 # coming out of the shadow. Could we simply forbid that, as this line does? Here is what it costs on streets where
-# things do move:
+# things do move (*far*: from 25 to 50 m away):
 
 # %% jupyter={"source_hidden": true}
 rows = [["called DYNAMIC, per cent", *("as it was", BARRED)]]
@@ -348,8 +349,8 @@ print(
 assert beside_a_wall > 5 * alone
 
 # %% [markdown]
-# One number stands for two very different ones. Then and now it is about twice the measured share away from walls, and
-# about a tenth of it beside one.
+# One number stands for two very different ones, and lies between them. The old one is 2.6 times the measured share away
+# from walls, the new one 1.7 times; beside a wall, an eighth and a twelfth.
 #
 # ### As a graph
 #
@@ -425,7 +426,7 @@ plt.show()
 
 # %% [markdown]
 # On this line the filter does exact inference in the wrong graph, so more particles would not help it. In the right
-# graph the particle stays an idle suspicion.
+# graph the odds don't even double with each cell: after six cells the particle is still below 0.1.
 #
 # ## The mend
 #
@@ -455,8 +456,9 @@ plt.show()
 #
 # As in lecture 04, "something arrives" and what the cell holds are taken as independent, all combinations are written
 # down, and the impossible ones are struck out. By hand: a particle arrives with $a = 0.6$, at its origin something
-# stands with probability 0.9, and nobody has seen the place ahead, so it is surely UNKNOWN.
-# So the part $a_w = 0.6 \cdot 0.9 \cdot (0 + 1) = 0.54$ of $a$ is doubtful. The cell is UNKNOWN with 0.8 and FREE with 0.2.
+# stands with probability 0.9, and nobody has seen the place ahead, so it is surely UNKNOWN. So the part $a_w = 0.6
+# \cdot 0.9 \cdot (0 + 1) = 0.54$ of $a$ is doubtful (ahead, STATIC has 0 and UNKNOWN 1). The cell is UNKNOWN with 0.8
+# and FREE with 0.2.
 #
 # | | cell: UNKNOWN 0.8 | cell: FREE 0.2 |
 # |---|---|---|
@@ -514,15 +516,16 @@ assert now.max() < 0.01
 
 # %% [markdown]
 # The last line is the wall of above again, with the rule: the particle that runs along with the edge gets nothing. The
-# rule does more here than the right graph, which let the odds grow a little.
+# rule does more here than the right graph, which let the odds nearly double with each cell.
 #
 # ### Rule two: wakes
 #
 # The same thought works in the other direction. A car was taken for a standing one at first sight, and then it drove
 # off. Behind it lies a piece of STATIC that nobody can see, because the car itself hides it. The next car of a convoy
 # would get stuck in it. But one thing can't be in two places: if what was here a time $T_b$ ago has left with
-# probability $\lambda$, it doesn't stand here. By hand, for a hidden cell with $b_S = 0.8$ and $\lambda = 0.5$: of the four
-# combinations, "has left" and "stands", 0.4, is struck out, and STATIC keeps 0.4 / 0.6 = 0.67.
+# probability $\lambda$, it doesn't stand here. By hand, for a hidden cell with $b_S = 0.8$ and $\lambda = 0.5$: of the
+# four combinations, "has left" and "stands", 0.4, is struck out, and STATIC keeps 0.4 / 0.6 = 0.67. What STATIC loses
+# goes to FREE, since the thing has left.
 #
 # $$ b'_S = \frac{(1 - \lambda)\, b_S}{1 - \lambda\, b_S} \qquad \text{in cells of which the scan says nothing} $$
 
@@ -581,8 +584,8 @@ assert [name for name, keeps in with_us.items() if keeps] == ["beside us", "over
 # it needs a STATIC origin and a cell that hasn't been seen to be free.
 #
 # <details><summary>Answer</summary>B is gone: the wall behind the gap comes out of a deep shadow, so its cells are
-# UNKNOWN, and the piece before is known to stand. The two cells of A are still there at this instant. The section on
-# limits looks at what such cells held before.</details>
+# UNKNOWN, and the piece before is known to stand. Of A's two cells, one is still called DYNAMIC at this instant. The
+# section on limits looks at what such cells held before.</details>
 
 # %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
 after = watch(scenes, AFTER)
@@ -630,10 +633,11 @@ for name, found in measured["counts"].items():
 Markdown(markdown_table(rows) + f"\n\nPer cent, {measured['drives']} drives each, by `{measured['command']}`.")
 
 # %% [markdown]
-# The first column should be small, the next three large, and the last one small. Every entry is before → after. Walls,
-# fences, plants and poles are called DYNAMIC less often on most streets. But look for who pays. The rules doubt whoever
-# comes out of something that stands and goes where nobody has looked, and that is just what somebody may do who has
-# stood and now sets off. Here is each change of some size:
+# The first column should be small, the next three large, and the last one, of the cells that something moving has left,
+# small. Every entry is before → after. What stands is called DYNAMIC less often on most streets, and a little more
+# often along glass and posts. But look for who pays. The rules doubt whatever comes out of something that stands and
+# goes where nobody has looked. Somebody who has stood and now sets off may do just that. Here is each change of some
+# size:
 
 # %% jupyter={"source_hidden": true}
 gained, lost = [], []
@@ -704,12 +708,11 @@ Markdown(markdown_table(rows))
 
 # %% [markdown]
 # The first two lines don't look back at all. With the new `first_sight` alone, more walkers are found than before, and
-# there are more phantoms, too. The look back takes most phantoms away; with half a second alone, it takes more than half
-# of these walkers with them. Three cells bring most of them back, with twice as many phantom cells as half a second alone
-# (18, of 63 before). With four cells and six there are more still. A likely reason: the longer the way, the more
-# often it ends
-# beside the wall or in a gap, and then the particle isn't doubted. So three cells are a compromise. These numbers are of
-# one drive each; for the walkers of all drives see the line of pedestrians in the table before.
+# there are more phantoms, too. Looking back takes most phantoms away; with half a second alone, it takes more than half
+# of these walkers with them. Three cells bring most of them back, with twice as many phantom cells as half a second
+# alone (18, of 63 before). With four cells and six there are more still. A likely reason: the longer the way, the more
+# often it ends beside the wall or in a gap, and then the particle isn't doubted. So three cells are a compromise. These
+# numbers are of one drive each; for the walkers of all drives see the line of pedestrians in the table before.
 #
 # ## Where this breaks
 #
@@ -749,8 +752,8 @@ ax.set(xlim=(11, -15), ylim=(0, 40), title=f"mesh and hedge, default filter, {wo
 plt.show()
 
 # %% [markdown]
-# At C the default filter still calls cells of the fence DYNAMIC. The line above says why the rule is silent: on average
-# UNKNOWN is the smaller part of what these cells held, and in a FREE cell every arrival counts. A beam that passes
+# At C the default filter still calls cells of the fence DYNAMIC. The numbers above the map say why rule one is silent:
+# on average only 0.16 of what these cells held was UNKNOWN, and in a FREE cell every arrival counts. A beam that passes
 # through one part of a cell before another hits the fence in it is one way to get there.
 #
 # Three more limits:
@@ -770,7 +773,7 @@ plt.show()
 # 1. Take `replace(AFTER, clearing_time=t, clearing_cells=0)` for $t$ of 0.1, 0.25, 1 and 2 s, and print `phantoms_left`
 #    and `walkers_found`. Why does a short time cost walkers, and why does a long time bring phantoms back? And what
 #    becomes of the origin of a car that brakes if the time is very long?
-# 2. Set `first_sight=(0.3, 0.697, 0.003)`, as if each new cell were beside a wall, with `clearing_time=0`. Do the
+# 2. Set `first_sight=(0.47, 0.527, 0.003)`, as if each new cell were beside a wall, with `clearing_time=0`. Do the
 #    phantoms go? What happens on the street `"convoy"`, to cars that come out of a shadow?
 # 3. Compute `first_sights` for `scenes_of("pedestrians", 1, spec, Suspect())`. How much is DYNAMIC beside something
 #    that stands? Is "doubtful" the right word there?
@@ -782,7 +785,7 @@ plt.show()
 # 3. Switching suspects off one at a time found the moving edge of shadows; transparency and poses had been wrong bets.
 # 4. A particle that comes out of a wall and goes on along it isn't believed in cells that nobody has seen, least of all
 #    if it keeps pace with us. And a thing that has left a place doesn't stand there any more.
-# 5. What remains: phantoms in cells that were held for free and on walls without a past, and people who set off and are
+# 5. What remains: phantoms in cells that were believed FREE and on walls without a past, and people who set off and are
 #    found later.
 #
 # ## Further reading

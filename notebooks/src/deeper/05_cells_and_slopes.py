@@ -67,6 +67,8 @@ def places_of(rows, cols, frame=frame):
 # $$ \text{across} = \frac{f_u\,\text{cell}}{Z}, \qquad
 #    \text{along} \approx \frac{f_v\, |z_\text{cam} - \delta|\,\text{cell}}{Z^2}, \qquad
 #    \text{pixels per cell} \approx \frac{f_u f_v\, |z_\text{cam} - \delta|\,\text{cell}^2}{Z^3} $$
+#
+# Here $\delta$ is the plane's height, as in lecture 05; for the ground it is 0.
 
 
 # %% jupyter={"outputs_hidden": true}
@@ -149,8 +151,9 @@ for near, far in ((6, 20), (20, 40), (40, 71)):
 #
 # ## The best of several planes
 #
-# Each pixel of the red car has a true height. Suppose that someone chose, for each pixel, the plane on which it lands
-# nearest to its true place. How far off is it still, with every plane of the course, with every second one, and so on?
+# Each pixel of lecture 05's red car has a true height. Suppose that someone chose, for each pixel, the plane on which
+# it lands nearest to its true place. How far off is it still, with all 20 planes of the course, 0.2 m apart, with every
+# second one, and so on?
 
 # %%
 instances, _ = ndimage.label(frame.labels.image == CAR)
@@ -260,10 +263,10 @@ for near, far in ((6, 20), (20, 40), (40, 60)):
         print(f"{near} to {far} m, planes {name}: road read on {found:.0f} % of road, {wrong:.0f} % of the rest")
 
 # %% [markdown]
-# Beyond 40 m the ground plane offers *road* on 15 % of the cells that are road, because in many frames it looks over
-# the crest, and planes a little higher don't change that. With planes from -1.4 m on, 99 % are offered it. But so are
-# up to half of the others: a low plane gives a cell a lower pixel, and that may show the road in front of whatever stands
-# in the cell. So a right answer is among those that are offered, and choosing becomes harder.
+# From 40 to 60 m the ground plane offers *road* on 15 % of the cells that are road, because in many frames it looks
+# over the crest, and planes a little higher don't change that. With planes from -1.4 m on, 99 % are offered it. But so
+# are up to half of the others: a low plane gives a cell a lower pixel, and that may show the road in front of whatever
+# stands in the cell. So a right answer is among those that are offered, and choosing becomes harder.
 #
 # ## Where this breaks
 #

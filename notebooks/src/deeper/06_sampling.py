@@ -5,7 +5,7 @@
 # and is a noisy answer near by, where a cell covers dozens of pixels.
 #
 # **You will be able to**
-# - say why a fixed sparse matrix is faster there and back than PyTorch's general sampler;
+# - say why a fixed sparse matrix is faster, forward and backward, than PyTorch's general sampler;
 # - recognise a kink when a gradient check fails now and then;
 # - say what a mean over the cell's area would give instead of four pixels, and at which distances it matters.
 #
@@ -120,7 +120,8 @@ for at in (1.25, 1.0):
 
 # %% [markdown]
 # A `gradcheck` that fails now and then may have landed on a kink: look there first. (It must run in double precision:
-# in single, nudges of a millionth drown in rounding.) In training it doesn't matter, since the calibration is fixed.
+# in single, nudges of a millionth drown in rounding.) Training a network doesn't meet it: the calibration
+# is fixed, so nobody asks for the gradient with respect to $u$.
 #
 # ## Four pixels or the whole cell
 #
@@ -176,7 +177,7 @@ ax.legend(fontsize="small")
 plt.show()
 
 # %% [markdown]
-# Near by, the area mean has less than a quarter of the bilinear error. The waves come from the rows of the image: a cell
+# At 7 m the area mean has less than a quarter of the bilinear error. The waves come from the rows of the image: a cell
 # whose centre falls on a row's centre reads two pixels instead of four. The gain shrinks with the distance: 24 m ahead,
 # where a cell covers one pixel's area (but several pixels across), it is 0.37 instead of 0.65, and 40 m ahead 0.47. So
 # the price of equation (2) is largest where the map is best anyway, and a cheap remedy exists: several points per cell,
