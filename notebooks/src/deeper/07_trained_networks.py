@@ -2,7 +2,8 @@
 # # What trained networks do: sizes, fields, failures
 #
 # **In one sentence.** Lecture 07 built the mechanisms; here are the networks that use them: how large they are, how far
-# they can see and how far they look, how well they label the drive, and which changes of an image they don't survive.
+# they can see (their *receptive field*, below just *field*) and how far they look, how well they label the drive, and
+# which changes of an image they don't survive.
 #
 # **You will be able to**
 # - read a network's table: parameters, field, and how fine its scores are;
@@ -13,7 +14,7 @@
 #
 # **Prerequisites.** Lecture [07](../07_segmentation.ipynb).
 #
-# **Time.** 25 minutes; the computer needs less than one.
+# **Time.** 26 minutes; the computer needs less than one.
 #
 # **Paper.** Section 3.1.
 
@@ -159,11 +160,11 @@ for name, columns in looked.items():
     print("{:<11} columns reached to the left {}, to the right {}; middle half {}".format(NAMES[name], *columns))
 
 # %% [markdown]
-# (The pictures show the square root, so that small slopes can be seen too.) The dashed lines are the edges of the
-# field (FCN's lie outside the picture). SegNet uses nearly all of it, 51 of 56 columns to the left; so do FCN
-# (221 of 230) and DeepLab (196 of 198), whose slopes also reach the right border of the image. But the slopes are unequal:
-# half of their sum lies between the dotted lines, in 24 columns of SegNet, 67 of FCN and 51 of DeepLab. DeepLab's
-# picture is made of blocks of 8 pixels, as wide as the cells of its map.
+# (The pictures show the square root, so that small slopes can be seen too.) The dashed lines are the edges of the field
+# (both of FCN's and DeepLab's right one lie outside the picture). SegNet uses nearly all of it, 51 of 56 columns to the
+# left; so do FCN (221 of 230) and DeepLab (196 of 198), whose slopes also reach the right border of the image. But the
+# slopes are unequal: half of their sum lies between the dotted lines, in 24 columns of SegNet, 67 of FCN and 51 of
+# DeepLab. DeepLab's picture is made of blocks of 8 pixels, as wide as the cells of its map.
 #
 # ## Before the first label: ImageNet
 #
@@ -261,11 +262,12 @@ shares = 100 * m.sum(axis=1)[[SIGNAGE, PEDESTRIAN]] / m.sum()
 print("true pixels that are signage or pedestrian: {:.1f}, {:.1f}".format(*shares))
 
 # %% [markdown]
-# "Found" is the *recall* of a class, "right" its *precision*. SegNet's borders are detailed and ragged, with specks; FCN
-# and DeepLab, which score every eighth pixel, draw smooth blobs. Sharp isn't right, though: SegNet finds fewer of the
-# pixels of signage than the other two. All three call three to six times as many pixels pedestrian as there are
-# (area). This is one street with one training run each, so it doesn't rank the three; the paper's first claim does, and
-# lecture [12](../12_experiments.ipynb) tests it.
+# "Found" is the *recall* of a class, "right" its *precision*, and "area" the number of pixels called so, in per cent of
+# those that are. SegNet's borders are detailed and ragged, with specks; FCN and DeepLab, which score every eighth
+# pixel, draw smooth blobs. Sharp isn't right, though: SegNet finds fewer of the pixels of signage than the other two.
+# All three call three to six times as many pixels pedestrian as there are. A likely reason is their loss, in which rare
+# classes count more (lecture 08). This is one street with one training run each, so it doesn't rank the three; the
+# paper's first claim does, and lecture [12](../12_experiments.ipynb) tests it.
 #
 # **Small classes.** Pixel accuracy hardly sees them. Forbid each network to say signage, pedestrian or bicycle, so that
 # it says the best of the other classes:
@@ -285,9 +287,9 @@ for name, m in matrices.items():
 
 # %% [markdown]
 # Blind, each network gains about one point of pixel accuracy and loses more than ten of class accuracy. The classes are
-# small, and at least 70 % of what the networks call signage or pedestrian is something else (*right* is 30 % at best),
-# so little is lost by never saying it. By the first number alone you would choose the network that sees no pedestrian.
-# So look at both, as the paper does; and lecture 08 weights the classes in the loss by their frequency.
+# small, and more than two thirds of what the networks call signage or pedestrian is something else (*right* is 30 % at
+# best), so little is lost by never saying it. By the first number alone you would choose the network that sees no
+# pedestrian. So look at both, as the paper does.
 #
 # ## Where this breaks
 #
@@ -321,9 +323,9 @@ plt.show()
 # 2x2 pixels repeats. If a map of yours shows a pattern with a period of 2, 4 or 8 pixels, look for its cause on the way
 # up first.
 #
-# **Another world.** The networks have seen simulated streets by daylight, mirrored by chance and with the brightness
-# varied by a fifth (*data augmentation*). Take the same twenty frames, and change them in a way that a human would cope
-# with.
+# **Another world.** The networks have seen simulated streets by daylight, mirrored by chance and with brightness and
+# contrast varied by up to a fifth (*data augmentation*). Take the same twenty frames, and change them in a way that a
+# human would cope with.
 #
 # **Predict before you run.** Which costs most: half or double the light, noise of 10 %, red and blue swapped, left and
 # right swapped, or the image upside down? And upside down, how much of the road is still called road?
@@ -392,7 +394,8 @@ for name in TRAINED:
 #
 # ## In five lines
 #
-# 1. The field is what a score can see; the gradient says where it looks, and half of that is in a few columns.
+# 1. The field is what a score can see; the gradient says where it looks, and half of that is in about a fifth of the
+#    columns that it reaches.
 # 2. The paper's encoders start from ImageNet; the compact networks start at random, with batch normalisation.
 # 3. Ask for found, right and area of each class: pixel accuracy hardly sees a post or a pedestrian.
 # 4. A doubling layer can print a pattern on a flat map; its period is that of its stride.

@@ -112,7 +112,8 @@ print("theta:", path.round(3), "  cosine, four steps:", cosine(1.0, 4).round(3))
 # %% [markdown]
 # So is momentum just a larger rate? Take a narrow valley, the loss $(\theta_1^2 + 100\,\theta_2^2) / 2$: across it is a
 # hundred times as steep as along. The steep direction limits the rate, because above $2\,(1 + \kappa) / 100$ the steps
-# across grow instead of shrinking.
+# across grow instead of shrinking. (A plain step makes $\theta_2$ into $(1 - 100\,\eta)\,\theta_2$, which grows once
+# $\eta > 0.02$.)
 #
 # **Predict before you run.** Give plain descent and momentum each the best rate below its limit. Which reaches 0.01 in
 # both parameters first, and which has the larger rate?
@@ -166,7 +167,8 @@ plt.show()
 
 # %% [markdown]
 # A: plain descent jumps from wall to wall and creeps along the valley. B: momentum swings, the swings die out, and the
-# motion along the valley builds up. The red cross is the minimum.
+# motion along the valley builds up. The red cross is the minimum, the grey lines are lines of equal loss. C: how far
+# the worse parameter is from its best value, 0; the grey line is the 0.01 of the question.
 #
 # A batch isn't all streets, so its gradient is right only on average. Add noise to that of one parameter:
 
@@ -187,13 +189,14 @@ ax.legend(frameon=False, fontsize="small", ncols=2)
 plt.show()
 
 # %% [markdown]
-# With one parameter, momentum and a rate ten times as large both arrive within 15 steps, and both then go wherever
-# the noise pushes them. With the falling rate momentum comes to rest, because small last steps average over many
-# gradients.
+# With one parameter, momentum and a rate ten times as large both arrive within 15 steps, and both then go wherever the
+# noise pushes them. If the rate falls to zero along half a cosine, as in training, momentum comes to rest, because
+# small last steps average over many gradients.
 #
 # ## All of it in twenty lines
 #
-# The whole of training is this loop. Only `loss.backward()` isn't written out; it is the chain rule of lecture 08.
+# The whole of training is this loop. Lecture 08 has the parts that it calls: the class weights, the loss, and the chain
+# rule, which is `loss.backward()`.
 
 
 # %%
@@ -299,8 +302,9 @@ Markdown("\n".join(lines))
 # ## Then ten seconds, then half an hour
 #
 # Now the whole way from random weights by `train`: first the image network on image labels, then all of it on the grid,
-# with varied brightness and mirrored streets (*data augmentation*). Six frames, three in each of 20 + 30 steps. The
-# shipped weights come from the same code with 142 frames, six in each of 2000 + 2000 steps; their log lies beside them.
+# with varied brightness and contrast and mirrored streets (*data augmentation*). Six frames, three in each of 20 + 30
+# steps. The shipped weights come from the same code with 142 frames, six in each of 2000 + 2000 steps; their log lies
+# beside them.
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 quick = build_net(Architecture("segnet"), drive.camera, seed=0)
@@ -345,6 +349,10 @@ plotting.label_maps(spec, maps | {"truth": truth[shown]}, KITTI_14)
 plt.show()
 
 # %% [markdown]
+# In the maps, the network that learnt by heart loses most of the road beyond 50 m and paints sidewalk where
+# there is none. After ten seconds there are road and vegetation, and little else. The shipped network draws the
+# sidewalk, the lawn beside it and some of the cars.
+#
 # Frames and steps changed together, so the table doesn't say which of them helped. The six frames are among the 142, so
 # the first pair of the last row isn't a test.
 #
@@ -352,7 +360,8 @@ plt.show()
 #
 # Three questions, often taken for one. *Which heights are right?* That has nothing to do with the network: carry the
 # true labels of the pixels to each plane, and count in how many true cells of a class they say this class. *Which have
-# large weights? Which does the result depend on?*
+# large weights? Which does the result depend on?* To see this, let planes fall silent: each cell in view takes the mean
+# scores of its plane, which say nothing about this cell.
 #
 # **Predict before you run.** For which planes do the true labels say road in a road's cell, car in a car's, building in
 # a building's beyond a row of parked cars?
@@ -450,7 +459,8 @@ plt.show()
 # %% [markdown]
 # A: where each class is right. For a road that is the ground plane, and even there only in 56 of 100 cells, because
 # things stand in the way and because beyond the crest of this street the road lies below the plane. B: the norms of the
-# weights. From 1 m up they differ little from what was drawn at random. But the weights themselves have changed there by
+# weights, the length of the 16 numbers by which the reduction multiplies a class's score on a plane. From 1 m up they
+# differ little from what was drawn at random, most at the top. But the weights themselves have changed there by
 # 0.3 to 0.6 of that norm, as the printed line says: a norm doesn't show what was learnt. C: what is found when
 # all higher planes fall silent.
 #
@@ -491,9 +501,9 @@ Markdown("\n".join(lines))
 #
 # ## What this does not show
 #
-# A network with fewer planes that is *trained* so may learn as much: lecture [12](../12_experiments.ipynb) has networks
-# with 1, 2, 5 and 10 planes. A plane that falls silent is an input that this network has never met. And one drive is
-# one street.
+# A network with fewer planes that is *trained* so may learn as much: the companion [more tables](12_more_tables.ipynb)
+# has networks with 1, 2, 5 and 10 planes. A plane that falls silent is an input that this network has never met. And
+# one drive is one street.
 #
 # ## Further reading
 #

@@ -52,6 +52,9 @@ size, known = tester.architecture.image_size, mean_histograms(training_images())
 # **total variation** between two distributions, from 0 (equal) to 1 (nothing in common):
 #
 # $$ d(p, q) = \tfrac{1}{2} \sum_b |p_b - q_b| $$
+#
+# The **colour distance** is its mean over red, green and blue, with 32 bins $b$ each. The training images here are the
+# six of 142 that come with the course.
 
 
 # %% tags=["distance"]
@@ -91,11 +94,11 @@ axes[1].set(xlabel="colour distance", xlim=(0, 0.7))
 plt.show()
 
 # %% [markdown]
-# Left you see what the distance compares: solid lines are the images that the network learned from, dashed lines those
-# of the real street. Right, each mark is a distance. The grey dots are the yardstick: each training image against all
-# the others. The sample drive lies below them. The real street lies just beyond the farthest grey dot, drive 0013
-# farther. (Histograms of a drive are means of several images, which evens out what differs from image to image; that
-# brings a drive nearer, not farther.) What is different about real images?
+# Left you see what the distance compares: solid lines are the six training images, dashed lines the images of the real
+# street. Right, each mark is a distance, a diamond one of real images. The grey dots are the yardstick: each training
+# image against the five others. The sample drive lies below them. The real street lies just beyond the farthest grey
+# dot, drive 0013 farther. (Histograms of a drive are means of several images, which evens out what differs from image
+# to image; that brings a drive nearer, not farther.) What is different about real images?
 
 # %%
 rows = {"training images": measured["training images"]} | {name: one["images"] for name, one in drives.items()}
@@ -113,17 +116,18 @@ for name in (CALLED["stretch 1"], CALLED["stretch 2"]):
 # %% [markdown]
 # *Brightness* is the mean grey value, *contrast* its standard deviation, *saturation* the mean difference of the
 # largest and the smallest of red, green and blue, and *edges* the mean gradient. On drive 0013 contrast and edges are
-# larger than in the training images by 59 to 72 %: a black car, deep shadows of trees, and a white fence in
-# the sun in one image. The real street is about as dark as drive 0013, but its contrast is larger by only an eighth, and
-# its saturation and edges hardly differ. And yet the map that the network makes of it is wrong in nearly half of the
-# labelled cells (lecture 13).
+# larger than in the training images by 59 to 72 %: one image has a black car, deep shadows of trees and a bright sky.
+# The real street is about as dark as drive 0013, but its contrast is larger by only an eighth, and its saturation and
+# edges hardly differ. And yet the map that the network makes of it is wrong in nearly half of the labelled cells
+# (lecture 13).
 #
 # ## Is the distance the damage?
 #
 # **Predict before you run.** We change the sample images in seven ways, and measure each time the colour distance to
-# the training images and the share of right pixels. If the distance were the damage, the larger distance would always
-# have the lower share. What do you expect for an image that is a little warmer (red x 1.15, blue x 0.8), compared
-# with one at half the brightness?
+# the training images and the share of right pixels. (Printed as well, from lecture 13: *confidence*, the mean
+# probability of the class that is called, and *lane*, the share of LIDAR returns from the ground of our own lane whose
+# pixels are called road.) If the distance were the damage, the larger distance would always have the lower share. What
+# do you expect for an image that is a little warmer (red x 1.15, blue x 0.8), compared with one at half the brightness?
 #
 # <details><summary>Answer</summary>
 #
@@ -180,11 +184,13 @@ plt.show()
 # %% [markdown]
 # The dots don't lie on a falling line. A distance of histograms tells you *that* the images are different, and not what
 # follows from it. The last line is even more instructive: after `match_colours` the distance is nearly zero, and the
-# network isn't better by it. (The function gives an image the training images' histogram, colour by colour.) And look
+# network does no better. (The function gives an image the training images' histogram, colour by colour.) And look
 # at *red and blue swapped*: fewer pixels are right, but the lane column says little of it. A check with two classes can
 # be blind to a third.
 #
-# Would matching the colours at least help on a real drive? There we can only ask the LIDAR:
+# Would matching the colours at least help on a real drive? There we can only ask the LIDAR about the lane, and about
+# what is *standing*: the share of returns from half a metre to three metres up whose pixels are called something that
+# stands.
 
 # %%
 for name, one in drives.items():
@@ -209,7 +215,8 @@ for name, one in drives.items():
 # - **Fine-tune.** Train on with a few labelled images of the new domain. It needs labels there, and a place to test
 #   from which you haven't learned.
 # - **Augment.** Train in simulation with more variation of what we have just measured: brightness, white balance,
-#   contrast, noise, sharpness. It needs no real data. `semgrid-edu train` jitters images a little already.
+#   contrast, noise, sharpness. It needs no real data. `semgrid-edu train` varies the first and contrast already, and
+#   with `--tint` colours.
 # - **Self-train.** Let the network label real images, keep the labels that something independent confirms, and train on
 #   them. The two rules about lane and standing things are such a confirmation. The danger: what it believes wrongly and
 #   surely, it learns again.
