@@ -28,7 +28,7 @@ from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.session import Session
-from semgrid_edu.workshop.course.sandbox.surroundings import PREPARED, keep_compiled, worker_environment
+from semgrid_edu.workshop.course.sandbox.surroundings import ONLY_WHOLE, PREPARED, keep_compiled, worker_environment
 
 SERVER = Path(__file__).with_name("warm_server.py")
 
@@ -85,7 +85,7 @@ def warm_processes(source, prepared):
         yield lambda: StudentProcess(Limits(), prepared)
         return
     with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(prepared, Path(folder, PREPARED))
+        shutil.copytree(prepared, Path(folder, PREPARED), ignore=ONLY_WHOLE)
         ours, theirs = socket.socketpair()
         command = [sys.executable, SERVER, source, str(theirs.fileno())]
         environment = worker_environment(Path(folder)) | {"NUMBA_THREADING_LAYER": "workqueue"}

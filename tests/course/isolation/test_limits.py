@@ -332,6 +332,11 @@ def test_the_folder_is_gone_afterwards_and_never_shared(prepared):
         assert not process.folder.exists()
 
 
+def test_a_file_that_is_being_written_to_what_is_prepared_does_not_keep_it_from_starting(prepared):
+    (prepared / ".function-a1b2.nbi").symlink_to("gone")  # listed, and gone when it is to be read
+    StudentProcess(Limits(), prepared).stop()
+
+
 def test_who_interrupts_its_start_leaves_no_folder(prepared, tmp_path, monkeypatch):
     def interrupted(*arguments):
         raise KeyboardInterrupt

@@ -18,7 +18,7 @@ from traitlets import Bool, Integer, Unicode
 from traitlets import List as ListTrait
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage.compiled import takes_files, user_cache
+from semgrid_edu.storage.compiled import PACKAGE, takes_files, user_cache
 from semgrid_edu.workshop.course.nbgrader.autograde import UnfitError, student_variant
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import INSTRUCTOR, cell_name, run_submission
@@ -241,7 +241,8 @@ def prepared_folder(course: Path, assignment: str) -> Path:
     assignment : str
         The exercise.
     """
-    shared = user_cache() / "semgrid_edu" / "prepared" / assignment
+    # Numba knows a function by its file: what another copy of the package compiled is of no use to this one.
+    shared = user_cache().joinpath("semgrid_edu", "prepared", *PACKAGE.parts[1:], assignment)
     folder = shared if takes_files(shared) else course / "prepared" / assignment
     folder.mkdir(parents=True, exist_ok=True)
     return folder

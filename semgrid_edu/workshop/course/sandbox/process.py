@@ -19,8 +19,8 @@ from typing import Any
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import table_beside
+from semgrid_edu.workshop.course.sandbox import surroundings as around
 from semgrid_edu.workshop.course.sandbox.limits import MEGABYTE, PARTS, Limits
-from semgrid_edu.workshop.course.sandbox.surroundings import PREPARED, files_beside, keep_compiled, worker_environment
 from semgrid_edu.workshop.course.sandbox.taken import (
     Sampled,
     count_tasks,
@@ -95,7 +95,7 @@ class StudentProcess:
         self.prepared, self.keeps, self.contained, self.namespace = prepared, keeps, bool(container), ""
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
         if prepared is not None:
-            shutil.copytree(prepared, self.folder / PREPARED)
+            shutil.copytree(prepared, self.folder / around.PREPARED, ignore=around.ONLY_WHOLE)
         alone = () if container or not _can_be_alone() else ALONE
         # A container has a Python of its own.
         self.process = self._started([*container, *alone, "python" if container else sys.executable, *WORKER])
@@ -106,7 +106,7 @@ class StudentProcess:
         self.speaker.start()
         self.unlimited = self._greeted(limits, alone, container)
         if beside is not None:
-            self.ask({"do": "beside", "files": files_beside(beside)}, time.monotonic() + STARTED)
+            self.ask({"do": "beside", "files": around.files_beside(beside)}, time.monotonic() + STARTED)
         self.namespace = namespace_of(self.process.pid)
         threading.Thread(target=self._watch, args=(limits,), daemon=True).start()
 
@@ -118,7 +118,7 @@ class StudentProcess:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             cwd=self.folder,
-            env=worker_environment(self.folder),
+            env=around.worker_environment(self.folder),
             start_new_session=True,
         )
 
@@ -261,7 +261,7 @@ class StudentProcess:
                 with suppress(OSError):
                     pipe.close()
         if self.keeps:
-            keep_compiled(self.folder / PREPARED, self.prepared)
+            around.keep_compiled(self.folder / around.PREPARED, self.prepared)
         delete_folder(self.folder)
 
     def _wait_for_the_last(self) -> None:

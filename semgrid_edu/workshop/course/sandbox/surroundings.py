@@ -16,6 +16,9 @@ INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
 PREPARED = ".prepared"
 """The folder of what is compiled already, in the folder of a process; no file that is handed in gets there."""
 
+ONLY_WHOLE = shutil.ignore_patterns(".*")
+"""For copies of what is compiled: a file that another process is still writing has such a name."""
+
 
 def worker_environment(folder: Path) -> dict[str, str]:
     """Return the environment of a worker: one thread for each library, and all caches in its own folder.
@@ -47,7 +50,7 @@ def keep_compiled(source: Path, target: Path) -> None:
         with atomic_path(target) as path:
             shutil.copyfile(source, path)
 
-    shutil.copytree(source, target, copy_function=replace_file, dirs_exist_ok=True)
+    shutil.copytree(source, target, ignore=ONLY_WHOLE, copy_function=replace_file, dirs_exist_ok=True)
 
 
 def files_beside(folder: Path) -> dict[str, NDArray]:
