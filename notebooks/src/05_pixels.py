@@ -139,14 +139,13 @@ plotting.animate(
 # ### The graph
 #
 # As a graphical model: four cells lie in a row, straight ahead: $m_1$ to $m_4$, each road or car.
-# $a_j$ is the label of the pixel that looks at the *ground* in cell $j$. Its ray passes over all cells before it: on
-# the
-# left, the car in cell 3 also blocks the ray to cell 4 (blue pixels say *car*). Equation (1) knows of one arrow only,
+# $a_j$ is the label of the pixel that looks at the *ground* in cell $j$. Its ray passes over all cells before it: here
+# the car in cell 3 also blocks the ray to cell 4 (blue pixels say *car*). Equation (1) knows of one arrow only,
 # $m_j \to a_j$:
 
-# %% tags=["graph"] jupyter={"source_hidden": true} alt="left, a sketch from the side: a camera, its four pixels, and their rays to the ground in four cells; a car in cell 3 blocks the rays to cells 3 and 4; right, a directed graph: four cells m1 to m4 above, four observed pixels a1 to a4 below; each pixel has arrows from its own cell and from all nearer ones"
-stage, colours = pixel_ray(), KITTI_14.colours(np.array([ROAD, ROAD, CAR, CAR])) / 255
-fig, (side, ax) = plt.subplots(1, 2, figsize=(9.4, 3.2), layout="constrained", width_ratios=(1, 1.3))
+# %% jupyter={"source_hidden": true} alt="a sketch from the side: a camera, its four pixels, and their rays to the ground in four cells; a car in cell 3 blocks the rays to cells 3 and 4"
+colours = KITTI_14.colours(np.array([ROAD, ROAD, CAR, CAR])) / 255
+fig, side = plt.subplots(figsize=(4.6, 2.6), layout="constrained")
 side.add_patch(plt.Rectangle((7.1, 0), 1.8, 1.3, color=colours[2], alpha=0.4))
 for j, (x, colour) in enumerate(zip((4, 6, 8, 10), colours, strict=True), start=1):
     stop = np.array([0, min(x, 7.1), x])  # camera, first thing, ground
@@ -159,12 +158,11 @@ for j, (x, colour) in enumerate(zip((4, 6, 8, 10), colours, strict=True), start=
 side.plot(0, 3, "ks")
 side.set(xlim=(-0.4, 11), ylim=(-0.6, 3.2), title="A car in cell 3, from the side")
 side.axis("off")
-stage.draw(ax)
 plt.show()
 
 # %% [markdown]
 # **Predict before you run.** The four pixels say road, car, car, car. Three cars, or one? Each cell is a car with
-# probability 0.2 beforehand, and a pixel's label is right with 0.95. And are $m_1$ and $m_3$ independent: before the
+# probability 0.2 beforehand, and a pixel's label is right with 0.95. Draw the graph: are $m_1$ and $m_3$ independent: before the
 # pixels are known, and once $a_3$ is known?
 #
 # <details><summary>Answer</summary>
@@ -176,13 +174,21 @@ plt.show()
 # </details>
 
 # %% jupyter={"outputs_hidden": true}
-labels = [0, 1, 1, 1]
+stage, labels = pixel_ray(), [0, 1, 1, 1]
 print("exact,        P(car):", exact_ray(labels).round(2))
 print("equation (1), P(car):", cell_by_cell(labels).round(2))
 print("by how much (1) is off, mean over all labels:", occlusion_cost().round(2))
 assert np.allclose(occlusion_cost(RayWorld(right=0.8)), 0.125, atol=0.012)  # with poorer labels
 assert d_separated(stage.model, "m1", "m3")
 assert not d_separated(stage.model, "m1", "m3", given=("a3",))
+
+# %% [markdown]
+# Here is the graph:
+
+# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: four cells m1 to m4 above, four observed pixels a1 to a4 below; each pixel has arrows from its own cell and from all nearer ones; one of the slanted arrows is dashed and carries its price"
+fig, ax = plt.subplots(figsize=(5.4, 3.2), layout="constrained")
+stage.draw(ax)
+plt.show()
 
 # %% [markdown]
 # Equation (1) cuts every slanted arrow, $m_i \to a_j$ with $i < j$: *occlusion*. One of them is dashed, with its

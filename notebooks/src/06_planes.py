@@ -164,18 +164,11 @@ plotting.animate(converging(), period=0.5, alt="the map's cells slide onto road 
 # ### The graph
 #
 # One thing first that no derivative repairs. $m$ is what lies on a patch of ground, $a$ the label of the pixel that
-# shows it, and $x_1, x_2, \dots$ are what different cells read there:
-
-# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: the patch m, below it the pixel a, below it four observed cells x1 to x4 that all depend on the pixel"
-stage = shared_pixel()
-fig, ax = plt.subplots(figsize=(5.4, 3.2), layout="constrained")
-stage.draw(ax)
-plt.show()
-
-# %% [markdown]
+# shows it, and $x_1, x_2, \dots$ are what different cells read there.
+#
 # **Predict before you run.** Before you look, a car is as probable as none. The pixel is right with 0.8, and all four
-# cells read *car*. How probable is a car? How probable would it be if each cell had read a pixel of its own? Given $m$,
-# are $x_1$ and $x_2$ independent?
+# cells read *car*. How probable is a car? How probable would it be if each cell had read a pixel of its own? Draw the
+# graph: given $m$, are $x_1$ and $x_2$ independent?
 #
 # <details><summary>Answer</summary>
 #
@@ -185,6 +178,7 @@ plt.show()
 # </details>
 
 # %% jupyter={"outputs_hidden": true}
+stage = shared_pixel()
 for n in (1, 2, 4, 10):
     exact, independent = believed_by_readers(n)
     print(f"{n:>2} cells say car: exact {exact:.2f}, as if independent {independent:.3f}")
@@ -195,6 +189,11 @@ for name, (at, seen) in {"drive": (pixels, visible), "real street": on_street}.i
     bands = [at[0][seen[0] & (x_cells >= a) & (x_cells < b)].round() for a, b in ((6, 20), (20, 40), (40, 71))]
     shares = ", ".join(f"{len(read_by) / len(np.unique(read_by, axis=0)):.1f}" for read_by in bands)
     print(f"on the {name}, cells a pixel from 6 m, from 20 m and from 40 m on: {shares}")
+
+# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: the patch m, below it the pixel a, below it four observed cells x1 to x4 that all depend on the pixel"
+fig, ax = plt.subplots(figsize=(5.4, 3.2), layout="constrained")
+stage.draw(ax)
+plt.show()
 
 # %% [markdown]
 # The cut edge is the pixel's shared error. A network that looks at neighbouring cells can learn to allow for it; a rule

@@ -132,22 +132,14 @@ plotting.animate(moving(), period=0.6, alt="a thin post moves by single pixels a
 #
 # A network gives each pixel scores, and a soft-max (next section) turns the scores of *one* pixel into probabilities. The
 # network has seen the pixels around, but it names each pixel without asking for its neighbours' *labels*. And labels
-# along a post depend on each other:
-
-# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: labels x1 to x5 in a chain, below each, grey because it is observed, what its scores say, s1 to s5; a dashed arc from x2 to the circled x3 carries the price of cutting that edge, .66 to .27"
-stage = post_pixels()
-fig, ax = plt.subplots(figsize=(6.4, 3.2), layout="constrained")
-stage.draw(ax, highlight=["x3"])
-plt.show()
-
-# %% [markdown]
+# along a post depend on each other, here as a chain:
 # $x_1 \dots x_5$ are the labels of five pixels from top to bottom, $s_k$ the class that the scores prefer at pixel
 # $k$ (elsewhere $s$ are the scores themselves), right with probability 0.73. A neighbour has the same label with
 # probability 0.8.
 #
 # **Predict before you run.** The scores say post, post, *something else*, post, post. Is the third pixel a post? Then go
 # *across* a post that is one pixel wide: else, else, post, else, else. What does the same chain say of the third pixel
-# now? And with all scores known, are $x_1$ and $x_5$ independent?
+# now? Draw the graph: with all scores known, are $x_1$ and $x_5$ independent?
 #
 # <details><summary>Answer</summary>
 #
@@ -158,6 +150,7 @@ plt.show()
 # </details>
 
 # %% jupyter={"outputs_hidden": true}
+stage = post_pixels()
 for name, says in (("along", [1, 1, 0, 1, 1]), ("across", [0, 0, 1, 0, 0])):
     exact, alone = believed_of_post(says)[:, 2]
     print(f"{name:<6} the post: exact {exact:.2f}, soft-max of the pixel alone {alone:.2f}")
@@ -172,9 +165,14 @@ print(
 )
 print(f"beside it with {beside:.2f}")
 
+# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: labels x1 to x5 in a chain, below each, grey because it is observed, what its scores say, s1 to s5; the arrow from x2 to the circled x3 is dashed and carries the price of cutting it, .66 to .27"
+fig, ax = plt.subplots(figsize=(8.4, 2.6), layout="constrained")
+stage.draw(ax, highlight=["x3"])
+plt.show()
+
 # %% [markdown]
 # So one strength for both directions is wrong for signage: it needs a stronger edge along a post than across. The
-# networks of this lecture cut all four arrows between labels (the dashed curve stands for one of them). Lecture
+# networks of this lecture cut all four arrows between labels (the dashed one shows the price of one). Lecture
 # [10](10_crf.ipynb) puts such edges back, on the map.
 #
 # ## What comes out: a score for each class

@@ -229,7 +229,7 @@ def post_pixels(pixels: int = 5, stays: float = 0.8, lead: float = 1.0) -> Stage
         "Labels of pixels along a post",
         directed(factors),
         observed=tuple(scores),
-        positions=in_rows(labels, (), scores),
+        positions=in_rows(with_gaps(labels), (), with_gaps(scores)),
         equations={labels[-1]: "labels of the pixels", scores[-1]: "what the scores say"},
         cut=cut_edges("network"),
     )
