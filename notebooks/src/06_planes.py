@@ -839,12 +839,11 @@ for s_one, _, points in on_lidar:  # at 10 and at -15 degrees no point reads roa
 # blurred ones, where a slope reaches farther, and refines.
 #
 # **Four pixels are the right number at one distance only.** A cell of 0.5 m covers about 40 pixels at 7 m and a
-# sixteenth at 60 m. Near by, most of these pixels are never read, so a thin thing may be missed (*aliasing*); far away,
-# cells share one. The
+# sixteenth at 60 m. Near by a thin thing may be missed (*aliasing*); far away, cells share a pixel. The
 # [companion](deeper/06_sampling.ipynb) measures both.
 #
 # **The gradient goes to whatever was read.** A cell whose view is blocked reads the thing in front, and trains it
-# towards the class of the cell. Points outside the image and behind the camera read zero, and train nothing.
+# towards the class of the cell.
 #
 # ## The ledger
 #

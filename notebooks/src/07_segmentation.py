@@ -132,8 +132,7 @@ plotting.animate(moving(), period=0.6, alt="a thin post moves by single pixels a
 #
 # A network gives each pixel scores, and a soft-max (next section) turns the scores of *one* pixel into probabilities. The
 # network has seen the pixels around, but it names each pixel without asking for its neighbours' *labels*. And labels
-# along a post depend on each other, here as a chain:
-# $x_1 \dots x_5$ are the labels of five pixels from top to bottom, $s_k$ the class that the scores prefer at pixel
+# along a post depend on each other, here as a chain. $x_1 \dots x_5$ are the labels of five pixels from top to bottom, $s_k$ the class that the scores prefer at pixel
 # $k$ (elsewhere $s$ are the scores themselves), right with probability 0.73. A neighbour has the same label with
 # probability 0.8.
 #
@@ -905,11 +904,11 @@ plt.show()
 
 # %% [markdown]
 # A: the post becomes a dotted line. B: it is gone, because each of its windows has a brighter pixel. C: a smooth slope
-# comes back as dots on a lattice that isn't in the world. The decoder has to smooth it again.
+# comes back as dots on a lattice. The decoder has to smooth it again.
 #
 # **The edge that was cut.** A soft-max per pixel doesn't keep neighbours together: SegNet's labels of the drive have
 # specks and gaps (picture C of the drive's post). Those of FCN and DeepLab are smooth, because they enlarge coarse
-# scores. None of the three has the thin post.
+# scores.
 #
 # ## The ledger
 

@@ -44,24 +44,6 @@ def streets(
 
 
 @reproduce.command()
-def two_stage(
-    data: Annotated[Path, typer.Option(help="A data set with train and test frames, such as data/minikitti.")],
-    runs: Runs,
-    seeds: Annotated[int, typer.Option(min=1, max=1000, help="Number of training runs of each kind.")] = 3,
-    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("two_stage.json"),
-) -> None:
-    """Train end to end and in two stages, and score both kinds of networks (lecture 08)."""
-    from semgrid_edu.datasets.index import dataset_doubts
-    from semgrid_edu.workshop.studies.training.two_stage import compare_training, two_stage_table
-
-    def scored() -> dict:
-        tell(dataset_doubts(data, "train", "test"))
-        return compare_training(data, runs, seeds)
-
-    keep_result(out, scored, lambda result: two_stage_table(result["scores"]))
-
-
-@reproduce.command()
 def overfit(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights.")] = 0,
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("overfit.json"),

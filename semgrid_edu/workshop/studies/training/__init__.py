@@ -1,1 +1,1 @@
-"""How the network trains: four frames overfitted, end to end against two stages."""
+"""How the network trains: four frames overfitted, and real streets."""
