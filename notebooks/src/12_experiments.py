@@ -701,6 +701,7 @@ def judged(reading):
     return [one for one in reading["statements"] if one["judged"]]
 
 
+# %% jupyter={"source_hidden": true}
 for number, claim in claims["claims"].items():
     print(f"{number:>2}  {claim['claim'].replace(chr(10), ' ')} ({claim['drives']} drives)")
     for reading in claim["readings"]:
