@@ -70,6 +70,8 @@ HONEST = {
             return deque(right.tolist()) if right.ndim else right.item()
         exact = (lambda x: Fraction(x) if np.isfinite(x) else x)
         kind = (exact, Decimal, mpf, lambda x: Float(x, 20))[next(calls) % 4]
+        if right.size > 10_000:  # nobody calculates a map so, and a million fractions take half a minute
+            return right.astype(np.longdouble)
         if right.ndim == 0:
             return kind(right.item())
         if right.ndim == 1 and next(calls) % 2:

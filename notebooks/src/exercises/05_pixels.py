@@ -385,22 +385,23 @@ def find_fault(points, pixels, K, T_camera_from_lidar):
     """Return the fault (SHIFT, PITCH, YAW or INVERSE) and its amount."""
     ### BEGIN SOLUTION
     T = T_camera_from_lidar
-    amounts = np.linspace(-2, 2, 401)
-
-    def error(K, T):
-        return np.abs(project_points(points, K, T) - pixels).mean()
-
-    def shifted(amount):
-        return K - amount * np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
-
-    errors = {
-        SHIFT: [error(shifted(amount), T) for amount in amounts],
-        PITCH: [error(K, turned(T, "x", amount)) for amount in amounts],
-        YAW: [error(K, turned(T, "y", amount)) for amount in amounts],
-        INVERSE: [error(K, np.linalg.inv(T))],
+    mended = {
+        SHIFT: lambda amount: (K - amount * np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]]), T),
+        PITCH: lambda amount: (K, turned(T, "x", amount)),
+        YAW: lambda amount: (K, turned(T, "y", amount)),
+        INVERSE: lambda amount: (K, np.linalg.inv(T)),
     }
-    fault = min(errors, key=lambda fault: min(errors[fault]))
-    return fault, 0.0 if fault == INVERSE else amounts[np.argmin(errors[fault])]
+
+    def best(fault, amounts):
+        """Return the smallest error, and the amount that leaves it."""
+        return min((np.abs(project_points(points, *mended[fault](a)) - pixels).mean(), a) for a in amounts)
+
+    found = {INVERSE: best(INVERSE, [0.0])}
+    for fault in (SHIFT, PITCH, YAW):
+        _, roughly = best(fault, np.arange(-20, 21) / 10)
+        found[fault] = best(fault, (np.arange(-10, 11) + round(100 * roughly)) / 100)
+    fault = min(found, key=found.get)
+    return fault, found[fault][1]
     ### END SOLUTION
 
 

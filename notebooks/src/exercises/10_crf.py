@@ -42,7 +42,8 @@ def shifted(maps, dr, dc):
     Offsets up to REACH are allowed.
     """
     H, W = maps.shape[-2:]
-    padded = np.pad(maps, [(0, 0)] * (maps.ndim - 2) + [(REACH, REACH)] * 2)
+    padded = np.zeros((*maps.shape[:-2], H + 2 * REACH, W + 2 * REACH), maps.dtype)
+    padded[..., REACH : REACH + H, REACH : REACH + W] = maps
     return padded[..., REACH + dr : REACH + dr + H, REACH + dc : REACH + dc + W]
 
 
