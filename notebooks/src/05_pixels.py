@@ -78,8 +78,8 @@ pale.image[is_red_car] = pale.image[is_red_car] // 2 + np.array([110, 10, 10], n
 # %% [markdown]
 # ## A plane that rises through the street
 #
-# To bring classes from pixels to cells of the map we need to know which pixel belongs to which cell. Watch what happens when we lift the grid, as a flat sheet of
-# points, from one metre below the ground to three metres above it:
+# To bring classes from pixels to cells of the map we need to know which pixel belongs to which cell. Watch what happens
+# when we lift the grid, as a flat sheet of points, from one metre below the ground to three metres above it:
 
 
 # %% jupyter={"source_hidden": true}
@@ -160,8 +160,8 @@ plt.show()
 
 # %% [markdown]
 # **Predict before you run.** The four pixels say road, car, car, car. Three cars, or one? Each cell is a car with
-# probability 0.2 beforehand, and a pixel's label is right with 0.95. Draw the graph: are $m_1$ and $m_3$ independent: before the
-# pixels are known, and once $a_3$ is known?
+# probability 0.2 beforehand, and a pixel's label is right with 0.95. Draw the graph. Are $m_1$ and $m_3$ independent,
+# before the pixels are known and once $a_3$ is known?
 #
 # <details><summary>Answer</summary>
 #

@@ -132,9 +132,9 @@ plotting.animate(moving(), period=0.6, alt="a thin post moves by single pixels a
 #
 # A network gives each pixel scores, and a soft-max (next section) turns the scores of *one* pixel into probabilities. The
 # network has seen the pixels around, but it names each pixel without asking for its neighbours' *labels*. And labels
-# along a post depend on each other, here as a chain. $x_1 \dots x_5$ are the labels of five pixels from top to bottom, $s_k$ the class that the scores prefer at pixel
-# $k$ (elsewhere $s$ are the scores themselves), right with probability 0.73. A neighbour has the same label with
-# probability 0.8.
+# along a post depend on each other, here as a chain. $x_1 \dots x_5$ are the labels of five pixels from top to bottom,
+# $s_k$ the class that the scores prefer at pixel $k$ (elsewhere $s$ are the scores themselves), right with probability
+# 0.73. A neighbour has the same label with probability 0.8.
 #
 # **Predict before you run.** The scores say post, post, *something else*, post, post. Is the third pixel a post? Then go
 # *across* a post that is one pixel wide: else, else, post, else, else. What does the same chain say of the third pixel

@@ -876,7 +876,7 @@ Markdown(table)
 
 # %% [markdown]
 # Five bars contain zero; the sixth lies below it, by true labels half a point fewer cells are right. So on these streets
-# the way back buys nothing that we can see, and it costs the labels of pixels. Our stage one is a strong one: it learns
+# the way back buys nothing that we can see, and on the drive above it cost the labels of pixels. Our stage one is strong: it learns
 # true labels of every pixel of the same images. The paper starts from ImageNet weights; what end to end would buy after
 # such a start these runs don't say. Lecture [12](12_experiments.ipynb) judges this claim of the paper.
 #

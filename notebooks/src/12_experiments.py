@@ -18,8 +18,8 @@
 #
 # **Time.** 74 minutes, of which the computer needs one.
 #
-# **Paper.** Section 4: its Tables 1 and 2, and twelve of its claims. Table 3, what the paper leaves open, and how sure
-# the maps are stand in the companion [more tables](deeper/12_more_tables.ipynb).
+# **Paper.** Section 4: its Tables 1 and 2, and twelve of its claims. The companion
+# [more tables](deeper/12_more_tables.ipynb) has Table 3, what the paper leaves open, and how sure the maps are.
 
 # %% jupyter={"source_hidden": true}
 import json
@@ -766,8 +766,8 @@ plt.show()
 # Some claims deserve a second look, because of how they are *built* or how they came out:
 #
 # - **Claim 1** ("SegNet before FCN before DeepLab, since fewer parameters learn better from few images") gives an
-#   order *and* a reason. Our statements test the order alone, and FCN is clearly ahead of SegNet, although our SegNet
-#   is still the smallest of the three. That speaks against the reason, too, but weakly: all three have less than a
+#   order *and* a reason. Our statements test the order alone, over all cells, and FCN is clearly ahead of SegNet,
+#   although our SegNet is still the smallest of the three. That speaks against the reason, too, but weakly: all three have less than a
 #   million parameters. Whether SegNet loses least when frames are few is in the companion. By true labels the bar of
 #   one statement, class accuracy, lies wholly on the wrong side, and it is a "?" all the same: that is Holm's doing.
 # - **Claim 2** is reproduced by both kinds of labels for networks that learned from LIDAR labels. For one that learned
@@ -786,7 +786,7 @@ plt.show()
 #   accuracy (1.2 to 2.2). (In its last rows each circle is a round of timing on one machine.)
 # - **Claims 10 and 12**, end to end and several planes, are what the paper is about. Both are a "?", with short bars:
 #   by true labels, whatever either brings or costs is at most a point of pixel accuracy and 1.6 points of the others.
-# - **Claim 11**: balancing costs two points of pixel accuracy and brings fifteen of class accuracy. "Better in every
+# - **Claim 11**: over all cells balancing costs two points of pixel accuracy and brings fifteen of class accuracy. "Better in every
 #   metric" is refuted by what balancing is made for (lecture [08](08_fusion.ipynb)).
 
 # %% jupyter={"source_hidden": true}

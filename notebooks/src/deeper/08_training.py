@@ -195,7 +195,7 @@ plt.show()
 #
 # ## All of it in twenty lines
 #
-# The whole of training is this loop. Lecture 08 has the parts that it calls: the class weights, the loss, and the chain
+# Training is this loop and nothing more. Lecture 08 explains what it calls: the class weights, the loss, and the chain
 # rule, which is `loss.backward()`.
 
 
@@ -350,7 +350,7 @@ plt.show()
 
 # %% [markdown]
 # In the maps, the network that learnt by heart loses most of the road beyond 50 m and paints sidewalk where
-# there is none. After ten seconds there are road and vegetation, and little else. The shipped network draws the
+# the truth has none. The network of ten seconds draws road and vegetation, and hardly any other class. The shipped network draws the
 # sidewalk, the lawn beside it and some of the cars.
 #
 # Frames and steps changed together, so the table doesn't say which of them helped. The six frames are among the 142, so

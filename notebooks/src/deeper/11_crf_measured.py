@@ -90,7 +90,7 @@ assert max(v[:, : at[1] + 1].max() for v in variation.values()) < 0.01
 # mean field is nearer. At 4 they are wrong by 10 to 15 %. In lecture 10 they picked a side there, too.
 #
 # Was the grid of lecture 10, whose centre was off by 48 %, a rare case? At a coupling of 4 the green bands end at 17 to
-# 31 %, so three quarters of the draws are clearly better. But in one quarter converged mean field is off by more than that.
+# 31 %, so three quarters of the draws are clearly better. In the last quarter converged mean field is off by more than where the band ends.
 #
 # **Labels (below).** The share of cells whose label differs from the most likely labelling. At a coupling of 1 to 2
 # the *exact marginals* themselves differ from it in up to 27 % of the cells: the best label of each cell and the
@@ -225,7 +225,7 @@ Markdown(crf_error_tables(error))
 #
 # <details><summary>Answer</summary>
 #
-# None gains in both. The weights shrink to less than a tenth of what they were: for class accuracy the best of these
+# None gains in both. The weights shrink to a tenth of what they were or less: for class accuracy the best of these
 # CRFs do hardly anything.
 #
 # </details>

@@ -232,7 +232,7 @@ def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ..
 
 
 def prepared_folder(course: Path, assignment: str) -> Path:
-    """Return the folder of what is compiled: in the user's cache for all courses, or in this one if need be.
+    """Return the folder of what is compiled: in the user's cache, one for each copy of the package, or in this course.
 
     Parameters
     ----------
