@@ -505,6 +505,15 @@ Markdown("\n".join(lines))
 # has networks with 1, 2, 5 and 10 planes. A plane that falls silent is an input that this network has never met. And
 # one drive is one street.
 #
+# ## In five lines
+#
+# 1. Training repeats four things: a batch, its loss, the gradient, a step.
+# 2. In a narrow valley momentum wins, and not by a larger rate: across the valley gradients cancel, along it they add up.
+# 3. Let new training code learn four frames by heart first. A network that only does that is good on its own frames and
+#    poor on others.
+# 4. A norm of weights shows neither what was learnt nor what the result depends on.
+# 5. With its lowest planes alone the network keeps road and sidewalk and loses many buildings.
+#
 # ## Further reading
 #
 # - Sutskever, Martens, Dahl, Hinton, *On the importance of initialization and momentum in deep learning*, ICML 2013.

@@ -29,7 +29,7 @@ def frame_counts(data: str) -> dict[str, tuple[int, int]]:
     return {split: (sum(frames), len(frames)) for split, frames in labelled.items()}
 
 
-def deviations(scale: Scale, field: str) -> list[str]:
+def deviations(scale: Scale, field: str, on_gpu: bool = False) -> list[str]:
     """Return in what an experiment differs from the paper's, one sentence each.
 
     Parameters
@@ -38,6 +38,8 @@ def deviations(scale: Scale, field: str) -> list[str]:
         How large it is.
     field : str
         On which data: "kitti", "chroma" or "synthia".
+    on_gpu : bool
+        Whether the networks were trained on a GPU.
     """
     labels = _TEXTS["labels"]["true" if field == "synthia" else "made"]
     return [
@@ -46,6 +48,7 @@ def deviations(scale: Scale, field: str) -> list[str]:
         *labels,
         *_networks(scale),
         _training(scale),
+        *[_TEXTS["training"]["on_gpu"]] * on_gpu,
         *_said_openly(scale, field),
     ]
 

@@ -188,7 +188,9 @@ def computed_result(name: str, experiment: Experiment, scale: Scale, seeds: int,
     """
     records = [counted.record(run) for run in with_needs(experiment.runs(scale, seeds))]
     processes = max(record.get("processes", 1) for record in records)
+    gpus = sorted({record["device"] for record in records} - {"cpu"})
     command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
+    command += "".join(f" --device {device}" for device in gpus)
     about = {
         "experiment": name,
         "title": experiment.title,
@@ -197,7 +199,7 @@ def computed_result(name: str, experiment: Experiment, scale: Scale, seeds: int,
         "seeds": seeds,
         "iterations": [scale.image_iterations, scale.grid_iterations],
         "frames and drives": frame_counts(getattr(scale, experiment.field)),
-        "deviations": [*deviations(scale, experiment.field), *experiment.deviations],
+        "deviations": [*deviations(scale, experiment.field, bool(gpus)), *experiment.deviations],
         "commits": sorted({str(record["commit"]) for record in records}),
         "versions": versions("numpy", "torch", "numba", "scipy"),
     }
