@@ -114,9 +114,9 @@ def test_committed_results_give_the_committed_text(name):
 
 def test_a_result_is_written_with_all_that_made_it(tmp_path):
     runs, scale = [Note("a"), Note("b", (Note("a"),))], SCALES["quick"]
-    for run, own in zip(runs, ({"seconds": 60}, {"seconds": 120, "processes": 2}), strict=True):
+    for run, own in zip(runs, ({"seconds": 60}, {"seconds": 120, "processes": 2, "device": "cuda"}), strict=True):
         run.folder(tmp_path).mkdir()
-        ended = {"commit": "abc", "date": "2026-01-01", **own}
+        ended = {"commit": "abc", "date": "2026-01-01", "device": "cpu", **own}
         (run.folder(tmp_path) / "ended.json").write_text(json.dumps(ended))
     shown = Experiment(
         title="A table",
@@ -131,7 +131,8 @@ def test_a_result_is_written_with_all_that_made_it(tmp_path):
     assert content["x"] == 1
     assert content["commits"] == ["abc"]
     assert content["command"].startswith("semgrid-edu reproduce table --scale quick --seeds 2")
-    assert content["command"].endswith(" --processes 2")
+    assert content["command"].endswith(" --device cuda --processes 2")
+    assert any("bfloat16" in line for line in content["deviations"])
     assert all(line in text for line in content["deviations"])
     assert content["deviations"][-1] == "No frame was seen by day."
     times = json.loads((tmp_path / "out" / "table_times.json").read_text())

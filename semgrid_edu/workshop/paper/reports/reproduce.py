@@ -188,7 +188,7 @@ def computed_result(name: str, experiment: Experiment, scale: Scale, seeds: int,
     """
     records = [counted.record(run) for run in with_needs(experiment.runs(scale, seeds))]
     processes = max(record.get("processes", 1) for record in records)
-    gpus = sorted({record["device"] for record in records} - {"cpu"})
+    gpus = sorted({record.get("device", "cpu") for record in records} - {"cpu"})
     command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
     command += "".join(f" --device {device}" for device in gpus)
     about = {
