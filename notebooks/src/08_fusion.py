@@ -908,15 +908,14 @@ rows = [
 Markdown("\n".join([head, *rows]))
 
 # %% [markdown]
-# In brackets 95 % intervals. The simulated rows are of an earlier version of the simulator, and their networks learnt
-# in 500 steps from labels made with the LIDAR (lecture 09), so don't compare their 45 % with the 73 % above. The real
-# row has no interval: two cameras for four seconds are too little for one. By true labels $o$ brings about six
-# points; by real labels about 26, on one street corner, with one network without $o$. The judges differ, too: a real
-# cell is labelled only where a *LIDAR return* lies, and there $o$ has evidence. And look at the last column: on
-# cameras that no network has seen, a table of $o$ alone does about as well as the networks, which get 63 to 72 by
-# seed. The second row is a surprise of its own: a network that was trained with the ground plane alone does as well
-# as one with twenty. So on these simulated streets, with these labels, the number of planes isn't what a network has
-# over a table.
+# In brackets 95 % intervals. The simulated rows' networks learnt in 500 steps from labels made with the LIDAR (lecture
+# 09), on a GPU, so don't compare their 54 % with the 73 % above. The real row has no interval: two cameras for four
+# seconds are too little for one. By true labels $o$ brings 14 points; by real labels about 26, on one street corner, with
+# one network without $o$. The judges differ, too: a real cell is labelled only where a *LIDAR return* lies, and there $o$
+# has evidence. And look at the last column: on cameras that no network has seen, a table of $o$ alone does about as well
+# as the networks, which get 63 to 72 by seed. The second row is a surprise of its own: a network that was trained with
+# the ground plane alone loses one point against one with twenty. So on these simulated streets, with these labels, the
+# number of planes is hardly what a network has over a table.
 #
 # Is late fusion nearly free on the real street, too? Labels by the shipped real network, state by the filter, truth by
 # people:

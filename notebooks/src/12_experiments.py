@@ -111,10 +111,8 @@ print(f"scale: {table1['scale']}; seeds: {table1['seeds']}; test frames: {frames
 # about where such a bar comes from, when you may believe it, and what it lets you conclude about the paper's claims.
 #
 # The results below are read from [docs/results/reduced](../docs/results/reduced/), unless a sentence names another
-# place or you see the code. Tables and claims were made by today's simulator, on test streets on which nothing was chosen.
-# The *ablations* are of an earlier version, from before its LIDAR and its ground were made like KITTI's: it had a fifth
-# of KITTI's columns, and all roads lay in one plane. The rule by which claims are judged was written before these
-# results. The sentences that name an outcome came later, and a cell prints or asserts what they say.
+# place or you see the code. They are of test streets on which nothing was chosen. The rule by which claims are judged was
+# written before these results. The sentences that name an outcome came later, and a cell prints or asserts what they say.
 #
 # ## A score has two parents
 #
@@ -517,17 +515,16 @@ print(f"by LIDAR labels {cells[10:].sum() / cells.sum():.0%} of the cells are un
 # %% [markdown]
 # The paper's numbers correspond to the rows "lidar all". For the same predictions, the rows "true all" are 11 points of
 # pixel accuracy lower. A likely reason: a network that learned from LIDAR labels has learned their errors too
-# (lecture [09](09_truth.ipynb)), and test labels of the same kind call that right. We tested it on the earlier
-# simulator, where that gap was 17 points, and trained SegNet on true labels. That one scores 8 points *higher* by true
-# labels than by LIDAR labels: each of the two looks better by labels like those that it learned from. When you compare
-# two papers, find out first which row each of them reports.
+# (lecture [09](09_truth.ipynb)), and test labels of the same kind call that right. To test it, we trained SegNet on true
+# labels. That one scores 6 points *higher* by true labels than by LIDAR labels: each of the two looks better by labels
+# like those that it learned from. When you compare two papers, find out first which row each of them reports.
 
 # %% jupyter={"source_hidden": true}
 by_labels = {row["what"]: row["scores"] for row in ablations["variants"]}
 for what in ("usual", "learned from true labels"):
     lidar, true = (by_labels[what][truth]["all"]["pixel accuracy"] for truth in ("lidar", "true"))
-    print(f"earlier simulator: SegNet, {what + ',':<25} by LIDAR labels {shown(lidar)}, by true labels {shown(true)}")
-assert 0.08 < true["mean"] - lidar["mean"] < 0.085
+    print(f"SegNet, {what + ',':<25} by LIDAR labels {shown(lidar)}, by true labels {shown(true)}")
+assert 0.055 < true["mean"] - lidar["mean"] < 0.065
 
 # %% [markdown]
 # **Against what comes for free.** A score means little without a baseline. The next figure shows SegNet minus nine
@@ -588,8 +585,7 @@ for what, scores in free.items():
 # A simple remedy is **Bonferroni's**: with $n$ comparisons, ask each for a level of $1 - 0.05/n$ in place of 0.95. Then
 # the probability of *any* false alarm is at most 5 %, also when the comparisons depend on each other. The price is
 # width, so true differences are missed more often. The cell below counts all comparisons of our Table 1 and of the
-# *ablations* (of the earlier simulator), in which one part of the system is left out or changed, and widens each bar
-# as if it were normal. (With few seeds the right factor is larger. Hence the "at most" in the output.)
+# *ablations*, in which one part of the system is left out or changed, and widens each bar as if it were normal. (With few seeds the right factor is larger. Hence the "at most" in the output.)
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true}
 print(f"twenty equal pairs: {100 * (1 - 0.95**20):.0f} %")
@@ -1017,8 +1013,8 @@ plt.show()
 # %% [markdown]
 # The two upper rows of each panel belong to the occupancy grid, the two lower ones to the planes. On the left stands
 # what you just made, with true labels to learn from; on the right the same comparison from the committed results,
-# with longer training, end to end, on more data of the earlier simulator, from LIDAR labels. Of the occupancy grid both
-# panels say the same, though by other amounts. Of the planes neither sees a difference, but the bars on the right are at most a quarter as
+# with longer training, end to end, on more data, from LIDAR labels. Of the occupancy grid both panels say the same,
+# though by other amounts. Of the planes neither sees a difference, but the bars on the right are at most two fifths as
 # long as those stored here on the left. If an interval contains zero, the honest sentence is: *this experiment cannot
 # tell*. That isn't a failure. It tells you how large an experiment would have to be: to halve a bar that drives
 # dominate, you need four times as many drives.

@@ -100,12 +100,7 @@ def test_every_command_has_a_result():
     ]
 
 
-def to_come(name):
-    """A result whose form is new, or that is new itself, until its runs have been done again."""
-    return pytest.param(name, marks=pytest.mark.xfail(strict=True, reason="its runs are to be done again"))
-
-
-@pytest.mark.parametrize("name", [to_come(name) if name == "structure" else name for name in EXPERIMENTS])
+@pytest.mark.parametrize("name", EXPERIMENTS)
 def test_committed_results_give_the_committed_text(name):
     folder = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "reduced"
     result = json.loads((folder / f"{name}.json").read_text())

@@ -14,9 +14,8 @@
 #
 # **Time.** 18 minutes, of which the computer needs less than one.
 #
-# All numbers are read from [docs/results/reduced](../../docs/results/reduced/), or come from code that you see. Tables
-# and claims were made by today's simulator. The ablations are of an earlier version, from before its LIDAR and
-# its ground were made like KITTI's: it had a fifth of KITTI's columns, and all roads lay in one plane.
+# All numbers are read from [docs/results](../../docs/results/), or come from code that you see. The ablations' networks
+# were trained on a GPU, those of tables and claims on a CPU. A cell below shows what that changes.
 
 # %% jupyter={"source_hidden": true}
 import json
@@ -28,11 +27,17 @@ import numpy as np
 from semgrid_edu import plotting
 from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.crf.temperature import Reliability
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS
+from semgrid_edu.workshop.paper.runs.claim_runs import table1_runs
+from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
+from semgrid_edu.workshop.paper.runs.scales import SCALES
+from semgrid_edu.workshop.paper.runs.score_runs import by_seed
+from semgrid_edu.workshop.scoring.grids import NETWORK
 from semgrid_edu.workshop.paper.reports.forest import draw_score, legend_entries
 from semgrid_edu.workshop.paper.reports.pictures import confusion_picture
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
-from semgrid_edu.workshop.scoring.score_with_interval import shown
+from semgrid_edu.workshop.scoring.score_with_interval import compared, on_cells, shown
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 
@@ -176,48 +181,96 @@ for metric in METRICS:
 # What do the bars say, by true labels over all cells? (Beyond one point the axis is logarithmic, so that half a point
 # can be seen beside twenty.)
 #
-# - **Occupancy grid.** Without it 11 points of pixel accuracy are lost, and 22 of class accuracy.
-# - **Planes.** One plane, the lowest, does about as well as twenty: the bar contains zero, and it is *short*, half a
-#   point to each side. By LIDAR labels twenty planes are clearly better than one, by 0.5 to 0.8 points. A spacing of
-#   0.4 m in place of 0.2 m costs half to three quarters of a point by true labels and less by LIDAR labels; the cell
-#   below prints both.
-# - **Reduction.** Without it all seeds are worse, by very different amounts, and class accuracy is clearly worse.
-# - **Balancing** costs half a point of pixel accuracy and brings twelve of class accuracy.
-# - **True labels to learn from** bring 11 points of pixel accuracy and 18 of class accuracy, more than any two
-#   networks of Table 1 differ, with or without the CRF (today's table, by true labels).
+# - **Occupancy grid.** Without it 16 points of pixel accuracy are lost, and 29 of class accuracy.
+# - **Planes.** One plane, the lowest, is half a point behind twenty in the mean. The bar of pixel accuracy just contains
+#   zero, that of class accuracy doesn't. By LIDAR labels pixel accuracy is clearly lower, by 0.5 to 1.0. Two, five or ten
+#   planes we can't tell from twenty by true labels. Planes 0.4 m apart in place of 0.2 m cost at most half a point of
+#   pixel accuracy.
+# - **Reduction.** Without it all seeds are worse, by very different amounts, and class accuracy is clearly worse, by 8.
+# - **Balancing** costs 2 points of pixel accuracy and brings 15 of class accuracy.
+# - **True labels to learn from** bring 9 points of pixel accuracy and 16 of class accuracy, more than any two
+#   networks of Table 1 differ, with or without the CRF (by true labels).
 # - **A quarter of the frames**, each network against itself with all. If few frames favour SegNet, as claim 1's reason
-#   says, it should lose least. In the mean FCN does, though the losses differ by less than half a point. By LIDAR
-#   labels SegNet loses least class accuracy, FCN least in the other two.
-
-# %% jupyter={"source_hidden": true}
-for truth in ("true", "lidar"):
-    of = next(row["differences"][truth]["all"] for row in variants if row["what"] == "planes 0.4 m apart")
-    print(f"planes 0.4 m apart, {truth} labels: " + ", ".join(f"{m} {100 * of[m]['mean']:+.2f}" for m in METRICS))
-    assert all(clear(of[metric]) for metric in METRICS)
+#   says, it should lose least. In pixel accuracy the three lose 0.8 to 0.9 in the mean, and each bar contains zero. In class
+#   accuracy SegNet loses least, 2.8 against 3.3 and 3.4, and its bar overlaps the others.
 
 # %% jupyter={"source_hidden": true}
 by_true = {row["what"]: row["differences"]["true"]["all"] for row in variants}
 few = [f"{name}, 35 frames" for name in NETWORKS.values()]
-changes = ("no occupancy grid", "no 1x1 reduction", "no balancing", "learned from true labels")
-none, reduced, balanced, learned = (by_true[what] for what in changes)
-one_plane = next(row["differences"]["lidar"]["all"] for row in variants if row["what"] == "1 plane")
+changes = ("no occupancy grid", "no 1x1 reduction", "no balancing", "learned from true labels", "1 plane")
+none, reduced, balanced, learned, one_plane = (by_true[what] for what in changes)
+one_lidar = next(row["differences"]["lidar"]["all"] for row in variants if row["what"] == "1 plane")
 for metric in METRICS:
     assert clear(none[metric])
-    assert clear(by_true["planes 0.4 m apart"][metric])
-    assert not any(clear(by_true[planes][metric]) for planes in ("1 plane", "2 planes", "5 planes", "10 planes"))
-    assert clear(one_plane[metric])
-    assert -0.009 < one_plane[metric]["mean"] < -0.004
+    assert not any(clear(by_true[planes][metric]) for planes in ("2 planes", "5 planes", "10 planes"))
     assert max(reduced[metric]["seeds"]) < 0
     in_table = [row["scores"]["true"]["all"][metric]["mean"] for row in table1["rows"]]
     assert learned[metric]["low"] > np.ptp(in_table)
-    losses = [by_true[what][metric]["mean"] for what in few]
-    assert np.argmax(losses) == 1
-    by_lidar = [row["differences"]["lidar"]["all"][metric]["mean"] for row in ablations["frames"]]
-    assert np.argmax(by_lidar) == (0 if metric == "class accuracy" else 1)
-    assert np.ptp(losses) < 0.005
-assert max(abs(by_true["1 plane"][m][end]) for m in METRICS for end in ("low", "high")) < 0.006
+assert [clear(one_plane[metric]) for metric in METRICS] == [False, True, False]
+assert clear(one_lidar["pixel accuracy"])
+assert np.allclose([one_lidar["pixel accuracy"][end] for end in ("low", "high")], (-0.010, -0.005), atol=5e-4)
+assert by_true["planes 0.4 m apart"]["pixel accuracy"]["low"] > -0.005
 assert clear(reduced["class accuracy"])
 assert clear(balanced["pixel accuracy"])
+losses = {metric: np.array([by_true[what][metric]["mean"] for what in few]) for metric in METRICS}
+assert not any(clear(by_true[what]["pixel accuracy"]) for what in few)
+assert np.allclose(losses["pixel accuracy"], -0.009, atol=1e-3)
+assert np.allclose(losses["class accuracy"], (-0.028, -0.033, -0.034), atol=5e-4)
+assert max(by_true[what]["class accuracy"]["low"] for what in few[1:]) < losses["class accuracy"][0]
+
+# %% [markdown]
+# **Trained on a GPU.** A GPU convolves in bfloat16, with eight bits in place of float32's 24. Does that matter? SegNet
+# with the same seeds, trained on a GPU and on a CPU, by their counts of each drive:
+
+# %% jupyter={"source_hidden": true}
+usual = table1_runs(SCALES["reduced"], 3)["segnet"]
+on_cpu, on_gpu = (RunCounts(f"../../docs/results/reduced/{name}_counts.npz") for name in ("table1", "ablations"))
+for truth in ("true", "lidar"):
+    both = (by_seed(usual, counts, NETWORK, truth) for counts in (on_gpu, on_cpu))
+    ours, theirs = (on_cells(counts, "all", KITTI_14) for counts in both)
+    changes = {name: compared(ours, theirs, metric) for name, metric in METRICS.items()}
+    print(f"GPU - CPU, {truth} labels: " + ", ".join(f"{name} {shown(change)}" for name, change in changes.items()))
+    assert abs(changes["pixel accuracy"]["mean"]) < 0.0015
+    assert not any(clear(change) for name, change in changes.items() if name != "pixel accuracy")
+
+# %% [markdown]
+# In the mean it moves pixel accuracy by a tenth of a point. (FCN and DeepLab v2 with all frames are Table 1's, trained on
+# a CPU; with 35 frames they were trained on a GPU. So a tenth of their losses of 0.8 and 0.9 may be the GPU's.)
+#
+# ## Four times as many steps
+#
+# Table 1's networks learn in 500 + 500 steps, the paper's in up to 2000. Would longer training change the order of the
+# networks? `semgrid-edu reproduce table1 --scale long` trains each for 2000 + 2000.
+#
+# **Predict before you run.** By LIDAR labels FCN is ahead of SegNet by a point of pixel accuracy after 500 + 500 steps.
+# And after 2000 + 2000?
+#
+# <details><summary>Answer</summary>Still ahead, by half a point. By these labels all three networks gain about two points,
+# and lie closer together.</details>
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
+long = json.loads(Path("../../docs/results/long/table1.json").read_text(encoding="utf-8"))
+print(" " * 18 + "".join(f"{network:>22}" for network in NETWORKS.values()))
+for truth in ("lidar", "true"):
+    for name, table in (("500 + 500", table1), ("2000 + 2000", long)):
+        scores = [row["scores"][truth]["all"]["pixel accuracy"] for row in table["rows"] if not row["CRF"]]
+        print(f"{truth:<6}{name:<12}" + "".join(f"{shown(score):>22}" for score in scores))
+        segnet, fcn, deeplab = (score["mean"] for score in scores)
+        assert fcn > max(segnet, deeplab)
+        assert abs(segnet - deeplab) < 0.003
+        for what in ("SegNet - FCN", "FCN - DeepLab v2", "SegNet - table of label and state"):
+            one = next(row["scores"][truth]["all"] for row in table["differences"] if row["what"] == what)
+            print(f"    {what + ':':<34} {shown(one['pixel accuracy'])}, class accuracy {shown(one['class accuracy'])}")
+            assert clear(one["pixel accuracy"]) or (truth, name, what[9:14]) == ("true", "500 + 500", "table")
+            assert (one["pixel accuracy"]["mean"] < 0) == (
+                what == "SegNet - FCN" or (truth, what[9:14]) == ("true", "table")
+            )
+
+# %% [markdown]
+# FCN stays ahead of both others, by both kinds of labels; SegNet and DeepLab v2 lie within 0.3 points of each other. (In
+# the paper SegNet leads.) By true labels the longer training brings less than a point, and SegNet is now clearly *behind*
+# the table of image label and state in pixel accuracy, by 0.8 points. The table looks up SegNet's own image labels, and
+# these have become better too. In class accuracy SegNet leads that table by 11 points.
 
 # %% [markdown]
 # ## A turned camera, distance, and how sure the maps are
@@ -239,7 +292,7 @@ assert np.isclose(expected_calibration_error(by_hand), (by_hand.cells * gaps).su
 print(f"by hand: {100 * expected_calibration_error(by_hand):.1f} points")
 for row in ablations["confidence"]:
     errors = 100 * np.array(row["expected calibration error"])
-    print(f"{row['what']:<24} {errors.mean():5.1f} points; seeds {', '.join(f'{e:.1f}' for e in errors)}")
+    print(f"{row['what']:<56} {errors.mean():5.1f} points; seeds {', '.join(f'{e:.1f}' for e in errors)}")
 
 
 # %% jupyter={"source_hidden": true}
@@ -251,7 +304,6 @@ def draw_calibration(ax):
         found[0.0] = {"low": 0, "mean": 0, "high": 0}
         sizes = np.sort([*found])
         low, mean, high = (100 * np.array([found[size][end] for size in sizes]) for end in ("low", "mean", "high"))
-        assert sizes[mean.argmax()] == 0
         ax.errorbar(sizes + 0.06 * (kind == "yaw"), mean, [mean - low, high - mean], fmt=mark, capsize=2, label=kind)
     ax.axhline(0, color="0.5", lw=0.8)
     ax.set(title="camera turned, true labels", xlabel="turned by [degrees]", ylabel="pixel accuracy change [points]")
@@ -260,16 +312,22 @@ def draw_calibration(ax):
 def draw_reliability(ax):
     """Draw how often each method is right when it is how sure, all seeds together."""
     ax.plot([0, 1], [0, 1], color="0.4", lw=0.8)
-    for row, mark in zip(ablations["confidence"], ("o-", "s--", "D:"), strict=True):
+    for row, mark in zip(ablations["confidence"], ("o-", "s--", "D:", "o-.", "", ""), strict=True):
         cells, sure, found = (np.array([d[n] for d in row["diagrams"]]) for n in ("cells", "confidence", "accuracy"))
         some = cells.sum(axis=0) > 1e-3 * cells.sum()  # a handful of cells is no share
-        ax.plot(
-            *((cells * part).sum(0)[some] / cells.sum(0)[some] for part in (sure, found)), mark, ms=4, label=row["what"]
-        )
-    ax.set(title="reliability, true labels", xlabel="probability", ylabel="share right", xlim=(0, 1), ylim=(0, 1))
+        shares = ((cells * part).sum(0)[some] / cells.sum(0)[some] for part in (sure, found))
+        if mark:
+            ax.plot(*shares, mark, ms=4, label=row["what"].replace(", by labels made with the LIDAR", ", LIDAR labels"))
+    ax.set(
+        title="reliability, true labels but for one",
+        xlabel="probability",
+        ylabel="share right",
+        xlim=(0, 1),
+        ylim=(0, 1),
+    )
 
 
-# %% jupyter={"source_hidden": true} alt="three panels: pixel accuracy lost against the angle by which the camera is turned in pitch and yaw; pixel accuracy by distance, from near to far; a reliability diagram of network, CRF and searched CRF against the diagonal"
+# %% jupyter={"source_hidden": true} alt="three panels: pixel accuracy lost against the angle by which the camera is turned in pitch and yaw; pixel accuracy by distance, from near to far; a reliability diagram of network, CRF and searched CRF below the diagonal, and of the network by LIDAR labels along it"
 fig, axes = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
 draw_calibration(axes[0])
 for place, row in enumerate(ablations["distance"]):
@@ -283,49 +341,62 @@ for ax in (axes[0], axes[2]):
 plt.show()
 
 # %% [markdown]
-# On the left, both curves have their top at 0: the network does best with the camera where it was in training (which
-# doesn't prove that it was right there). In the mean pitch costs over five times as much as yaw, though three bars of
-# pitch contain zero. Geometry says why it might: the camera is 1.65 m above the ground, so one degree of pitch moves
-# the ground at 20 m by about $20^2 / 1.65 \cdot \pi / 180 = 4.2$ m towards us or away, one degree of yaw by 0.35 m to
-# the side, less than a cell. Where a bar of pitch is long, the seeds differ.
+# On the left, **yaw** costs little either way, at most 0.6 points at two degrees. **Pitch** isn't symmetric. A camera
+# that is believed to look further down than it does (positive) costs 2.0 points at one degree and 5.3 at two. One that
+# is believed to look further up *gains* pixel accuracy over all cells, 0.8 at one degree! It pays in class accuracy, with
+# 1.8. Over the cells with a semantic class no gain is clear: 0.3 points (-2.6 to 3.2). So what is gained lies in cells
+# without one, whose truth the occupancy grid defines; why, we haven't looked into. The lesson: the right calibration isn't
+# the top of every curve, and pixel accuracy over all cells alone would have chosen a wrong one. Why pitch matters more
+# than yaw, geometry says: the camera is 1.65 m above the ground, so one degree of pitch moves the ground at 20 m by about
+# $20^2 / 1.65 \cdot \pi / 180 = 4.2$ m towards us or away, one degree of yaw by 0.35 m to the side, less than a cell.
 #
-# In the middle, accuracy falls with every band, most from 30-40 m to 40-50 m. In part the labels are why: made with the
-# LIDAR, they have few classes far away. A network that learned from true labels is right in 63 % at 40-50 m, in place
-# of 32 % ([what wrong labels cost](09_truth_costs.ipynb)); but its accuracy falls as well.
+# In the middle, accuracy falls from band to band, from 74 % in the first ten metres to 30 % beyond 60 m. In part the
+# labels are why: made with the LIDAR, they have fewer classes far away. A network that learned from true labels is right
+# in 48 % beyond 60 m ([what wrong labels cost](09_truth_costs.ipynb)); but its accuracy falls as well.
 #
-# On the right, nearly all points lie below the diagonal: by true labels all three are too sure. But this network
-# learned from LIDAR labels. In the mean it is 86 % sure, and by LIDAR labels it is right in 86 % of the cells, by
-# true ones in 69 %. So by labels like those that it learned from, it isn't too sure in the mean. Mean field makes
-# neighbours agree, and so makes cells sure. With the CRF's default weights the 17 points become 29, with the searched
-# ones 24, and all seeds say the same.
+# On the right, by true labels all three are too sure: the network by 9 points. But it learned from LIDAR labels, and by
+# LIDAR labels the error is only 1.5 points (the line along the diagonal): it says what it means, in the words of its
+# labels. Mean field makes neighbours agree, and so makes cells sure. With the CRF's default weights the 9 points become 26,
+# with the searched ones 18.5, and all seeds say the same, by LIDAR labels too (15 and 8).
 
 # %% jupyter={"source_hidden": true}
-by_labels = {row["what"]: row["scores"] for row in ablations["variants"]}
 errors = np.array([row["expected calibration error"] for row in ablations["confidence"]])
-assert (errors[0] < errors[2]).all()
-assert (errors[2] < errors[1]).all()
-by_distance = [row["pixel accuracy"]["mean"] for row in ablations["distance"]]
+for network, with_crf, searched in (errors[:3], errors[3:]):
+    assert (network < searched).all()
+    assert (searched < with_crf).all()
+assert np.allclose(100 * errors.mean(axis=1), (9.2, 25.9, 18.5, 1.5, 15, 7.7), atol=0.05)
+by_distance = np.array([row["pixel accuracy"]["mean"] for row in ablations["distance"]])
 assert (np.diff(by_distance) < 0).all()
-assert np.diff(by_distance).argmin() == 3
-cells, sure = (
-    np.array([diagram[n] for diagram in ablations["confidence"][0]["diagrams"]]) for n in ("cells", "confidence")
-)
-right = [by_labels["usual"][truth]["all"]["pixel accuracy"]["mean"] for truth in ("lidar", "true")]
-print(
-    "sure {:.1f} %, right by LIDAR labels {:.1f} %, by true labels {:.1f} %".format(
-        *100 * np.array([(cells * sure).sum() / cells.sum(), *right])
-    )
-)
-cost = {row["what"]: row["differences"]["true"]["all"]["pixel accuracy"] for row in ablations["calibration"]}
-sizes = ("-2", "-1", "-0.5", "+0.5", "+1", "+2")
-assert all(cost["pitch" + size]["mean"] < 5 * cost["yaw" + size]["mean"] < 0 for size in sizes)
-assert sum(not clear(cost["pitch" + size]) for size in sizes) == 3
+assert np.allclose(by_distance[[0, -1]], (0.74, 0.30), atol=0.005)
+beyond = next(row for row in kept("truth-costs")["rows"] if row["truth"] == "true")["distances"]["beyond 60 m"]
+assert abs(beyond["networks"]["mean"] - 0.48) < 0.005
+rows = {row["what"]: row["differences"]["true"] for row in ablations["calibration"]}
+cost = {what: of["all"]["pixel accuracy"] for what, of in rows.items()}
+assert all(clear(cost[what]) for what in cost if what.startswith("pitch"))
+assert all((cost[what]["mean"] > 0) == ("-" in what) for what in cost if what.startswith("pitch"))
+assert min(cost[what]["mean"] for what in cost if what.startswith("yaw")) > -0.0065
+for what, place, expected in (
+    ("pitch+1", "pixel accuracy", -0.020),
+    ("pitch+2", "pixel accuracy", -0.053),
+    ("pitch-1", "pixel accuracy", 0.008),
+    ("pitch-1", "class accuracy", -0.018),
+):
+    assert abs(rows[what]["all"][place]["mean"] - expected) < 5e-4
+print(f"one degree too far up, cells with a class: {shown(rows['pitch-1']['semantic']['pixel accuracy'])}")
 
 # %% [markdown]
 # ## What this does not show
 #
 # All of it is simulated streets and small networks. Table 3 rests on a single street, so its matrix has no interval. A
 # part whose removal costs nothing here may be needed where streets, cameras or labels differ.
+#
+# ## In five lines
+#
+# 1. A table can be checked against its own definitions; the paper's 0.72 and 0.73 can't both be right for the same cells.
+# 2. Without the occupancy grid this network loses most, without its twenty planes hardly anything.
+# 3. Four times as many steps bring two points by LIDAR labels, less than one by true ones, and leave FCN ahead.
+# 4. A wrong pitch can raise one score and lower another.
+# 5. Probabilities are honest by the labels that were learned; the CRF makes them too sure.
 #
 # ## Further reading
 #

@@ -220,7 +220,10 @@ def _command(experiment: str) -> Callable[..., None]:
         runs: Runs,
         out: Annotated[Path, typer.Option(help="Takes the results: JSON, Markdown and pictures.")],
         scale: Annotated[
-            str, typer.Option(help="quick (minutes), reduced (hours) or paper (GPU); quick+unet adds U-Net to Table 1.")
+            str,
+            typer.Option(
+                help="quick (minutes), reduced (hours), long or paper (GPU); quick+unet adds U-Net to Table 1."
+            ),
         ] = "quick",
         seeds: Annotated[int | None, typer.Option(min=1, max=1000, help="Seeds; by default the scale's own.")] = None,
         workers: Annotated[int | None, typer.Option(help="Runs at a time; one per core by default.")] = None,

@@ -78,8 +78,8 @@ def ablated_runs(scale: Scale, seeds: int) -> dict[str, dict[str, tuple[list[Sco
 def ablation_runs(scale: Scale, seeds: int) -> list[Run]:
     """Return all runs: the usual networks first, then what trains nothing. Parameters are those of `ablated_runs`."""
     rows, usual = ablated_runs(scale, seeds), table1_runs(scale, seeds)["segnet"]
-    lists = (runs for name in ("calibration", "variants", "frames") for runs, _ in rows[name].values())
-    return [*usual, *chain(*lists)]
+    pairs = (pair for name in ("calibration", "variants", "frames") for pair in rows[name].values())
+    return [*usual, *chain(*chain(*pairs))]
 
 
 def ablations(scale: Scale, seeds: int, counted: RunCounts) -> dict:

@@ -1,5 +1,7 @@
 """What differs from the paper at each scale: it stands below every table (section 4)."""
 
+from collections.abc import Sequence
+
 from semgrid_edu.crf import CrfParams
 from semgrid_edu.storage.files import table_beside
 from semgrid_edu.training.run import PAPER_IMAGE, architecture
@@ -29,7 +31,7 @@ def frame_counts(data: str) -> dict[str, tuple[int, int]]:
     return {split: (sum(frames), len(frames)) for split, frames in labelled.items()}
 
 
-def deviations(scale: Scale, field: str, on_gpu: bool = False) -> list[str]:
+def deviations(scale: Scale, field: str, beside_gpu: Sequence[str] | None = None) -> list[str]:
     """Return in what an experiment differs from the paper's, one sentence each.
 
     Parameters
@@ -38,8 +40,9 @@ def deviations(scale: Scale, field: str, on_gpu: bool = False) -> list[str]:
         How large it is.
     field : str
         On which data: "kitti", "chroma" or "synthia".
-    on_gpu : bool
-        Whether the networks were trained on a GPU.
+    beside_gpu : sequence of str, optional
+        The names of the training runs that were done on the CPU when others were done on a GPU; left out when all were
+        done on the CPU.
     """
     labels = _TEXTS["labels"]["true" if field == "synthia" else "made"]
     return [
@@ -48,9 +51,17 @@ def deviations(scale: Scale, field: str, on_gpu: bool = False) -> list[str]:
         *labels,
         *_networks(scale),
         _training(scale),
-        *[_TEXTS["training"]["on_gpu"]] * on_gpu,
+        *_devices(beside_gpu),
         *_said_openly(scale, field),
     ]
+
+
+def _devices(beside_gpu: Sequence[str] | None) -> list[str]:
+    """Return what was trained on a GPU, and what beside it on the CPU, seeds not told apart."""
+    if beside_gpu is None:
+        return []
+    texts, names = _TEXTS["training"], dict.fromkeys(name.rsplit("-seed", 1)[0] for name in beside_gpu)
+    return [texts["gpu"] + texts["beside_gpu"].format(runs=", ".join(names)) * bool(names)]
 
 
 def _said_openly(scale: Scale, field: str) -> list[str]:

@@ -186,24 +186,31 @@ def computed_result(name: str, experiment: Experiment, scale: Scale, seeds: int,
     counted : RunCounts
         What is known about the runs: from their folders, or from what was kept of them.
     """
-    records = [counted.record(run) for run in with_needs(experiment.runs(scale, seeds))]
-    processes = max(record.get("processes", 1) for record in records)
-    gpus = sorted({record.get("device", "cpu") for record in records} - {"cpu"})
+    records = {run: counted.record(run) for run in with_needs(experiment.runs(scale, seeds))}
+    options, beside_gpu = _how_trained(records)
     command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
-    command += "".join(f" --device {device}" for device in gpus)
     about = {
         "experiment": name,
         "title": experiment.title,
-        "command": command + (f" --processes {processes}" if processes > 1 else ""),
+        "command": command + options,
         "scale": scale.name,
         "seeds": seeds,
         "iterations": [scale.image_iterations, scale.grid_iterations],
         "frames and drives": frame_counts(getattr(scale, experiment.field)),
-        "deviations": [*deviations(scale, experiment.field, bool(gpus)), *experiment.deviations],
-        "commits": sorted({str(record["commit"]) for record in records}),
+        "deviations": [*deviations(scale, experiment.field, beside_gpu), *experiment.deviations],
+        "commits": sorted({str(record["commit"]) for record in records.values()}),
         "versions": versions("numpy", "torch", "numba", "scipy"),
     }
     return about | experiment.result(scale, seeds, counted)
+
+
+def _how_trained(records: dict[Run, dict]) -> tuple[str, list[str] | None]:
+    """Return the command's options for that, and which runs trained on the CPU if others trained on a GPU."""
+    processes = max(record.get("processes", 1) for record in records.values())
+    gpus = sorted({record.get("device", "cpu") for record in records.values()} - {"cpu"})
+    options = "".join(f" --device {gpu}" for gpu in gpus) + f" --processes {processes}" * (processes > 1)
+    on_cpu = [run.name for run, record in records.items() if run.is_training and record.get("device", "cpu") == "cpu"]
+    return options, on_cpu if gpus else None
 
 
 def result_files(out: Path, name: str) -> list[Path]:
