@@ -12,7 +12,7 @@
 # **Prerequisites.** Lecture [12](../12_experiments.ipynb), beside which this companion stands: intervals over drives
 # and seeds, paired differences.
 #
-# **Time.** 18 minutes, of which the computer needs less than one.
+# **Time.** 23 minutes, of which the computer needs less than one.
 #
 # All numbers are read from [docs/results](../../docs/results/), or come from code that you see. The ablations' networks
 # were trained on a GPU, those of tables and claims on a CPU. A cell below shows what that changes.
@@ -309,6 +309,7 @@ def draw_calibration(ax):
     ax.set(title="camera turned, true labels", xlabel="turned by [degrees]", ylabel="pixel accuracy change [points]")
 
 
+# %% jupyter={"source_hidden": true}
 def draw_reliability(ax):
     """Draw how often each method is right when it is how sure, all seeds together."""
     ax.plot([0, 1], [0, 1], color="0.4", lw=0.8)
