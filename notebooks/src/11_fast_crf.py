@@ -988,7 +988,8 @@ assert max(classes[1:]) < classes[0] - 0.05
 #
 # On these ten frames pixel accuracy rises by about one point, and class accuracy falls by more than five. Is that the
 # rule? Here is the same difference on 110 frames of streets that no network has seen, with 95 % intervals over drives
-# (measured on the earlier simulator, whose scanner had fewer columns), and beside it what other weights bring:
+# (measured on the earlier simulator, whose scanner had fewer columns; lecture 10's are today's networks), and beside it
+# what other weights bring:
 
 # %% jupyter={"source_hidden": true} tags=["crf-table"]
 rows = ["| trained on 142 simulated frames, judged by true labels of 110 | weights | pixel accuracy | class accuracy |"]

@@ -102,7 +102,7 @@ def truth_policies(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives, the errors, the particles.")] = 0,
     drives: Annotated[int, typer.Option(min=1, max=1000, help="Number of drives, of two seconds each.")] = 20,
     grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
-    lidar: Annotated[str, typer.Option(help="coarse, which the simulated data sets have, or HDL-64E.")] = "coarse",
+    lidar: Annotated[str, typer.Option(help="HDL-64E, KITTI's, or coarse, with a fifth of its columns.")] = "coarse",
     out: Annotated[Path, typer.Option(help="Takes each drive; the same command goes on.")] = Path("truth.json"),
 ) -> None:
     """Measure how wrong each way of making ground truth from LIDAR is, by class and distance (lecture 09)."""

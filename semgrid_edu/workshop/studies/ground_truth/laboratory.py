@@ -80,7 +80,7 @@ def truth_policies(log: Path, seed: int = 0, drives: int = 20, grid: str = "comp
     grid : str
         "compact" or "paper".
     lidar : str
-        "coarse" for the LIDAR of the simulated data sets, or "HDL-64E".
+        "HDL-64E" for KITTI's, or "coarse" for one with a fifth of its columns.
 
     Returns
     -------
