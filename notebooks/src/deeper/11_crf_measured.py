@@ -338,9 +338,8 @@ for name, values in learned["learnt"].items():
 # %% jupyter={"source_hidden": true} tags=["crf-joined"]
 reduced = json.loads((results / "reduced" / "table1.json").read_text(encoding="utf-8"))
 by_network = {row["what"].partition(":")[0].removesuffix(" v2"): row["scores"] for row in reduced["differences"][:3]}
-table = ["| points gained by the default CRF | trained on | judged by | pixel accuracy | class accuracy |"]
-table.append("|---|---|---|---|---|")
-signs = {}
+head = "| points gained by the default CRF | trained on | judged by | pixel accuracy | class accuracy |"
+table, signs = [head, "|---|---|---|---|---|"], {}
 for name, file in FILES.items():
     ways = {("true labels, earlier simulator", "true labels"): kept(file)["test"]["gains"]["CRF"]}
     for judge, key in (("true labels", "true"), ("LIDAR labels", "lidar")):
