@@ -12,6 +12,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10, LabelSet
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.plotting import class_legend, confusion, grid_labels
+from semgrid_edu.workshop.paper.reports.ablations import CONFIDENCE
 from semgrid_edu.workshop.paper.reports.forest import draw_scores, legend_entries
 from semgrid_edu.workshop.paper.runs.claim_runs import FIGURES, figure_runs
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
@@ -73,7 +74,7 @@ def ablations_picture(result: dict) -> Figure:
     """
     figure, axes = plt.subplots(1, 4, figsize=(19, 6), layout="constrained")
     others = [row for row in result["variants"] if row["what"] != "usual"]
-    charts = {"trained differently": others + result["frames"], "wrong calibration": result["calibration"]}
+    charts = {"trained differently": others + result["frames"], "wrong by degrees or metres": result["calibration"]}
     for ax, (title, rows) in zip(axes, charts.items(), strict=False):
         draw_scores(ax, {row["what"]: row["differences"]["true"]["all"]["pixel accuracy"] for row in rows})
         ax.axvline(0, color="0.4", linewidth=0.8)
@@ -83,6 +84,7 @@ def ablations_picture(result: dict) -> Figure:
     for ax in axes[:3]:
         ax.invert_yaxis()
     _draw_reliability(axes[3], result["confidence"])
+    figure.legend(*legend_entries(axes[0]), loc="outside lower center", ncols=3)
     return figure
 
 
@@ -93,11 +95,11 @@ def _draw_reliability(ax: Axes, rows: list[dict]) -> None:
         cells, confidence, accuracy = (
             np.array([diagram[name] for diagram in row["diagrams"]]) for name in ("cells", "confidence", "accuracy")
         )
-        some = cells.sum(axis=0) > 0
+        some = cells.sum(axis=0) > 1e-3 * cells.sum()  # a handful of cells is no share
         mean, right = ((cells * part).sum(axis=0)[some] / cells.sum(axis=0)[some] for part in (confidence, accuracy))
-        ax.plot(mean, right, marker=marker, label=row["what"])
-    ax.set(title="reliability", xlabel="confidence: mean probability", ylabel="accuracy", xlim=(0, 1), ylim=(0, 1))
-    ax.legend(loc="upper left")
+        ax.plot(mean, right, marker=marker, label=row["what"].replace(CONFIDENCE["lidar"], ",\nby LIDAR labels"))
+    ax.set(title="reliability", xlabel="confidence: mean probability", ylabel="share right", xlim=(0, 1), ylim=(0, 1))
+    ax.legend(loc="upper left", bbox_to_anchor=(1.02, 1))
 
 
 TITLES = {"true": "true labels", "network": "SegNet"}

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS, pixel_accuracy
 from semgrid_edu.workshop.paper.reports.deviations import frame_counts
-from semgrid_edu.workshop.paper.reports.forest import draw_scores
+from semgrid_edu.workshop.paper.reports.forest import draw_scores, legend_entries
 from semgrid_edu.workshop.paper.runs.claim_runs import structure_runs
 from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.scales import Scale
@@ -97,9 +97,13 @@ def structure_picture(result: dict) -> Figure:
     result : dict
         From `structure`.
     """
-    rows = {f"{row['learned']} to {row['tested']}": row["scores"]["all"]["pixel accuracy"] for row in result["rows"]}
-    figure, ax = plt.subplots(figsize=(8, 1.2 + 0.5 * len(rows)), layout="constrained")
+    rows = {
+        f"learned from {row['learned']},\ntested on {row['tested']}": row["scores"]["all"]["pixel accuracy"]
+        for row in result["rows"]
+    }
+    figure, ax = plt.subplots(figsize=(8, 1.6 + 0.5 * len(rows)), layout="constrained")
     draw_scores(ax, rows)
     ax.invert_yaxis()
-    ax.set(xlabel="pixel accuracy, per cent of all labelled cells")
+    ax.set(xlabel="pixel accuracy, per cent of all labelled cells; labels made with the LIDAR")
+    figure.legend(*legend_entries(ax), loc="outside lower center", ncols=3)
     return figure
