@@ -129,7 +129,7 @@ def test_names_tell_runs_apart_and_stages_are_shared(scale):
 
 
 def test_an_unknown_scale_is_refused():
-    with pytest.raises(ArgumentError, match="quick, reduced, paper"):
+    with pytest.raises(ArgumentError, match="quick, reduced, long, paper"):
         scale_named("huge")
 
 
