@@ -58,7 +58,7 @@ def results():
 @pytest.fixture
 def found(inputs, results, tmp_path):
     if not results:
-        results.update(crf_search.search_crf(*inputs, tmp_path / "log.json", n_trials=TRIALS))
+        results.update(crf_search.search_crf(*inputs, tmp_path / "whole.json", n_trials=TRIALS))
     return results
 
 
