@@ -6,6 +6,7 @@ import pytest
 
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.metrics import METRICS, pixel_accuracy
+from semgrid_edu.workshop.paper.reports.ablations import ablated_runs, ablation_runs
 from semgrid_edu.workshop.paper.reports.claims import CLAIMS, STATEMENTS, Reading, called, called_void, stated
 from semgrid_edu.workshop.paper.reports.deviations import deviations
 from semgrid_edu.workshop.paper.reports.drop import drop_markdown
@@ -296,6 +297,11 @@ def test_every_deviation_of_scale_is_told(scale):
     assert "eight runs" in told
     assert ("64 elevations" in told) == (scale.name != "quick")
     assert "64 elevations" not in "\n".join(deviations(scale, "synthia"))  # of a depth image, without a scanner
+    assert "GPU" not in told
+    assert "Trained on the CPU" not in "\n".join(deviations(scale, "kitti", []))
+    assert "CPU, in float32: image-a, grid-b." in "\n".join(
+        deviations(scale, "kitti", ["image-a-seed0", "image-a-seed1", "grid-b-seed0"])
+    )
 
 
 def drop(pixel, by_class):
@@ -319,6 +325,12 @@ def test_the_page_shows_quote_rule_labels_and_every_verdict():
     assert table.count("reproduced") == 2
     assert table.count(" - ") == 2
     assert "Trained on LIDAR labels, judged by true labels: **reproduced**" in text
+
+
+@pytest.mark.parametrize("scale", SCALES.values(), ids=SCALES)
+def test_ablations_do_every_run_that_a_row_reads(scale):
+    pairs = [pair for rows in ablated_runs(scale, scale.seeds).values() for pair in rows.values()]
+    assert {run for pair in pairs for runs in pair for run in runs} <= set(ablation_runs(scale, scale.seeds))
 
 
 @pytest.mark.parametrize("scale", SCALES.values(), ids=SCALES)
