@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Lecture [02](../02_grids.ipynb): one beam over five cells, log-odds, the clamp.
 #
-# **Time.** 30 minutes, of which the computer needs less than one.
+# **Time.** 31 minutes, of which the computer needs less than one.
 
 # %% jupyter={"source_hidden": true}
 from dataclasses import replace
@@ -444,6 +444,19 @@ assert sum(sorted(porous for porous, _ in flips)[-2:]) > 0.9 * sum(porous for po
 #   has lost it.
 # - The ground is one height per cell, so a bridge over the road or a car park with two floors has no place in it.
 # - All numbers of this page are from simulated streets, whose mesh, hedges and parks somebody invented.
+#
+# ## In five lines
+#
+# 1. On a bank a flat rule calls bare grass an obstacle. Carrying the ground along, bin by bin, removes more than 85 % of
+#    these false hits in three of four simulated parks, and 55 % in the fourth, where the walk loses the bank.
+# 2. Asking each cell for its beam, in place of each ray for its cells, hits the same cells and is the more careful of
+#    the two: where they differ, walking the ray says free in 98 %.
+# 3. A post stays in the map if its returns outweigh the passes between two meetings: with two returns in every fifth
+#    scan it is always there, with one in one scan of five.
+# 4. Wire mesh is neither full nor empty. One return overrules all passes of its scan, so the fence stays whole; the
+#    price is that what lies behind it stays unknown.
+# 5. On five simulated streets porous hedges are first passed, then hit, more often than opaque ones; two of the streets
+#    make nearly all of it. A log-odds grid hardly suffers from that.
 #
 # ## Further reading
 #

@@ -400,6 +400,19 @@ assert share < 5
 # scanner. The errors against BOF say nothing about the truth. For a real street see the end of lecture
 # [04](../04_cmcdot.ipynb).
 #
+# ## In five lines
+#
+# 1. A map that is mixed by parts of a cell blurs for ever; one that takes the nearest cell may never move. Scrolling by
+#    whole cells and keeping the remainder does neither.
+# 2. More particles bring CMCDOT to BOF, with BOF's errors, and not to the truth. With 100 of them it is luck whether a
+#    car is found, with 30,000 it isn't.
+# 3. On twenty simulated drives CMCDOT finds 61.6 % of all cells that move, and more than 96 % of those with returns,
+#    within 25 m, that have been in view for 1.5 s; a binary grid finds none.
+# 4. Somebody who sets out is noticed after about 1.5 m, at 1.4, 2.8 and 5 m/s alike; a stroller at 0.7 m/s isn't within
+#    three seconds.
+# 5. Behind a van 3.5 m wide a car's particles last until it comes out; behind one of 6 m they fade, and the car counts
+#    as new. Without objects nothing says that what went in comes out.
+#
 # ## Further reading
 #
 # - Douc, Cappé, Moulines, *Comparison of resampling schemes for particle filtering*, ISPA 2005.
