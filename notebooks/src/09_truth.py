@@ -2,8 +2,8 @@
 # # 09 · Where truth comes from, and how wrong it is
 #
 # **In one sentence.** The maps that a network learns from are made from labelled images and LIDAR returns, in five
-# steps; each step makes errors of its own, and on a simulated street, where you know what is really there, you can count
-# them.
+# steps; these make errors of their own, and on a simulated street, where you know what is really there, you can
+# count them.
 #
 # **You will be able to**
 # - make a semantic grid from an image's labels and one LIDAR scan, step by step, as the paper does;
@@ -128,11 +128,10 @@ assert not d_separated(graph.model, "x1", "x2", given=("m",))
 # is **open** from $x_1$ to $x_2$, that is, lets information pass. (Those through $y$ are closed, because $y$ is their common effect and isn't given.) The
 # calibration is *not* known, so they all share one error. Soon we shall see what that does to a vote.
 #
-# The recipe also leaves edges out. It counts votes as if $\kappa$ were known (dashed, with its price: a vote of nine
-# returns is wrong with probability 0.10, where independent errors of the same size would leave 0.012). It doesn't ask
-# $o$ once there is a vote. It joins the labels of neighbours $y'$ only in the clean-up, without asking what else is known of them. And
-# it takes a return to lie on the very thing that its pixel shows (dashed, from $a_1$ to $d_1$). We begin with that
-# one.
+# The recipe also leaves edges out. It counts votes as if $\kappa$ were known (dashed; step 3 explains the
+# price). It doesn't ask $o$ once there is a vote. It joins the labels of neighbours $y'$ only in the clean-up,
+# without asking what else is known of them. And it takes a return to lie on the very thing that its pixel shows
+# (dashed, from $a_1$ to $d_1$). We begin with that one.
 #
 # ## Step 1: which returns does the camera see?
 #
@@ -263,7 +262,7 @@ plt.show()
 # **The rule does almost nothing here.** It drops 3 % of the hidden returns of 20 scans, because two of so few returns
 # seldom meet on one pixel. On the one scan of an HDL-64E that we tried, with twice as many returns in view, it still
 # leaves more than four in five. Not every hidden return does harm: a quarter of them bring their cell's true label
-# all the same (last line), as grass behind grass does. In the picture, most hidden returns (red crosses) are at the
+# all the same (last line), as road behind road does. In the picture, most hidden returns (red crosses) are at the
 # fence, others at the poles, the bicycle and far down the road. The LIDAR looks between the pickets and over them
 # onto the grass and the house, and the pixel shows a picket. That is the patch **A** of the opening picture.
 #
@@ -377,11 +376,12 @@ ax.legend(frameon=False)
 plt.show()
 
 # %% [markdown]
-# With errors of outlines alone (triangles) a majority soon is nearly always right. With those of the calibration as well
-# (circles) its error sinks to 0.1 (dotted) and no further. Remember this line when we add up nineteen scans. *What stands
-# wins* (squares) gets worse for a road cell the more returns there are. (For a car cell it gets better; so it helps what
-# is thin.) Where all returns of a cell bring one class, the two rules are the same. How often do they differ with one
-# scan, and with nineteen?
+# With errors of outlines alone (triangles) a majority soon is nearly always right. With those of the calibration as
+# well (circles) its error sinks to 0.1 (dotted) and no further. That is the price in the graph: with nine
+# returns 0.10, where independent errors as large would leave 0.012. Remember this line when we add up nineteen
+# scans. *What stands wins* (squares) gets worse for a road cell the more returns there are. (For a car cell it gets
+# better; so it helps what is thin.) Where all returns of a cell bring one class, the two rules are the same. How many
+# cells hold two classes with one scan, and nineteen?
 #
 # ## Step 4: what has no label
 #
@@ -486,10 +486,10 @@ np.testing.assert_array_equal(clean_up(votes, spec.cell), close_and_spread(votes
 # %% [markdown]
 # ### The graph of the clean-up
 #
-# Below we shall see that most wrong labels come from this step, so let us draw it as well. Cell 1 has a vote, cell 2 has
-# none. Two neighbours usually hold the same, say with probability 0.9. The finished label $t_2$ of cell 2 is
-# the neighbour's vote $y_1$, if that is ground and cell 2 was observed at all. Which of the four states $o_2$ is the most
-# probable, FREE or STATIC, the clean-up doesn't ask: this edge is cut.
+# Below we shall see that most wrong labels come from this step, so let us draw it as well. Cell 1 has a vote, cell 2
+# has none. Two neighbours usually hold the same, say with probability 0.9. The finished label $t_2$ of cell 2 is the
+# neighbour's vote $y_1$, if that is ground and cell 2 was observed at all. Whether $o_2$ is then FREE, STATIC or
+# DYNAMIC, the clean-up doesn't ask: this edge is cut.
 #
 # **Predict before you run.** Cell 1 is road for sure, and cell 2 is STATIC. A road cell is STATIC with probability 0.05, a
 # car cell with 0.6. How probable is road in cell 2? What does the clean-up say?
@@ -565,8 +565,8 @@ plt.show()
 # road still has gaps. The third map only closes things, which keeps them thinner, and lets the ground spread by 3 m
 # instead: out of the image (**C**) and into the cars (**D**), as the graph said. It is what `lidar_truth` makes, cell for cell.
 #
-# In the paper a person looks at each map in the end and corrects it. No function can do that for us, so our numbers
-# are those of the recipe before a person sees its result.
+# In the paper a person looks at each map in the end and corrects it if necessary. No function can do that for us, so
+# our numbers are those of the recipe before a person sees its result.
 #
 # ## How wrong is it?
 #
@@ -727,13 +727,13 @@ truth_errors(counts_of(result, PAPER), result["bands"], KITTI_14)
 plt.show()
 
 # %% [markdown]
-# Look at the panel in the middle first, and at the first printed line, which adds up its classes. Within 30 m a tenth
-# of the cells that the camera sees lack a label, or fewer; in the farthest band six in ten do, because few rings
-# reach the ground there (**B** in the opening picture). Of the cells of cars (dark blue triangles) more than a third lack
-# a label at every distance: only the sides that face us send returns (**D**). On the right, thin things stand out. About
-# three in four cells labelled signage, bicycle or fence hold something else (second line, all distances), of those
-# labelled car one in three. A thin thing fills few cells of its own, and the returns that pass it carry its
-# label to many others. (A share of fewer than 50 cells isn't drawn, so the panels have gaps.)
+# Look at the panel in the middle first, and at the first printed line, which adds up its classes. Within 30 m about a
+# tenth of the cells that the camera sees lack a label, or fewer; in the farthest band six in ten do, because few
+# rings reach the ground there (**B** in the opening picture). Of the cells of cars (dark blue triangles) more than a
+# third lack a label at every distance: only the sides that face us send returns (**D**). On the right, thin things
+# stand out. About three in four cells labelled signage, bicycle or fence hold something else (second line, all
+# distances), of those labelled car one in three. A thin thing fills few cells of its own, and the returns that pass
+# it carry its label to many others. (A share of fewer than 50 cells isn't drawn, so the panels have gaps.)
 #
 # ## Choices on which people disagree
 #
@@ -848,10 +848,11 @@ plotting.animate(windows_growing(), period=0.6, alt="smearing, carving and carry
 
 # %% [markdown]
 # In the smeared map the car that overtakes us leaves a streak on the road, up to 16 m ahead, and the oncoming cars
-# melt into one band on the left (5 to 10 m beside us). Carving removes the streak, and nearly all of the car with it. Of
-# the band it removes only a part, because the filter doesn't take each of those cells for DYNAMIC at each instant. Carrying leaves a patch
-# where the overtaking car is. Otherwise it looks much like carving, with single cells of car strewn about, which were
-# carried to a wrong place. None of the three shows the oncoming cars as the truth does.
+# melt into one band with the parked ones on the left (5 to 10 m beside us). Carving removes the streak, and nearly
+# all of the car with it. Of the oncoming cars it removes only a part, because the filter doesn't take each cell
+# for DYNAMIC at each instant. Carrying leaves a patch where the overtaking car is. Otherwise it looks like
+# carving, with single cells of car strewn about, which were carried to a wrong place. None of the three shows the
+# oncoming cars as the truth does.
 #
 # ### The policy laboratory
 #
@@ -949,10 +950,10 @@ plt.show()
 # of one scan. In the right one (wrong labels) those with one image are longer than the first row, those with own images
 # not always. The second table compares two policies drive by drive. In its lines:
 #
-# - **More scans find more, in each drive** (a to c). The share of wrong labels rises or falls, by at most 2.4 points. (The
-#   vote changes, too: by majority, one scan has fewer wrong labels than any of the three.) Three in ten of
-#   their labels lie in cells that the camera doesn't see (column *hidden* above), of one scan's one in six. When both
-#   keep only what it sees (d), nineteen scans still find more.
+# - **More scans find more, in each drive** (a to c). The share of wrong labels rises or falls, by at most 2.4 points.
+#   (The vote changes, too: by majority, one scan has fewer wrong labels than any of the three.) Three in ten of their
+#   labels lie in cells that the camera doesn't see (column *hidden* above), of one scan's one in six. When both keep
+#   only what it sees (d), nineteen carved scans still find more.
 # - **One image for all scans makes more labels wrong than own images** (e to g), in 14 to 16 drives. What another scan
 #   measured behind a car takes the label of the car, as the hidden return of step 1 did.
 # - **With own images, carving makes fewer labels wrong, in each drive, and carrying makes more, in most** (h, i). Carried
@@ -1120,9 +1121,9 @@ plt.show()
 # %% [markdown]
 # On these ten frames one degree to either side raises wrong labels from 22 % to 28 %. One degree of nodding raises
 # them to 25 or 48 %, depending on its sign. With a positive sign each return takes the label of a pixel *above* its
-# own: the far road gets the labels of trees, cars and sidewalk (right map). With a negative sign it takes the label
-# of a pixel below, and below the road there is mostly road. So a shift by this sign, 18 cells of 0.2 m at 20 m, spoils little
-# of the map: a label that moves from road to road does no harm. The harm is at the outlines.
+# own: the far road gets the labels of trees and cars (right map). With a negative sign it takes the label of a pixel
+# below, and below the road there is mostly road. So a shift by this sign, 18 cells of 0.2 m at 20 m, spoils little of
+# the map: a label that moves from road to road does no harm. The harm is at the outlines.
 #
 # **Where no beam went.** A recipe can only carry what was measured. Of the cells that the camera sees, how many were
 # hit by a labelled return at all?

@@ -26,7 +26,8 @@ def test_reference_passes_whatever_the_variant(source, choose_variant):
     cells = [cell for cell in read_percent(source).cells if cell.cell_type == "code"]
     names = {"__name__": "__main__"}
     for cell in cells:
-        exec(cell.source, names)
+        if not is_grade(cell):  # the usual variant's tests are run with the exercise's catalogue
+            exec(cell.source, names)
     for variant in (1, 2, 3):
         choose_variant(variant)
         for cell in filter(is_grade, cells):

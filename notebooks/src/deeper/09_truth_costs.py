@@ -294,11 +294,11 @@ assert all(clear[key] == 1 for key in [("true", n) for n in usual] + list(produc
 #
 # ## In five lines
 #
-# 1. Errors that vary among frames that look alike are evened out; errors that come with what the image shows are
-#    learned.
+# 1. By hand: errors that vary among frames that look alike are evened out; errors that come with what the image shows
+#    are learned.
 # 2. Class weights make rare classes louder, and their false labels, too.
-# 3. Test labels that were made like the training labels favour the network that learned from them: true labels cost
-#    8 points by the usual labels, and brought 9 by the true ones.
+# 3. Test labels that were made like the training labels favour the network that learned from them: over all cells
+#    true labels cost 8 points by the usual labels, and brought 9 by the true ones.
 # 4. Over cells with a class, better labels brought the network less than half of their own gain.
 # 5. True labels brought most at fences, buildings and cars; even with them, small things had an intersection over union
 #    of 16 to 22 %.
