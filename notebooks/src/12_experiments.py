@@ -112,7 +112,7 @@ print(f"scale: {table1['scale']}; seeds: {table1['seeds']}; test frames: {frames
 #
 # The results below are read from [docs/results/reduced](../docs/results/reduced/), unless a sentence names another
 # place or you see the code. They are of test streets on which nothing was chosen. The rule by which claims are judged was
-# written before these results. The sentences that name an outcome came later, and a cell prints or asserts what they say.
+# written before these results. The sentences that name an outcome came later.
 #
 # ## A score has two parents
 #
@@ -330,16 +330,16 @@ for metric in METRICS.values():
 # %% jupyter={"source_hidden": true}
 for row in kept("structure")["rows"]:
     if row["learned"] == row["tested"]:
-        score, (frames, drives) = row["scores"]["all"]["pixel accuracy"]["mean"], row["frames and drives"]
+        score, (n_frames, n_drives) = row["scores"]["all"]["pixel accuracy"]["mean"], row["frames and drives"]
         by_drives, by_frames = (100 * row["half-width"][unit] for unit in ("drives", "frames"))
-        print(f"{frames} frames of {drives:>3} drives: {100 * score:.1f} %, give or take ", end="")
+        print(f"{n_frames} frames of {n_drives:>3} drives: {100 * score:.1f} %, give or take ", end="")
         print(f"{by_drives:.1f} points; were the frames independent, {by_frames:.1f}")
 assert by_drives > 12
 assert by_frames < 1.5
 
 # %% [markdown]
-# From four runs we would know SegNet's score only to within 12 points, where differences in our Table 1 are of one or
-# two. To take their frames for independent would hide that.
+# From four runs we would know SegNet's pixel accuracy only to within 12 points, where rows of our Table 1 differ by at
+# most two. To take their frames for independent would hide that.
 #
 # ## Seeds vary too
 #
@@ -505,7 +505,7 @@ for metric in METRICS:
 # as in the paper, though by less. But FCN is also better than SegNet, and in the paper it is worse. (By true labels all
 # fifteen differences over all cells have the same signs, and none of their intervals contains zero: the cell asserts it.)
 #
-# Two things to notice about the *kind* of evidence. First, the paper's column has no interval, so a difference of 0.1
+# Two things about the *kind* of evidence. First, the paper's column has no interval, so a difference of 0.1
 # or 0.2 points there may be anything. Second, the metrics may disagree, because they ask different questions. Take 90
 # cells of road and 10 of pedestrians. A network that says *road* everywhere has 90 % pixel accuracy and 50 % class
 # accuracy. One that finds 80 of the road cells and 8 of the pedestrians has 88 % and 84 %. Which is better depends on
@@ -577,8 +577,8 @@ for what, scores in free.items():
 # %% [markdown]
 # Of the six that use no true labels, SegNet is clearly behind none. But the share of all cells that are right doesn't
 # tell it from the table or from naive Bayes, which look up one pixel and one state for each cell and nothing around it.
-# SegNet leads in class accuracy, by 13 or 14 points: its loss was balanced, and their counts weren't. It also leads on
-# the cells with a semantic class, by 2 points of pixel accuracy and 8 or 9 of FmIoU. Given true image labels, the table
+# Over all cells SegNet leads in class accuracy, by 13 or 14 points: its loss was balanced, and their counts weren't.
+# It also leads on semantic cells, by 2 points of pixel accuracy and 8 or 9 of FmIoU. Given true image labels, the table
 # beats SegNet in pixel accuracy, and geometry in all metrics. (No baseline is an upper limit: another rule for carrying labels may do
 # better.)
 #
@@ -725,7 +725,8 @@ for number, claim in claims["claims"].items():
 
 # %% [markdown]
 # A verdict is the beginning of reading, not its end. Choose a claim and look at its statements. Each number is drawn as
-# its distance from its limit, on the claimed side to the right (for claim 4 on a logarithmic scale beyond five points).
+# its distance from its limit, on the claimed side to the right. (The figure shows each claim's first reading, and
+# claim 4 on a logarithmic scale beyond five points.)
 # Ask: *which* statement decides? By how much? Is a "?" a wide bar (too little data) or a short one around zero (hardly
 # any effect)?
 
@@ -780,23 +781,24 @@ plt.show()
 #   order *and* a reason. Our statements test the order alone, over all cells, and FCN is clearly ahead of SegNet,
 #   although our SegNet is still the smallest of the three. That speaks against the reason, too, but weakly: all three have less than a
 #   million parameters. Whether SegNet loses least when frames are few is in the companion. By true labels the bar of
-#   one statement, class accuracy, lies wholly on the wrong side, and it is a "?" all the same: that is Holm's doing.
+#   one statement, class accuracy, lies wholly on the wrong side, yet is a "?": Holm's doing.
 # - **Claim 2** is reproduced by both kinds of labels for networks that learned from LIDAR labels. For one that learned
 #   from true labels we can't tell by either: judged by LIDAR labels the CRF adds three points of pixel accuracy and
-#   costs next to no class accuracy, and by true labels it is the other way round. No statement tests *slightly*.
+#   costs next to no class accuracy; by true labels it adds 0.2 and costs five. No statement tests *slightly*.
 # - **Claims 3 and 4** rest on twenty routes each, not on the two test drives and the one of Tables 2 and 3. You have
 #   seen what an interval over two drives is worth; from a single drive none can be computed. Claim 4 fails by its poles:
 #   our network calls a sixth as many cells pole as there are. Road and car are as claimed, the rest is open.
 # - **Claim 5** has four readings and gets three different verdicts. A network that learned from true labels, judged by
-#   LIDAR labels, gets *fewer* cells right up to 20 m than from 20 to 40 m. So before you say that near is better, say
-#   by which labels.
+#   LIDAR labels, gets a *smaller* share right up to 20 m than from 20 to 40 m. So before you say that near is better,
+#   say by which labels.
 # - **Claim 6**, the car on its top, could only be *shown* in the paper. We count: 74 % of its cells are called car, but
 #   only 47 % of those of upright cars on the same drives (nobody has looked into why). The control is a network
 #   without the occupancy grid, with 26 points less. Without it "it is called car" wouldn't say *why*.
 # - **Claim 8** expects that the reduction costs no accuracy. It even adds some: by LIDAR labels 1.7 points of pixel
 #   accuracy (1.2 to 2.2). (In its last rows each circle is a round of timing on one machine.)
 # - **Claims 10 and 12**, end to end and several planes, are what the paper is about. Both are a "?", with short bars:
-#   by true labels, whatever either brings or costs is at most a point of pixel accuracy and 1.6 points of the others.
+#   by true labels, either brings or costs at most a point of pixel accuracy and 1.6 points of the others. End to end's
+#   bar of pixel accuracy lies wholly on the wrong side there (-1.0 to -0.03): Holm's doing again.
 # - **Claim 11**: over all cells balancing costs two points of pixel accuracy and brings fifteen of class accuracy. "Better in every
 #   metric" is refuted by what balancing is made for (lecture [08](08_fusion.ipynb)).
 
@@ -831,8 +833,8 @@ for reading in found["5"]:
 # semgrid-edu reproduce table1 --scale quick --runs RUNS --out OUT      # add --plan to see only how long it will take
 # ```
 #
-# It plans about three minutes, so it isn't run here. Its table is in
-# [docs/results/quick](../docs/results/quick/table1.md), made with today's simulator. *Quick* says what it is: 18
+# It takes a few minutes, so it isn't run here. Its table is in
+# [docs/results/quick](../docs/results/quick/table1.md). *Quick* says what it is: 18
 # frames to learn from, 12 + 10 steps, two seeds, eight test drives.
 #
 # **Predict before you run.** Fill in your own table: pixel accuracy of each network, in per cent, by labels made with
@@ -895,10 +897,10 @@ assert min(crf_gains) > 0
 #
 # </details>
 #
-# Is SegNet now better than FCN, as the paper says, or worse, as our long runs say? **Neither follows.** Two seeds and
-# eight drives give no interval, so the rule refuses, and it does so before it looks at the means. That is what it is
-# for: these means look as good as those of any published table. What a quick run does show is that every step works
-# on your machine. That its ranking isn't the one of the long runs has many possible reasons: fewer frames, fewer
+# Is SegNet now better than FCN, as the paper says, or worse, as our reduced runs say? **Neither follows.** Two seeds
+# and eight drives give no interval, so the rule refuses, and it does so before it looks at the means. That is what it
+# is for: these means look as good as those of any published table. What a quick run does show is that every step works
+# on your machine. That its ranking isn't that of the reduced runs has many possible reasons: fewer frames, fewer
 # steps, two seeds, other streets.
 #
 # ## What the scale permits
@@ -914,7 +916,7 @@ for line in table1["deviations"]:
 #
 # | kind of sentence | may we say it? |
 # |---|---|
-# | "Our SegNet has more pixel accuracy than the paper's" | Not as evidence: other data, other labels, other cells. |
+# | "Our FCN has more pixel accuracy than the paper's" | Not as evidence: other data, other labels, other cells. |
 # | "The effect of the CRF has the same sign as in the paper" | Yes, if the interval says so: both sides of the difference changed alike. |
 # | "The paper's claim is true" | No. It is reproduced *here*, with small networks on simulated streets. |
 # | "The paper's claim is false" | No. It isn't reproduced here. Any deviation of the list may be the reason. |
@@ -1027,11 +1029,11 @@ plt.show()
 
 # %% [markdown]
 # The two upper rows of each panel belong to the occupancy grid, the two lower ones to the planes. On the left stands
-# what you just made, with true labels to learn from; on the right the same comparison from the committed results,
-# with longer training, end to end, on more data, from LIDAR labels. Of the occupancy grid both panels say the same,
-# though by other amounts. Of the planes neither sees a difference, but the bars on the right are at most two fifths as
-# long as those stored here on the left. If an interval contains zero, the honest sentence is: *this experiment cannot
-# tell*. That isn't a failure. It tells you how large an experiment would have to be: to halve a bar that drives
+# what you just made, with true labels to learn from; on the right the same comparison from the committed results, on
+# 110 drives, with longer training, end to end, on more data, from LIDAR labels. Of the occupancy grid both panels say
+# the same, though by other amounts. Of the planes neither sees a difference, but the bars on the right are at most two
+# fifths as long as those stored here on the left. If an interval contains zero, the honest sentence is: *this
+# experiment cannot tell*. That tells you how large an experiment would have to be: to halve a bar that drives
 # dominate, you need four times as many drives.
 #
 # ## Where this breaks

@@ -14,8 +14,9 @@
 #
 # **Time.** 23 minutes, of which the computer needs less than one.
 #
-# All numbers are read from [docs/results](../../docs/results/), or come from code that you see. The ablations' networks
-# were trained on a GPU, those of tables and claims on a CPU. A cell below shows what that changes.
+# All numbers are read from [docs/results](../../docs/results/), or come from code that you see. The networks of the
+# ablations and of 2000 + 2000 steps were trained on a GPU, those of Tables 1 and 3 and the claims on a CPU. A cell
+# below compares.
 
 # %% jupyter={"source_hidden": true}
 import json
@@ -121,8 +122,8 @@ for one in (errors, marking, poles):
 # 0.36 class accuracy and 0.73 FmIoU.
 #
 # **Predict before you run.** Class accuracy is the mean of the diagonal. Pixel accuracy is a mean of the same diagonal,
-# weighted by how many cells a class has. Void is right in 93 % of its cells, no other class in more than 57 %. What
-# does a pixel accuracy of 72 % then say about the share of void? And can FmIoU be larger than pixel accuracy?
+# weighted by how many cells a class has. Void is right in 93.35 % of its cells, no other class in more than 57.42 %.
+# What does a pixel accuracy of 72 % then say about the share of void? And can FmIoU be larger than pixel accuracy?
 #
 # <details><summary>Answer</summary>
 #
@@ -178,23 +179,22 @@ for metric in METRICS:
 
 # %% [markdown]
 # The usual network has 20 planes 0.2 m apart, sees the occupancy grid, reduces the planes, balances the classes, and
-# learns from labels made with the LIDAR. The *reduction* is the learned 1x1 convolution that makes few planes of many.
-# What do the bars say, by true labels over all cells? (Beyond one point the axis is logarithmic, so that half a point
-# can be seen beside twenty.)
+# learns from labels made with the LIDAR. The *reduction* is the learned 1x1 convolution.
+# What do the bars say, by true labels over all cells? (Beyond one point the axis is logarithmic.)
 #
 # - **Occupancy grid.** Without it 16 points of pixel accuracy are lost, and 29 of class accuracy.
-# - **Planes.** One plane, the lowest, is half a point behind twenty in the mean. The bar of pixel accuracy just contains
-#   zero, that of class accuracy doesn't. Over the cells with a class it is 1.3 points behind, clearly, and by LIDAR labels
-#   over all cells clearly, too, by 0.5 to 1.0. Two, five or ten
-#   planes we can't tell from twenty by true labels. Planes 0.4 m apart in place of 0.2 m cost at most half a point of
-#   pixel accuracy.
+# - **Planes.** One plane, the lowest, is 0.6 points behind twenty in both metrics. The bar of pixel accuracy just
+#   contains zero, that of class accuracy doesn't. Pixel accuracy is clearly behind over the cells with a class, by 1.3
+#   points, and by LIDAR labels over all cells, by 0.5 to 1.0. (In claim 12, trained on a CPU, the latter isn't clear.)
+#   Two, five or ten planes we can't tell from twenty by true labels. Planes 0.4 m apart in place of 0.2 m cost at most
+#   half a point of pixel accuracy.
 # - **Reduction.** Without it all seeds are worse, by very different amounts, and class accuracy is clearly worse, by 8.
 # - **Balancing** costs 2 points of pixel accuracy and brings 15 of class accuracy.
 # - **True labels to learn from** bring 9 points of pixel accuracy and 16 of class accuracy, more than any two
 #   networks of Table 1 differ, with or without the CRF (by true labels).
 # - **A quarter of the frames**, each network against itself with all. If few frames favour SegNet, as claim 1's reason
 #   says, it should lose least. In pixel accuracy the three lose 0.8 to 0.9 in the mean, and each bar contains zero. In class
-#   accuracy SegNet loses least, 2.8 against 3.3 and 3.4, and its bar overlaps the others.
+#   accuracy SegNet loses least, 2.8 against 3.3 and 3.4. Nothing here pairs these losses, so we can't tell.
 
 # %% jupyter={"source_hidden": true}
 by_true = {row["what"]: row["differences"]["true"]["all"] for row in variants}
@@ -224,8 +224,8 @@ assert np.allclose(losses["class accuracy"], (-0.028, -0.033, -0.034), atol=5e-4
 assert max(by_true[what]["class accuracy"]["low"] for what in few[1:]) < losses["class accuracy"][0]
 
 # %% [markdown]
-# **Trained on a GPU.** A GPU convolves in bfloat16, with eight bits in place of float32's 24. Does that matter? SegNet
-# with the same seeds, trained on a GPU and on a CPU, by their counts of each drive:
+# **Trained on a GPU.** A GPU convolves in bfloat16, with eight significant bits in place of float32's 24. Does that
+# matter? SegNet with the same seeds, trained on a GPU and on a CPU, by their counts of each drive:
 
 # %% jupyter={"source_hidden": true}
 usual = table1_runs(SCALES["reduced"], 3)["segnet"]
@@ -240,7 +240,8 @@ for truth in ("true", "lidar"):
 
 # %% [markdown]
 # In the mean it moves pixel accuracy by a tenth of a point. (FCN and DeepLab v2 with all frames are Table 1's, trained on
-# a CPU; with 35 frames they were trained on a GPU. So a tenth of their losses of 0.8 and 0.9 may be the GPU's.)
+# a CPU; with 35 frames they were trained on a GPU. The GPU
+# may hide a tenth of a point of their losses.)
 #
 # ## Four times as many steps
 #
@@ -272,15 +273,16 @@ for truth in ("lidar", "true"):
             )
 
 # %% [markdown]
-# FCN stays ahead of both others, by both kinds of labels; SegNet and DeepLab v2 lie within 0.3 points of each other. (In
-# the paper SegNet leads.) By true labels the longer training brings less than a point, and SegNet is now clearly *behind*
-# the table of image label and state in pixel accuracy, by 0.8 points. The table looks up SegNet's own image labels, and
-# these have become better too. In class accuracy SegNet leads that table by 11 points.
+# In pixel accuracy FCN stays ahead of both others, by both kinds of labels; SegNet and DeepLab v2 lie within 0.3
+# points of each other. In class accuracy FCN's lead over SegNet isn't clear any more. By true labels the longer
+# training brings less than a point, and SegNet is now clearly *behind* the table of image label and state, by 0.8
+# points. The table looks up SegNet's own image labels, and has gained as well. In class accuracy SegNet leads that
+# table by 11 points.
 
 # %% [markdown]
 # ## A turned camera, distance, and how sure the maps are
 #
-# Three more questions. What if the camera looks elsewhere than we think? How far ahead may one believe the map? And are
+# What if the camera looks elsewhere than we think? How far ahead may one believe the map? And are
 # its probabilities worth their name?
 #
 # For the last one, sort all cells by how sure the network is of its class, and look in each group how many are right
@@ -346,13 +348,13 @@ for ax in (axes[0], axes[2]):
 plt.show()
 
 # %% [markdown]
-# On the left, **yaw** costs little either way, at most 0.6 points at two degrees. **Pitch** isn't symmetric. A camera
-# that is believed to look further down than it does (positive) costs 2.0 points at one degree and 5.3 at two. One that
-# is believed to look further up *gains* pixel accuracy over all cells, 0.8 at one degree! It pays in class accuracy, with
-# 1.8. Over the cells with a semantic class no gain is clear: 0.3 points (-2.6 to 3.2). Of the cells gained, 83 % have no
-# class, and their truth is the occupancy grid's. The network now gives a class to fewer cells, 42 % in place of 44 %; why,
-# we haven't looked into. The lesson: the right calibration isn't the top of every curve, and pixel accuracy over all cells
-# alone would have chosen a wrong one. Why pitch matters more
+# On the left (all cells), **yaw** costs little either way, at most 0.6 points at two degrees. **Pitch** isn't
+# symmetric. A camera that is believed to look further down than it does (positive) costs 2.0 points at one degree and
+# 5.3 at two. One that is believed to look further up *gains* pixel accuracy, 0.8 at one degree! It pays in class
+# accuracy, with 1.8. Over the cells with a semantic class no gain is clear: 0.3 points (-2.6 to 3.2). Of the net gain,
+# 83 % lies in cells without a class, whose truth is the occupancy grid's. The network now gives a class to fewer
+# cells, 42 % in place of 44 %; why, we haven't looked into. The lesson: the right calibration isn't the top of every
+# curve, and pixel accuracy over all cells alone would have chosen a wrong one. Why pitch matters more
 # than yaw, geometry says: the camera is 1.65 m above the ground, so one degree of pitch moves the ground at 20 m by about
 # $20^2 / 1.65 \cdot \pi / 180 = 4.2$ m towards us or away, one degree of yaw by 0.35 m to the side, less than a cell.
 #
@@ -361,9 +363,9 @@ plt.show()
 # in 48 % beyond 60 m ([what wrong labels cost](09_truth_costs.ipynb)); but its accuracy falls as well.
 #
 # On the right, by true labels all three are too sure: the network by 9 points. But it learned from LIDAR labels, and by
-# LIDAR labels the error is only 1.5 points (the line along the diagonal): it says what it means, in the words of its
-# labels. Mean field makes neighbours agree, and so makes cells sure. With the CRF's default weights the 9 points become 26,
-# with the searched ones 18.5, and all seeds say the same, by LIDAR labels too (15 and 8).
+# LIDAR labels the error is only 1.5 points (the line along the diagonal). Mean field makes neighbours agree, and so
+# makes cells sure. With the CRF's default weights the 9 points become 26, with the searched ones 18.5, and all seeds
+# say the same, by LIDAR labels too (15 and 8).
 
 # %% jupyter={"source_hidden": true}
 errors = np.array([row["expected calibration error"] for row in ablations["confidence"]])
@@ -408,8 +410,10 @@ assert np.allclose((gained[n:].sum() / gained.sum(), *given), (0.83, 0.42, 0.44)
 # ## In five lines
 #
 # 1. A table can be checked against its own definitions; the paper's 0.72 and 0.73 can't both be right for the same cells.
-# 2. Without the occupancy grid this network loses most; with one plane in place of twenty, about a point.
-# 3. Four times as many steps bring two points by LIDAR labels, less than one by true ones, and leave FCN ahead.
+# 2. Without the occupancy grid this network loses most; with one plane in place of twenty, 0.6 to 1.3 points of pixel
+#    accuracy.
+# 3. Four times as many steps bring two points of pixel accuracy by LIDAR labels, less than one by true ones, and leave
+#    FCN ahead.
 # 4. A wrong pitch can raise one score and lower another.
 # 5. Probabilities are honest by the labels that were learned; the CRF makes them too sure.
 #
