@@ -28,13 +28,13 @@ def list_data() -> None:
 
 @data.command()
 def make(
-    name: Annotated[str, typer.Argument(help="minikitti, minichroma, minisynthia, validation, sample or all.")],
+    name: Annotated[str, typer.Argument(help="A simulated one of `data list`, or all.")],
     folder: Annotated[Path, typer.Argument(help="Where the data set's own folder is made.")],
     seed: Annotated[int, typer.Option(help="Seed for the drives; the same seed gives the same bytes.")] = 0,
     workers: Annotated[int, typer.Option(help="Number of processes that share the work.")] = 2,
     scheduler: Annotated[str | None, typer.Option(help="Instead, a dask cluster: tcp://HOST:PORT.")] = None,
 ) -> None:
-    """Simulate a data set in KITTI's raw layout; "all" makes the first three.
+    """Simulate a data set in KITTI's raw layout; "all" makes minikitti, minichroma and minisynthia.
 
     The same command continues after an interruption.
     """
