@@ -240,8 +240,8 @@ for truth in ("true", "lidar"):
 
 # %% [markdown]
 # In the mean it moves pixel accuracy by a tenth of a point. (FCN and DeepLab v2 with all frames are Table 1's, trained on
-# a CPU; with 35 frames they were trained on a GPU. The GPU
-# may hide a tenth of a point of their losses.)
+# a CPU; with 35 frames they were trained on a GPU. The GPU may
+# hide a tenth of a point of their losses.)
 #
 # ## Four times as many steps
 #
