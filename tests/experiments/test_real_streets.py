@@ -17,8 +17,16 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import WEIGHTS, Architecture
 from semgrid_edu.training import TrainingParams
+from semgrid_edu.workshop.scoring.score_with_interval import shown
 from semgrid_edu.workshop.studies.training import real_streets
-from semgrid_edu.workshop.studies.training.real_streets import LATER, STATE_TABLE, WayToTrain, compare_real, splits
+from semgrid_edu.workshop.studies.training.real_streets import (
+    LATER,
+    LEFT_OUT,
+    STATE_TABLE,
+    WayToTrain,
+    compare_real,
+    splits,
+)
 
 CLONE = Path(semgrid_edu.__file__).parents[1]
 
@@ -30,16 +38,18 @@ def sides():
 
 
 def test_no_network_is_tested_on_what_it_learned(sides):
-    for training, test in splits(sides).values():
+    for training, test in (one for rounds in splits(sides).values() for one in rounds):
         learned, kept = ({(id(frames), k) for frames, ks in parts for k in ks} for parts in (training, test))
         assert min(len(learned), len(kept)) > 0
         assert not learned & kept
 
 
-def test_a_camera_is_left_out_whole_and_later_frames_come_a_second_later(sides):
-    by_side, in_time = splits(sides).values()
-    assert sum(len(ks) for _, ks in by_side[1]) == 20
-    assert sum(len(ks) for part in by_side for _, ks in part) == 70
+def test_each_camera_is_left_out_once_and_whole_and_later_frames_come_a_second_later(sides):
+    by_side, (in_time,) = splits(sides).values()
+    tested = [id(frames) for _, test in by_side for frames, _ in test]
+    assert sorted(tested) == sorted(map(id, sides.values()))  # each camera once
+    for training, test in by_side:
+        assert sum(len(ks) for _, ks in training + test) == 70
     for (frames, learned), (_, kept) in zip(*in_time, strict=True):
         assert kept[-1] == frames[-1]
         assert (kept[0] - learned[-1]) * 4 / len(frames) >= 1  # the frames of each camera span four seconds
@@ -66,7 +76,7 @@ def small(monkeypatch, streets):
     monkeypatch.setattr(real_streets, "sets_by_camera", lambda *_: [streets])
     monkeypatch.setattr(real_streets, "CAMERAS", ("front_camera", "left_camera"))
     monkeypatch.setattr(real_streets, "WAYS", {"as shipped": WayToTrain(Architecture(), "segnet"), "once": once})
-    chosen = {"left_out": ("left_camera",), "later": ("once",)}
+    chosen = {"left_out": [["left_camera"], ["front_camera"]], "later": ["once"]}
     monkeypatch.setattr(real_streets, "TABLE", real_streets.TABLE | chosen)
 
 
@@ -77,7 +87,12 @@ def test_every_way_is_scored_and_a_run_that_has_ended_is_not_repeated(small, roo
     assert list(by_side) == [STATE_TABLE, "as shipped", "as shipped + CRF", "once", "once + CRF"]
     assert list(in_time) == [STATE_TABLE, "once", "once + CRF"]
     assert len({scores["cells"] for scores in by_side.values()}) == 1
-    assert [run.parent.name for run in runs] == [f"{LATER}, once, 0", "two cameras left out, once, 0"]
+    assert [run.parent.name for run in runs] == [
+        f"{LEFT_OUT} 0, once, 0",
+        f"{LEFT_OUT} 1, once, 0",
+        f"{LATER} 0, once, 0",
+    ]
+    assert list(by_side["once"]["cameras"]) == ["left_camera", "front_camera"]
     assert sorted(root.rglob("*")) == before
     written = [run.stat().st_mtime_ns for run in runs]
     assert compare_real(root, SCENE, "simulated", tmp_path)["scores"] == result["scores"]
@@ -85,30 +100,25 @@ def test_every_way_is_scored_and_a_run_that_has_ended_is_not_repeated(small, roo
     json.dumps(result)
 
 
-class _Confusions:
-    drives = ("a", "b")
-
-    def __init__(self, matrix):
-        self.matrix = matrix
-
-    def of(self, method, _):
-        return SimpleNamespace(counts={method: self.matrix})
-
-
-@pytest.mark.parametrize("method", ["pixel accuracy", "class accuracy"])
-def test_each_seed_counts_as_much(method):
-    """Two blocks; one network calls half of the road cells car, the other all of them road."""
+def _counted(drives, road_right, road_called_car):
+    """Counts of one camera, by frame, of cells that are road."""
     road, car = KITTI_14.index("road"), KITTI_14.index("car")
-    counts = np.zeros((2, 2, len(KITTI_14.names), len(KITTI_14.names)), np.int64)
-    counts[:, :, car, car] = 10
-    counts[0, :, road, road] = counts[0, :, road, car] = 5
-    counts[1, :, road, road] = 10
-    counted = [SimpleNamespace(confusions=_Confusions(matrix), reliability={}) for matrix in counts]
-    scores = real_streets._scores_by_method([{"net": [("net", one)]} for one in counted])["net"]
-    assert scores[method]["seeds"] == [0.75, 1.0]
-    assert scores[method]["mean"] == 0.875
-    assert scores["recall"] == {"road": 0.75, "car": 1.0}
-    assert (scores["cells"], scores["frames"]) == (40, 2)
+    counts = np.zeros((len(drives), len(KITTI_14), len(KITTI_14)), np.int64)
+    counts[:, road, road], counts[:, road, car] = road_right, road_called_car
+    of = lambda name, _: SimpleNamespace(counts={name: counts})  # noqa: E731
+    return "net", SimpleNamespace(confusions=SimpleNamespace(drives=drives, of=of), reliability={})
+
+
+def test_scores_are_of_the_cells_of_all_cameras_and_stand_beside_the_tables():
+    """One camera has 30 cells, 20 right, the other 10, all wrong; the table has half of each right."""
+    ours = [_counted(("a, 0", "a, 1"), [12, 8], [4, 6]), _counted(("b, 0",), [0], [10])]
+    table = [_counted(("a, 0", "a, 1"), [8, 7], [8, 7]), _counted(("b, 0",), [5], [5])]
+    scores = real_streets._scores_of(ours, table)
+    assert scores["pixel accuracy"]["mean"] == scores["recall"]["road"] == 0.5
+    assert scores["above the table"]["pixel accuracy"]["mean"] == 0
+    assert scores["cameras"] == {"a": 2 / 3, "b": 0}
+    assert (scores["cells"], scores["frames"]) == (40, 3)
+    assert scores["pixel accuracy"]["low"] is None  # three blocks are too few
 
 
 def test_a_camera_that_is_missing_is_named_before_any_work(root, tmp_path):
@@ -124,9 +134,6 @@ NAMES = {
     "SegNet, then real pixels and cells": "simulated, then real, image stage on points",
     "SegNet, then real pixels and cells, image network frozen on cells": "simulated, then real, two stages",
     "SegNet, then real and simulated pixels and cells in turn": "simulated and real in turn, image stage on points",
-    "SegNet, then real pixels and cells, each colour varied by 15 %": (
-        "simulated, then real, image stage on points, tint"
-    ),
     "FCN, then real cells": "simulated, then real, FCN",
     "DeepLab, then real cells": "simulated, then real, DeepLab",
     "SegNet, real pixels and cells alone": "real only",
@@ -145,6 +152,8 @@ def test_the_page_of_results_quotes_the_committed_result():
     ]
     assert [name for name, *_ in rows] == list(NAMES)
     for name, *quoted in rows:
-        scores = [split.get(NAMES[name]) for split in (by_side, in_time)]
-        metrics = [(one, metric) for one in scores for metric in ("pixel accuracy", "class accuracy")]
-        assert quoted == [f"{100 * one[metric]['mean']:.1f}" if one else "" for one, metric in metrics]
+        one, later = by_side[NAMES[name]], in_time.get(NAMES[name])
+        metrics = ("pixel accuracy", "class accuracy")
+        expected = [shown(one[metric]) for metric in metrics]
+        expected += [shown(one["above the table"][metric]) if NAMES[name] != STATE_TABLE else "" for metric in metrics]
+        assert quoted == expected + [shown(later[metric]) if later else "" for metric in metrics]

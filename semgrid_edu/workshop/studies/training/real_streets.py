@@ -1,14 +1,16 @@
 """Ways to train for real streets, scored on labelled returns of a PandaSet scene that were kept apart (section 4).
 
-A scene shows a few seconds of one street corner. A camera that is left out of training sees another side of it; a later
+A scene shows a few seconds of one street corner. Cameras that are left out of training see another side of it; a later
 time shows the same side again. Neither says how a network does in other streets.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
@@ -27,6 +29,7 @@ from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, reliability_of_sums
 from semgrid_edu.workshop.scoring.grids import NETWORK, majority_by_state, network_grids
 from semgrid_edu.workshop.scoring.score_with_interval import (
+    compared,
     markdown_table,
     on_cells,
     per_cent,
@@ -46,8 +49,6 @@ class WayToTrain(NamedTuple):
         The image network of the shipped compact network to start from.
     params : TrainingParams, optional
         How it learns; left out, it is scored as it starts.
-    seeds : int
-        How many networks learn in this way from the first split; one does from the split in time.
     with_simulated : bool
         Whether every other step takes frames of simulated streets.
     """
@@ -55,7 +56,6 @@ class WayToTrain(NamedTuple):
     architecture: Architecture
     start: str | None = None
     params: TrainingParams | None = None
-    seeds: int = 1
     with_simulated: bool = False
 
 
@@ -69,8 +69,8 @@ TABLE = table_beside(__file__)
 WAYS = {name: _way(**row) for name, row in TABLE["ways"].items()}
 """The ways to train, by name, from `real_streets.toml`."""
 
-LATER = "later"
-"""The split in time."""
+LEFT_OUT, LATER = "each pair of cameras left out", "later"
+"""The splits: by camera, in as many rounds as there are pairs, and in time, in one round."""
 
 STATE_TABLE = "occupancy state alone"
 """The baseline that a network must beat: the most frequent class of each state in the training frames."""
@@ -81,6 +81,9 @@ BLOCK = 2.0
 Part = tuple[TrainingSet, list[int]]
 """The frames of one camera, and the numbers of those that are meant."""
 
+Round = tuple[list[Part], list[Part]]
+"""What is learned from, and what is scored."""
+
 Counted = dict[str, list[tuple[str, GridCounts]]]
 """For each method and camera, what the method is called in the counts, and the counts."""
 
@@ -90,6 +93,7 @@ def compare_real(
 ) -> dict[str, object]:
     """Train networks on one part of a scene in each of `WAYS`, and score them on the other part, for two splits.
 
+    The split by camera has a round for each pair of cameras: a network that hasn't learned from them is scored on them.
     A cell counts when it lies in view of the camera and a labelled return of the frame's own scan lies in it. Networks
     learn from the returns of the neighbouring scans too.
 
@@ -103,13 +107,14 @@ def compare_real(
         Takes a folder per scene, which holds one folder per training run, and the arrays that are made of the frames. A
         run that has ended isn't repeated, and one that was interrupted is resumed.
     seed : int
-        First seed for initial weights and for the order of the frames.
+        Seed for initial weights and for the order of the frames.
 
     Returns
     -------
     dict
         "scores": by split and method "pixel accuracy" and "class accuracy" with intervals over blocks of two seconds,
-        the recall of each class, and the "ECE"; and all that made them. JSON can hold it.
+        each also as "above the table" of occupancy states, the recall of each class, the pixel accuracy in the view of
+        each camera, and the "ECE"; and all that made them. JSON can hold it.
 
     Raises
     ------
@@ -125,20 +130,20 @@ def compare_real(
     streets = sets_by_camera(simulated, "train")
     views = {camera: _frames(drive, runs) for camera, drive in drives.items()}
     found, weights = {}, {}
-    for split, (training, test) in splits(views).items():
-        found[split] = _scores_by_method([_count_states(training, test)])
+    for split, rounds in splits(views).items():
+        counted = _joined(_count_states(*one) for one in rounds)
         for name in TABLE["later"] if split == LATER else WAYS:
-            seeds = range(seed, seed + (1 if split == LATER else WAYS[name].seeds))
-            folders = {k: runs / f"{split}, {name}, {k}" for k in seeds}
-            files = {folder.name: _trained(WAYS[name], training, streets, folder, k) for k, folder in folders.items()}
-            weights |= {run: sha256(file) for run, file in files.items()}
-            found[split] |= _scores_by_method([_count(name, file, test) for file in files.values()])
+            folders = [runs / f"{split} {k}, {name}, {seed}" for k in range(len(rounds))]
+            files = [_trained(WAYS[name], one, streets, at, seed) for (one, _), at in zip(rounds, folders, strict=True)]
+            weights |= {at.name: sha256(file) for at, file in zip(folders, files, strict=True)}
+            counted |= _joined(_count(name, file, test) for file, (_, test) in zip(files, rounds, strict=True))
+        found[split] = {method: _scores_of(parts, counted[STATE_TABLE]) for method, parts in counted.items()}
     command = f"semgrid-edu reproduce real-streets --scene {scene} --seed {seed}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
 
 
-def splits(views: dict[str, TrainingSet]) -> dict[str, tuple[list[Part], list[Part]]]:
-    """Return the frames to learn from and those to score on, by the name of the split.
+def splits(views: dict[str, TrainingSet]) -> dict[str, list[Round]]:
+    """Return the frames to learn from and those to score on, in each round, by the name of the split.
 
     Parameters
     ----------
@@ -147,15 +152,17 @@ def splits(views: dict[str, TrainingSet]) -> dict[str, tuple[list[Part], list[Pa
 
     Returns
     -------
-    dict of str to (list of Part, list of Part)
+    dict of str to list of (list of Part, list of Part)
         Training and test frames, camera by camera.
     """
     whole = {camera: (frames, list(range(len(frames)))) for camera, frames in views.items()}
     first = [(frames, ks[: round(TABLE["learnt"] * len(ks))]) for frames, ks in whole.values()]
     last = [(frames, ks[round((TABLE["learnt"] + TABLE["skipped"]) * len(ks)) :]) for frames, ks in whole.values()]
-    left_out = [whole[camera] for camera in TABLE["left_out"]]
-    others = [part for camera, part in whole.items() if camera not in TABLE["left_out"]]
-    return {"two cameras left out": (others, left_out), LATER: (first, last)}
+    rounds = [
+        ([part for camera, part in whole.items() if camera not in pair], [whole[camera] for camera in pair])
+        for pair in TABLE["left_out"]
+    ]
+    return {LEFT_OUT: rounds, LATER: [(first, last)]}
 
 
 def _frames(drive: PandasetScene, folder: Path) -> TrainingSet:
@@ -214,27 +221,42 @@ def _count_states(training: list[Part], test: list[Part]) -> Counted:
     return {STATE_TABLE: [(STATE_TABLE, count_grids(lambda k, c=c: {STATE_TABLE: c[k]}, f)) for f, c in called]}
 
 
-def _scores_by_method(seeds: list[Counted]) -> dict[str, dict]:
-    """Return the scores of each method, from what was counted for each seed."""
-    return {method: _scores_of([counted[method] for counted in seeds]) for method in seeds[0]}
+def _joined(rounds: Iterable[Counted]) -> Counted:
+    """Put the cameras of all rounds together, method by method."""
+    joined: Counted = {}
+    for counted in rounds:
+        for method, parts in counted.items():
+            joined.setdefault(method, []).extend(parts)
+    return joined
 
 
-def _scores_of(seeds: list[list[tuple[str, GridCounts]]]) -> dict[str, object]:
-    """Return the scores of a method, from its counts on each camera, for each seed."""
-    drives = tuple(drive for _, counted in seeds[0] for drive in counted.confusions.drives)
-    of_parts = [[counted.confusions.of(name, "true").counts[name] for name, counted in parts] for parts in seeds]
-    matrices = np.stack([np.concatenate(parts) for parts in of_parts])  # (S, N, C, C), rows: labelled returns
-    by_block = np.stack([FrameConfusions(drives, {"": one}).by_drive("") for one in matrices])
-    kept = on_cells(by_block, "semantic", KITTI_14)
-    total = matrices.sum(axis=(0, 1))[: KITTI_14.n_semantic]
-    diagrams = [counted.reliability[name] for parts in seeds for name, counted in parts if name in counted.reliability]
+def _scores_of(parts: list[tuple[str, GridCounts]], table: list[tuple[str, GridCounts]]) -> dict[str, object]:
+    """Return the scores of a method from its counts on each camera, beside those of the table of occupancy states."""
+    kept, of_table = (on_cells(_by_block(some), "semantic", KITTI_14) for some in (parts, table))
+    metrics = ("pixel accuracy", "class accuracy")
+    total = kept.sum(axis=(0, 1))[: KITTI_14.n_semantic]
+    diagrams = [counted.reliability[name] for name, counted in parts if name in counted.reliability]
     return {
-        **{name: score_with_interval(kept, METRICS[name]) for name in ("pixel accuracy", "class accuracy")},
+        **{name: score_with_interval(kept, METRICS[name]) for name in metrics},
+        "above the table": {name: compared(kept, of_table, METRICS[name]) for name in metrics},
         "recall": {KITTI_14.names[c]: total[c, c] / row.sum() for c, row in enumerate(total) if row.any()},
-        "cells": int(matrices[0].sum()),
-        "frames": len(drives),
+        "cameras": {_camera(one): METRICS["pixel accuracy"](_by_block([one]).sum(axis=(0, 1))) for one in parts},
+        "cells": int(total.sum()),
+        "frames": sum(len(counted.confusions.drives) for _, counted in parts),
         "ECE": expected_calibration_error(reliability_of_sums(sum(diagrams))) if diagrams else None,
     }
+
+
+def _by_block(parts: list[tuple[str, GridCounts]]) -> NDArray:
+    """Return the confusions of each block of two seconds, (1, V, C, C); rows: labelled returns."""
+    drives = tuple(drive for _, counted in parts for drive in counted.confusions.drives)
+    matrices = np.concatenate([counted.confusions.of(name, "true").counts[name] for name, counted in parts])
+    return FrameConfusions(drives, {"": matrices}).by_drive("")[None]
+
+
+def _camera(part: tuple[str, GridCounts]) -> str:
+    """Return the camera that a method was counted on."""
+    return part[1].confusions.drives[0].partition(",")[0]
 
 
 def real_streets_table(result: dict[str, object]) -> str:
