@@ -134,12 +134,13 @@ def real_streets(
     runs: Runs,
     scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")] = "002",
     seed: Annotated[int, typer.Option(min=0, help="First seed for initial weights and the order of frames.")] = 0,
+    device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "cpu",
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("real_streets.json"),
 ) -> None:
     """Train for a real street in several ways, and score the networks on cameras and times that were kept apart."""
     from semgrid_edu.workshop.studies.training.real_streets import compare_real, real_streets_table
 
-    keep_result(out, lambda: compare_real(pandaset, scene, simulated, runs, seed), real_streets_table)
+    keep_result(out, lambda: compare_real(pandaset, scene, simulated, runs, seed, device), real_streets_table)
 
 
 @reproduce.command()

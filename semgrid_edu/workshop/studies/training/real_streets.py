@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from semgrid_edu.crf import expected_calibration_error
@@ -25,6 +26,7 @@ from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import check_writable, sha256, table_beside
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
+from semgrid_edu.training.devices import choose_device
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, reliability_of_sums
 from semgrid_edu.workshop.scoring.grids import NETWORK, majority_by_state, network_grids
@@ -89,7 +91,7 @@ Counted = dict[str, list[tuple[str, GridCounts]]]
 
 
 def compare_real(
-    root: str | Path, scene: str, simulated: str | Path, runs: str | Path, seed: int = 0
+    root: str | Path, scene: str, simulated: str | Path, runs: str | Path, seed: int = 0, device: str = "cpu"
 ) -> dict[str, object]:
     """Train networks on one part of a scene in each of `WAYS`, and score them on the other part, for two splits.
 
@@ -107,23 +109,26 @@ def compare_real(
         Takes a folder per scene, which holds one folder per training run, and the arrays that are made of the frames. A
         run that has ended isn't repeated, and one that was interrupted is resumed.
     seed : int
-        Seed for initial weights and for the order of the frames.
+        First seed for initial weights and for the order of the frames; `TABLE["seeds"]` networks learn in each way.
+    device : str
+        "cpu", "cuda", "cuda:N" or "auto", where networks learn; they are scored on the CPU.
 
     Returns
     -------
     dict
-        "scores": by split and method "pixel accuracy" and "class accuracy" with intervals over blocks of two seconds,
-        each also as "above the table" of occupancy states, the recall of each class, the pixel accuracy in the view of
-        each camera, and the "ECE"; and all that made them. JSON can hold it.
+        "scores": by split and method "pixel accuracy" and "class accuracy" with intervals over seeds and blocks of two
+        seconds, each also as "above the table" of occupancy states, the recall of each class, the pixel accuracy in the
+        view of each camera, and the "ECE"; and all that made them. JSON can hold it.
 
     Raises
     ------
     ArgumentError
-        When the seed is negative.
+        When the seed is negative, or there is no such device.
     DataError
         When there is no such scene, it lacks a camera or labels, or a file is damaged.
     """
     check_whole(seed=seed)
+    computer = choose_device(device)
     drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
     runs = Path(runs) / scene
     check_writable(runs / "run")
@@ -131,14 +136,21 @@ def compare_real(
     views = {camera: _frames(drive, runs) for camera, drive in drives.items()}
     found, weights = {}, {}
     for split, rounds in splits(views).items():
-        counted = _joined(_count_states(*one) for one in rounds)
+        table = _joined(_count_states(*one) for one in rounds)[STATE_TABLE]
+        found[split] = {STATE_TABLE: _scores_of([table], table)}
         for name in TABLE["later"] if split == LATER else WAYS:
-            folders = [runs / f"{split} {k}, {name}, {seed}" for k in range(len(rounds))]
-            files = [_trained(WAYS[name], one, streets, at, seed) for (one, _), at in zip(rounds, folders, strict=True)]
-            weights |= {at.name: sha256(file) for at, file in zip(folders, files, strict=True)}
-            counted |= _joined(_count(name, file, test) for file, (_, test) in zip(files, rounds, strict=True))
-        found[split] = {method: _scores_of(parts, counted[STATE_TABLE]) for method, parts in counted.items()}
-    command = f"semgrid-edu reproduce real-streets --scene {scene} --seed {seed}"
+            counted = []
+            for k in range(seed, seed + (TABLE["seeds"] if WAYS[name].params else 1)):
+                folders = [runs / f"{split} {r}, {name}, {k}" for r in range(len(rounds))]
+                files = [
+                    _trained(WAYS[name], training, streets, folder, k, computer)
+                    for (training, _), folder in zip(rounds, folders, strict=True)
+                ]
+                weights |= {folder.name: sha256(file) for folder, file in zip(folders, files, strict=True)}
+                tests = (test for _, test in rounds)
+                counted.append(_joined(_count(name, *one) for one in zip(files, tests, strict=True)))
+            found[split] |= {method: _scores_of([one[method] for one in counted], table) for method in counted[0]}
+    command = f"semgrid-edu reproduce real-streets --scene {scene} --seed {seed} --device {device}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
 
 
@@ -187,7 +199,9 @@ class _Subset(TrainingSet):
         self.arrays = {name: frames.arrays[name][numbers] for name in ("image", "labels", "occupancy", "truth", "true")}
 
 
-def _trained(way: WayToTrain, training: list[Part], streets: list[TrainingSet], folder: Path, seed: int) -> Path:
+def _trained(
+    way: WayToTrain, training: list[Part], streets: list[TrainingSet], folder: Path, seed: int, device: torch.device
+) -> Path:
     """Return the file of a network's weights: the shipped one if it doesn't learn, else that of its training run."""
     start, file = sample_weights(way.start) if way.start else None, folder / WEIGHTS
     if start and not way.params:
@@ -196,7 +210,7 @@ def _trained(way: WayToTrain, training: list[Part], streets: list[TrainingSet], 
         mixture = Mixture([[_Subset(*part) for part in training], *([streets] if way.with_simulated else [])])
         net = load_net(start, mixture.camera) if start else build_net(way.architecture, mixture.camera, seed)
         params = replace(way.params, batch_size=min(way.params.batch_size, *map(len, mixture.parts)))
-        train(net, mixture, folder, params, seed, resume=True)
+        train(net, mixture, folder, params, seed, resume=True, device=device)
     return file
 
 
@@ -230,28 +244,33 @@ def _joined(rounds: Iterable[Counted]) -> Counted:
     return joined
 
 
-def _scores_of(parts: list[tuple[str, GridCounts]], table: list[tuple[str, GridCounts]]) -> dict[str, object]:
-    """Return the scores of a method from its counts on each camera, beside those of the table of occupancy states."""
-    kept, of_table = (on_cells(_by_block(some), "semantic", KITTI_14) for some in (parts, table))
-    metrics = ("pixel accuracy", "class accuracy")
+def _scores_of(seeds: list[list[tuple[str, GridCounts]]], table: list[tuple[str, GridCounts]]) -> dict[str, object]:
+    """Return the scores of a method from its counts on each camera, by seed, beside those of the table of states."""
+    kept, of_table = (on_cells(_by_block(some), "semantic", KITTI_14) for some in (seeds, [table]))
+    metrics, parts = ("pixel accuracy", "class accuracy"), [part for one in seeds for part in one]
     total = kept.sum(axis=(0, 1))[: KITTI_14.n_semantic]
     diagrams = [counted.reliability[name] for name, counted in parts if name in counted.reliability]
     return {
         **{name: score_with_interval(kept, METRICS[name]) for name in metrics},
         "above the table": {name: compared(kept, of_table, METRICS[name]) for name in metrics},
         "recall": {KITTI_14.names[c]: total[c, c] / row.sum() for c, row in enumerate(total) if row.any()},
-        "cameras": {_camera(one): METRICS["pixel accuracy"](_by_block([one]).sum(axis=(0, 1))) for one in parts},
-        "cells": int(total.sum()),
-        "frames": sum(len(counted.confusions.drives) for _, counted in parts),
+        "cameras": {_camera(some[0]): _share_right(some) for some in zip(*seeds, strict=True)},
+        "cells": int(kept[0].sum()),
+        "frames": sum(len(counted.confusions.drives) for _, counted in seeds[0]),
         "ECE": expected_calibration_error(reliability_of_sums(sum(diagrams))) if diagrams else None,
     }
 
 
-def _by_block(parts: list[tuple[str, GridCounts]]) -> NDArray:
-    """Return the confusions of each block of two seconds, (1, V, C, C); rows: labelled returns."""
-    drives = tuple(drive for _, counted in parts for drive in counted.confusions.drives)
-    matrices = np.concatenate([counted.confusions.of(name, "true").counts[name] for name, counted in parts])
-    return FrameConfusions(drives, {"": matrices}).by_drive("")[None]
+def _by_block(seeds: list[list[tuple[str, GridCounts]]]) -> NDArray:
+    """Return the confusions of each seed and block of two seconds, (S, V, C, C); rows: labelled returns."""
+    drives = tuple(drive for _, counted in seeds[0] for drive in counted.confusions.drives)
+    of_parts = [[counted.confusions.of(name, "true").counts[name] for name, counted in parts] for parts in seeds]
+    return np.stack([FrameConfusions(drives, {"": np.concatenate(parts)}).by_drive("") for parts in of_parts])
+
+
+def _share_right(one_camera: tuple[tuple[str, GridCounts], ...]) -> float:
+    """Return the pixel accuracy on one camera, over all seeds."""
+    return METRICS["pixel accuracy"](_by_block([[part] for part in one_camera]).sum(axis=(0, 1)))
 
 
 def _camera(part: tuple[str, GridCounts]) -> str:
