@@ -68,7 +68,7 @@ CAR, ROAD = KITTI_14.index("car"), KITTI_14.index("road")
 street = real_drive()
 net = load_net(real_weights(), street.camera)
 real = list(run_pipeline(street, Stages.of(net, keep_steps=True)))
-now, CELL = real[-1], (103, 35)
+now, CELL = real[-1], (89, 35)
 story = cell_story(now, CELL, net, past=real[:-1])
 fig = draw_cell_story(story, now.frame.image // 8 * 8)  # fewer colours: a smaller file
 for letter, ax in zip("ABDFGCE", fig.axes, strict=True):
@@ -280,8 +280,8 @@ plotting.animate_occupancy(
 # The vehicle is at the bottom, in the middle. Light is FREE, dark STATIC, grey UNKNOWN: no beam has said anything
 # about these cells, or not for some time, for instance because something stands in front of them. DYNAMIC cells have
 # the colour of their velocity on the wheel; where no velocity is drawn, as in panels B and C, DYNAMIC is orange. Our
-# cell lies in the row of parked cars on the right, and panel C says the same of it: nearly certainly STATIC from the
-# second scan on. Dark trails grow behind the cars that drive off ahead of us; lectures 02 to 04 explain where they
+# cell lies in the row of parked cars on the right, and panel C says the same of it: STATIC with more than 90 % from
+# the second scan on. Dark trails grow behind the cars that drive off ahead of us; lectures 02 to 04 explain where they
 # come from.
 #
 # ## Stage 2, $i \to s$: what it looks like
@@ -311,7 +311,7 @@ plotting.animate_occupancy(
 for scores in (np.array([2.0, 1, 0]), np.array([7.0, 6, 5])):
     print((np.exp(scores) / np.exp(scores).sum()).round(2))
 
-# %% jupyter={"source_hidden": true} alt="the street coloured by the class of the highest score in each pixel, with the column of dots of our cell: the road is mostly coloured as road, but nearly all above it as building: houses, the sky, half of the trees and most of each car"
+# %% jupyter={"source_hidden": true} alt="the street coloured by the class of the highest score in each pixel, with the column of dots of our cell: road, cars, trees and houses have the colours of their classes; most of the sky is coloured as building, and patches at a fence on the left as pedestrian"
 small = resize_image(now.frame.image, now.scores.shape[1:]) // 8 * 8
 fig, ax = plt.subplots(figsize=(8, 3), layout="constrained")
 plotting.image_labels(small, now.scores.argmax(axis=0), KITTI_14, ax=ax)
@@ -319,15 +319,17 @@ shrink = small.shape[1] / now.frame.image.shape[1]
 column = (story.pixels + 0.5) * shrink - 0.5
 ax.plot(*column.T, "o", color="white", markeredgecolor="black", markersize=4)
 plt.show()
-on_cars = now.scores.argmax(axis=0)[resize_labels(now.frame.labels.image, now.scores.shape[1:]) == CAR]
-assert (on_cars == CAR).mean() > 0.9
+labelled = resize_labels(now.frame.labels.image, now.scores.shape[1:])
+assert 0.965 < (now.scores.argmax(axis=0) == labelled)[labelled < 255].mean() < 0.975
+assert KITTI_14.index("sky") not in labelled
 
 # %% [markdown]
-# Each pixel has the colour of its highest score; the white dots are our cell's column of panel A. Don't trust the
-# colours: most pixels of cars are coloured as *building*, and so is the sky. The system doesn't use the colours. It
-# passes on all 14 scores of each pixel, without a soft-max, and the last steps of training rewarded them only for what
-# they do to the *map*. So they have become signals for the next network, which need not name what a pixel shows
-# (lectures 07, 08).
+# Each pixel has the colour of its highest score; the white dots are our cell's column of panel A. Of the pixels with a
+# label 97 % have the right colour. But the network has learned from this very image, and where no label ever was it
+# guesses: no LIDAR return comes back from the sky, so none of its pixels has a label, and most of it is coloured as
+# *building*. The system doesn't use the colours. It passes on all 14 scores of each pixel, without a soft-max. (This
+# image network learned from pixels alone. One that is trained on by the *map's* errors, as in the paper, may make
+# signals of its scores that no longer name what a pixel shows: lectures 07, 08.)
 #
 # ## Stage 3, $s \to p$: from pixels to places
 #

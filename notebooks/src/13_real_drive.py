@@ -626,7 +626,7 @@ for k, frame in list(enumerate(FAULTS["LIDAR tilted"](frames)))[::4]:
 #
 # <details><summary>Answer</summary>
 #
-# 55 % and 91 %. The first is 21 points behind the table. Six in ten of its wrong cells are called *unknown*, an
+# 55 % and 92 %. The first is 21 points behind the table. Six in ten of its wrong cells are called *unknown*, an
 # answer that the table doesn't have. Without this answer it is right in 69 %, and its interval beside the table
 # contains zero. The second is a school test whose questions were handed out before. Its number says nothing about
 # another street.
@@ -770,7 +770,7 @@ plt.show()
 
 # %% [markdown]
 # The network from simulated streets is 68 % sure in the right half, and right in 27 %. The taught one is off by about
-# 3 points in the half that it knows, and by about 11 in the other: it is less sure there than in the half that it
+# 3 points in the half that it knows, and by about 10 in the other: it is less sure there than in the half that it
 # knows, as it should be, but not enough. A soft-max compares the classes with each other; it can't say *I have never
 # been here*.
 #
@@ -840,7 +840,7 @@ if ours:
 # <details><summary>Answer</summary>
 #
 # Memory: 8 points, 5 to 11. All of it is fewer answers *unknown*: where neither may answer that, one frame is right
-# in 69 % and memory in 68 %. The memory knows that the camera has seen a cell, but not better what stands there. The
+# in 69 %, and memory is too. The memory knows that the camera has seen a cell, but not better what stands there. The
 # CRF: a point less, and the interval contains zero. It mends one wrong cell in ten, and spoils one right cell in ten.
 #
 # </details>

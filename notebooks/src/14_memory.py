@@ -487,8 +487,8 @@ Markdown("In per cent:\n\n" + "\n".join(rows))
 # points, and the interval is far from zero. The two memories that one writes first, mean and product of the last five
 # maps, *lose* points there. The gain isn't one of simulated streets alone: the network from simulated streets gains
 # 3.9 points on the real scene, whose labels people made. The last rows are for a network that learned from these very
-# frames. In view it errs in fewer than 8 cells of 100, and the memory changes little: +0.3, with an interval from
-# 0.0 to 0.5.
+# frames. In view it errs in fewer than 8 cells of 100, and the memory changes little: +0.4, with an interval from
+# 0.1 to 0.6.
 #
 # Is this knowledge, or does the memory only say *unknown* less frequently? Ask both maps for the most probable
 # *semantic* class, also where an unknown one is more probable:
@@ -622,7 +622,7 @@ show_windows([(results, one) for results in (simulated, street) for one in windo
 #
 # Seen before: 0.34 nats against 0.08. A cell in view has an image already, and further ones repeat its errors. On the
 # sample drive the real memory gets 0.49 for cells seen before, and in view a quarter of the 0.08. On the real street it
-# loses a little with the network that learned there, and gains 0.02 and 0.01 with the other one.
+# gains nothing with the network that learned there, and 0.02 and 0.01 with the other one.
 #
 # </details>
 
@@ -655,10 +655,11 @@ for name, results in {"sample drive": simulated, "real street": street}.items():
 
 # %% [markdown]
 # On the sample drive the toy gets the order right: most of what memory gives lies where the camera doesn't look any
-# more, even more than predicted. On the real street both are *negative*. Two things are different there, of which the
-# toy knew nothing. This network learned from these frames, so that one frame is right in 92 of 100 cells in view.
-# With the network from simulated streets (last column) both gains are positive, but small. And the vehicle waits, so what is hidden now is hidden by traffic: 38 % of these cells have another class
-# than when they were last seen, on the sample drive 5 %. A prediction that fails tells where the model is too simple.
+# more, even more than predicted. On the real street both are next to nothing, and their sign is *negative*. Two things
+# are different there, of which the toy knew nothing. This network learned from these frames, so that one frame is right
+# in 93 of 100 cells in view. With the network from simulated streets (last column) both gains are positive, but small.
+# And the vehicle waits, so what is hidden now is hidden by traffic: 38 % of these cells have another class than when
+# they were last seen, on the sample drive 5 %. A prediction that fails tells where the model is too simple.
 #
 # This is the price that stays, the errors that no exponent follows:
 
@@ -702,7 +703,7 @@ Markdown("Pixel accuracy, per cent:\n\n" + "\n".join(rows))
 # %% [markdown]
 # On fresh streets the second pass gains 2.7 points in view and as many in cells seen before. In cells that are only
 # seen later it gains 51: from the past alone one in eight of them is right, with the whole drive five in eight. For
-# the network that knows the real street it gains 0.3 points in view, and in the other two groups the intervals
+# the network that knows the real street it gains 0.4 points in view, and in the other two groups the intervals
 # contain 0. And as labels even these maps would be wrong in 15 of 100 cells in view on fresh streets.
 #
 # ## Play with it
@@ -783,10 +784,10 @@ assert min(left[1:]) > 0.4 * left[0]
 # 3. On the sample drive the best limit was the smallest: all frames of a cell together are worth one, a running mean
 #    of log P.
 # 4. Most of the gain lies where the camera doesn't look any more: 15 to 74 % of the cells on fresh streets; in view
-#    +4.9 points there, and +0.3 for the network that knows the real street. On the sample drive nearly all of the gain
+#    +4.9 points there, and +0.4 for the network that knows the real street. On the sample drive nearly all of the gain
 #    in view is fewer answers *unknown*.
 # 5. The graph named this edge in lecture 00, before anybody had built it. The order of the gains that it predicted
-#    was right on the sample drive and wrong on the real street; for the network that learned there the sign was, too.
+#    was right on the sample drive and wrong on the real street, where the network that learned there gained nothing.
 #
 # **What you can now do.** You can draw a perception system as a graph, find what it cuts, put a price on each edge with
 # exact inference on a toy, choose the edge that is worth paying for, build it, and measure whether the price was right.

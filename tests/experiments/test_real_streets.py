@@ -76,7 +76,7 @@ def small(monkeypatch, streets):
     monkeypatch.setattr(real_streets, "sets_by_camera", lambda *_: [streets])
     monkeypatch.setattr(real_streets, "CAMERAS", ("front_camera", "left_camera"))
     monkeypatch.setattr(real_streets, "WAYS", {"as shipped": WayToTrain(Architecture(), "segnet"), "once": once})
-    chosen = {"left_out": [["left_camera"], ["front_camera"]], "later": ["once"]}
+    chosen = {"left_out": [["left_camera"], ["front_camera"]], "later": ["once"], "seeds": 1}
     monkeypatch.setattr(real_streets, "TABLE", real_streets.TABLE | chosen)
 
 
@@ -113,12 +113,20 @@ def test_scores_are_of_the_cells_of_all_cameras_and_stand_beside_the_tables():
     """One camera has 30 cells, 20 right, the other 10, all wrong; the table has half of each right."""
     ours = [_counted(("a, 0", "a, 1"), [12, 8], [4, 6]), _counted(("b, 0",), [0], [10])]
     table = [_counted(("a, 0", "a, 1"), [8, 7], [8, 7]), _counted(("b, 0",), [5], [5])]
-    scores = real_streets._scores_of(ours, table)
+    scores = real_streets._scores_of([ours], table)
     assert scores["pixel accuracy"]["mean"] == scores["recall"]["road"] == 0.5
     assert scores["above the table"]["pixel accuracy"]["mean"] == 0
     assert scores["cameras"] == {"a": 2 / 3, "b": 0}
     assert (scores["cells"], scores["frames"]) == (40, 3)
     assert scores["pixel accuracy"]["low"] is None  # three blocks are too few
+
+
+def test_each_seed_counts_as_much_and_is_compared_with_the_same_table():
+    one, other = ([_counted(("a, 0", "a, 1"), [right, right], [10 - right, 10 - right])] for right in (10, 5))
+    scores = real_streets._scores_of([one, other], [_counted(("a, 0", "a, 1"), [5, 5], [5, 5])])
+    assert scores["pixel accuracy"]["seeds"] == [1.0, 0.5]
+    assert scores["above the table"]["pixel accuracy"]["seeds"] == [0.5, 0.0]
+    assert (scores["cameras"], scores["cells"], scores["frames"]) == ({"a": 0.75}, 20, 2)
 
 
 def test_a_camera_that_is_missing_is_named_before_any_work(root, tmp_path):

@@ -142,13 +142,9 @@ def compare_real(
             counted = []
             for k in range(seed, seed + (TABLE["seeds"] if WAYS[name].params else 1)):
                 folders = [runs / f"{split} {r}, {name}, {k}" for r in range(len(rounds))]
-                files = [
-                    _trained(WAYS[name], training, streets, folder, k, computer)
-                    for (training, _), folder in zip(rounds, folders, strict=True)
-                ]
+                files = _networks(WAYS[name], rounds, streets, folders, k, computer)
                 weights |= {folder.name: sha256(file) for folder, file in zip(folders, files, strict=True)}
-                tests = (test for _, test in rounds)
-                counted.append(_joined(_count(name, *one) for one in zip(files, tests, strict=True)))
+                counted.append(_joined(_count(name, file, one[1]) for file, one in zip(files, rounds, strict=True)))
             found[split] |= {method: _scores_of([one[method] for one in counted], table) for method in counted[0]}
     command = f"semgrid-edu reproduce real-streets --scene {scene} --seed {seed} --device {device}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
@@ -197,6 +193,13 @@ class _Subset(TrainingSet):
         self.__dict__ |= frames.__dict__
         self.drives = tuple(frames.drives[k] for k in numbers)
         self.arrays = {name: frames.arrays[name][numbers] for name in ("image", "labels", "occupancy", "truth", "true")}
+
+
+def _networks(
+    way: WayToTrain, rounds: list[Round], streets: list[TrainingSet], folders: list[Path], seed: int, on: torch.device
+) -> list[Path]:
+    """Return the files of the weights that are learned in each round."""
+    return [_trained(way, one[0], streets, at, seed, on) for one, at in zip(rounds, folders, strict=True)]
 
 
 def _trained(
@@ -254,7 +257,7 @@ def _scores_of(seeds: list[list[tuple[str, GridCounts]]], table: list[tuple[str,
         **{name: score_with_interval(kept, METRICS[name]) for name in metrics},
         "above the table": {name: compared(kept, of_table, METRICS[name]) for name in metrics},
         "recall": {KITTI_14.names[c]: total[c, c] / row.sum() for c, row in enumerate(total) if row.any()},
-        "cameras": {_camera(some[0]): _share_right(some) for some in zip(*seeds, strict=True)},
+        "cameras": dict(map(_share_right, zip(*seeds, strict=True))),
         "cells": int(kept[0].sum()),
         "frames": sum(len(counted.confusions.drives) for _, counted in seeds[0]),
         "ECE": expected_calibration_error(reliability_of_sums(sum(diagrams))) if diagrams else None,
@@ -268,14 +271,10 @@ def _by_block(seeds: list[list[tuple[str, GridCounts]]]) -> NDArray:
     return np.stack([FrameConfusions(drives, {"": np.concatenate(parts)}).by_drive("") for parts in of_parts])
 
 
-def _share_right(one_camera: tuple[tuple[str, GridCounts], ...]) -> float:
-    """Return the pixel accuracy on one camera, over all seeds."""
-    return METRICS["pixel accuracy"](_by_block([[part] for part in one_camera]).sum(axis=(0, 1)))
-
-
-def _camera(part: tuple[str, GridCounts]) -> str:
-    """Return the camera that a method was counted on."""
-    return part[1].confusions.drives[0].partition(",")[0]
+def _share_right(one_camera: tuple[tuple[str, GridCounts], ...]) -> tuple[str, float]:
+    """Return the name of a camera, and the pixel accuracy on it over all seeds."""
+    confusions = _by_block([[part] for part in one_camera]).sum(axis=(0, 1))
+    return one_camera[0][1].confusions.drives[0].partition(",")[0], METRICS["pixel accuracy"](confusions)
 
 
 def real_streets_table(result: dict[str, object]) -> str:
