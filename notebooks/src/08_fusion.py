@@ -953,11 +953,11 @@ plt.show()
 
 # %% [markdown]
 # Three times as many bits are shared as on the simulated drive, and here late fusion isn't nearly free: it loses three
-# points against the table, which may ask how label and state occur together. (The network has learnt from these very frames, so its row shows what it can hold, not how it does on a new street.)
-# Over all ten frames late fusion finds most of the road, half of the cells of cars and nearly three quarters of
-# those of buildings, and gives these names to many other cells (B shows the last frame). It names no vegetation, sidewalk,
-# bicycle or pedestrian at all. The road nearer than 13 m is missing, too: this camera doesn't see the ground so near,
-# and a table can't ask the neighbours.
+# points against the table, which knows how label and state occur together. (The network has learnt from these very
+# frames, so its row shows what it can hold, not how it does on a new street.) Over all ten frames late fusion finds
+# most of the road, half of the cells of cars and nearly three quarters of those of buildings, and gives these names to
+# many other cells (B shows the last frame). It names no vegetation, sidewalk, bicycle or pedestrian at all. The road
+# nearer than 13 m is missing, too: this camera doesn't see the ground so near, and a table can't ask the neighbours.
 #
 # ## Play with it
 #

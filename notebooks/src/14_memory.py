@@ -607,7 +607,7 @@ show_windows([(results, one) for results in (simulated, street) for one in windo
 # %% [markdown]
 # Forward is up. White cells of the truth are those that nobody labelled. In the simulated squares unknown cells become what they
 # are: vegetation, road, car. On the real street two of the three squares show the oncoming car of the opening;
-# the third gains three cells.
+# the third gains nine cells.
 #
 # ## The ledger's line, paid back
 #
@@ -740,12 +740,13 @@ _ = interact(show_repeats, repeats=FloatSlider(value=0.6, min=0.0, max=0.95, ste
 #
 # **Far ahead.** The squares in which memory does most harm, three per drive:
 
-# %% jupyter={"source_hidden": true} alt="six squares of map in three rows, one frame, memory and truth, in which memory is worse: in the simulated ones, far ahead, vegetation or a wider strip of sidewalk stands where the truth is sidewalk or road; in the real ones a few cells at the edge of the sidewalk differ"
+# %% jupyter={"source_hidden": true} alt="six squares of map in three rows, one frame, memory and truth, in which memory is worse: in the simulated ones, far ahead, vegetation or a wider strip of sidewalk stands where the truth is sidewalk or road; in the real ones a few cells at edges of sidewalk and building differ"
 show_windows([(results, one) for results in (simulated, street) for one in windows(results, -1)])
 
 # %% [markdown]
 # In the simulated squares, 45 to 67 m ahead, earlier guesses of *sidewalk* and *vegetation* stay where the newest
-# frame, from nearer by, has fewer of them. On the real street it is a few cells at the edge of the sidewalk.
+# frame, from nearer by, has fewer of them. On the real street it is a few cells, most at the edge of a sidewalk
+# or of a building.
 #
 # **A car that leaves.** And what of a car that stood, was seen, and drove away out of view?
 
