@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Python with numpy; a matrix times a vector; conditional probability. No deep learning.
 #
-# **Time.** 64 minutes, of which the computer needs less than one.
+# **Time.** 65 minutes, of which the computer needs less than one.
 #
 # **Paper.** Erkent, Wolf, Laugier, *End-to-End Learning of Semantic Grid Estimation Deep Neural Network with
 # Occupancy Grids*, Unmanned Systems 7(3), 2019. Sections 3 and 4 from far above; equations (1) and (2), Bayes' rule of
