@@ -100,11 +100,11 @@ def test_every_way_is_scored_and_a_run_that_has_ended_is_not_repeated(small, roo
     json.dumps(result)
 
 
-def _counted(drives, road_right, road_called_car):
-    """Counts of one camera, by frame, of cells that are road."""
+def _counted(drives, road_right, road_called_car, car_right=0):
+    """Counts of one camera, by frame, of cells that are road or car."""
     road, car = KITTI_14.index("road"), KITTI_14.index("car")
     counts = np.zeros((len(drives), len(KITTI_14), len(KITTI_14)), np.int64)
-    counts[:, road, road], counts[:, road, car] = road_right, road_called_car
+    counts[:, road, road], counts[:, road, car], counts[:, car, car] = road_right, road_called_car, car_right
     of = lambda name, _: SimpleNamespace(counts={name: counts})  # noqa: E731
     return "net", SimpleNamespace(confusions=SimpleNamespace(drives=drives, of=of), reliability={})
 
@@ -122,11 +122,13 @@ def test_scores_are_of_the_cells_of_all_cameras_and_stand_beside_the_tables():
 
 
 def test_each_seed_counts_as_much_and_is_compared_with_the_same_table():
-    one, other = ([_counted(("a, 0", "a, 1"), [right, right], [10 - right, 10 - right])] for right in (10, 5))
-    scores = real_streets._scores_of([one, other], [_counted(("a, 0", "a, 1"), [5, 5], [5, 5])])
-    assert scores["pixel accuracy"]["seeds"] == [1.0, 0.5]
-    assert scores["above the table"]["pixel accuracy"]["seeds"] == [0.5, 0.0]
-    assert (scores["cameras"], scores["cells"], scores["frames"]) == ({"a": 0.75}, 20, 2)
+    one, other = ([_counted(("a, 0", "a, 1"), [right, right], [10 - right, 10 - right], 30)] for right in (10, 5))
+    scores = real_streets._scores_of([one, other], [_counted(("a, 0", "a, 1"), [5, 5], [5, 5], 30)])
+    assert scores["pixel accuracy"]["seeds"] == [1.0, 0.875]
+    assert scores["class accuracy"]["seeds"] == [1.0, 0.75]
+    assert scores["above the table"]["pixel accuracy"]["seeds"] == [0.125, 0.0]
+    assert scores["recall"] == {"road": 0.75, "car": 1.0}
+    assert (scores["cameras"], scores["cells"], scores["frames"]) == ({"a": 0.9375}, 80, 2)
 
 
 def test_a_camera_that_is_missing_is_named_before_any_work(root, tmp_path):
