@@ -42,6 +42,10 @@ def main() -> None:
         *_, last = run_pipeline(scene[-SEEN:], Stages.of(load_net(arguments.weights, scene.camera), keep_steps=True))
         labels = np.where(scene.undecided(k, SPEC), scene.truth(k, SPEC, 0, 0), np.uint8(IGNORE))
         draw_frame(row, f"{camera}, {last.frame.time:.1f} s", last, labels)
+    for ax in axes[:, 1]:
+        ax.set_ylabel("x, forward [m]", fontsize=8)
+    for ax in axes[-1, 1:]:
+        ax.set_xlabel("y, to the left [m]", fontsize=8)
     names = colour_patches(KITTI_14.names, KITTI_14.rgb)
     fig.legend(handles=names, loc="outside lower center", ncols=5, fontsize=8, title=scene.credit, title_fontsize=8)
     fig.savefig(arguments.out, dpi=plotting.FIGURE_DPI)
@@ -74,7 +78,7 @@ def errors(labels: NDArray, called: NDArray) -> str:
 def only_near(ax: Axes) -> None:
     """Show a map up to 50 m ahead, without words on its axes."""
     ax.set(ylim=(0, 50), xlabel="", ylabel="")
-    ax.tick_params(labelsize=7)
+    ax.tick_params(labelsize=8)
 
 
 if __name__ == "__main__":

@@ -61,10 +61,10 @@ CAR, ROAD = KITTI_14.index("car"), KITTI_14.index("road")
 # %% [markdown]
 # ## The story of one cell
 #
-# Here is the whole course in one figure. The street is real: a corner of PandaSet, ten camera images and LIDAR scans in
-# two seconds. We look at one cell of its map, half a metre wide, and ask: why does the map say *car* there?
+# Here is the whole course in one figure. The street is real: a street corner from PandaSet, a public data set; ten camera
+# images and LIDAR scans in two seconds. We look at one cell of its map, half a metre wide, and ask: why does the map say *car* there?
 
-# %% jupyter={"source_hidden": true} alt="at the top a street with a column of dots rising from a parked car at the right; below, bars for the four states of the cell step by step and frame by frame, bars for what image and occupancy add to the score of car, by class and by plane, and the probability of car before and after the CRF"
+# %% jupyter={"source_hidden": true} alt="at the top a street with a column of dots rising beside parked cars at the right; below, bars for the four states of the cell step by step and frame by frame, bars for what image and occupancy add to the score of car, by class and by plane, and the probability of car before and after the CRF"
 street = real_drive()
 net = load_net(real_weights(), street.camera)
 real = list(run_pipeline(street, Stages.of(net, keep_steps=True)))
@@ -73,6 +73,7 @@ story = cell_story(now, CELL, net, past=real[:-1])
 fig = draw_cell_story(story, now.frame.image // 8 * 8)  # fewer colours: a smaller file
 for letter, ax in zip("ABDFGCE", fig.axes, strict=True):
     ax.set_title(f"{letter}  {ax.get_title(loc='left')}", loc="left", fontsize="medium")
+fig.supxlabel(street.credit, fontsize=8)
 plt.show()
 
 # %% jupyter={"source_hidden": true}
@@ -88,11 +89,12 @@ assert story.pull.before[CAR] > 0.99
 # them.
 #
 # - **A** The dots are points above the cell, one every 20 cm from the ground up, drawn where the camera sees them. The
-#   lower ones fall on a parked car, the upper ones on a tree. So the image alone doesn't say what stands in this cell.
+#   lower ones fall on parked cars, one behind the other, the upper ones on a tree behind them. So the image alone doesn't say what stands in this cell.
 # - **B**, **C** What the filter believes of the cell: after each of its steps within this scan (B; *shown* is what it
-#   passes on), and scan by scan (C). It is sure that something stands there: STATIC. *What* it is, no return says.
+#   passes on), and scan by scan (C). It is sure that something stands there: STATIC. No return says *what* it is.
 # - **D**, **E**, **F** How much image and occupancy speak for *car* (violet) or for the runner-up, *road* (orange; the
-#   maps below have other colours): by kind of input (D), by the score's class (E, the six largest) and by height (F).
+#   maps below have other colours): by kind of input, with the network's constants and the sum (D); the image's part by
+#   the score's class (E, the six largest) and by height (F).
 #   Each pixel has a score for every class, and the network may use each of them: a score for *vegetation*, too, can
 #   speak for *car*.
 # - **G** What the CRF makes of it. The neighbours' push is in brackets: it is largest for *car*, which was nearly
@@ -199,7 +201,8 @@ assert not d_separated(system.model, "near1", "i0", given=("l0", "l1", "i1"))
 # H x W are cells, h x w pixels, C = 14 classes, D = 20 planes, N points. ($v$ is a velocity in 01 to 04 and a pixel's
 # row here and from 05 on; $w$ is a width, and in 04 and 14 a weight; $K$ and $T$ also count cells and scans, before
 # 05. From 05 on $z$ without a time is a height. In 05 $R$ is a rotation and $t$ a shift, in 06 $k$ is a kernel, in 06
-# and 07 $m$ below a sum counts columns, in 14 $z_t$ is what the camera says. A letter that isn't in this table means
+# and 07 $m$ below a sum counts columns, in 14 $z_t$ is what the camera says. In 10 $l$ is a label, $Z$ a sum over all
+# labellings, $K$ a kernel, $p_i$ a part of a step; $k_{ij}$ and $a_l$ are prices, $w_1$ and $w_2$ weights. A letter that isn't in this table means
 # something on its own page only.)
 #
 # ## A map with forward up
@@ -273,7 +276,7 @@ plotting.animate_occupancy(
     [result.belief for result in real],
     [result.frame.time for result in real],
     "A map seen from above, over two seconds: free ground grows ahead, a row of parked cars stands on the right, "
-    "a car drives towards us on the left, and the rest stays grey, unknown",
+    "cars drive towards us on the left, others drive off ahead and leave dark trails, and the rest stays grey, unknown",
 )
 
 # %% [markdown]
@@ -327,9 +330,9 @@ assert KITTI_14.index("sky") not in labelled
 # Each pixel has the colour of its highest score; the white dots are our cell's column of panel A. Of the pixels with a
 # label 97 % have the right colour. But the network has learned from this very image, and where no label ever was it
 # guesses: no LIDAR return comes back from the sky, so none of its pixels has a label, and most of it is coloured as
-# *building*. The system doesn't use the colours. It passes on all 14 scores of each pixel, without a soft-max. (This
-# image network learned from pixels alone. One that is trained on by the *map's* errors, as in the paper, may make
-# signals of its scores that no longer name what a pixel shows: lectures 07, 08.)
+# *building*. The system doesn't use the colours. It passes on all 14 scores of each pixel, without a soft-max. (The
+# last thing that this image network learned from was labelled pixels. One that the *map's* errors trained last, as in
+# the paper, may make signals of its scores that no longer name what a pixel shows: lectures 07, 08.)
 #
 # ## Stage 3, $s \to p$: from pixels to places
 #
@@ -453,7 +456,7 @@ assert parts["occupancy"] > 0
 
 # %% [markdown]
 # Both sensors speak for *car*; the constants, which come from the network's biases and from no sensor, speak for
-# *road*. The parts add up to the difference of the two scores, and by the soft-max $e^\text{difference}$ is the odds of
+# *road*. The parts add up (before rounding) to the difference of the two scores, and by the soft-max $e^\text{difference}$ is the odds of
 # *car* against the runner-up. (A part isn't what would change without this input; lecture 08 measures that.) The map on
 # the left shows the most probable class of each cell:
 
@@ -472,7 +475,8 @@ for name in ("road", "car", "vegetation", "building"):
     assert (claimed[cells] == c).mean() > 0.5
 
 # %% [markdown]
-# On the right, inside the camera's view, are labels that people gave to LIDAR returns; white cells have none. Where the
+# On the right, inside the camera's view, are labels that people gave to LIDAR returns; white cells have none. There the
+# map guesses: the long *bicycle* straight ahead lies behind the white car, where no return came from. Where the
 # camera doesn't see, both maps show only the filter's states, the last four of the 14 classes: *unknown-free*,
 # *unknown-static*, *unknown-dynamic* and *unknown-unobserved*. Of each of the four classes that are printed, most
 # labelled cells are right. But this network has learned from this very street, so the picture shows what the stages do,
@@ -495,14 +499,14 @@ for name in ("road", "car", "vegetation", "building"):
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three label maps: before the CRF, after it, and only the cells that changed, which are crumbs and borders"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three label maps: before the CRF, after it, and only the cells that changed, which are crumbs, borders, distant cars and a strip of sidewalk along the left edge"
 before, after = now.grid.argmax(axis=0), now.refined.argmax(axis=0)
 changed = np.where(after != before, after, 255)
 plotting.label_maps(spec, {"before": before, "after": after, "what changed, and to what": changed}, KITTI_14)
 plt.show()
 
 # %% tags=["nbval-ignore-output"]
-known = (truth < 255) & (after != before)
+known = (truth < KITTI_14.n_semantic) & (after != before)
 mended, spoiled = (after == truth)[known].sum(), (before == truth)[known].sum()
 print(f"{known.sum()} labelled cells changed: {mended} became right, {spoiled} were right before")
 assert (after != before).mean() < 0.1
@@ -510,7 +514,8 @@ assert spoiled > mended > 0
 
 # %% [markdown]
 # More than nine cells in ten keep their class, ours among them (panel G). The map looks tidier, and it has become
-# worse: of the labelled cells that changed, more were right before than are right now.
+# worse: of the labelled cells that changed, more were right before than are right now. Look at the left edge: the strip
+# of sidewalk has become road.
 #
 # ## How good is it?
 #
@@ -675,7 +680,7 @@ assert clear[0] > 0.9 > 0.65 > clear[1]
 # map takes a moving car for a parked one. What the image shows might help; that is the dashed edge from $i_t$ to
 # $o_t$.
 #
-# **Far away everything is worse.**
+# **Far away fewer cells are right.**
 
 # %% jupyter={"source_hidden": true} alt="bars of the share of semantic cells that are right, by distance: high below 30 metres, lower from 30 to 45, lowest beyond"
 ahead = spec.centers()[..., 0]
@@ -717,7 +722,7 @@ for name in ("road", "sidewalk", "car", "pedestrian", "bicycle"):
 # Every stage can be read as inference in a model from which edges were cut to make it affordable. Here is what that
 # costs, each on a toy world of its own lecture in which the exact answer can be computed. *What is asked* names a
 # quantity; the last two columns give its exact value, and what the system says without the edge. (In the first row more
-# is better: how often a place is named rightly. In the rows with an error or with nats, less is better. In the others
+# is better: how often a place is named rightly. In the rows with a root mean square error or with nats, less is better. In the others
 # only the exact value is right.) An edge has the names of its lecture's graph, and stands for all of its kind: `m2 -> a3`
 # means every $m_i \to a_j$ with $i < j$, `m5 - m6` every pair of cells, `n1 <- n2` every step of the trip. (In the rows
 # of 00, 0 is $t-1$ and 1 is $t$.)

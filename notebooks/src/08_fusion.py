@@ -329,7 +329,7 @@ print("road", reduce(p, theta, beta)[0], "  car", reduce(p, theta, beta)[1])
 # and may find others. Its reduction leaves 16 maps, with $16 \cdot 280 + 16 = 4496$ weights.
 #
 # One detail matters later. A point of a plane that the camera doesn't see takes the score 0 for every class. So on
-# planes zero has a meaning, "nobody looked". Under a soft-max the same number may be added to all scores of a pixel
+# planes zero has a meaning: "the camera doesn't see this". Under a soft-max the same number may be added to all scores of a pixel
 # and nothing changes. Here the map changes: lecture 07 counted it on one frame, here are ten. (*Semantic cells* are
 # those in which a class like road or car is true, and not one of the four *unknown* ones.)
 
@@ -401,8 +401,8 @@ with torch.inference_mode():
 #
 # <details><summary>Answer</summary>
 #
-# Of all cells 52 % with the label, 56 % with $o$, 74 % with both; the network 80 %. Late fusion: 73 %, half a point
-# less. So on this drive cutting the dashed edge costs little, although in the toy P(car) became 0.33 instead of 0.22.
+# Of all cells 52 % with the label, 56 % with $o$, 74 % with both; the network 80 %. Late fusion: 73 %, less than a
+# point below. So on this drive cutting the dashed edge costs little, although in the toy P(car) became 0.33 instead of 0.22.
 # What else the table leaves out costs much more: on semantic cells it stays at 50 %, and the network reaches 73 %.
 #
 # </details>
@@ -473,7 +473,7 @@ assert np.abs(np.subtract(*list(drive_rows.values())[-2:])).max() < 0.5
 Markdown(as_table(drive_rows))
 
 # %% [markdown]
-# The last two rows could really be used: they have seen neither a true label of a pixel nor this drive, and differ by less
+# The last two rows could really be used: they need no true label of a pixel of this drive, and were counted on other frames. They differ by less
 # than half a point in each column. (The *table of both* is the best one over all cells of this drive. Over semantic
 # cells another can be better, and the one from the training frames is.)
 #
@@ -672,7 +672,7 @@ print(f"weighted {cross_entropy(g, true, alpha):.3f}   unweighted {cross_entropy
 # <details><summary>Answer</summary>
 #
 # The shares are equal: $f(c)$ is $n_c$ over all cells, so $\alpha_c n_c$ doesn't depend on $n_c$. Then 25 cells have as
-# much weight as 19,585: one of them weighs as much as 783 unobserved ones, and 8 % of the loss depends on 25 cells.
+# much weight as 19,585: one of them weighs as much as 783 unobserved ones, and 25 cells have 8 % of the weight.
 # So the package keeps weights between 1/4 and 4 (`weight_limit`; the paper has no limit), and
 # most of the balance goes: with it the three largest classes keep 54 % of the weight, pedestrians have 2.8 %, signage
 # 1.4 %, and those 25 cells 0.6 %.
@@ -692,7 +692,7 @@ for name, share in kept.items():
     print(f"{name}: three largest classes {share[np.argsort(cells)[-3:]].sum():.0f} %, of the rest", rare)
 assert cells[dynamic] == 25
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three bar charts of each class's share of the loss: without weights unobserved, road and unknown-free have 71 per cent; balanced nearly all classes have 8 per cent; with the limit of 4 the large classes have most again"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three bar charts of each class's share of the weight: without weights unobserved, road and unknown-free have 71 per cent; balanced nearly all classes have 8 per cent; with the limit of 4 the large classes have most again"
 occurs = cells > 0
 fig, axes = plt.subplots(1, 3, figsize=(8.2, 3.6), sharey=True, layout="constrained")
 names = [f"{KITTI_14.names[c]} ({cells[c]})" for c in np.flatnonzero(occurs)]
@@ -875,8 +875,9 @@ assert all(value["low"] < 0 < value["high"] for value in by_lidar + by_true[1:])
 Markdown(table)
 
 # %% [markdown]
-# Five bars contain zero; the sixth lies below it, by true labels half a point fewer cells are right. So on these streets
-# the way back buys nothing that we can see, and on the drive above it cost the labels of pixels. Our stage one is strong: it learns
+# Five of the six intervals contain zero. The sixth lies just below it: by true labels half a point fewer cells are right
+# end to end. So on these streets the way back brings nothing that we can see, and on the drive above fewer pixels were
+# right after it. Our stage one is strong: it learns
 # true labels of every pixel of the same images. The paper starts from ImageNet weights; what end to end would buy after
 # such a start these runs don't say. Lecture [12](12_experiments.ipynb) judges this claim of the paper.
 #
@@ -910,8 +911,9 @@ Markdown("\n".join([head, *rows]))
 
 # %% [markdown]
 # In brackets 95 % intervals. The simulated rows' networks learnt in 500 steps from labels made with the LIDAR (lecture
-# 09), on a GPU, so don't compare their 54 % with the 73 % above. For the real row each pair of six cameras was left out
-# once, three networks learned from the four others, and the two were scored: all on one street corner. By true labels
+# 09), on a GPU, so don't compare their 54 % with the 73 % above. For the real row six cameras made three pairs
+# (right, left, front and back). Each pair was left out once, three networks learned from the four others, and the two
+# were scored: all on one street corner. By true labels
 # $o$ brings 14 points; by real labels 33. The judges differ, too: a real cell is labelled only where a *LIDAR return*
 # lies, and there $o$ has evidence. And look at the last column: in the view of cameras that a network hasn't learned
 # from, a table of $o$ alone gets *more* cells right, by 6 points (2 to 10). Of six ways that go on from simulated
@@ -953,7 +955,8 @@ plt.show()
 
 # %% [markdown]
 # Three times as many bits are shared as on the simulated drive, and here late fusion isn't nearly free: it loses three
-# points against the table, which knows how label and state occur together. (The network has learnt from these very
+# points of all cells, and six of semantic ones, against the table, which knows how label and state occur together. By
+# class accuracy it is eight points better, as on the simulated drive. (The network has learnt from these very
 # frames, so its row shows what it can hold, not how it does on a new street.) Over all ten frames late fusion finds
 # most of the road, half of the cells of cars and nearly three quarters of those of buildings, and gives these names to
 # many other cells (B shows the last frame). It names no vegetation, sidewalk, bicycle or pedestrian at all. The road
@@ -962,7 +965,7 @@ plt.show()
 # ## Play with it
 #
 # Turn the camera, and keep the calibration. Positive: it points higher than the calibration says. Where does the map
-# break first, near or far? (Without a running kernel there is no slider; the curves below show all angles.)
+# break first, near or far? (Without a running kernel there is no slider; the curves below show seven angles, from -2 to 2 degrees.)
 
 
 # %% jupyter={"source_hidden": true}
@@ -1008,7 +1011,7 @@ _ = interact(show, pitch=FloatSlider(value=1.0, min=-3, max=3, step=0.25, descri
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="accuracy of three networks against the error of pitch and of yaw from minus two to two degrees: with pitch it falls steeply when the camera points too high and rises or stays when it points too low; with yaw it falls little on both sides"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="accuracy of three networks against the error of pitch and of yaw from minus two to two degrees: with pitch it falls steeply when the camera points too high; when it points too low it rises for SegNet and FCN, while DeepLab v2 falls at two degrees; with yaw it falls little on both sides"
 NAMES = {"segnet": "SegNet", "fcn": "FCN", "deeplab": "DeepLab v2"}
 angles = (-2, -1, -0.5, 0, 0.5, 1, 2)
 looks = {name: scores_of(load_net(sample_weights(name), drive.camera), image) for name in NAMES}
@@ -1024,7 +1027,7 @@ for (name, axis), curve in curves.items():
 axes[0].set(
     xlabel="pitch error [degrees]; positive: camera points higher", ylabel="semantic cells right [%]", ylim=(40, 85)
 )
-axes[1].set(xlabel="yaw error [degrees]")
+axes[1].set(xlabel="yaw error [degrees]; positive: farther to the left")
 axes[0].legend(fontsize="small", loc="lower left")
 plt.show()
 
@@ -1060,7 +1063,7 @@ for name in looks:
 # *unknown-unobserved*. How many of these cells get a name all the same, and can the probabilities tell a guess from a
 # sight?
 
-# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="histograms of the confidence of named cells: where a beam has been most lie above 0.9, where nobody has looked they spread from 0.3 to 1"
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="histograms of the confidence of named cells: where a beam has been most lie above 0.9, where neither beam nor camera has been they spread from 0.3 to 1"
 dark = o[:, State.UNKNOWN].numpy() > 0.9
 nobody, named = dark & (truth == unobserved), whole < KITTI_14.n_semantic
 with torch.inference_mode():
@@ -1069,12 +1072,12 @@ with torch.inference_mode():
     )
 guessed, sighted = sure[nobody & named], sure[semantic & named & ~dark]
 ranks = np.searchsorted(np.sort(sighted), guessed)
-print(f"of the cells that nobody sees {100 * named[nobody].mean():.0f} % get a name")
+print(f"of the cells that neither camera nor LIDAR sees {100 * named[nobody].mean():.0f} % get a name")
 print(f"mean confidence there {guessed.mean():.2f}, of named cells that a beam has reached {sighted.mean():.2f}")
 assert guessed.mean() < sighted.mean() - 0.1
 print(f"a sight is surer than a guess in {100 * (1 - ranks.mean() / len(sighted)):.0f} % of pairs")
 fig, ax = plt.subplots(figsize=(5.4, 2.4), layout="constrained")
-for values, style, name in ((sighted, "-", "a beam has been there"), (guessed, "--", "nobody has looked")):
+for values, style, name in ((sighted, "-", "a beam has been there"), (guessed, "--", "neither beam nor camera")):
     ax.hist(values, np.linspace(0, 1, 41), density=True, histtype="step", linestyle=style, label=name)
 ax.set(xlabel="confidence of a named cell", ylabel="density")
 ax.legend(loc="upper left", fontsize="small")
@@ -1092,13 +1095,14 @@ plt.show()
 Markdown(ledger_table(ledger("fusion")))
 
 # %% [markdown]
-# Late fusion cuts it; this network needn't. On both drives the edge is worth half a point of all cells. What the
-# network has over a table must lie elsewhere. On simulated streets it isn't the number of planes. What remains is its
-# look at the cells around, and scores that were learnt for the map.
+# Late fusion cuts it; this network needn't. Over all cells the edge is worth less than a point on the simulated drive,
+# and three points on the real one. The network is farther above the table than that, so most of its lead lies
+# elsewhere. It reads scores in place of one label, and it sees the cells around. On simulated streets the number of
+# planes brings a point at most.
 #
 # ## In five lines
 #
-# 1. A 1x1 convolution is a matrix product in each cell; on planes zero means that nobody looked.
+# 1. A 1x1 convolution is a matrix product in each cell; on planes zero means that the camera doesn't see the point.
 # 2. The image says what, $o$ says where. A table of both gets 74 % of all cells, late fusion 73 %, the network
 #    80 %.
 # 3. Balancing gives classes that are in all frames equal shares; with the limit that training uses the three largest

@@ -144,7 +144,8 @@ plt.show()
 # tells about L and nothing about S.
 #
 # Suppose that one LIDAR in twenty leans and three streets in ten slope. The ground seems to rise in 2 of 100 drives
-# anyway; a LIDAR that leans makes it rise with probability 0.95, a street that slopes with 0.8, each by itself. Walls
+# anyway; a LIDAR that leans makes it rise with probability 0.95, a street that slopes with 0.8, each by itself: it stays level
+# only if none of the three makes it rise (the field calls this a **noisy or**). Walls
 # show a leaning LIDAR in 90 of 100 cases; without one they seem to lean in 2 of 100. These numbers are made up.
 
 # %% tags=["graph"]
@@ -222,7 +223,7 @@ with tempfile.TemporaryDirectory() as folder:
 # %% [markdown]
 # Each damage is named with its file. Whether the files that are there show what you think is another matter: look.
 
-# %% jupyter={"source_hidden": true} alt="contact sheet of four frames of the drive: in all of them the white car stands at the same place, while a dark car on the left comes nearer and leaves the image"
+# %% jupyter={"source_hidden": true} alt="contact sheet of four frames of the drive: in all of them houses and parked cars stand at the same place, the white car ahead grows smaller, and a dark car on the left comes nearer and leaves the image"
 fig, axes = plt.subplots(2, 2, figsize=(6.4, 2.4), layout="constrained")
 for ax, k in zip(axes.flat, np.linspace(0, len(frames) - 1, 4).round().astype(int), strict=True):
     ax.imshow(frames[k].need_image() // 16 * 16)  # fewer colours: a smaller file
@@ -231,7 +232,9 @@ for ax, k in zip(axes.flat, np.linspace(0, len(frames) - 1, 4).round().astype(in
 plt.show()
 
 # %% [markdown]
-# Four frames, and the white car is where it was. It will matter in check 5.
+# Four frames: the white car drives off, but the houses and the parked cars are where they were. So our own vehicle
+# stands. It will matter in check 5. (`image_02` is the camera, `velodyne_points` are the scans, and `oxts` is the
+# position.)
 #
 # ## Check 2: time
 #
@@ -275,7 +278,7 @@ plt.show()
 
 # %% [markdown]
 # The steps are even, 200 ms, and yet two things are odd. PandaSet's scanner turns ten times a second, so every second
-# frame is missing: our excerpt left them out. The check doesn't see it, because all steps are *equally* too long. And
+# frame is missing: the copy that the excerpt was cut from hadn't them. The check doesn't see it, because all steps are *equally* too long. And
 # all sensors agree to the millisecond, which no real clocks do: whoever made the excerpt (we) wrote one time into all
 # files. That reading is not *passes* but *can't tell*. This is how the clocks of a real car look:
 
@@ -322,7 +325,8 @@ np.testing.assert_allclose(np.linalg.norm(depth_edges(ring[:, None] * directions
 
 # %% [markdown]
 # For a whole scan we take the image's gradient at all borders, divided by its mean over the image. This **contrast** is
-# 1 when borders in the scan have nothing to do with borders in the image. We turn the camera to and fro, and look where
+# 1 at places picked at random. (Borders of a scan that is out of place may lie above 1 all the same, since they fall on
+# parts of the image that are full of detail. So look for a peak.) We turn the camera to and fro, and look where
 # the contrast is largest. Here is what comes out when the lines of a scan are read in the order of the file:
 
 
@@ -372,9 +376,7 @@ if ours:
 
 # %%
 for name, points in {"this drive": frames[0].points, "simulated": sample_drive()[0].points}.items():
-    print(
-        f"{name:<11} of two successive returns {100 * neighbours(points).mean():.0f} % are less than 1.5 degrees apart"
-    )
+    print(f"{name:<11} {100 * neighbours(points).mean():.0f} % of successive returns are less than 1.5 degrees apart")
 
 # %% [markdown]
 # They aren't: PandaSet sorts returns by time, and the next line is mostly another laser's. So `depth_edges` puts a scan
@@ -558,7 +560,9 @@ assert motion_verdict(real["stretch 1"]["axes"]) is True
 # The numbers of the first section were made up. Now we measure: damage the drive in seven ways, one at a time, and read
 # all checks, here and on the simulated drive. `yaw` is the best turn of check 3, `tilt` the rise ahead of check 4;
 # `motion` says by how much some other motion fits better than the poses', and `colours` how unlike the colours of the
-# training images these are (0 to 1). "!" is an alarm. Look for rows that are nearly equal to the first one.
+# training images these are (0 to 1). Camera and LIDAR are turned by 2 degrees, and images come three frames late. "!" is
+# an alarm: more than 0.5 gaps, 0.5 degrees of yaw, 1 degree of tilt, 0.05 m of motion, or colours farther off than
+# those of the oddest training image. Look for rows that are nearly equal to the first one.
 
 # %%
 known = mean_histograms(training_images())
@@ -569,7 +573,7 @@ readings = {
 LIMITS = {"gaps": 0.5, "yaw": 0.5, "tilt": 1.0, "motion": 0.05}
 LIMITS["colours"] = max(measured["training images"]["colour distance"])
 
-# %% jupyter={"source_hidden": true} alt="two tables of readings, no fault and seven faults by five checks; beyond the limit a cell is orange with an exclamation mark, and the end of a search has a question mark: on the simulated drive five faults raise an alarm, on this drive backwards poses raise none and colours raise one in every row"
+# %% jupyter={"source_hidden": true} alt="two tables of readings, no fault and seven faults by five checks; beyond the limit a cell is orange with an exclamation mark, and the end of a search has a question mark: on the simulated drive five faults raise an alarm, on this drive colours raise one in every row, and late images and backwards poses raise no other"
 fig, axes = plt.subplots(1, 2, figsize=(10.5, 3.1), layout="constrained", sharey=True)
 for ax, (title, of) in zip(axes, readings.items(), strict=True):
     alarms = np.array([[abs(one[check]) > LIMITS[check] for check in LIMITS] for one in of.values()])
@@ -725,7 +729,7 @@ if ours:
     assert shares["taught here"]["left, later"] > shares["taught here"]["right"] + 0.2
     assert shares["taught here"]["right"] > shares["simulated streets"]["right"] + 0.1
 
-# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="three maps of labelled cells in the last frame, by the network from simulated streets, the one taught here, and the labels, with a dashed line between left and right half: before, much of the road is called something else; after, the left half agrees with the labels and the right half still has many wrong cells"
+# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="three maps of labelled cells in the last frame, by the network from simulated streets, the one taught here, and the labels, with a dashed line between left and right half: before, the road just ahead is called vegetation and most cells of the right half are wrong; after, the left half agrees with the labels and the right half still has many wrong cells"
 last = truths[-1] != IGNORE
 shown = {
     name: np.where(last, maps[name][-1].argmax(axis=0), IGNORE)
@@ -741,13 +745,15 @@ plt.show()
 
 # %% [markdown]
 # Left of the dashed line the taught map looks like the labels. On the left there was no wall and hardly a hedge to
-# learn from. So on the right, as printed above, it has most cells of road right, which it was taught, and less than a
-# third of the wall and of the vegetation. The lesson is older than neural networks: **the places that you test must
+# learn from. So on the right, as printed above, it has most cells of road right, which it was taught, and about a fifth
+# of the wall and a third of the vegetation. The lesson is older than neural networks: **the places that you test must
 # differ from those you learned from as much as the places where you will use it.**
 #
-# Does the map know how sure to be? Sort the cells by the probability of their class, and look how many are right:
+# Does the map know how sure to be? Sort the cells by the probability of their class, and look how many are right. *Off
+# by* is the mean distance from the diagonal, each point weighted by its number of cells: the **expected calibration
+# error** (ECE).
 
-# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="reliability diagram: the network from simulated streets lies far below the diagonal; the one taught here lies a little below it in the half from which it learned, and up to twenty points below it in the other half"
+# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="reliability diagram: the network from simulated streets lies far below the diagonal; the one taught here lies up to sixteen points below it in the half from which it learned, though near it where most cells are, and up to twenty points below it in the other half"
 fig, ax = plt.subplots(figsize=(4.6, 3.4), layout="constrained")
 ax.plot([0, 1], [0, 1], color="0.6", lw=1)
 rows = [("simulated streets", "right", "s:"), ("taught here", "left, later", "o-"), ("taught here", "right", "D--")]
@@ -796,8 +802,8 @@ for name, one in agreement.items():
 # returns, in both columns; on this street and on both stretches of drive 0013 it agrees less. It also grows less
 # sure, but from its sureness of 0.76 on this street you can't see that 45 % of the map's labelled cells are wrong.
 # Two classes are a coarse check: they can't tell a car from a fence. And what lies lower than 30 cm counts as ground: on
-# this street a quarter of the lane's returns are labelled *car*, the lower edge of the car ahead. The network that knows
-# the street calls nearly all of these car, so it agrees in only 66 of 100. The companion [the domain gap,
+# this street that takes in the lower edge of the car ahead. Returns there are labelled *car*, and the network that knows
+# the street says so: one reason why it agrees in only 66 of 100. The companion [the domain gap,
 # measured](deeper/13_domain_gap.ipynb) takes this further: how far these images are from those learned from, and why
 # that distance isn't the damage.
 #
@@ -862,7 +868,7 @@ for name, grids in maps.items() if labelled else ():
 for line in lines[:8]:
     print(f"{line.verdict!s:<6} {line.check:<20} {line.reading}")
 
-# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="report card of the drive, one row per check with a mark, a verdict in words and a reading: files, gaps, borders and ground ahead pass; clocks and motion can't tell; ground to the left, colours and the map of the network from simulated streets raise an alarm"
+# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="report card of the drive, one row per check with a mark, a verdict in words and a reading: files, gaps, borders and ground ahead pass; clocks and motion can't tell; ground to the left, colours and the map of the network from simulated streets raise an alarm; the maps of the networks for real streets and taught here pass"
 fig, ax = plt.subplots(figsize=(8.2, 0.31 * len(lines) + 0.3), layout="constrained")
 draw_report_card(lines, ax).set_title(f"your drive: {drive.folder.name}", loc="left")
 plt.show()
@@ -892,8 +898,7 @@ plt.show()
 # 2. When a check fails, doubt the check as well as the data; a second check that depends on one suspect alone tells
 #    the causes apart.
 # 3. Without images a table of occupancy states, made from its labels, had 76 % of this street right; the network from
-#    simulated streets 55
-#    %, or 69 % when it mustn't answer *unknown*.
+#    simulated streets 55 %, or 69 % when it mustn't answer *unknown*.
 # 4. A network that learned on one half of a street does well there, and worse and too surely on the other. Test where
 #    you haven't learned.
 # 5. Paying back an edge is a measurement: memory brought the network from simulated streets 8 points on this street,

@@ -6,10 +6,10 @@
 # the predicted one.
 #
 # **You will be able to**
-# - draw the class of a cell as a chain over time, and say why two frames aren't two independent witnesses;
+# - draw the class of a cell as a chain over time, and read from it what two frames share;
 # - compute what one more frame is worth, by hand, by exact inference and by measurement;
 # - write a memory of classes for one cell, and carry the class of what moves;
-# - score a memory fairly: cells in view, seen before and never seen, each by itself;
+# - score a memory fairly: cells in view, seen before and only seen later, each by itself;
 # - say where a memory makes the map worse, and why.
 #
 # **Prerequisites.** Lectures [03](03_bof.ipynb) and [04](04_cmcdot.ipynb): a filter over time, velocities of cells.
@@ -56,7 +56,7 @@ measured = json.loads(Path("../docs/results/memory.json").read_text())
 # %% [markdown]
 # ## A car drives out of the picture
 #
-# The vehicle waits at a crossing. An oncoming car passes on the left. After 1.4 seconds it has left the image, but
+# The vehicle waits at a crossing. An oncoming car passes on the left. After 1.6 seconds it has left the image, but
 # not the laser scan. What does the map say of it?
 
 
@@ -105,7 +105,8 @@ plotting.animate(passing(), period=0.6, alt="a car leaves the image; only the ma
 
 # %% [markdown]
 # Follow the ring, which appears when the filter finds that the car moves. In B, the map of one frame, the car is
-# blue, *car*, as long as the image shows it, and then it turns pale orange: *unknown-dynamic*. The filter knows that
+# blue, *car*, in the cells that the camera sees; as it leaves the view it turns pale orange, cell by cell:
+# *unknown-dynamic*. The filter knows that
 # something moves there. That it is a car, the system knew half a second ago, and has forgotten. In C it stays a car,
 # because there the class is kept and moves along.
 #
@@ -128,9 +129,10 @@ plt.show()
 # that the network names. So far this is lecture 01's chain, with two sensors. What is new is the row below: $e_t$ is
 # the network's *error*. It is either "none", or "says building, whatever it sees", and so on. Errors last: the
 # shadow that made the network wrong is mostly still there a tenth of a second later. In this toy world an error
-# stays with probability $r = 0.6$, and is otherwise drawn anew; by itself each frame is right with 0.8. Dashed is what
-# the memory of this lecture will cut: the chain of errors, at a price that you will compute, and what laser and camera
-# tell each other about the content, because each of them keeps a belief of its own.
+# stays with probability $r = 0.6$, and is otherwise drawn anew; by itself each frame is right with 0.8. Two
+# dashed arcs mark what the memory of this lecture will give up: that each error depends on the one before, at a price
+# that you will compute, and what laser and camera tell each other about the content, because each of them keeps a
+# belief of its own. (The second arc is no edge of the graph: this dependence goes through $m_1$.)
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph of three frames: contents m0 to m2 in a row, above them scans, below them the classes named, which also depend on a row of errors e0 to e2; a dashed arc below the last two errors has the price .34 to .38, and another one joins scan l1 and class named z1"
 world = MemoryWorld(steps=3, repeats=0.6)
@@ -141,8 +143,8 @@ plt.show()
 
 # %% [markdown]
 # **Predict before you run.** The simplest memory of classes multiplies what the frames say. This is right if $z_0$
-# and $z_1$ are independent once the contents $m_0, m_1$ are known. Are they? And $z_0$ and $l_1$, once $m_0$ and
-# $m_1$ are known?
+# and $z_1$ are independent once the contents $m_0, m_1$ are known. By which path are they dependent, and what must be
+# known to close it? And are $z_0$ and $l_1$ independent, once $m_0$ and $m_1$ are known?
 #
 # <details><summary>Answer</summary>
 #
@@ -218,7 +220,8 @@ print(f"exact:        {exact_classes(world, *seen)[-1].round(2)}")
 # sequence of readings. We measure in nats: the mean of −log P(true class) after three frames; less is better.
 #
 # **Predict before you run.** Order these four by their loss, with $r = 0.6$: forget all images but the last one (the
-# paper); the product of the frames; the frames with the best exponent; the exact answer.
+# paper); the product of the frames; the frames with the best exponent; the exact answer. The graph's price shows two of
+# the four. Where do the others lie?
 #
 # <details><summary>Answer</summary>
 #
@@ -303,7 +306,7 @@ assert rates[10] > 5 * rates[1] ** 10  # far more than if it fell like r^k
 
 # %% [markdown]
 # So errors repeat: their correlation from one frame to the next is 0.7 on both drives. (The filter draws particles,
-# so on another processor the last digit may differ, here and below; assertions hold what the text says.) Note also
+# so on another processor the last digit may differ, here and below; assertions hold the main statements, not every digit.) Note also
 # how slowly the correlation falls from one frame apart to ten. The formula assumes that it falls like $r^k$, so that
 # frames far apart are nearly independent. Here they aren't, so the formula promises too much.
 #
@@ -453,7 +456,8 @@ for step in range(11):
 # ## What it gains
 #
 # Cells are scored in three groups: those that the camera sees now; those that it saw before and doesn't see now;
-# those that it never saw. The first group is what the paper's tables count. Each drive is compared with itself, so
+# those that it never saw. The table shows the first two; those of the third that are seen later come at the end. The
+# first group is what the paper's tables count. Each drive is compared with itself, so
 # that easy and hard streets don't hide the difference; the intervals are over drives (lecture 12), on the real street
 # over blocks of two seconds of one of its six cameras.
 
@@ -601,7 +605,7 @@ def show_windows(chosen, side=16):
     plt.show()
 
 
-# %% jupyter={"source_hidden": true} alt="six squares of map in three rows, one frame, memory and truth: in the simulated ones pale or black unknown cells become road and vegetation as in the truth; in the real ones blue car cells appear where one frame said unknown"
+# %% jupyter={"source_hidden": true} alt="six squares of map in three rows, one frame, memory and truth: in the simulated ones pale or brown unknown cells become mostly road and vegetation as in the truth; in two of the real ones blue car cells appear where one frame said unknown-dynamic, in the third a few sidewalk cells become road"
 show_windows([(results, one) for results in (simulated, street) for one in windows(results, 1)])
 
 # %% [markdown]
@@ -615,14 +619,14 @@ show_windows([(results, one) for results in (simulated, street) for one in windo
 # fitted to any drive, predicts two gains: for a cell in view, from the last image alone to all images; for a cell that
 # the camera no longer sees, from the scans alone to scans and earlier images.
 #
-# **Predict before you run.** Which gain is larger, and by about what factor: in view, or seen before? And will the real
-# memory get the whole of it?
+# **Predict before you run.** You have seen both gains on the drive, and the larger one lies where the camera doesn't look
+# any more. By about what factor do they differ in the toy? And does the drive get more or less than the toy promises?
 #
 # <details><summary>Answer</summary>
 #
-# Seen before: 0.34 nats against 0.08. A cell in view has an image already, and further ones repeat its errors. On the
-# sample drive the real memory gets 0.49 for cells seen before, and in view a quarter of the 0.08. On the real street it
-# gains nothing with the network that learned there, and 0.02 and 0.01 with the other one.
+# By four: seen before 0.34 nats, in view 0.08. A cell in view has an image already, and further ones repeat its errors. On the
+# sample drive the real memory gets 0.49 for cells seen before, and in view a quarter of the 0.08. On the real
+# street, in nats and on its ten frames, it gains nothing with the network that learned there, and 0.02 and 0.01 with the other one.
 #
 # </details>
 
@@ -679,7 +683,8 @@ Markdown(ledger_table([line for line in ledger("system") if line.edge == "g0 -> 
 #
 # <details><summary>Answer</summary>
 #
-# In cells that are only seen later: the memory of the past knows nothing of them, and answers *unknown*.
+# In cells that are only seen later, most of all on simulated streets: there the memory of the past calls most of them
+# *unknown*.
 #
 # </details>
 
@@ -744,11 +749,11 @@ _ = interact(show_repeats, repeats=FloatSlider(value=0.6, min=0.0, max=0.95, ste
 show_windows([(results, one) for results in (simulated, street) for one in windows(results, -1)])
 
 # %% [markdown]
-# In the simulated squares, 45 to 67 m ahead, earlier guesses of *sidewalk* and *vegetation* stay where the newest
-# frame, from nearer by, has fewer of them. On the real street it is a few cells, most at the edge of a sidewalk
+# In the first simulated square, 45 to 67 m ahead, earlier *vegetation* stays where the newest frame says sidewalk; in
+# the two others earlier *sidewalk* and *vegetation* stay where it says road or unobserved. On the real street it is a few cells, most at the edge of a sidewalk
 # or of a building.
 #
-# **A car that leaves.** And what of a car that stood, was seen, and drove away out of view?
+# **A car that leaves.** And what of a car that was in a cell, and has left it while the camera looked elsewhere?
 
 # %% tags=["nbval-ignore-output"]
 cars, left = KITTI_14.index("car"), np.zeros(3, int)
@@ -787,8 +792,8 @@ assert min(left[1:]) > 0.4 * left[0]
 # 4. Most of the gain lies where the camera doesn't look any more: 15 to 74 % of the cells on fresh streets; in view
 #    +4.9 points there, and +0.4 for the network that knows the real street. On the sample drive nearly all of the gain
 #    in view is fewer answers *unknown*.
-# 5. The graph named this edge in lecture 00, before anybody had built it. The order of the gains that it predicted
-#    was right on the sample drive and wrong on the real street, where the network that learned there gained nothing.
+# 5. The graph named this edge in lecture 00. The order of the gains that it predicted, in nats, was right on the sample
+#    drive; on the ten real frames both gains are nearly zero.
 #
 # **What you can now do.** You can draw a perception system as a graph, find what it cuts, put a price on each edge with
 # exact inference on a toy, choose the edge that is worth paying for, build it, and measure whether the price was right.

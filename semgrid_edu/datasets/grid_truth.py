@@ -78,9 +78,9 @@ def fill_unlabelled(truth: NDArray[np.uint8], belief_probability: NDArray, label
     """
     if np.shape(belief_probability) != (4, *truth.shape):
         raise ArgumentError("belief_probability", f"shape {(4, *truth.shape)}", f"{np.shape(belief_probability)}")
-    if label_set is KITTI_14:
+    if label_set == KITTI_14:
         unknown = unknown_classes(belief_probability)
-    elif label_set is SYNTHIA_10:
+    elif label_set == SYNTHIA_10:
         unknown = np.uint8(SYNTHIA_10.index("void"))
     else:
         raise ArgumentError("labels", f"the label set {KITTI_14.name} or {SYNTHIA_10.name}", label_set.name)

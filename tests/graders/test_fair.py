@@ -29,7 +29,8 @@ NOISE = {  # the strict one last, because it changes how the others would end
 
 
 def test_what_is_said_beside_costs_nothing(forked):
-    assert graded(forked, "noisy", handed_in(inside("locate", "\n    ".join(NOISE.values())))).score == 15
+    noisy = handed_in(inside("locate", "\n    ".join(NOISE.values())))
+    assert graded(forked, "noisy", noisy, GradeSettings(timeout=60)).score == 15
 
 
 def twin(cell):

@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.camera import project, transform_points
@@ -18,8 +19,9 @@ from semgrid_instructor import close, generator, hidden
 
 def _open(uv: NDArray, Z: NDArray, reach: int, gap: float) -> NDArray:
     """Return which returns aren't hidden, pair by pair."""
-    apart = np.maximum(np.abs(np.subtract.outer(uv[:, 0], uv[:, 0])), np.abs(np.subtract.outer(uv[:, 1], uv[:, 1])))
-    return ~((apart <= reach) & (np.subtract.outer(Z, Z) > gap)).any(axis=1)
+    near = KDTree(uv).query_pairs(reach, p=np.inf, output_type="ndarray")
+    hidden_ones = [far[Z[far] - Z[other] > gap] for far, other in (near.T, near.T[::-1])]
+    return ~np.isin(np.arange(len(Z)), np.concatenate(hidden_ones))
 
 
 @hidden

@@ -19,7 +19,7 @@ from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 from semgrid_edu.workshop.course.sandbox import linux, taken
 from semgrid_edu.workshop.course.sandbox.limits import PARTS, Limits, _all_but
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
-from semgrid_edu.workshop.course.sandbox.taken import namespace_of, processes_in
+from semgrid_edu.workshop.course.sandbox.taken import has_ended, namespace_of, processes_in
 
 needs_landlock = pytest.mark.skipif(not linux.landlock_version(), reason="this system has no Landlock")
 
@@ -239,7 +239,18 @@ def test_the_last_process_has_ended_when_it_is_stopped(session):
     process = session.process
     assert not process.namespace or len(processes_in(process.namespace)) >= 21
     session.stop()
-    assert processes_in(process.namespace) == []
+    assert all(map(has_ended, processes_in(process.namespace)))
+
+
+def test_a_process_that_waits_for_its_parent_has_ended():
+    """Where nobody asks for the last words of orphans, as in many a container, they stay in /proc for ever."""
+    with subprocess.Popen(["true"]) as child:
+        place = Path(f"/proc/{child.pid}")
+        os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)
+        assert place.exists()
+        assert has_ended(place)
+    assert has_ended(place)
+    assert not has_ended(Path("/proc/self"))
 
 
 def test_a_folder_that_cannot_be_listed_is_gone_afterwards(session):

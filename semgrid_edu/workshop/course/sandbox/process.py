@@ -26,6 +26,7 @@ from semgrid_edu.workshop.course.sandbox.taken import (
     count_tasks,
     delete_folder,
     deleted_bytes,
+    has_ended,
     memory_held,
     memory_of,
     namespace_of,
@@ -267,7 +268,7 @@ class StudentProcess:
     def _wait_for_the_last(self) -> None:
         """Wait until the system has ended all that the process has started, at most some seconds."""
         until = time.monotonic() + ENDING
-        while processes_in(self.namespace) and time.monotonic() < until:
+        while not all(map(has_ended, processes_in(self.namespace))) and time.monotonic() < until:
             time.sleep(0.01)
 
 

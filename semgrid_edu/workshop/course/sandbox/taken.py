@@ -76,6 +76,19 @@ def processes_in(namespace: str) -> list[Path]:
     return [place for place in Path("/proc").glob("[0-9]*") if _link(place / "ns" / "pid") == namespace]
 
 
+def has_ended(process: Path) -> bool:
+    """Return whether a process has ended; if so, at most its number is left, until its parent asks how it ended.
+
+    Parameters
+    ----------
+    process : Path
+        `/proc/PID`.
+    """
+    with suppress(OSError):
+        return (process / "stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+    return True
+
+
 def processes_below(pid: int) -> list[Path]:
     """Return `/proc/PID` of each process that a process has started, and of those that these have.
 

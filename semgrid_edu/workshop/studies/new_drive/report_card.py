@@ -130,7 +130,7 @@ def _colour_line(frames: Sequence[Frame]) -> Line:
         others = mean_histograms(images[:k] + images[k + 1 :])
         apart.append(colour_distance(mean_histograms([images[k]]), others))
     distance = colour_distance(mean_histograms([frame.need_image() for frame in frames[::4]]), known)
-    return Line("colours", f"{distance:.2f} from simulated ones ({max(apart):.2f})", distance <= max(apart))
+    return Line("colours", f"{distance:.2f} from simulated ones (limit {max(apart):.2f})", distance <= max(apart))
 
 
 def map_lines(name: str, truths: NDArray, grids: NDArray, table: NDArray, pieces: NDArray) -> list[Line]:
@@ -154,7 +154,7 @@ def map_lines(name: str, truths: NDArray, grids: NDArray, table: NDArray, pieces
     low, gain, high = paired_interval(ours, theirs, accuracy)
     error = expected_calibration_error(reliability(np.moveaxis(grids, 1, 0), truths, 10))
     right = f"{100 * drive_interval(ours, accuracy).mean:.0f} % right"
-    more = f"{100 * gain:+.0f} ({100 * low:+.0f} to {100 * high:+.0f})"
+    more = f"{100 * gain:+.0f} points ({100 * low:+.0f} to {100 * high:+.0f})"
     return [
         Line(f"{name} against the table", f"{right}; {more}", None if low <= 0 <= high else bool(gain > 0)),
         Line(f"{name}: sureness", f"off by {100 * error:.0f} points", bool(error <= OVERSURE)),
