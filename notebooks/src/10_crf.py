@@ -17,7 +17,7 @@
 #
 # **Time.** 75 minutes, of which the computer needs less than one.
 #
-# **Paper.** Section 3.5, equations (3) and (4); table 1; claim 2 (lecture 12): the CRF raises pixel accuracy slightly and lowers class accuracy.
+# **Paper.** Section 3.5, equations (3) and (4); table 1; claim 2 of lecture 12.
 
 # %% jupyter={"source_hidden": true}
 import json
@@ -102,8 +102,8 @@ for ax in fig.axes[:3]:
 plt.show()
 
 # %% [markdown]
-# At A, at the right edge, the network calls a ragged patch *unknown* where the vegetation on its left goes on. A person
-# would correct it at once. We want a rule that does the same. The rule must also say when *not* to correct:
+# At A, at the right edge, the network calls a ragged patch *unknown* where the vegetation on its left goes on. We want a
+# rule that corrects this. The rule must also say when *not* to correct:
 # at B the network had found a part of a bicycle, a few cells that are really there, and the refined map has lost some of them.
 #
 # A CRF writes such a rule as a list of prices. A label that the network thinks improbable costs something. Two cells
@@ -114,8 +114,8 @@ plt.show()
 #
 # Here are four cells of such a model. Each circle $x_i$ is the label of cell $i$. Each black square is a **factor**:
 # a table with a number $e^{-\text{price}}$ for each choice of labels (the field calls the prices *potentials*). One
-# square belongs to each cell, and one to each pair. (In the figure $\phi_u$ is the price of a label and $k_{12}$ that of
-# two labels that differ; the bracket is 1 when they differ, and otherwise 0.)
+# square belongs to each cell, and one to each pair. ($\phi_u$ is the price of a label, $k_{12}$ that of two labels
+# that differ.)
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a factor graph of four cells on a circle: a black square at each cell and one between each of the six pairs; a dashed curve between two cells carries the price .52 to .998"
 stage = crf_stage(unary=two_classes(np.full((2, 2), 0.6)))
@@ -530,7 +530,7 @@ for i in range(4):
 # <details><summary>Answer</summary>
 #
 # Cell 1 hears "car" and turns to car, cell 2 hears "road" and turns to road. Now they disagree again, the other way
-# round, so they swap back, after the first swap surer each time, until the swap repeats itself. They never agree, and the free energy ends far above its beginning. Exactly, "both road" weighs
+# round, so they swap back, from then on surer each time. They never agree, and the free energy ends far above its beginning. Exactly, "both road" weighs
 # 0.245 and "both car" 0.195, so both cells are road with about 0.56: they agree, but on which class is nearly undecided.
 #
 # </details>
@@ -941,7 +941,7 @@ plt.show()
 #
 # ### Play with it
 #
-# With a four times larger $w_1$ the bicycle's cell at B stays and the patch at A is filled, but the sidewalk frays. Can you
+# With a larger $w_1$ the bicycle's cell at B stays and the patch at A is filled, but the sidewalk frays. Can you
 # find weights without that? (Without a running kernel there are no sliders; the figure above shows six settings.)
 
 
@@ -970,12 +970,12 @@ print("gain:", ", ".join(name for name in KITTI_14.names[:10] if changes[name] >
 print("lose:", ", ".join(name for name in KITTI_14.names[:10] if changes[name] < 0))
 
 # %% [markdown]
-# Road, sidewalk, vegetation and cars gain. Pedestrians, bicycles, fences and buildings lose; a likely reason is that most
-# cells around theirs have another label. Yet signs, whose poles are one cell wide, keep their share, so size alone
-# doesn't decide. Nothing in the model says that a person is small and still a person.
+# Road, sidewalk, vegetation and cars gain. Pedestrians, bicycles, fences and buildings lose; perhaps because most cells
+# around theirs have another label, but sign poles, one cell wide, keep their share. Nothing in the model says that a
+# person is small and still a person.
 #
-# **Most errors stay.** The CRF only knows the network's probabilities and the occupancy grid. A patch that is wrong,
-# large and confident looks to it just like a patch that is right. How many wrong cells does it repair?
+# **Most errors stay.** The CRF only knows the network's probabilities and the occupancy grid. A large, confident
+# patch that is wrong looks to it like one that is right. How many wrong cells does it repair?
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 before, after = (maps[name] == truths for name in ("network", "normalised"))
@@ -987,11 +987,11 @@ print(f"of the network's {(~before).sum()} wrong cells, {(~before & ~after).mean
 assert (~before & ~after).sum() > 0.5 * (~before).sum()
 
 # %% [markdown]
-# It repairs about a quarter of the wrong cells. How large the patches of the others are, we haven't measured.
+# About a quarter. How large the other patches are, we haven't measured.
 #
 # **Does it hold on a real street?** The shipped real drive has labelled returns. We refine its ten maps with the same
 # prices, once those of a network from simulated streets, and once those of a network that has learned from these very
-# frames. The labelled cells that are marked as seen in their own frame are scored.
+# frames. Labelled cells that are seen in their own frame are scored.
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 street, correct = real_drive(), {}
@@ -1040,9 +1040,8 @@ plt.show()
 # them, so both terms of equation (4) tie them to it.
 #
 # **What else the model assumes.** Every confusion costs the same (Potts): a border between road and sidewalk is as
-# expensive as one between road and car. The network's probabilities are taken at their word. So if a network is too
-# sure, neighbours can hardly change its labels, and if it isn't sure enough, they decide nearly alone. And only pairs
-# count: no shapes, no sizes, no memory of the last frame.
+# expensive as one between road and car. The network's probabilities are taken at their word: of one
+# that is too sure neighbours can hardly change a label. And only pairs count: no shapes, no sizes, no memory.
 #
 # ## What the paper gained by it
 #
