@@ -942,7 +942,7 @@ plt.show()
 # ### Play with it
 #
 # With a larger $w_1$ the bicycle's cell at B stays and the patch at A is filled, but the sidewalk frays. Can you
-# find weights without that? (Without a running kernel there are no sliders; the figure above shows six settings.)
+# find weights without that? (Without a running kernel, look at the six settings above.)
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
@@ -960,7 +960,7 @@ _ = interact(at, **weights)
 # %% [markdown]
 # ## Where this breaks
 #
-# **Small things are outvoted.** Look at the table by class once more: which of the semantic classes gain, and which lose?
+# **Small things are outvoted.** Look at the table by class: which semantic classes gain, and which lose?
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 changes = dict(zip(KITTI_14.names, class_change, strict=True))
