@@ -146,8 +146,8 @@ for a, b in combinations(names, 2):
 print("cells that one square links, at most:", max(len(factor.names) for factor in stage.model.factors))
 
 # %% [markdown]
-# *Mean field* cuts all six links; the dashed curve marks one of them. Its price, first exact, then by mean field, comes
-# from an example further down.
+# *Mean field* cuts all six links; the dashed curve marks one of them. Its price (exact, then mean field) comes
+# from an example below.
 #
 # ## Two cells by hand
 #
@@ -971,7 +971,7 @@ print("lose:", ", ".join(name for name in KITTI_14.names[:10] if changes[name] <
 
 # %% [markdown]
 # Road, sidewalk, vegetation and cars gain. Pedestrians, bicycles, fences and buildings lose; perhaps because most cells
-# around theirs have another label, but sign poles, one cell wide, keep their share. Nothing in the model says that a
+# around have another label, but sign poles, one cell wide, keep their share. The model doesn't know that a
 # person is small and still a person.
 #
 # **Most errors stay.** The CRF only knows the network's probabilities and the occupancy grid. A large, confident
@@ -1034,7 +1034,7 @@ plt.gcf().supxlabel(street.credit, fontsize=8)
 plt.show()
 
 # %% [markdown]
-# On these frames, of one street corner, the same prices gain where many cells are wrong and lose where few are. The gain
+# Here, at one street corner, the same prices gain where many cells are wrong and lose where few are. The gain
 # isn't safe: on the 27,445 labelled cells of lecture 13 it is a loss of 1.1 points, and the interval contains zero.
 # Sidewalks lose most cells in both maps: nearly all of theirs lie in the two leftmost columns, FREE like the road beside
 # them, so both terms of equation (4) tie them to it.
