@@ -1072,11 +1072,11 @@ Markdown("\n".join(lines))
 
 # %% [markdown]
 # For all three networks, in the paper as here, the CRF costs more than a point of class accuracy, and pixel accuracy rises
-# a little, here by 0.03 to 0.12 points. Lecture 12 uses several seeds, and LIDAR labels like the paper; by those
-# pixel accuracy rises by about a point.
+# a little, here by 0.03 to 0.12 points. By LIDAR labels, as in the paper, and several seeds (lecture 12)
+# it rises by about a point.
 #
-# What is missing is speed. All 2400 cells of this lecture make 2.9 million pairs; the paper's grid makes 1.5 billion.
-# Lecture 11 computes nearly the same sums without visiting the pairs.
+# What is missing is speed. The 2400 cells here make 2.9 million pairs; the paper's grid makes 1.5 billion. Lecture 11
+# computes nearly the same sums without visiting them.
 #
 # ## The ledger's line
 #
