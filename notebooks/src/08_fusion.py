@@ -336,7 +336,7 @@ print("road", reduce(p, theta, beta)[0], "  car", reduce(p, theta, beta)[1])
 # %% tags=["nbval-ignore-output"]
 print(f"weights of the reduction: {sum(part.numel() for part in net.fusion.reduce[0].parameters()):,}")
 for added in (1, 5, -5):
-    shifted = grid_of(net, torch.cat([net.sampler(s[None] + added) for s in scores]), o)
+    shifted = grid_of(net, (net.sampler(s[None] + added)[0] for s in scores), o)
     pixel, by_class = accuracies(shifted, truth)
     changed = 100 * (shifted != whole).mean()
     print(
@@ -929,7 +929,7 @@ street = real_drive()
 real_net = load_net(real_weights(), street.camera).requires_grad_(False)
 _, real_image, real_o, real_truth = prepared(street)
 real_scores = scores_of(real_net, real_image)
-real_grid = grid_of(real_net, torch.cat([real_net.sampler(s[None]) for s in real_scores]), real_o)
+real_grid = grid_of(real_net, (real_net.sampler(s[None])[0] for s in real_scores), real_o)
 real_label = read_on_ground(real_scores.argmax(dim=1).numpy(), street.camera.resized(size))
 use = real_truth != IGNORE
 real_columns = real_label[use], real_o.numpy().argmax(axis=1)[use], real_truth[use].astype(int)
@@ -979,7 +979,7 @@ def turned(pitch=0.0, yaw=0.0):
 def map_with(name, scores, camera, which=slice(None)):
     """Return the grids that a shipped network makes of its scores with a calibration."""
     wrong = load_net(sample_weights(name), camera).requires_grad_(False)
-    return grid_of(wrong, torch.cat([wrong.sampler(s[None]) for s in scores[which]]), o[which])
+    return grid_of(wrong, (wrong.sampler(s[None])[0] for s in scores[which]), o[which])
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="the map of a frame with the calibration of the slider's angle"

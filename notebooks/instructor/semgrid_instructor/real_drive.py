@@ -1,6 +1,7 @@
 """Hidden tests of exercise 13, your own street: other clocks, planes, scans and maps."""
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,23 +107,28 @@ def check_refine(refine: Callable) -> None:
         assert same, "it changes an argument: make new arrays"
 
 
+@cache
+def _street() -> list[tuple[NDArray, NDArray, NDArray]]:
+    """Return map, occupancy and truth of the street's first six frames; the same for every answer."""
+    drive = real_drive()
+    net = load_net(sample_weights(), drive.camera)
+    grids, beliefs = zip(*((one.grid, one.belief.probability) for one in run_pipeline(drive[:6], net)), strict=True)
+    return list(zip(grids, beliefs, semantic_truths(drive, beliefs, net.architecture.grid), strict=True))
+
+
 @hidden
 def check_better_map(refine: Callable) -> None:
     """Two later frames of the street, with left and right exchanged."""
-    drive = real_drive()
-    net = load_net(sample_weights(), drive.camera)
-    results = list(run_pipeline(drive[:6], net))
-    beliefs = [result.belief.probability for result in results]
-    truths = semantic_truths(drive, beliefs, net.architecture.grid)
     shares = []
-    for k in (4, 5):
-        g, counted = results[k].grid[..., ::-1], truths[k, :, ::-1] != 255
-        refined = answer_array(refine(np.log(np.maximum(g, 1e-12)), beliefs[k][..., ::-1].copy()))
+    for street in _street()[4:]:
+        g, o, truth = (part[..., ::-1] for part in street)
+        counted = truth != 255
+        refined = answer_array(refine(np.log(np.maximum(g, 1e-12)), o.copy()))
         assert refined.shape == g.shape, "another shape in a frame of the real street"
         assert close(refined.sum(axis=0), np.ones(g.shape[1:]), atol=1e-4), (
             "no probabilities in a frame of the real street"
         )
-        right = [(one.argmax(axis=0) == truths[k, :, ::-1])[counted].mean() for one in (refined, g)]
+        right = [(one.argmax(axis=0) == truth)[counted].mean() for one in (refined, g)]
         shares.append(right)
     new, old = np.mean(shares, axis=0)
     assert new > old, "no gain in later frames, with left and right exchanged"
