@@ -76,7 +76,7 @@ def draw_ring(ax, belief, place, title):
     ax.set_axis_off()
 
 
-# %% jupyter={"source_hidden": true} alt="animation of ten cells in a circle with a bar at each; after two readings of pole in a row the bars gather at A and from then on follow the vehicle round the ring: each prediction spreads them, each reading sharpens them, and at step 7 they are one cell ahead"
+# %% jupyter={"source_hidden": true} alt="animation of ten cells in a circle with a bar at each; after two readings of pole in a row the bars gather at A and from then on follow the vehicle round the ring; at step 7 they are one cell ahead"
 def ring_frames():
     """Draw the ring twice per step: after the prediction, and after the reading."""
     ax = plt.subplots(figsize=(3.9, 4.1), layout="constrained")[1]
@@ -95,8 +95,7 @@ plotting.animate(ring_frames(), period=0.7, alt="a belief follows a vehicle roun
 
 # %% [markdown]
 # At first all ten bars are alike. Two readings of *pole* in a row fit the pair at A best, so the bars gather there, and
-# from then on they mostly follow the vehicle. Each prediction makes them blunter, and most readings make them sharper
-# again. By the end of this page you will have written this filter.
+# from then on they mostly follow the vehicle. By the end of this page you will have written this filter.
 #
 # ## The graph
 #
@@ -186,8 +185,8 @@ plotting.probability_lines({"prior": nothing_known, "likelihood of 'pole'": P_PO
 plt.show()
 
 # %% [markdown]
-# The assertion compares our function with `filterpy`, a library for filters: its `discrete_bayes` has two functions,
-# and you have just written the first.
+# The assertion compares our function with `filterpy`, a library for filters: its `discrete_bayes` has both steps,
+# and you have just written one.
 #
 # Look at the middle row: it doesn't sum to one, and needn't. A likelihood is not a belief. It answers ten *what if*
 # questions: if the vehicle were here, how probable was it that the sensor says what it said? The sum below the
@@ -296,7 +295,7 @@ for k, says in enumerate(says_pole):
     history.append(belief)
     bits += [entropy(prior), entropy(belief)]
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="above, the belief over 25 steps as a table of ten cells, with the true places as circles along its dark diagonal stripes; below, the entropy, which goes up with every prediction and mostly down with every update, between 0.5 and 3.3 bits"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="above, the belief over 25 steps as a table of ten cells, with the true places as circles along its dark diagonal stripes; below, the entropy, which goes up with every prediction and mostly down with every update, between 1.0 and 3.3 bits"
 np.testing.assert_array_equal(places, TRIP)
 np.testing.assert_array_equal(np.flatnonzero(says_pole), SAYS_POLE)
 fig, axes = plt.subplots(2, 1, figsize=(7, 4.2), sharex=True, layout="constrained")
@@ -323,7 +322,7 @@ assert favourite[7] == 6 != places[7] == 5
 # mostly down with every update (squares). At step 3 the sensor has said *pole* twice in a row. That fits the pair at A,
 # so the filter takes the vehicle to be in cell 3. But the vehicle hasn't moved and is still in cell 2, beside the same
 # pole. One step later it is in cell 3, and the filter is right. But nothing is settled for good, because the next
-# prediction takes away most of what an update gains: at step 7 the filter is one cell ahead again.
+# prediction takes away much of what an update gains: at step 7 the filter is one cell ahead again.
 #
 # Six readings are surprises: not what the favourite cell made one expect. At steps 8, 14 and 16 the sensor says
 # *nothing* where a pole was expected, and these three updates raise the entropy. At steps 2, 4 and 18 it says *pole*
@@ -656,7 +655,7 @@ np.testing.assert_allclose(predict_states(one_reading, MOVE), predict(one_readin
 # $$ M(\Delta t) = \lim_{k \to \infty} \left(I + R\,\frac{\Delta t}{k}\right)^{k} = \exp(R\,\Delta t) $$
 #
 # The filter of this course has four states: FREE, STATIC and DYNAMIC (the two kinds of occupied), and UNKNOWN, for
-# what nobody has seen, or not for long. For this page:
+# what nobody has seen, or not lately. For this page:
 
 # %% tags=["transition-matrix"]
 RATES = (  # to FREE, STATIC, DYNAMIC, UNKNOWN, 1/s
@@ -1019,7 +1018,7 @@ assert 12 < speed < 16
 
 # %% [markdown]
 # Each row by itself is a ghost of two scans. All rows together are a car that comes towards us at some 14 m/s: what
-# turns up in one cell has just left the one before. One cell, filtered by itself, has no velocity. That is the subject
+# turns up in one cell comes from the one before. One cell, filtered by itself, has no velocity. That is the subject
 # of lectures 03 and 04; lecture [02](02_grids.ipynb) first puts thousands of such cells side by side.
 #
 # ## In five lines

@@ -166,8 +166,8 @@ plt.show()
 #   errors of two scans as independent.
 # - **The collider.** One beam crosses several cells, is reflected at $r$, and reports a range $z_1$. The grid keeps
 #   one number per cell, so it cuts whatever the beam has coupled.
-# - **The shared error.** Two returns of one scan (here $z_1$ and $z_2$) are wrong *together*, because both were
-#   placed with the same wrong pose $e$. The grid has no $e$: it takes them for two witnesses. (Its price is the exact
+# - **The shared error.** Two returns of one scan (here $z_1$ and $z_2$) are placed with one pose, whose error is $e$.
+#   The grid has no $e$: it takes them for two witnesses. (Its price is the exact
 #   belief, .46, and what it would be if each return had an error of its own, .57.)
 #
 # Two variables are **conditionally independent** given a third if, once you know the third, neither tells you
@@ -264,7 +264,7 @@ for letter, at, text in (("S", (12, 30), (5, 36)), ("F", (-4.6, 16), (-10, 18)),
 plt.show()
 
 # %% [markdown]
-# S is the shadow behind a parked car: no beam got there, so the cells are unknown. F is a fence, H the front of a
+# (One pass gives 0.30, a little darker than the legend's free.) S is the shadow behind a parked car: no beam got there, so the cells are unknown. F is a fence, H the front of a
 # house. Behind the house the map stays grey too.
 #
 # ## The fork: scans add up
@@ -466,8 +466,8 @@ assert both[1] > 0.75 > 0.5 > both[0]
 # returns it grows, so with this sensor walls get thicker scan by scan.
 #
 # How much of that happens in the package's own grid? Now take the package's sensor, with a noise of half a cell (10 cm
-# on the paper's grid) in range and pose together, and scan a wall of one cell 20 times. Bars show the mean over 50
-# random sequences of scans:
+# on the paper's grid) in range and pose together, and scan a wall of one cell 20 times. Means over 50 random
+# sequences; above the line, 0.5, a cell is occupied:
 
 # %% jupyter={"source_hidden": true} alt="animation, 20 scans of a wall one cell thick in a row of eight cells: exact inference keeps one high bar; the package's grid also raises the bar of the cell behind it to 0.8"
 walls = thick_walls()
@@ -595,7 +595,7 @@ for k in (2, 8, 16, 24):
     print(f"{k / 10:.1f} s: tail of the car that drives away {away:.1f} m, of the one that comes {coming:.1f} m")
 
 # %% [markdown]
-# The clamp decides the first tail and can do nothing about the second. (Only the front of the oncoming car is hit, so
+# The clamp decides the first tail and can do nothing about the second. (Mostly the front of the oncoming car is hit, so
 # the first four metres of its tail lie under the car itself and aren't counted.) That is what the drive shows: E, the
 # car that overtakes us, drags a short tail, and D is a row of oncoming cars, each in the shadow of the one before. One
 # remedy for shadows is to let every cell **forget** a little before each scan: its log-odds shrink towards "don't
@@ -732,7 +732,7 @@ assert [next(k for k in range(15, 40) if p[k] < 0.5) - 14 for p in cells] == [5,
 #
 # ## Where this breaks: the map boasts
 #
-# The third graph is left. A cell that says 0.97 should be occupied in 97 of 100 such cells; a map that keeps such
+# The third graph is left. Of 100 cells that say 0.97, 97 should be occupied; a map that keeps such
 # promises is called **calibrated**. We can check that on the sample drive, where the truth is known. Take all cells
 # that a scan has hit. One return promises 0.8 / 0.85 = 0.941, two returns promise 256 / 257 = 0.996. (Grass and
 # hedges have the same class in the truth, so they are left out.)
@@ -781,7 +781,7 @@ assert (more_returns - one_return).max() > 0.05 > -0.05 > (more_returns - one_re
 assert sum(more_returns > one_return + 0.05) == 3
 
 # %% [markdown]
-# On five other simulated drives (the lines above) the second return makes the claim truer on three, and less true on one.
+# On five other simulated drives (the lines above) the second return makes the claim truer on three, and less true on two.
 # No drive keeps the promise of 0.996. Why does it help so little here? Look at the cells that were hit although they are
 # empty. How far are their returns from the nearest thing that stands there?
 
@@ -825,8 +825,8 @@ assert (counted.exact[:2].round(2) == (0.40, 0.46)).all()
 assert counted.independent[1].round(2) == 0.57
 
 # %% [markdown]
-# A second return raises the exact belief from 0.40 to 0.46, and the third adds nothing that you could see: there is only
-# one witness, the pose. With an error of its own in each return it would be 0.57: **0.57 instead of 0.46** is the price of
+# A second return raises the exact belief from 0.40 to 0.46, and the third adds nothing that you could see: all
+# share one pose error. With an error of its own in each return it would be 0.57: **0.57 instead of 0.46** is the price of
 # cutting $e$. The grid goes from 0.80 to 0.97, its clamp. The rest of the way, from 0.57 to 0.97, is another
 # approximation: it takes each range as exact. Without the clamp, and the rule that only two returns of a cell count,
 # the boast would be larger still. Over 20 scans the smear comes on top, so that cells which promise 0.97 are right in

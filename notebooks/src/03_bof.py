@@ -10,7 +10,7 @@
 # - name the three kinds of edges that this filter cuts from the exact model, and measure what each of them costs;
 # - say what happens when something arrives in a cell where something stands;
 # - read from the joint what a cell holds: free, unknown, standing, moving, how fast and how surely;
-# - say which speeds a lattice of velocities can't tell from standing, and why the flank of a bus seems to stand.
+# - say which speeds a lattice of velocities can't tell from standing, and what happens at the flank of a bus.
 #
 # **Prerequisites.** Lectures [01](01_bayes.ipynb) (Bayes' rule, transition matrix) and [02](02_grids.ipynb) (evidence,
 # the smear behind a moving car); d-separation, as in [graphical models](deeper/graphical_models.ipynb).
@@ -58,7 +58,7 @@ assert (defaults.stop_rate, defaults.stop_speed, defaults.clearing_time) == (5.0
 # %% [markdown]
 # ## One column, sheared apart
 #
-# The log-odds grid of lecture 02 left a smear behind every car, because a cell knew nothing but its own past. In this
+# The log-odds grid of lecture 02 left a smear behind moving cars, because a cell knew nothing but its own past. In this
 # lecture a cell also asks its neighbours: *is something coming?* For that it needs velocities. Here is the whole idea,
 # before any formula. One thing is somewhere on a street. Each row of the upper picture is one velocity, each column
 # one place; dark blue is probable. Below is what remains when the velocities are summed: P(occupied).
@@ -119,7 +119,7 @@ plotting.animate(frames_of(scene), 0.3, alt="a column of velocities is sheared, 
 #
 # Write $m_k^t$ for the state of cell $k$ at scan $t$. Until now it was free or occupied. Now it is FREE, or it is
 # occupied with one of a fixed set of velocities $v$, the **lattice**; and a cell of which no scan has told anything,
-# or not for long, is UNKNOWN. Velocity zero is called STATIC, all others together DYNAMIC. Here are four cells on a
+# or not lately, is UNKNOWN. Velocity zero is called STATIC, all others together DYNAMIC. Here are four cells on a
 # line, at $t-1$ and at $t$:
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a graph of four cells at two times; arrows run from each cell before to itself and its two neighbours now, from each cell now to its scan, and from three cells before to a node that says at most one thing; dashed lines are the edges that BOF cuts"
@@ -335,7 +335,7 @@ for when, given in (("after the flight", only_one), ("after the scan", row_evide
 # into cell 2. Of the four combinations one is impossible, so cell 2 is occupied with 2/3. BOF adds 1/2 and 1/2, and
 # stops at 0.999. *No
 # message back*: the thing in cell 2 stands (0.3) or drives (0.6) towards a fence that is there with 0.5. Strike out
-# 0.6 · 0.5 of driving into the fence: 0.7 is left, 0.3 of it stands. Then it is less probable
+# 0.6 · 0.5 of driving into the fence: 0.7 is left, so it stands with 0.3 / 0.7 = .43. Then it is less probable
 # that it drives. BOF lets the fence act only on the fence's own cell, so its cell 2 keeps .30.
 
 # %%
@@ -554,7 +554,7 @@ assert total[1] < 0.25 * total[0]
 wall = cells_in(world(0)[0], spec, margin=0.3)
 assert max(state.probability[DYNAMIC, wall].max() for state in states) < 0.5
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="animation from above, two maps: in the log-odds grid on the left both boxes drag long dark tails; in the BOF on the right they take the colours of their headings, yellow towards us and green to the left, and leave hardly any tail; the wall stays dark"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="animation from above, two maps: in the log-odds grid on the left both boxes drag dark tails; in the BOF on the right they take the colours of their headings, yellow towards us and green to the left, and leave hardly any tail; the wall stays dark"
 fig, axes = plt.subplots(1, 2, figsize=(8.2, 4.2), layout="compressed")
 plotting.occupancy(spec, plotting.binary_states(p_occupied[0]), ax=axes[0], legend=False)
 plotting.velocity_wheel(spec, states[0].probability, bof_velocity(states[0])[0], ax=axes[1])
@@ -693,9 +693,9 @@ print("ghosts after 1.9 s [m²]: log-odds {:.0f}, BOF without looking back {:.0f
 # one stretch on the left, 16 to 22 m ahead: the rear of an oncoming car was believed STATIC there, and now hardly a
 # beam reaches this stretch. That is the first dashed edge, one thing in two places.
 #
-# ## Slow things stand
+# ## Slow things
 #
-# The cyclists have a colour. There are pedestrians on this street, too, and hardly a cell of theirs has one. Why? Let a
+# The cyclists have a colour. There are pedestrians on this street, too. Does the filter see them walk? Let a
 # single person, 0.6 m wide, come towards us at 1.4 m/s, as people walk. We give BOF three lattices.
 #
 # **Predict before you run.** The drive's lattice has velocities 2 m/s apart. The true 1.4 m/s lies between 0 and 2.
@@ -799,7 +799,7 @@ for way, (x_0, y_0), (vx, vy) in (("drives away", (9.2, 0), (2, 0)), ("crosses t
 # %% [markdown]
 # With either spacing, a box that comes at half a spacing or less is called standing, and one that comes at a whole
 # spacing is DYNAMIC with more than 0.7 (left). The same box at 2 m/s is below one half in the second second if it drives
-# away or crosses; lecture 04 asks why for a car that drives away. The speed that BOF gives it is right within half a
+# away or crosses; lecture 04 asks why for a car that drives away. The speed of the one that comes is right within half a
 # metre a second with 2 m/s, and goes up in stairs with 4 m/s (right). With a spacing of 1 m/s the rule fails: a box that
 # comes at 1 m/s gets 0.36, since in two seconds it covers four cells only.
 #
@@ -853,7 +853,7 @@ beside = (truth == car) & (y > 2) & (y < 4) & (held[1] > 0.5)
 assert beside.sum() > 20
 assert (p[DYNAMIC, beside] > 0.5).mean() < 0.25  # few cells of the cars there
 
-# %% jupyter={"source_hidden": true} alt="animation of a real street from above: in lane E on the left two oncoming cars turn yellow; the car F ahead of us stays dark, as does everything at the right border; large areas are unknown"
+# %% jupyter={"source_hidden": true} alt="animation of a real street from above: in lane E on the left oncoming cars turn yellow; the car F ahead of us stays dark, as does everything at the right border; large areas are unknown"
 fig, ax = plt.subplots(figsize=(4.6, 6.2), layout="constrained")
 for letter, place in (("E", (6, 12)), ("F", (0, 7))):
     ax.text(*place, letter, weight="bold", ha="center", zorder=3)
@@ -863,7 +863,7 @@ plotting.animate_occupancy(
 
 # %% [markdown]
 # Data: PandaSet by Hesai and Scale AI, CC BY 4.0. Nearly all cells called DYNAMIC lie within a metre of cars, cyclists or
-# pedestrians. In lane E BOF needs a second to find the cars, and then finds nearly all of their cells. Of the ghosts of
+# pedestrians. In lane E, nearer than 40 m, BOF needs a second to find the cars, and then calls nearly all their occupied cells DYNAMIC. Of the ghosts of
 # the log-odds grid a third is left. More than half of these lie in the lane beside ours, 2 to 4 m to the left, where cars
 # drive away and only few of their cells turn blue. The car **F** ahead of us rolls away, too, and stays dark; lecture 04
 # asks why. And on the sample drive the rear of the overtaking car was slower than its front. This we
@@ -871,7 +871,7 @@ plotting.animate_occupancy(
 #
 # ## Where this breaks
 #
-# **A flank looks the same whether it stands or moves.** A bus 12 m long passes you at 8 m/s, which the lattice has
+# **A passing bus.** It is 12 m long and passes you at 8 m/s, which the lattice has
 # exactly.
 #
 # **Predict before you run.** What does BOF say of its front, and what of the middle of its flank?

@@ -127,12 +127,12 @@ plotting.animate(
 )
 
 # %% [markdown]
-# A: each dot is the centre of a cell, drawn at its pixel; nearer cells are lighter. B: the same from the side, with
+# A: each dot is the centre of a square of 1 m, drawn at its pixel; nearer cells are lighter. B: the same from the side, with
 # the pixels of the red car where they really are. The black square is the camera. C: the map of classes that the
 # plane reads. Bright red are the cells that read the red car (*pedestrian* is darker), black is its true place. At
 # 0 m the car is thrown over the map like a shadow. At 0.8 m, in the middle of its bodywork, the smear is shorter and
 # lies on both sides of the true place. At the camera's own height the sheet becomes a line, and above it the map
-# shows what is high: trees, houses. **No height is right for everything.**
+# shows what is high: trees, houses, sky. **No height is right for everything.**
 #
 # ### The graph
 #
@@ -150,7 +150,8 @@ for j, (x, colour) in enumerate(zip((4, 6, 8, 10), colours, strict=True), start=
     side.plot(stop[:2], 3 - 3 * stop[:2] / x, color=colour, linewidth=1.2)
     side.plot(stop[1:], 3 - 3 * stop[1:] / x, ":", color="0.4", linewidth=1.2)
     side.plot(2.8, 3 - 3 * 2.8 / x, "s", color=colour, markersize=6)
-    side.text(2.8, 3 - 3 * 2.8 / x + (0.35 if j == 4 else -0.1), f"$a_{j}$", ha="center", va="top", fontsize=9)
+    right, up = {3: (-0.27, 0.13), 4: (0, 0.35)}.get(j, (0, -0.1))  # beside its square, where no other square lies
+    side.text(2.8 + right, 3 - 3 * 2.8 / x + up, f"$a_{j}$", ha="center", va="top", fontsize=9)
     side.plot([x - 0.9, x + 0.9], [0, 0], color="black", linewidth=3, solid_capstyle="butt")
     side.text(x, -0.15, f"$m_{j}$", ha="center", va="top")
 side.plot(0, 3, "ks")
@@ -182,7 +183,7 @@ assert not d_separated(stage.model, "m1", "m3", given=("a3",))
 # %% [markdown]
 # Here is the graph:
 
-# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: four cells m1 to m4 above, four observed pixels a1 to a4 below; each pixel has arrows from its own cell and from all nearer ones; one of the slanted arrows is dashed and carries its price"
+# %% tags=["graph"] jupyter={"source_hidden": true, "outputs_hidden": true} alt="a directed graph: four cells m1 to m4 above, four observed pixels a1 to a4 below; each pixel has arrows from its own cell and from all nearer ones; one of the slanted arrows is dashed and carries its price"
 fig, ax = plt.subplots(figsize=(5.4, 3.2), layout="constrained")
 stage.draw(ax)
 plt.show()
@@ -289,7 +290,7 @@ for y, side in ((-2.1, 0), (-4.45, -1)):
     edge = np.flatnonzero(frame.labels.image[round(v)] == SIDEWALK)[side]
     print(f"line {-y:.2f} m to the right, 8 m ahead: u = {u:.0f}; the sidewalk ends at {edge}: {edge - u:+.0f} pixels")
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="the image with two red lines on the ground that meet at the vanishing point; the left one, A, runs along the foot of the kerb, the right one, B, runs inside the sidewalk instead of along its edge; a dashed line 16 cm higher fits"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="the image with two red lines on the ground that meet at the vanishing point; the left one, A, runs along the foot of the kerb, the right one, B, runs inside the sidewalk instead of along its edge; a dashed line 16 cm higher fits near by"
 fig, ax = plt.subplots(figsize=(7.5, 3.4), layout="constrained")
 ax.imshow(pale.image)
 for y, z, style in ((-2.1, 0.0, "-"), (-4.45, 0.0, "-"), (-4.45, 0.16, "--")):
@@ -321,8 +322,8 @@ print(f"line {outwards:.2f} m from the camera, ray {meets:.2f} m: the sidewalk i
 print(f"by the simulator {true_height:.2f} m")
 
 # %% [markdown]
-# That is the kerb, and the slopes of road and sidewalk. Drawn at 16 cm, the line fits (C, dashed). So 17 cm of
-# height are half a metre on the map: this is why the system needs several planes. Draw this picture for every camera.
+# That is the kerb, and the slopes of road and sidewalk. Drawn at 16 cm, the line fits near by (C, dashed); farther
+# ahead the street sinks. So 17 cm of height are half a metre on the map: this is why the system needs several planes.
 #
 # ## A new image, a new $K$
 #
@@ -598,9 +599,9 @@ plt.show()
 # road. The planes only make sure that better answers are among those offered. The choice is left to what is learnt.
 #
 # As a graph: a class $c$ says something about the height $h$ of what a pixel shows (in metres; not the image's $h$),
-# and the height says at which place $x$ along the ray the thing stands.
+# and the height says at which place $x$ along the ray the thing stands. Dashed: the cut edge; its price is explained below.
 
-# %% tags=["graph-height"] jupyter={"source_hidden": true} alt="a directed graph: class c to height h to place x, and class c to the observed label a"
+# %% tags=["graph-height"] jupyter={"source_hidden": true} alt="a directed graph: class c to height h (dashed, with its price), h to place x, and class c to the observed label a"
 height_stage = pixel_height()
 fig, ax = plt.subplots(figsize=(5, 2.4), layout="constrained")
 height_stage.draw(ax, highlight=["h"])
@@ -714,8 +715,8 @@ plt.show()
 #
 # ## Play with it
 #
-# Drag the height of the plane. At which height does it cut the red car's roof? At which does it become a line, and what
-# happens beyond? (Without a running kernel there is no slider; the animation above shows the same.)
+# Drag the height of the plane. At which height does it become a line, and what happens
+# beyond? (Without a running kernel there is no slider; the animation above shows the same.)
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="the grid lifted to a height, drawn over the image"
 

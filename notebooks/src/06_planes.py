@@ -125,7 +125,7 @@ on_zero, on_lidar = ([lesson(drive[k], from_lidar) for k in chosen] for from_lid
 # ## A calibration that converges on the image
 #
 # Suppose we believe that the drive's camera points two degrees lower than it does. Nobody tells the program. It has a map of
-# road and sidewalk, the labels of five images, and the derivative of what it reads. Watch:
+# road and sidewalk, the ground's height from the LIDAR, the labels of five images, and a derivative. Watch:
 
 # %% jupyter={"source_hidden": true} alt="animation: A, dots of road and sidewalk lie too high in the image and slide down within four steps until the border between them lies on the kerb; B, the pitch over the steps falls from two degrees to minus 0.3"
 path = descend(2.0, on_lidar, steps=12)
@@ -140,7 +140,7 @@ def converging():
         left, right = fig.subplots(1, 2, width_ratios=(3, 1))
         left.imshow(130 + image.mean(axis=2) // 16 * 7, cmap="gray", vmin=0, vmax=255)
         u, v = (a.numpy() for a in pixels_at(points, torch.tensor(np.radians(degrees))))
-        for c, colour in ((0, "tab:purple"), (1, "tab:orange")):
+        for c, colour in enumerate(KITTI_14.colours(np.array(flat)) / 255):
             left.plot(u[t[c] > 0], v[t[c] > 0], ".", color=colour, markersize=2, label=KITTI_14.names[flat[c]])
         left.set(ylim=(95.5, 30), xlim=(60, 319.5), xlabel="u [pixels]", ylabel="v [pixels]")
         left.set_title(f"A: the map's cells in the image, step {step}")
@@ -155,8 +155,8 @@ plotting.animate(converging(), period=0.5, alt="the map's cells slide onto road 
 
 # %% [markdown]
 # A: each dot is a cell that the map calls road or sidewalk, at the pixel that equation (1) gives to it with the pitch
-# learnt so far. B: that pitch. After four steps the border between the colours lies on the kerb. (Why the pitch ends
-# at -0.3° and not at 0 comes below.) This works because *reading a pixel has a derivative*: the loss on the map says
+# learnt so far. B: that pitch. After four steps the border between the colours lies on the kerb. (Why it stops
+# at -0.3° comes below.) This works because *reading a pixel has a derivative*: the loss on the map says
 # in which direction each dot should move, and the chain rule collects that into one number. The same derivative, in
 # the scores instead of the place, trains the whole image network (lecture 08). This lecture builds both, from four
 # numbers on.
@@ -188,15 +188,15 @@ on_street = plane_pixels(spec, heights, real_drive().camera.resized(camera.size)
 for name, (at, seen) in {"drive": (pixels, visible), "real street": on_street}.items():
     bands = [at[0][seen[0] & (x_cells >= a) & (x_cells < b)].round() for a, b in ((6, 20), (20, 40), (40, 71))]
     shares = ", ".join(f"{len(read_by) / len(np.unique(read_by, axis=0)):.1f}" for read_by in bands)
-    print(f"on the {name}, cells a pixel from 6 m, from 20 m and from 40 m on: {shares}")
+    print(f"on the {name}, cells per pixel from 6, 20 and 40 m on: {shares}")
 
-# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: the patch m, below it the pixel a, below it four observed cells x1 to x4 that all depend on the pixel"
+# %% tags=["graph"] jupyter={"source_hidden": true, "outputs_hidden": true} alt="a directed graph: the patch m, below it the pixel a, below it four observed cells x1 to x4 that all depend on the pixel; the arrow to x4 is dashed and carries its price"
 fig, ax = plt.subplots(figsize=(5.4, 3.2), layout="constrained")
 stage.draw(ax)
 plt.show()
 
 # %% [markdown]
-# The cut edge is the pixel's shared error. A network that looks at neighbouring cells can learn to allow for it; a rule
+# Cut is the error that all readers share (dashed at $x_4$, as an example). A network that looks at neighbouring cells can learn to allow for it; a rule
 # that multiplies their probabilities can't.
 #
 # ## A value between four pixels
@@ -253,10 +253,10 @@ for u, v in points:
 
 
 # %% [markdown]
-# On a pixel's centre the point reads that pixel alone; on the last row it reads two.
+# On a pixel's centre the point reads that pixel alone; on a line between two centres it reads two.
 
 
-# %% jupyter={"source_hidden": true} alt="left, nine pixels with their scores and a cross between four of them, whose weights are 3/8, 3/8, 1/8 and 1/8; right, the triangular kernel with the weights of three columns on it"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, nine pixels with their scores and a cross between four of them, whose weights are 3/8, 3/8, 1/8 and 1/8; right, the triangular kernel with the weights of three columns on it"
 def draw_point(ax, u, v):
     """Draw the image, a point on it, and the weights of its pixels."""
     ax.imshow(s, cmap="Blues", vmin=0, vmax=14)
@@ -288,7 +288,7 @@ plt.show()
 # On the drive, equation (1) has found the pixels. Here are three small pieces of one image, magnified, with the points
 # of the ground plane on them. Near by, most pixels are read by no point; far ahead, many points share the same four.
 
-# %% jupyter={"source_hidden": true} alt="three magnified pieces of the image with yellow dots: far apart 8 m ahead, a dense lattice at 20 m, lines of dots that run into each other at 45 m"
+# %% jupyter={"source_hidden": true} alt="three magnified pieces of the image with yellow dots: far apart 8 m ahead, lines of dots at 20 m, closer lines that run into each other at 45 m"
 fig, axes = plt.subplots(1, 3, figsize=(8, 2.9), layout="constrained")
 for ax, ahead in zip(axes, (8, 20, 45), strict=True):
     (row,), (col,), _ = spec.cells(np.array([[ahead, -0.2]]))
@@ -315,8 +315,8 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# The 8 is read by the first point alone, with 1/8: -0.125. No point reads the lower right corner: 0, and so for the three
-# pixels of column 0. A pixel gets back what it gave: the same weight, times
+# The 8 is read by the first point alone, with 1/8: -0.125. No point reads the lower right corner or
+# column 0: these four pixels get 0. A pixel gets back what it gave: the same weight, times
 # the gradient of the reader, **added up** over all readers.
 #
 # </details>
@@ -411,7 +411,7 @@ print(f"on the horizon: left {left.mean():.0f}, in the middle {middle.mean():.0f
 # $$ p = A s, \qquad \bar s = A^T \bar p, \qquad \bar p \cdot (A s) = (A^T \bar p) \cdot s $$
 #
 # The third equation is the test for every pair of a forward and a backward pass: it must hold for *any* $s$ and
-# $\bar p$, so a few random ones find nearly every mistake.
+# $\bar p$, so a few random ones find nearly every mismatch of the two.
 
 
 # %% jupyter={"outputs_hidden": true}
@@ -439,7 +439,7 @@ print(f"p_bar . (A s) = {p_bar @ (A @ s.ravel()):.3f},  (A^T p_bar) . s = {(A.T 
 # Forward, each row has at most four weights. Backward, a row of $A^T$ may have none or any number of them. The usual
 # backward pass *scatters*: each point adds its gradient to four pixels, and points that share a pixel must wait for
 # each other. With the transpose built once, each pixel *gathers* from its readers. The package's `PlaneSampler` is
-# that: two sparse matrices for a calibration, and one product for each direction. It passes the same test:
+# that: two sparse matrices per calibration, one product per direction. It passes the same test:
 
 # %% jupyter={"source_hidden": true}
 s_some = torch.from_numpy(rng.normal(size=(1, 3, *camera.size)).astype(np.float32)).requires_grad_()
@@ -469,7 +469,7 @@ print("fast == literal; sparse, with its transpose, {:.0f} MB, as a full matrix 
 #
 # <details><summary>Answer</summary>
 #
-# Those that are read: a lattice of dots near by, a closed carpet far away, nothing
+# Those that a cell in sight reads: a lattice of dots near by, a closed carpet far away, nothing
 # above the horizon. The fence's pixels are read by the ground behind it, so they learn *vegetation*: equation (2) knows
 # no depth.
 #
@@ -522,7 +522,7 @@ for ax in axes:
 plt.show()
 
 # %% [markdown]
-# A: where the photograph is seen, no point reads. On road and sidewalk the map reads part of the pixels, and
+# A: where the photograph is seen, nothing was learnt. On road and sidewalk the map reads part of the pixels, and
 # most of what it reads is right, although no pixel was ever labelled: this is end-to-end training in miniature. Of
 # everything else that is read, 42 % are right. Of the pixels of the fence (F) that are read, 1 % have learnt *fence*
 # and 89 % *vegetation*,
@@ -588,7 +588,7 @@ axes[1].set(xlabel="u [pixels]", ylabel="slope of p in u [per pixel]", xticks=ra
 plt.show()
 
 # %% [markdown]
-# Left, grey: stairs, flat except where they jump. Red: connected lines. Right: the slope of the stairs is 0 everywhere;
+# Left, grey: stairs, flat except where they jump. Red: connected lines. Right: the slope of the stairs is 0 between the jumps;
 # that of the lines is +4 up to the middle pixel and -6 after it. On a pixel's centre the slope jumps: there is a
 # *kink*, and each program returns a number of its own
 # ([companion](deeper/06_sampling.ipynb)).
@@ -787,14 +787,14 @@ for near, far in ((6, 20), (20, 40), (40, 71)):
     band = in_view & (x_cells > near) & (x_cells < far)
     print(f"{near} to {far} m ahead: {100 * (labels[0] != labels[1])[band].mean():.0f} % of cells read another class")
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="two maps: the classes that the ground plane reads, and, coloured, the cells that read another class half a pixel lower: few near by, many far ahead and along edges"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="two maps: the classes that the ground plane reads, and, coloured, the cells that read another class half a pixel lower: few near by, most between 20 and 50 m, and along edges"
 changed = np.where(labels[0] == labels[1], 255, labels[1])
 fig = plotting.label_maps(spec, {"read where it is": labels[0], "changed, half a pixel too low": changed}, KITTI_14)
 plt.show()
 
 # %% [markdown]
 # Right: coloured are the cells that now read another class, and the colour says which: more beyond 20 m than nearer.
-# Nothing fails, no picture looks wrong, and a network that is trained with the shift may learn to live with it, until
+# Nothing fails, and a network that is trained with the shift may learn to live with it, until
 # somebody corrects the bug.
 #
 # ## Play with it
@@ -834,12 +834,12 @@ for s_one, _, points in on_lidar:  # at 10 and at -15 degrees no point reads roa
 
 # %% [markdown]
 # From six degrees it arrives within thirty steps, from eight and from -12 it needs up to ninety. From ten degrees it
-# never moves: every cell reads trees, houses or sky, where the scores of road and sidewalk are 0 all around, so the
-# slope is exactly zero. From -15 all cells fall below the image. That is why registration of images starts with small,
+# never moves: no cell reads road or sidewalk, whose scores are 0 all around, so the
+# slope is exactly zero. From -15 all cells fall below the image. That is why aligning images (*registration*) starts with small,
 # blurred ones, where a slope reaches farther, and refines.
 #
 # **Four pixels are the right number at one distance only.** A cell of 0.5 m covers about 40 pixels at 7 m and a
-# sixteenth at 60 m. Near by a thin thing may be missed (*aliasing*); far away, cells share a pixel. The
+# fifteenth at 60 m. Near by a thin thing may be missed (*aliasing*); far away, cells share a pixel. The
 # [companion](deeper/06_sampling.ipynb) measures both.
 #
 # **The gradient goes to whatever was read.** A cell whose view is blocked reads the thing in front, and trains it

@@ -164,14 +164,14 @@ print(
 )
 print(f"beside it with {beside:.2f}")
 
-# %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph: labels x1 to x5 in a chain, below each, grey because it is observed, what its scores say, s1 to s5; the arrow from x2 to the circled x3 is dashed and carries the price of cutting it, .66 to .27"
+# %% tags=["graph"] jupyter={"source_hidden": true, "outputs_hidden": true} alt="a directed graph: labels x1 to x5 in a chain, below each, grey because it is observed, what its scores say, s1 to s5; the arrow from x2 to the circled x3 is dashed and carries the price of cutting all four, .66 to .27"
 fig, ax = plt.subplots(figsize=(8.4, 2.6), layout="constrained")
 stage.draw(ax, highlight=["x3"])
 plt.show()
 
 # %% [markdown]
 # So one strength for both directions is wrong for signage: it needs a stronger edge along a post than across. The
-# networks of this lecture cut all four arrows between labels (the dashed one shows the price of one). Lecture
+# networks of this lecture cut all four arrows between labels (the price of all four is on the dashed one). Lecture
 # [10](10_crf.ipynb) puts such edges back, on the map.
 #
 # ## What comes out: a score for each class
@@ -370,7 +370,7 @@ print("stride 2:", convolve(row, thin, stride=2)[0], "  post moved:", convolve(m
 #
 # ### How far does a pixel see?
 #
-# One 3x3 convolution sees 3 pixels a side. A second one on top sees 5, a third 7. Now halve the map after the first:
+# One 3x3 convolution sees 3 pixels a side (its *receptive field*, or field). A second one on top sees 5, a third 7. Now halve the map after the first:
 # neighbours in the map then lie 2 pixels of the *image* apart (the *jump*), and each further layer adds 2 · 2 pixels:
 #
 # | layer | kernel | stride | rate | adds (kernel - 1) · rate · jump | field | jump after |
@@ -552,7 +552,7 @@ print("off by", (interpolate_row(ramp, 8, 64) - enlarge_row(ramp, 8))[8:56].mean
 
 # %% [markdown]
 # On the drive: by how much does *signage* lead over the best other class? First in FCN's scores at 1/32 of the image's
-# size, then with the scores of pool4 added (1/16), then with those of pool3 (1/8), and enlarged to the image.
+# size, then with those after the fourth pooling added (1/16), then the third (1/8), and enlarged to the image.
 
 # %% jupyter={"source_hidden": true} alt="four maps of the lead of signage, orange where it leads: A at 1/32 five large cells on the right; B at 1/16 none; C at 1/8 small patches; D the same enlarged, smooth blobs, with arrows to a distant street lamp, the sign and the lamp post"
 fcn = nets["fcn"]
@@ -639,7 +639,7 @@ axes[0].set_ylabel("rows down [pixels]")
 plt.show()
 
 # %% [markdown]
-# Coloured are the pixels that the output in the middle depends on, brighter if in more ways. In the middle picture
+# The output in the middle depends on the coloured pixels, in more ways where brighter (own scales). In the middle picture
 # these are 7 · 7 of 13 · 13; the others are never looked at (*gridding*). The other price is computing time, since each
 # map keeps all its pixels. So DeepLab compromises: it halves three times, goes atrous for the rest, and scores every
 # eighth pixel. At its end four kernels of different rates look at one map, and their scores are summed. (A single one
@@ -686,7 +686,7 @@ for column in (8, 9, 10, 11):
     print(f"{column:14}  ", *(f"{place:5g} / {width:2d}" for place, width in found))
 
 # %% [markdown]
-# Play with it: move the post, and make it wider. Which ways still jump when it is wide? (Without a running kernel
+# Play with it: move the post, and make it wider. (Without a running kernel
 # there are no dials; the animation at the top shows a thin and a thicker post.) The orange band is where it truly stands.
 
 
@@ -722,7 +722,7 @@ _ = interact(draw_ways, column=IntSlider(9, 4, 16), width=IntSlider(1, 1, 6))
 #
 # <details><summary>Answer</summary>
 #
-# Strided is last, then nearest and bilinear, then indices; skips and atrous are best. With three times the steps
+# Strided is last, then bilinear and nearest, then indices; skips and atrous are best. With three times the steps
 # strided has gained, and its IoU stays below a half.
 #
 # </details>
@@ -753,10 +753,10 @@ for ax, name in zip(axes[0], drawn, strict=True):
 plt.show()
 
 # %% [markdown]
-# Each row is one unseen picture; the thin bar of the second column is the post, the other bar is the wall. (In the
+# Each row is one unseen picture; in the first column the thin bar is the post, the wide one the wall. (In the
 # table a row is missed if no pixel of it is called post; the error is that of the post's middle.)
 # The three ways that kept the column of the toy post are also the best three after learning (one training run each).
-# Atrous takes more time, because its maps keep all their pixels. Three times the steps didn't repair what strides had
+# Atrous computes more, because its maps keep all their pixels. Three times the steps didn't repair what strides had
 # lost: after 450 of them the strided network is still behind what indices have after 150.
 #
 # ## A post of the drive
@@ -880,14 +880,15 @@ plt.show()
 # %% [markdown]
 # The dotted line is the middle. Before, the networks have seen simulated streets only, and call more than half of the
 # labelled pixels right in each half. After 30 steps the left half mostly agrees with its points. On the right half
-# SegNet and FCN have gained pixel accuracy, too; but all three have lost class accuracy, and DeepLab both. That is
-# **overfitting**: a network comes to fit the view that it learns better than the street. If you judge a network on
+# SegNet and FCN have gained pixel accuracy, too; but all three have lost class accuracy, and DeepLab both: it
+# calls the trees *building* (H). To fit the view that is learnt better than the street is
+# **overfitting**. If you judge a network on
 # the frames that it learnt, you measure its memory. Lecture [13](13_real_drive.ipynb) comes back to it.
 #
 # ## Where this breaks
 #
-# **A post between two maxima.** An index can only say where the *largest* value of a window was. Give the post a
-# brighter wall in the same windows; and give a smooth slope, which has no thin thing in it, to the same two lines:
+# **A post beside a brighter wall.** An index can only say where the *largest* value of a window was. Give the post a
+# brighter wall in the same windows; and pool and unpool a smooth slope, which has no thin thing in it, in the same way:
 
 # %% jupyter={"source_hidden": true} alt="three pairs of pictures, before and after pooling and unpooling: A a post becomes a dotted line; B a post beside a brighter wall disappears; C a smooth slope becomes dots on a lattice"
 post = np.zeros((8, 8))
@@ -904,7 +905,7 @@ plt.show()
 
 # %% [markdown]
 # A: the post becomes a dotted line. B: it is gone, because each of its windows has a brighter pixel. C: a smooth slope
-# comes back as dots on a lattice. The decoder has to smooth it again.
+# comes back as dots on a lattice. The convolutions that follow have to smooth it.
 #
 # **The edge that was cut.** A soft-max per pixel doesn't keep neighbours together: SegNet's labels of the drive have
 # specks and gaps (picture C of the drive's post). Those of FCN and DeepLab are smooth, because they enlarge coarse

@@ -296,7 +296,7 @@ for ax, (title, picture) in zip(axes, pictures.items(), strict=True):
 plt.show()
 
 # %% [markdown]
-# Both assertions hold: the two passes give the sum over all pairs, to five digits, and so does the package's
+# Both assertions hold: the two passes give the sum over all pairs, within the tolerances, and so does the package's
 # `SeparableGaussian`. In the picture, cars are first smeared sideways and then also up and down. The normalisation of
 # lecture 10 separates too, because a row sum of the kernel is the product of a sum along the row and one along the
 # column. So the spatial kernel is solved, without an approximation that matters.
@@ -358,7 +358,7 @@ print("\n".join(table))
 
 # %% [markdown]
 # Two things speak against this grid. The box around all features is nearly empty. And with each halving of `sigma_beta`
-# it gets five to six times as large, because three of the five axes get longer. We could keep only the points that are
+# it gets four to seven times as large, because three of the five axes get longer. We could keep only the points that are
 # used. Then the number of corners remains: $2^d$ of them for each cell, in $d$ dimensions, to write to and to read from. A
 # shape with fewer corners is the simplex: a triangle in two dimensions has 3, a tetrahedron 4, and in general there
 # are $d + 1$. In five dimensions that is 6 instead of 32. So we want a space that is filled with simplices.
@@ -665,7 +665,7 @@ print(
 # %% [markdown]
 # A cell that counts itself confirms its own opinion. Among many similar cells that hardly matters, because after
 # normalisation a cell's own share is a few per cent. But a cell whose occupancy is unlike that of all cells around it
-# hears nearly nothing but itself: its share goes up to 1. In such cells a forgotten self-response changes a probability by
+# hears nearly nothing but itself: its share goes up to 1. A forgotten self-response changes a probability by
 # up to two thirds, although only some twenty of 8804 labels differ in the end.
 #
 # ## What kernel is it really?
@@ -754,7 +754,7 @@ for d in (1, 2, 3, 5, 7):
 # - the **convergence error**: the same kernel, and fewer iterations than it takes to settle;
 # - the error of mean field itself against exact inference (lecture 10), which no filter can remove.
 #
-# We measure the first two on 60 x 40 cells of the drive, where all pairs can still be written out.
+# We measure the first two (|dQ|: mean difference of probabilities) on 60 x 40 cells of the drive, where all pairs can still be written out.
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 ROUNDS = (1, 2, 3, 5, 10, 20, 40)
@@ -832,12 +832,12 @@ for infer in (mean_field_naive, mean_field_accurate, mean_field):
 # cent only.
 #
 # **Time** (middle and right). Both axes of the middle picture are logarithmic. Twice the cells cost the lattice about
-# twice the time, and all pairs about four times. With the classes, time grows slowly: 48 of them cost two to four times
-# as much as 2, by the kind of processor. One reason is that the package fills them up to a multiple of 16. On a quiet
+# twice the time, and all pairs about four times. With the classes, time grows slowly: 48 of them cost a few times as
+# much as 2, depending on the processor. One reason is that the package fills them up to a multiple of 16. On a quiet
 # machine you see steps after 16 and after 32; in a picture made on a busy one, chance hides them.
 #
-# **The tenth of a second.** The printed lines give the balance on the machine that built this page: the CRF of the drive's
-# map, and of the paper's grid. The drive's map leaves most of the tenth to the other stages. The paper's grid needs about
+# **The tenth of a second.** The printed lines give the times on the machine that built this page: for the drive's map,
+# and for the paper's grid. The drive's map leaves most of the tenth to the other stages. The paper's grid needs about
 # all of it (another machine took 127 ms), so there the CRF leaves hardly any time for the rest. Fewer iterations save a
 # part of it; the lattice is built once for each map in any case.
 #
@@ -882,7 +882,7 @@ _ = interact(
     iterations=IntSlider(value=10, min=0, max=30),
 )
 
-# %% jupyter={"source_hidden": true} alt="four maps of the street: the network's, and refined with occupancy widths 0.03, 0.2 and 2; cars shrink a little"
+# %% jupyter={"source_hidden": true} alt="four maps of the street: the network's, and refined with occupancy widths 0.03, 0.2 and 2; cars shrink, the farthest to a few cells with width 2"
 fig, axes = plt.subplots(1, 4, figsize=(12, 5), layout="compressed", sharey=True)
 for ax, (sigma_beta, iterations) in zip(axes, ((0.2, 0), (0.03, 10), (0.2, 10), (2.0, 10)), strict=True):
     refine_with(sigma_beta, 4, 3, iterations, ax)
@@ -943,14 +943,14 @@ print("\n".join(table))
 
 # %% [markdown]
 # For each of these widths, what a typical cell hears from all cells is between six and nine tenths of what it should be.
-# In each row the mean error, |dQ|, is larger without normalisation than with it. It hides the worst cell, for which that
-# isn't so in each row (columns "worst"). A width of 0.3 cells, far below a cell, does no harm here, because then the
+# In each row the mean error, |dQ|, is larger without normalisation than with it. The worst cell and the labels don't
+# follow in each row. A width of 0.3 cells, far below a cell, does no harm here, because then the
 # kernel is so narrow that cells hardly hear each other in either way.
 #
 # **Many dimensions.** A cell has only $d + 1$ corners, but the kernel gets worse with each dimension, as you have seen
 # in the cloud. Three colours as further features would make eight dimensions. The package refuses more than eight.
 #
-# **Thin things disappear.** Is the fast filter to blame when a pedestrian is smoothed away? We compare on ten frames of
+# **Some classes shrink.** Is the fast filter to blame when a pedestrian is smoothed away? We compare on ten frames of
 # the drive: the network alone, the CRF with the lattice, and the CRF with the window. The table shows how many of the
 # true cells of a class are found.
 
@@ -983,8 +983,8 @@ assert max(classes[1:]) < classes[0] - 0.05
 # %% [markdown]
 # The CRF finds more of the road, and less of sidewalk, building, car, pedestrian and signage. (Within 30 m, in lecture 10,
 # sidewalk and car gained.) Lattice and window differ by
-# about one point at most. So a better filter doesn't bring them back: it is the model that loses them, because a
-# pedestrian is a few cells among hundreds that say something else, and with these weights the many win.
+# about one point at most. So a better filter doesn't bring them back: it is the model that loses them. Where few
+# cells lie among many that say something else, with these weights the many win.
 #
 # On these ten frames pixel accuracy rises by about one point, and class accuracy falls by more than five. Is that the
 # rule? Here is the same difference on 110 frames of streets that no network has seen, with 95 % intervals over drives
@@ -1024,7 +1024,7 @@ Markdown("\n".join(rows))
 #    which rounding and sorting find. The filter is splat, blur, slice.
 # 4. The filter counts the cell itself; subtract what this filter gives back at this cell, not 1.
 # 5. Time grows in proportion to the cells. The kernel is only nearly Gaussian; a window avoids that error and takes
-#    longer. Neither makes the model better: thin things are smoothed away by both.
+#    longer. Neither makes the model better: pedestrians and buildings lose cells with both.
 #
 # **What you can now do**: run a fully connected CRF on a map of any size, and say how much of its error is the filter's.
 #
@@ -1042,4 +1042,4 @@ Markdown("\n".join(rows))
 # ## Exercise
 #
 # [Exercise 11](exercises/11_fast_crf.ipynb): a blur over gaps, the neighbours that a lattice lacks, a blur that loses
-# nothing, what cells tell themselves asked of many at once, and a CRF of your own that refines the sample drive.
+# nothing, the self-response of many cells at once, and a CRF of your own that refines the sample drive.

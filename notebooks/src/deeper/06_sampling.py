@@ -127,7 +127,7 @@ for at in (1.25, 1.0):
 #
 # A cell of 0.5 m on the ground is $f_u \cdot 0.5 / Z$ pixels wide and $f_v\, z_\text{cam} \cdot 0.5 / Z^2$ pixels high:
 # with 185 for both $f$ and a camera 1.65 m up, 13 x 3, so about 40 pixels at 7 m, 4 at 15 m, 1 at 24 m, and at 60 m a
-# sixteenth. Equation (2) reads four, always. The alternative is the mean over all pixels that the cell covers: the
+# fifteenth. Equation (2) reads four, always. The alternative is the mean over all pixels that the cell covers: the
 # *area* sample, as a blurred image (a *mip-map*) gives it.
 #
 # **Predict before you run.** Give each pixel an error of its own, with standard deviation 1. What is the standard
