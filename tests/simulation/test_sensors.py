@@ -11,7 +11,7 @@ from semgrid_edu.datasets.ground_truth.window import EgoVelocity, deskew_scan, s
 from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.camera import take_picture
-from semgrid_edu.workshop.simulation.sensors.lidar import labelled_scan, scan
+from semgrid_edu.workshop.simulation.sensors.lidar import labelled_scan
 from semgrid_edu.workshop.simulation.sensors.raycast import Instant, RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E_AHEAD, Lidar, Rig
 from semgrid_edu.workshop.simulation.street.layout import Road, Side
@@ -49,7 +49,7 @@ def test_the_hdl64e_has_64_rings_from_2_to_minus_24_9_degrees():
 
 
 def test_ranges_to_ground_and_wall_are_exact_without_noise():
-    points = scan(at(scene(wall(12.0))), at(POSE), EXACT, ROAD, np.random.default_rng(0))
+    points = labelled_scan(at(scene(wall(12.0))), at(POSE), EXACT, ROAD, np.random.default_rng(0))[0]
     points = points[np.abs(points[:, 1]) < 40]
     on_wall = points[:, 0] > 11.999
     assert points[on_wall, 0] == pytest.approx(12.0, abs=1e-3)
@@ -60,7 +60,7 @@ def test_ranges_to_ground_and_wall_are_exact_without_noise():
 
 def test_range_noise_is_two_centimetres():
     noisy = replace(EXACT, range_sigma=0.02)
-    points = scan(at(scene(wall(8.0))), at(POSE), noisy, ROAD, np.random.default_rng(0))
+    points = labelled_scan(at(scene(wall(8.0))), at(POSE), noisy, ROAD, np.random.default_rng(0))[0]
     ranges = np.linalg.norm(points[:, :3], axis=1)
     ahead = points[:, 2] > -1.5
     exact = 8.0 * ranges[ahead] / points[ahead, 0]
@@ -70,7 +70,7 @@ def test_range_noise_is_two_centimetres():
 def test_dark_and_distant_surfaces_lose_more_returns():
     def share(material, x):
         thing = box((x + 0.5, 0, 2), (1, 200, 20), (0.5,) * 3, material, Kind.BUILDING)
-        points = scan(at(scene(thing)), at(POSE), Lidar(range_sigma=0.0), ROAD, np.random.default_rng(0))
+        points = labelled_scan(at(scene(thing)), at(POSE), Lidar(range_sigma=0.0), ROAD, np.random.default_rng(0))[0]
         return (points[:, 0] > x - 0.1).sum()
 
     assert share(Material.PLASTER, 40.0) > 1.5 * share(Material.RUBBER, 40.0)
@@ -79,7 +79,7 @@ def test_dark_and_distant_surfaces_lose_more_returns():
 
 def test_a_turned_vehicle_sees_the_wall_turned():
     turn = rigid_transform(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), POSE[:3, 3])
-    points = scan(at(scene(wall(12.0))), at(turn), EXACT, ROAD, np.random.default_rng(0))
+    points = labelled_scan(at(scene(wall(12.0))), at(turn), EXACT, ROAD, np.random.default_rng(0))[0]
     assert points[points[:, 2] > -1.7, 1] == pytest.approx(-12.0, abs=1e-3)
 
 
@@ -88,7 +88,7 @@ def test_a_scanner_that_takes_its_time_measures_each_column_from_where_it_is_the
         return rigid_transform(rotation_matrix(0, 0, t), POSE[:3, 3] + [10.0 * t, 0, 0])
 
     turning = replace(EXACT, turn=0.1)
-    points = scan(at(scene(wall(12.0))), pose, turning, ROAD, np.random.default_rng(0))
+    points = labelled_scan(at(scene(wall(12.0))), pose, turning, ROAD, np.random.default_rng(0))[0]
     assert np.abs(sweep_times(points)).max() > 0.02
     still = deskew_scan(points, EgoVelocity(10.0, 0.0, 1.0))
     ahead = points[:, 2] > -1.7

@@ -21,16 +21,7 @@ def with_needs(wanted: Iterable[Run]) -> list[Run]:
     list of Run
         Otherwise in the order of `wanted`.
     """
-    ordered: dict[Run, None] = {}
-
-    def add(run: Run) -> None:
-        for needed in run.needs:
-            add(needed)
-        ordered.setdefault(run)
-
-    for run in wanted:
-        add(run)
-    return list(ordered)
+    return list(dict.fromkeys(one for run in wanted for one in (*with_needs(run.needs), run)))
 
 
 def left_to_do(runs: Sequence[Run], root: str | Path) -> list[Run]:

@@ -23,7 +23,6 @@ from semgrid_edu.workshop.course.sandbox import surroundings as around
 from semgrid_edu.workshop.course.sandbox.limits import MEGABYTE, PARTS, Limits
 from semgrid_edu.workshop.course.sandbox.taken import (
     Sampled,
-    count_tasks,
     delete_folder,
     deleted_bytes,
     has_ended,
@@ -139,8 +138,8 @@ class StudentProcess:
 
     def _limit(self, limits: Limits, alone: tuple[str, ...]) -> list[str]:
         """Let the process limit itself; return what it couldn't."""
-        ours = os.getuid() if hasattr(os, "getuid") else None
-        limits = replace(limits, processes=limits.processes + count_tasks(lambda at: at.stat().st_uid == ours))
+        ours = threads_of(Path("/proc").glob("[0-9]*"), os.getuid()) if hasattr(os, "getuid") else 0
+        limits = replace(limits, processes=limits.processes + ours)
         message = {"do": "limit", "limits": asdict(limits), "folder": str(self.folder)}
         done = self.ask(message, time.monotonic() + STARTED)["done"]
         return [part for part in PARTS if part not in (*done, *(("network", "processes", "signals") if alone else ()))]

@@ -6,7 +6,7 @@ import stat
 import subprocess
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -46,21 +46,6 @@ def memory_of(pid: int) -> dict[str, int]:
     """
     lines = (line.split() for line in Path(f"/proc/{pid}/status").read_text().splitlines())
     return {line[0].rstrip(":"): int(line[1]) * 1024 // 1000 for line in lines if line[-1] == "kB"}
-
-
-def count_tasks(counts: Callable[[Path], bool]) -> int:
-    """Return how many threads some processes have; 0 where there is no `/proc`.
-
-    Parameters
-    ----------
-    counts : callable
-        (`/proc/PID/task`) -> bool, whether the process counts.
-    """
-    found = 0
-    for tasks in Path("/proc").glob("[0-9]*/task"):
-        with suppress(OSError):
-            found += sum(1 for _ in tasks.iterdir()) if counts(tasks) else 0
-    return found
 
 
 def processes_in(namespace: str) -> list[Path]:
@@ -105,18 +90,20 @@ def processes_below(pid: int) -> list[Path]:
     return found
 
 
-def threads_of(processes: list[Path]) -> int:
+def threads_of(processes: Iterable[Path], owner: int | None = None) -> int:
     """Return how many threads some processes have.
 
     Parameters
     ----------
-    processes : list of Path
+    processes : iterable of Path
         `/proc/PID` of each.
+    owner : int, optional
+        Number of the user whose processes count; without it all do.
     """
     found = 0
-    for place in processes:
+    for tasks in (place / "task" for place in processes):
         with suppress(OSError):
-            found += sum(1 for _ in (place / "task").iterdir())
+            found += sum(1 for _ in tasks.iterdir()) if owner in (None, tasks.stat().st_uid) else 0
     return found
 
 

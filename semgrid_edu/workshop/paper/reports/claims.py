@@ -16,7 +16,7 @@ from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.metrics import METRICS, class_accuracy
 from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.paper.reports.verdicts import Statement
-from semgrid_edu.workshop.paper.runs.other_runs import OVERTURNED, UPRIGHT, p_not_saved, time_saved
+from semgrid_edu.workshop.paper.runs.other_runs import FRAME, OVERTURNED, STEP, UPRIGHT, p_not_saved, time_saved
 from semgrid_edu.workshop.paper.runs.paper import NETWORKS
 from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
 from semgrid_edu.workshop.paper.runs.score_runs import GEOMETRY, TRUE_GEOMETRY, WITH_CRF, CountingRun, ScoreRun, by_seed
@@ -219,7 +219,7 @@ def _apart(matrix: NDArray) -> NDArray[np.float64]:
 
 def _effect_of_reduction(one: Reading) -> list[Statement]:
     pair, times = (one.counted(one.runs.usual_of_all_seeds), one.counted(one.runs.unreduced)), one.runs.times[0]
-    rounds = {"of a frame": times.seconds_per_frame(one.known), "of a training step": times.seconds_per_step(one.known)}
+    rounds = {"of a frame": times.rounds(one.known, FRAME), "of a training step": times.rounds(one.known, STEP)}
     saved = [Statement(f"share of the time {of} saved", time_saved(r), p=p_not_saved(r)) for of, r in rounds.items()]
     return [*_gains({": with reduction - without": pair}, limit=-MARGIN), *saved]
 

@@ -149,21 +149,16 @@ class TimeRun(Run):
         steps = [[seconds_per_step(*one) for one in both] for _ in range(TRAINING_ROUNDS)]
         write_json(self.folder(root) / TIMES, {FRAME: rounds, STEP: steps})
 
-    def seconds_per_frame(self, counted: RunCounts) -> NDArray[np.float64]:
-        """Return the seconds per frame of both networks in each round, (R, 2).
+    def rounds(self, counted: RunCounts, name: str) -> NDArray[np.float64]:
+        """Return the seconds of both networks in each round, (R, 2).
 
         Parameters
         ----------
         counted : RunCounts
             What is known about the runs.
+        name : str
+            `FRAME` or `STEP`: per frame, or per training step.
         """
-        return self._rounds(counted, FRAME)
-
-    def seconds_per_step(self, counted: RunCounts) -> NDArray[np.float64]:
-        """Return the seconds per training step, (R, 2). Parameters are those of `TimeRun.seconds_per_frame`."""
-        return self._rounds(counted, STEP)
-
-    def _rounds(self, counted: RunCounts, name: str) -> NDArray[np.float64]:
         return counted.of(self, (name,), lambda root: {name: self._read(root, name)})[name]
 
     def _read(self, root: Path, name: str) -> NDArray[np.float64]:
@@ -189,7 +184,7 @@ def time_saved(rounds: NDArray) -> ScoreWithInterval:
     Parameters
     ----------
     rounds : (R, 2) float
-        From `TimeRun.seconds_per_frame`.
+        From `TimeRun.rounds`.
 
     Returns
     -------

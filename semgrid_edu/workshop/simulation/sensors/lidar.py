@@ -15,11 +15,11 @@ _SECTOR = 30.0
 """Degrees of a turn in which road users count as standing; at 14 m/s they move by 12 cm meanwhile."""
 
 
-def scan(
+def labelled_scan(
     world: Callable[[float], Instant], pose: Callable[[float], NDArray], lidar: Lidar, road: Road,
     rng: np.random.Generator,
-) -> NDArray[np.float32]:  # fmt: skip
-    """Take one LIDAR scan.
+) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:  # fmt: skip
+    """Take one LIDAR scan, and say what each return hit.
 
     A scanner that takes its time (`Lidar.turn`) measures each column from where it is then, and gives it in its frame
     of that moment, as KITTI's raw scans are. A return is lost when too little light comes back. So dark, far and grazed
@@ -41,22 +41,8 @@ def scan(
 
     Returns
     -------
-    (N, 4) float32
-        x, y, z in the LIDAR frame, metres, and reflectance 0..1, as KITTI's binary files hold them.
-    """
-    return labelled_scan(world, pose, lidar, road, rng)[0]
-
-
-def labelled_scan(
-    world: Callable[[float], Instant], pose: Callable[[float], NDArray], lidar: Lidar, road: Road,
-    rng: np.random.Generator,
-) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:  # fmt: skip
-    """Take a scan, and say what each return hit. Parameters are those of `scan`.
-
-    Returns
-    -------
     points : (N, 4) float32
-        What `scan` returns.
+        x, y, z in the LIDAR frame, metres, and reflectance 0..1, as KITTI's binary files hold them.
     kinds : (N,) uint8
         Members of `Kind`.
     """

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import LabelSet
+from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.workshop.scoring.confusions import band_names
 from semgrid_edu.workshop.scoring.counting import distance_bands
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
@@ -23,6 +23,8 @@ COUNTED = ("seen", "found", "missed", "labelled", "right", "hidden")
 """What is counted of each class c and each band: cells that the camera sees, in which c stands ("seen"), those of them
 that are labelled c ("found") and those without a label ("missed"); cells that are labelled c ("labelled"), those of
 them in which c stands ("right") and those that the camera doesn't see ("hidden")."""
+ABOUT = {"counted": list(COUNTED), "bands": list(BAND_EDGES), "classes": list(KITTI_14.names[: KITTI_14.n_semantic])}
+"""What a file of such counts says of them."""
 
 
 @dataclass(frozen=True, eq=False)

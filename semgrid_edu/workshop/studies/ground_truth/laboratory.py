@@ -19,7 +19,6 @@ from semgrid_edu.datasets.ground_truth import NO_FLAWS, Moment, TruthFlaws, Trut
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.storage.files import table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
@@ -28,7 +27,7 @@ from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, LIDARS, check_request
 from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
-from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, COUNTED, TruthCounts
+from semgrid_edu.workshop.studies.ground_truth.counts import ABOUT, TruthCounts
 
 HELD_OUT = 700
 """Seed of the first drive for seed 0; each further seed adds 1000."""
@@ -113,9 +112,7 @@ def truth_policies(log: Path, seed: int = 0, drives: int = 20, grid: str = "comp
     command = f"semgrid-edu reproduce truth-policies --seed {seed} --drives {drives} --grid {grid} --lidar {lidar}"
     return identity | {
         "policies": {name: asdict(trial.policy) | {"errors": asdict(trial.flaws)} for name, trial in TRIALS.items()},
-        "counted": list(COUNTED),
-        "bands": list(BAND_EDGES),
-        "classes": list(KITTI_14.names[: KITTI_14.n_semantic]),
+        **ABOUT,
         **kept,
         **made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh"),
     }

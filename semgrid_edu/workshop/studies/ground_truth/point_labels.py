@@ -15,7 +15,6 @@ from semgrid_edu.camera import invert_rigid, rigid_transform, transform_points
 from semgrid_edu.datasets.readers.cuboids import ANY_LIDAR, Cuboids, LabelledScan, put_together
 from semgrid_edu.datasets.readers.frames import visible_labels
 from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, unhidden
-from semgrid_edu.frame import FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, LabelSet
 from semgrid_edu.storage.provenance import made_by
@@ -23,7 +22,8 @@ from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import Kind, class_of_kind
 from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, LIDARS, check_request
-from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, COUNTED, TruthCounts
+from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
+from semgrid_edu.workshop.studies.ground_truth.counts import ABOUT, TruthCounts
 from semgrid_edu.workshop.studies.ground_truth.laboratory import HELD_OUT, REACH
 
 MOVABLE = (Kind.CAR, Kind.PEDESTRIAN, Kind.BICYCLE)
@@ -65,9 +65,7 @@ def point_labels(seed: int = 0, drives: int = 20, grid: str = "compact", lidar: 
     return {
         "sums": {name: counts.cells.tolist() for name, counts in sums.items()},
         "drives": list(numbers),
-        "counted": list(COUNTED),
-        "bands": list(BAND_EDGES),
-        "classes": list(KITTI_14.names[: KITTI_14.n_semantic]),
+        **ABOUT,
         **made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh"),
     }
 
@@ -94,7 +92,7 @@ def score_drive(spec: GridSpec, number: int, lidar: str) -> dict[str, TruthCount
         visible = np.zeros(spec.shape, bool)
         visible[rows[inside], cols[inside]] = True
         found[f"{name}, seen by the camera"] = np.where(visible, found[name], np.uint8(IGNORE))
-    labels = _true_labels(drive)
+    labels = labelled_frame(drive, REACH).labels
     truth, standing = visible_labels(labels, spec), labels.birdseye_on(spec)
     return {name: TruthCounts.of_frame(one, truth, standing, spec, KITTI_14) for name, one in found.items()}
 
@@ -133,10 +131,3 @@ def _cuboids(drive: SimulatedDrive, k: int) -> Cuboids:
         moving=np.arange(len(actors)) >= len(drive.parked),
         lidars=np.full(len(actors), ANY_LIDAR),
     )
-
-
-def _true_labels(drive: SimulatedDrive) -> FrameLabels:
-    """Return what is true of the frame in the middle."""
-    frame, classes = drive.frame(REACH, labelled=True), class_of_kind(KITTI_14)
-    picture, truth = frame.picture, frame.truth
-    return FrameLabels(KITTI_14, classes[picture.kind], picture.depth, classes[truth.kinds], truth.visible)

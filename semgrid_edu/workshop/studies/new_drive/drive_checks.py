@@ -127,13 +127,18 @@ def ground_plane(points: NDArray, height: float) -> GroundPlane:
     in_lane = (x > start) & (x < end) & (np.abs(y) < side) & (np.abs(z + height) < 0.05 * x + 3 * GROUND_ERROR)
     if in_lane.sum() < 10:
         raise ArgumentError("points", f"ten or more returns on the ground, {start:g} to {end:g} m ahead", in_lane.sum())
-    columns, z = np.column_stack([np.ones(in_lane.sum()), x[in_lane], y[in_lane]]), z[in_lane]
-    ground = np.ones(len(z), np.bool_)
-    for _ in range(10):
-        plane = np.linalg.lstsq(columns[ground], z[ground])[0]
-        error = np.abs(z - columns @ plane)
-        ground = error < max(GROUND_ERROR, float(np.median(error)))
+    plane, _ = _robust_plane(x[in_lane], y[in_lane], z[in_lane], 10, GROUND_ERROR)
     return GroundPlane(-plane[0], *np.degrees(np.arctan(plane[1:])))
+
+
+def _robust_plane(a: NDArray, b: NDArray, c: NDArray, rounds: int, least: float) -> tuple[NDArray, NDArray]:
+    """Fit c = p0 + p1 a + p2 b, leaving out what lies far off; return p and the distances of all."""
+    columns, kept = np.column_stack([np.ones(len(a)), a, b]), np.ones(len(a), np.bool_)
+    for _ in range(rounds):
+        plane = np.linalg.lstsq(columns[kept], c[kept])[0]
+        error = np.abs(c - columns @ plane)
+        kept = error < max(least, float(np.median(error)))
+    return plane, error
 
 
 def wall_lean(frame: Frame, box: tuple[float, float, float, float]) -> float:
@@ -164,12 +169,7 @@ def wall_lean(frame: Frame, box: tuple[float, float, float, float]) -> float:
     inside = (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max) & (z > 1) & (z < 8)
     if inside.sum() < 100:
         raise ArgumentError("box", "a place with 100 or more returns from a wall", f"{inside.sum()} in {box}")
-    columns, y = np.column_stack([np.ones(inside.sum()), x[inside], z[inside]]), y[inside]
-    wall = np.ones(len(y), np.bool_)
-    for _ in range(30):
-        plane = np.linalg.lstsq(columns[wall], y[wall])[0]
-        error = np.abs(y - columns @ plane)
-        wall = error < max(GROUND_ERROR / 2, float(np.median(error)))
+    plane, error = _robust_plane(x[inside], z[inside], y[inside], 30, GROUND_ERROR / 2)
     if (share := (error < GROUND_ERROR).mean()) < 0.5:
         raise ArgumentError("box", "a wall, most of it within 10 cm of a plane", f"{share:.0%} of the returns in {box}")
     return float(np.degrees(np.arctan(-plane[2])))
