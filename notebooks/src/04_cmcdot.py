@@ -65,8 +65,7 @@ frames = [drive[k] for k in range(len(drive))]
 # ## Three filters on one street
 #
 # The log-odds grid of lecture 02 can't say that anything moves. The BOF of lecture 03 can, but it stores a whole
-# lattice of velocities in every cell. This lecture builds a third filter, CMCDOT. Here are all three on the sample
-# drive:
+# lattice of velocities in every cell. This lecture builds a third, CMCDOT. Here are all three on the sample drive:
 
 
 # %% jupyter={"source_hidden": true}
@@ -82,7 +81,7 @@ def filtered(tracker):
 by_log_odds, by_bof, by_cmcdot = (filtered(tracker) for tracker in (LogOddsGrid(spec), Bof(spec), Cmcdot(spec)))
 
 
-# %% jupyter={"source_hidden": true} alt="animation of three maps of one street, seen from above: a car A overtakes us on the left and is blue in the two maps on the right, a car B comes towards us and is yellow there; in the left map B leaves a long dark trail C on the road, in the others hardly any; D stands and is dark in all three"
+# %% jupyter={"source_hidden": true} alt="animation of three maps of one street, seen from above: a car A overtakes us on the left and is blue in the two maps on the right, a car B comes towards us and is yellow there; in the left map B and the cars behind it leave a long dark trail C on the road, in the others it soon fades; D stands and is dark in all three"
 def three_filters():
     """Draw the three maps, frame after frame."""
     fig, axes = plt.subplots(1, 3, figsize=(9.4, 4.2), layout="compressed")
@@ -125,12 +124,12 @@ print(f"CMCDOT calls {100 * moving[cars & occupied['CMCDOT']].mean():.0f} % of t
 assert held["CMCDOT"] < 0.08 < 0.2 < held["log-odds grid"]
 
 # %% [markdown]
-# **A** overtakes us, **B** comes towards us, **D** is parked. Look at **C**, the road that B has just left. The
-# log-odds grid still holds it occupied (dark), because it believes that nothing ever changes. The two other filters
-# have nearly cleared it, and they say what moves where: blue drives our way, yellow comes towards us. After 1.6 s the
+# **A** overtakes us, **B**, the first of three, comes towards us, **D** is parked. Look at **C**, the road that B has just left. The
+# log-odds grid still holds it occupied (dark), because it believes that nothing ever changes. After a second the
+# two other filters have nearly cleared it, and they say what moves where: blue drives our way, yellow comes towards us. After 1.6 s the
 # log-odds grid holds 30 % of the free road in B's lane occupied, CMCDOT 4 %.
 #
-# So CMCDOT does what BOF does. Why do we want another filter?
+# So CMCDOT does what BOF does. Why want another filter?
 #
 # ## Too many numbers
 #
@@ -192,7 +191,7 @@ stage.draw(ax)
 plt.show()
 
 # %% [markdown]
-# Read it from the top:
+# Read it from the top; a box is there once for each particle $i$ or cell $k$:
 #
 # - $q_{t-1} \to q_t$: the thing flies on with its velocity.
 # - $q \to m_k$: a cell is DYNAMIC when the thing is in it.
@@ -279,7 +278,7 @@ assert came_in[loop_alone].mean() > 0.8
 
 # %% [markdown]
 # The package's `Cmcdot` is this loop with a margin around its map, so that the map may turn. At 1.6 s the two agree in
-# more than nine cells of ten. Most others came in at the far end, where only the package's margin had seen them.
+# more than nine cells of ten. Most others are UNKNOWN in the loop alone, at the far end.
 # Watch the overtaking car A (in the middle; top left is B) go through one round:
 
 
@@ -290,7 +289,7 @@ def crop(ax, title):
     ax.set(xlabel="y, to the left [m]", ylabel="x, forward [m]" if ax is axes[0] else "")
 
 
-# %% jupyter={"source_hidden": true} alt="seven small pictures of the overtaking car: the old belief, the car orange; after move all has slid down by a cell; after predict the orange has flown ahead and is paler; the scan, with hit cells black and passed cells pink; after update the orange is sharp again; its particles before step 4, mostly pale, and after it, all alike"
+# %% jupyter={"source_hidden": true} alt="seven small pictures of the overtaking car: the old belief, the car orange; after move all has slid down by a cell; after predict the orange has flown ahead and is paler; the scan, with hit cells black and passed cells pink; after update the orange is sharp again; its particles before step 4, mostly pale, and after it, most as strong as each other"
 fig, axes = plt.subplots(1, 7, figsize=(10.4, 3.0), layout="compressed")
 for k, state, title in (
     (0, old, "before"),
@@ -398,7 +397,7 @@ np.testing.assert_array_equal(got[UNKNOWN], 1 - got[STATIC])  # what enters is U
 # By the default rates a free cell that no scan sees turns UNKNOWN 0.3 times a second, a moving thing 0.5 times, a
 # standing thing 0.1 times. UNKNOWN has no way back: only a scan reveals what is there (step 3). And a sliver of FREE
 # and of STATIC turns DYNAMIC, 0.01 times a second: it is **born**. Newborn mass has no velocity yet; step 4 gives it
-# some. (On the right, DYNAMIC also turns STATIC, and FREE, 0.1 times a second each.)
+# some. (FREE and STATIC turn into each other, too, 0.02 times a second.)
 
 # %% jupyter={"source_hidden": true} alt="three charts of a cell that no scan sees for ten seconds: once free, about half unknown after two seconds; once static, about half static after five; once dynamic, nearly gone after four"
 times = np.linspace(0, 10, 101)
@@ -519,7 +518,7 @@ plt.show()
 #
 # One trap is left. A cell holds STATIC 0.5 and DYNAMIC 0.5, the latter in one particle that doesn't move. Returns
 # come back from it, scan after scan. STATIC and a DYNAMIC thing at rest predict the same returns, so no scan changes
-# the ratio, and it stays at one half for ever. On a street, whatever stands would slowly fill with particles of
+# the ratio, and both stay at one half for ever. On a street, whatever stands would slowly fill with particles of
 # almost zero speed. These are two names for one thing, so the filter settles on one: a particle of speed $v$ turns
 # STATIC at a rate that is high at rest and falls fast with $v$,
 #
@@ -613,13 +612,13 @@ np.testing.assert_allclose(*ratios, atol=1e-4)
 # A silent scan changes nothing, not even UNKNOWN. The third line would be 0/0: a cell that was surely free is surely
 # hit, so the filter knows nothing about it any more.
 #
-# The particles take part with their weights. By the first answer of the graph, each is multiplied by the same number as
-# its cell's $b_D$, so that the weights still sum to it.
+# The particles take part with their weights. By the first answer of the graph, each is multiplied by the number by which
+# Bayes' rule multiplies its cell's $b_D$. What was shared out is newborn: step 4 gives it particles.
 #
 # ## Step 4: resample
 #
 # Left alone, more and more particles would carry next to nothing and a few nearly everything. So the filter draws new
-# ones from the old, in proportion to their weights, and gives all the same weight. By hand: weights 0.1, 0.6, 0.3; draw
+# ones from the old, in proportion to their weights, and gives all the same weight at first. By hand: weights 0.1, 0.6, 0.3; draw
 # four. Lay the weights end to end on a line from 0 to 1. Lay a comb over it, with four teeth a quarter apart. Where the
 # comb begins is the only random number: the offset, as a part of the teeth's distance, say 0.2. The teeth are at 0.05,
 # 0.30, 0.55, 0.80:
@@ -764,7 +763,7 @@ Markdown("\n".join(rows))
 # DYNAMIC. Two cells of this world, one on the way of the oncoming car and one of the parked car, get the same kind of
 # evidence, "occupied":
 
-# %% jupyter={"source_hidden": true} alt="two charts over 2.5 seconds: a cell on the way of the car is free, then an orange band for half a second, then free; the cell of the parked car turns dark after the first scans and stays so"
+# %% jupyter={"source_hidden": true} alt="two charts over 2.5 seconds: a cell on the way of the car is free, then an orange band for half a second, then free; the cell of the parked car is dark from the first scan on"
 run = list(watch(street, 2.5, speed=5.0))
 fig, axes = plt.subplots(1, 2, figsize=(9.5, 2.3), layout="constrained")
 for ax, name, place in zip(
@@ -782,9 +781,9 @@ plt.show()
 # %% [markdown]
 # ## What the three cuts cost
 #
-# Is BOF exact, and CMCDOT a noisy copy of it? Neither. Take four cells in a row. In cell 2 something moves, to the
-# left or to the right with 1/2 each. The scan sees it arrive in cell 3. How probable is it now that something is in
-# cell 1? A person knows: the thing has gone to the right, so it isn't in cell 1. But the filter updates cell 1 by
+# Is BOF exact, so that CMCDOT only needs more particles? No. Take four cells in a row. In cell 2 something moves, to the
+# left or to the right with 1/2 each. Cell 3 is half UNKNOWN, so something may also stand there. The scan sees it arrive in cell 3. How probable is it now that something is in
+# cell 1? A person knows: it has probably gone to the right, so it is hardly in cell 1. But the filter updates cell 1 by
 # itself, and there the beam has merely passed, which lowers 1/2 somewhat. Exact inference over all cells together, as
 # in lecture 03, against the two filters:
 
@@ -813,7 +812,7 @@ assert sampled[0, Cell.LEFT] > 4 * exact[0, Cell.LEFT]
 #
 # <details><summary>Answer</summary>
 #
-# The sampling error by four in theory, and by 4.5 as measured, from 0.010 to 0.002. The error to the exact answer stays
+# The sampling error by four in theory, and by 4.5 as measured, from about 0.010 to 0.002. The error to the exact answer stays
 # at 0.05, because the bias is nearly all of it already.
 #
 # </details>
@@ -902,8 +901,8 @@ assert np.hypot(moved_by.dx, moved_by.dy) < 0.2  # we stand
 
 # %% [markdown]
 # In the first scans the cars in lane E are STATIC, as first sight says. Then particles arrive in free cells of the
-# lane, and from 1.2 s on nearly all hit cells there are DYNAMIC. Of what stands on the right, hardly a cell is ever
-# called DYNAMIC. But F is a failure: it rolls at 2.4 m/s on average, and is mostly called STATIC. The section *Where
+# lane, and from 1.2 s on (one car is left in the map) all hit cells there are DYNAMIC. Hardly a hit cell on
+# the right is ever called DYNAMIC. But F is a failure: it rolls at 2.4 m/s on average, and is mostly called STATIC. The section *Where
 # this breaks* asks why.
 #
 # ## Play with it
@@ -964,8 +963,8 @@ fig.supxlabel("arrows: distance covered in 0.5 s", fontsize="medium")
 plt.show()
 
 # %% [markdown]
-# Above each map stands how much of the car and of the person was called DYNAMIC, over the last second. With few
-# particles it is a matter of luck what is found, and another seed gives other numbers; the companion counts them.
+# Above each map stands how much of the car and of the person was called DYNAMIC, over the last second. Luck
+# decides part of it, with thousands of particles too, and another seed gives other numbers; the companion counts them.
 #
 # ## Where this breaks
 #
@@ -1021,8 +1020,8 @@ plt.show()
 #
 # **A car that drives away from us.** F on the real street rolled at 2.4 m/s for 1.8 s, and the filter hardly noticed.
 # Why? We see only its rear. So the rear leaves cells that were called STATIC at first sight, and what it arrives in
-# are cells that its own body hid: they are UNKNOWN, not FREE. Out of something STATIC, on into something UNKNOWN: by
-# the look-back rules that is how a wall comes into view, and the arrival is struck out. If this is the reason, then F
+# are cells that its own body hid: they are UNKNOWN, not FREE. From STATIC into UNKNOWN: by the look-back rules
+# that is a wall coming into view, and the arrival is struck out. If this is the reason, then F
 # should be found once we switch off the rules, or first sight's 15 to 1, or both:
 
 # %% jupyter={"outputs_hidden": true}
@@ -1044,7 +1043,7 @@ assert as_it_is < 20 < 30 < min(without_rules, even_odds) < max(without_rules, e
 # %% [markdown]
 # In the last scan 13 % of F's hit cells are DYNAMIC as the filter is, 47 % without the rules, 40 % with even odds at
 # first sight, and 60 % with both changes. So both are causes, and they don't explain all of it: 40 % aren't DYNAMIC
-# even then. This cost hurts: a vehicle that starts when the car ahead is
+# even then. A vehicle that starts when the car ahead is
 # DYNAMIC would start late. The rules are there because without them walls that come into view are called DYNAMIC, as
 # the companion [phantoms on real streets](deeper/04_real_streets.ipynb) shows.
 #

@@ -703,8 +703,8 @@ np.testing.assert_allclose(np.abs(np.subtract(found, 0.5)), 0.25, atol=1e-6)
 # Which coupling can you afford if mean field may be wrong by at most 0.05? Does it depend on how sure the scan of
 # $m_1$ is? (Without a running kernel there are no sliders; the figure below them shows three settings.)
 #
-# <details><summary>Answer</summary>With a scan that says 0.6, 0.7 or 0.8, a factor of at most 1.8 or 1.9. With 0.99
-# every factor up to 8, because nearly all is known already.</details>
+# <details><summary>Answer</summary>With a scan that says 0.6, 0.7 or 0.8, a factor of at most 1.8 or 1.9 (computed
+# on the slider's steps). With 0.99 every factor up to 8, because nearly all is known already.</details>
 
 
 # %% jupyter={"source_hidden": true}
@@ -772,7 +772,8 @@ plt.show()
 # is open. Leave the pitch out, and the cells fall apart into 55,025 problems of two variables each.
 #
 # Now you can read the graphs of the stages. A **dashed** edge is one that the real system leaves out, and the two numbers
-# on it are its **price** on a toy world: first the exact answer, then the system's. Without numbers the price wasn't
+# on it are its **price** on a toy world: first the exact answer, then the system's (mostly a
+# probability; 1.24 counts things, and what starts from 0 is an error). Without numbers the price wasn't
 # measured. A dashed circle is a node that the
 # toy model leaves out. `StageGraph.cut` holds a sentence for each dashed edge, and lecture [00](../00_tour.ipynb) shows
 # the whole ledger.
