@@ -126,7 +126,7 @@ assert held["CMCDOT"] < 0.08 < 0.2 < held["log-odds grid"]
 # %% [markdown]
 # **A** overtakes us, **B**, the first of three, comes towards us, **D** is parked. Look at **C**, the road that B has just left. The
 # log-odds grid still holds it occupied (dark), because it believes that nothing ever changes. After a second the
-# two other filters have nearly cleared it, and they say what moves where: blue drives our way, yellow comes towards us. After 1.6 s the
+# other two have nearly cleared it, and they say what moves where: blue drives our way, yellow comes towards us. After 1.6 s the
 # log-odds grid holds 30 % of the free road in B's lane occupied, CMCDOT 4 %.
 #
 # So CMCDOT does what BOF does. Why want another filter?
@@ -191,7 +191,7 @@ stage.draw(ax)
 plt.show()
 
 # %% [markdown]
-# Read it from the top; a box is there once for each particle $i$ or cell $k$:
+# Read it from the top (a box: once for each particle $i$ or cell $k$):
 #
 # - $q_{t-1} \to q_t$: the thing flies on with its velocity.
 # - $q \to m_k$: a cell is DYNAMIC when the thing is in it.
@@ -963,8 +963,8 @@ fig.supxlabel("arrows: distance covered in 0.5 s", fontsize="medium")
 plt.show()
 
 # %% [markdown]
-# Above each map stands how much of the car and of the person was called DYNAMIC, over the last second. Luck
-# decides part of it, with thousands of particles too, and another seed gives other numbers; the companion counts them.
+# Above each map stands how much of the car and of the person was called DYNAMIC, over the last second. Luck decides part
+# of it, and another seed gives other numbers; the companion counts them.
 #
 # ## Where this breaks
 #
@@ -1043,8 +1043,7 @@ assert as_it_is < 20 < 30 < min(without_rules, even_odds) < max(without_rules, e
 # %% [markdown]
 # In the last scan 13 % of F's hit cells are DYNAMIC as the filter is, 47 % without the rules, 40 % with even odds at
 # first sight, and 60 % with both changes. So both are causes, and they don't explain all of it: 40 % aren't DYNAMIC
-# even then. A vehicle that starts when the car ahead is
-# DYNAMIC would start late. The rules are there because without them walls that come into view are called DYNAMIC, as
+# even then. A vehicle that starts when the car ahead is DYNAMIC starts late. The rules are there because without them walls that come into view are called DYNAMIC, as
 # the companion [phantoms on real streets](deeper/04_real_streets.ipynb) shows.
 #
 # ## In five lines
