@@ -613,7 +613,7 @@ np.testing.assert_allclose(*ratios, atol=1e-4)
 # hit, so the filter knows nothing about it any more.
 #
 # The particles take part with their weights. By the first answer of the graph, each is multiplied by the number by which
-# Bayes' rule multiplies its cell's $b_D$. What was shared out is newborn: step 4 gives it particles.
+# Bayes' rule multiplies its cell's $b_D$. What was shared out gets particles in step 4.
 #
 # ## Step 4: resample
 #
@@ -782,7 +782,7 @@ plt.show()
 # ## What the three cuts cost
 #
 # Is BOF exact, so that CMCDOT only needs more particles? No. Take four cells in a row. In cell 2 something moves, to the
-# left or to the right with 1/2 each. Cell 3 is half UNKNOWN, so something may also stand there. The scan sees it arrive in cell 3. How probable is it now that something is in
+# left or to the right with 1/2 each. (Something may also stand in cell 3.) The scan sees it arrive in cell 3. How probable is it now that something is in
 # cell 1? A person knows: it has probably gone to the right, so it is hardly in cell 1. But the filter updates cell 1 by
 # itself, and there the beam has merely passed, which lowers 1/2 somewhat. Exact inference over all cells together, as
 # in lecture 03, against the two filters:
