@@ -124,7 +124,7 @@ print(f"CMCDOT calls {100 * moving[cars & occupied['CMCDOT']].mean():.0f} % of t
 assert held["CMCDOT"] < 0.08 < 0.2 < held["log-odds grid"]
 
 # %% [markdown]
-# **A** overtakes us, **B**, the first of three, comes towards us, **D** is parked. Look at **C**, the road that B has just left. The
+# **A** overtakes us, **B**, first of three, comes towards us, **D** is parked. Look at **C**, the road that B has just left. The
 # log-odds grid still holds it occupied (dark), because it believes that nothing ever changes. After a second the
 # other two have nearly cleared it, and they say what moves where: blue drives our way, yellow comes towards us. After 1.6 s the
 # log-odds grid holds 30 % of the free road in B's lane occupied, CMCDOT 4 %.
@@ -901,8 +901,8 @@ assert np.hypot(moved_by.dx, moved_by.dy) < 0.2  # we stand
 
 # %% [markdown]
 # In the first scans the cars in lane E are STATIC, as first sight says. Then particles arrive in free cells of the
-# lane, and from 1.2 s on (one car is left in the map) all hit cells there are DYNAMIC. Hardly a hit cell on
-# the right is ever called DYNAMIC. But F is a failure: it rolls at 2.4 m/s on average, and is mostly called STATIC. The section *Where
+# lane, and from 1.2 s on (one car is left in the map) all hit cells there are DYNAMIC. Hardly one on
+# the right ever is. But F is a failure: it rolls at 2.4 m/s on average, and is mostly called STATIC. The section *Where
 # this breaks* asks why.
 #
 # ## Play with it
