@@ -143,14 +143,14 @@ plotting.animate(
 
 # %% jupyter={"source_hidden": true} alt="a sketch from the side: a camera, its four pixels, and their rays to the ground in four cells; a car in cell 3 blocks the rays to cells 3 and 4"
 colours = KITTI_14.colours(np.array([ROAD, ROAD, CAR, CAR])) / 255
-fig, side = plt.subplots(figsize=(4.6, 2.6), layout="constrained")
+fig, side = plt.subplots(figsize=(5.6, 3.2), layout="constrained")
 side.add_patch(plt.Rectangle((7.1, 0), 1.8, 1.3, color=colours[2], alpha=0.4))
 for j, (x, colour) in enumerate(zip((4, 6, 8, 10), colours, strict=True), start=1):
     stop = np.array([0, min(x, 7.1), x])  # camera, first thing, ground
     side.plot(stop[:2], 3 - 3 * stop[:2] / x, color=colour, linewidth=1.2)
     side.plot(stop[1:], 3 - 3 * stop[1:] / x, ":", color="0.4", linewidth=1.2)
     side.plot(2.8, 3 - 3 * 2.8 / x, "s", color=colour, markersize=6)
-    right, up = {3: (-0.27, 0.13), 4: (0, 0.35)}.get(j, (0, -0.1))  # beside its square, where no other square lies
+    right, up = {3: (-0.36, 0.09), 4: (0, 0.35)}.get(j, (0, -0.1))  # where no other square or ray lies
     side.text(2.8 + right, 3 - 3 * 2.8 / x + up, f"$a_{j}$", ha="center", va="top", fontsize=9)
     side.plot([x - 0.9, x + 0.9], [0, 0], color="black", linewidth=3, solid_capstyle="butt")
     side.text(x, -0.15, f"$m_{j}$", ha="center", va="top")

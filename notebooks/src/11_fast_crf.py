@@ -837,8 +837,8 @@ for infer in (mean_field_naive, mean_field_accurate, mean_field):
 # machine you see steps after 16 and after 32; in a picture made on a busy one, chance hides them.
 #
 # **The tenth of a second.** The printed lines give the times on the machine that built this page: for the drive's map,
-# and for the paper's grid. The drive's map leaves most of the tenth to the other stages. The paper's grid needs about
-# all of it (another machine took 127 ms), so there the CRF leaves hardly any time for the rest. Fewer iterations save a
+# and for the paper's grid. The drive's map leaves most of the tenth to the other stages. The paper's grid needs all of
+# it or more (another machine took 127 ms), so there the CRF leaves no time for the rest. Fewer iterations save a
 # part of it; the lattice is built once for each map in any case.
 #
 # **A third way** is in the last table. `mean_field_accurate` computes the Gaussian exactly for all cells in a window of
