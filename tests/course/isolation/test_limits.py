@@ -242,6 +242,7 @@ def test_the_last_process_has_ended_when_it_is_stopped(session):
     assert all(map(has_ended, processes_in(process.namespace)))
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
 def test_a_process_that_waits_for_its_parent_has_ended():
     """Where nobody asks for the last words of orphans, as in many a container, they stay in /proc for ever."""
     with subprocess.Popen(["true"]) as child:
@@ -251,6 +252,18 @@ def test_a_process_that_waits_for_its_parent_has_ended():
         assert has_ended(place)
     assert has_ended(place)
     assert not has_ended(Path("/proc/self"))
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
+def test_a_process_whose_first_thread_alone_has_ended_goes_on():
+    code = "import ctypes, threading, time\nthreading.Thread(target=time.sleep, args=(60,)).start()\n"
+    with subprocess.Popen([sys.executable, "-c", code + "ctypes.CDLL(None).pthread_exit(None)"]) as child:
+        place, until = Path(f"/proc/{child.pid}"), time.monotonic() + 30
+        while "State:\tZ" not in (place / "status").read_text() and time.monotonic() < until:
+            time.sleep(0.05)
+        assert "State:\tZ" in (place / "status").read_text()
+        assert not has_ended(place)
+        child.kill()
 
 
 def test_a_folder_that_cannot_be_listed_is_gone_afterwards(session):

@@ -62,7 +62,7 @@ def processes_in(namespace: str) -> list[Path]:
 
 
 def has_ended(process: Path) -> bool:
-    """Return whether a process has ended; if so, at most its number is left, until its parent asks how it ended.
+    """Return whether a process has ended, with all its threads; at most its number is left, for a parent that asks.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def has_ended(process: Path) -> bool:
         `/proc/PID`.
     """
     with suppress(OSError):
-        return (process / "stat").read_text().rpartition(")")[2].split()[0] in "ZX"
+        return (process / "stat").read_text().rpartition(")")[2].split()[0] in "ZX" and threads_of([process]) < 2
     return True
 
 
