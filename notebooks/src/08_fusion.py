@@ -956,7 +956,7 @@ plt.show()
 # %% [markdown]
 # Three times as many bits are shared as on the simulated drive, and here late fusion isn't nearly free: it loses three
 # points of all cells, and six of semantic ones, against the table, which knows how label and state occur together. By
-# class accuracy it is eight points better, as on the simulated drive. (The network has learnt from these very
+# class accuracy it is better here, too, by eight points. (The network has learnt from these very
 # frames, so its row shows what it can hold, not how it does on a new street.) Over all ten frames late fusion finds
 # most of the road, half of the cells of cars and nearly three quarters of those of buildings, and gives these names to
 # many other cells (B shows the last frame). It names no vegetation, sidewalk, bicycle or pedestrian at all. The road
@@ -1097,8 +1097,8 @@ Markdown(ledger_table(ledger("fusion")))
 # %% [markdown]
 # Late fusion cuts it; this network needn't. Over all cells the edge is worth less than a point on the simulated drive,
 # and three points on the real one. The network is farther above the table than that, so most of its lead lies
-# elsewhere. It reads scores in place of one label, and it sees the cells around. On simulated streets the number of
-# planes brings a point at most.
+# elsewhere. It reads scores in place of one label, and it sees the cells around. On simulated streets twenty planes
+# bring about a point.
 #
 # ## In five lines
 #

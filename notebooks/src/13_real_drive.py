@@ -278,7 +278,7 @@ plt.show()
 
 # %% [markdown]
 # The steps are even, 200 ms, and yet two things are odd. PandaSet's scanner turns ten times a second, so every second
-# frame is missing: the copy that the excerpt was cut from hadn't them. The check doesn't see it, because all steps are *equally* too long. And
+# frame is missing: the copy that the excerpt was cut from lacks them. The check doesn't see it, because all steps are *equally* too long. And
 # all sensors agree to the millisecond, which no real clocks do: whoever made the excerpt (we) wrote one time into all
 # files. That reading is not *passes* but *can't tell*. This is how the clocks of a real car look:
 
@@ -749,7 +749,7 @@ plt.show()
 # of the wall and a third of the vegetation. The lesson is older than neural networks: **the places that you test must
 # differ from those you learned from as much as the places where you will use it.**
 #
-# Does the map know how sure to be? Sort the cells by the probability of their class, and look how many are right. *Off
+# Is the map as sure as it should be? Sort the cells by the probability of their class, and look how many are right. *Off
 # by* is the mean distance from the diagonal, each point weighted by its number of cells: the **expected calibration
 # error** (ECE).
 
