@@ -5,7 +5,7 @@ from semgrid_edu.networks.backbones.fcn import Fcn
 from semgrid_edu.networks.backbones.registry import SEGMENTERS, build_segmenter
 from semgrid_edu.networks.backbones.segmenter import Segmenter, unit_image
 from semgrid_edu.networks.backbones.segnet import SegNet
-from semgrid_edu.networks.build import build_net
+from semgrid_edu.networks.build import build_net, with_mean_scores
 from semgrid_edu.networks.fusion import FusionNet
 from semgrid_edu.networks.semantic_grid import Architecture, SemanticGridNet
 from semgrid_edu.networks.weights import IMAGE_STAGE, WEIGHTS, load_imagenet, load_net, save_net
@@ -27,4 +27,5 @@ __all__ = [
     "load_net",
     "save_net",
     "unit_image",
+    "with_mean_scores",
 ]

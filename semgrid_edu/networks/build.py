@@ -1,9 +1,12 @@
 """The whole network from its description and a camera; the operators of the last calibrations are kept (section 3)."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
+from torch import Tensor, nn
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.errors import ArgumentError
@@ -37,9 +40,66 @@ def build_net(architecture: Architecture, camera: Camera, seed: int = 0) -> Sema
     if architecture.label_set not in LABEL_SETS:
         raise ArgumentError("label_set", f"one of {', '.join(LABEL_SETS)}", repr(architecture.label_set))
     n_classes = len(LABEL_SETS[architecture.label_set])
-    segmenter = build_segmenter(architecture.segmenter, n_classes, architecture.preset, seed)
+    first, *others = (
+        build_segmenter(architecture.segmenter, n_classes, architecture.preset, seed + k)
+        for k in range(architecture.n_segmenters)
+    )
+    segmenter = MeanSegmenter([first, *others]) if others else first
     sampler = plane_sampler(architecture, camera)
     return SemanticGridNet(segmenter, sampler, n_classes, seed, architecture=architecture)
+
+
+class MeanSegmenter(nn.Module):
+    """Several image networks that score an image together: s is the mean of their scores.
+
+    Networks that learned from the same few frames, each in another order, are wrong about different pixels; their mean
+    is wrong less often than one of them. The soft-max of mean scores is the networks' geometric mean of probabilities,
+    normalised.
+
+    Parameters
+    ----------
+    members : sequence of Segmenter
+        Image networks with the same C classes.
+    """
+
+    def __init__(self, members: Sequence[nn.Module]) -> None:
+        super().__init__()
+        self.members = nn.ModuleList(members)
+        self.n_classes = members[0].n_classes
+
+    def forward(self, image: Tensor) -> Tensor:
+        """Return s. Parameters are those of `Segmenter.forward`.
+
+        Returns
+        -------
+        (B, C, h, w) float
+            The mean of the networks' scores, before any soft-max.
+        """
+        return sum(member(image) for member in self.members) / len(self.members)
+
+
+def with_mean_scores(nets: Sequence[SemanticGridNet]) -> SemanticGridNet:
+    """Return a network with the image networks of several, whose mean scores lie on the planes.
+
+    Parameters
+    ----------
+    nets : sequence of SemanticGridNet
+        Networks of one architecture and for one camera. Their parts aren't copied.
+
+    Returns
+    -------
+    SemanticGridNet
+        It fuses as the first of them does, which hasn't learned from mean scores: train its fusion network on them.
+        One network is returned as it is.
+    """
+    first = nets[0]
+    if len(nets) == 1:
+        return first
+    architecture = replace(first.need_architecture(), n_segmenters=len(nets))
+    mean = MeanSegmenter([net.segmenter for net in nets])
+    joined = SemanticGridNet(mean, first.sampler, first.n_classes, architecture=architecture)
+    joined.fusion = first.fusion
+    return joined
 
 
 def plane_sampler(architecture: Architecture, camera: Camera) -> PlaneSampler:

@@ -15,6 +15,9 @@ MOST_PIXELS, MOST_POINTS = 2**22, 2**24
 """Pixels of an image, and points of all planes together: nine and fifteen times as many as at the published size. What
 asks for more is a mistake, or a damaged file, and would take all memory."""
 
+MOST_SEGMENTERS = 9
+"""Image networks of one network: nine of the published size take a gigabyte."""
+
 
 @dataclass(frozen=True)
 class Architecture:
@@ -43,6 +46,8 @@ class Architecture:
         compared.
     reduces : bool
         Whether the 1x1 convolution reduces the planes. Without, all D x C of them go into the conv-deconv network.
+    n_segmenters : int
+        How many such image networks there are, 1 to 9; the scores are the mean of theirs, see `MeanSegmenter`.
     """
 
     segmenter: str = "segnet"
@@ -53,6 +58,7 @@ class Architecture:
     heights: tuple[float, ...] = tuple(plane_heights().tolist())
     uses_occupancy: bool = True
     reduces: bool = True
+    n_segmenters: int = 1
 
     @types_named
     def __post_init__(self) -> None:
@@ -60,6 +66,8 @@ class Architecture:
         height, width = self.image_size
         if not (height >= 1 and width >= 1 and height * width <= MOST_PIXELS):
             raise ArgumentError("image_size", f"two whole numbers, 1 to {MOST_PIXELS} pixels", self.image_size)
+        if not 1 <= self.n_segmenters <= MOST_SEGMENTERS:
+            raise ArgumentError("n_segmenters", f"1 to {MOST_SEGMENTERS}", self.n_segmenters)
         rows, columns = self.grid.shape
         if rows * columns * len(self.heights) > MOST_POINTS:
             found = f"{rows} x {columns} cells on {len(self.heights)} planes"

@@ -40,8 +40,8 @@ def save_net(net: SemanticGridNet, path: str | Path) -> None:
         When the network has no architecture, so that nothing says how to build it again.
     """
     description = asdict(net.need_architecture())
-    for name in ("uses_occupancy", "reduces"):
-        if description[name]:  # left out, so that networks have the checksums they had before this existed
+    for name in ("uses_occupancy", "reduces", "n_segmenters"):
+        if description[name] == getattr(Architecture, name):  # left out: the checksums are those of before it existed
             del description[name]
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in net.state_dict().items()}
     write_tensors(path, tensors, {"architecture": json.dumps(description)})

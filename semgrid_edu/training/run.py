@@ -6,15 +6,14 @@ from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from torch import Tensor
-
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks import Architecture, build_net, build_segmenter, load_imagenet, load_net
+from semgrid_edu.networks import Architecture, SemanticGridNet, build_net, build_segmenter, load_imagenet, load_net
+from semgrid_edu.networks.build import with_mean_scores
 from semgrid_edu.networks.weights import read_architecture
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import write_provenance
@@ -109,7 +108,7 @@ def train_network(
     imagenet: str | Path | None = None,
     device: str = "cpu",
     truth: LidarTruth | None = None,
-    start: str | Path | None = None,
+    start: Sequence[str | Path] = (),
 ) -> None:
     """Train a network on the split "train" of data sets; under torchrun, in all of its processes.
 
@@ -135,39 +134,40 @@ def train_network(
         "cpu", "cuda", "cuda:N" or "auto", see `choose_device`.
     truth : LidarTruth, optional
         How to make the truth from image labels and LIDAR; the data sets' own truth when left out.
-    start : path-like, optional
-        A trained network of the same architecture to start from, in place of `imagenet`; fresh weights when left out.
+    start : sequence of path-like
+        A trained network of the same architecture to start from, in place of `imagenet`; of several the image networks'
+        mean scores are fused, see `with_mean_scores`, and there is no first stage. Without any, the weights are fresh.
 
     Raises
     ------
     ArgumentError
-        When there is no such image network, preset or device, both `imagenet` and `start` are given, or as `train`
-        raises it.
+        When there is no such image network, preset or device, both `imagenet` and `start` are given, training end to
+        end would start from several, or as `train` raises it.
     DataError
         When a file is missing or damaged, `start` has another architecture, or the folder holds a run that would be
         overwritten.
     """
     if imagenet and start:
         raise ArgumentError("start", "no other network beside the ImageNet weights, which it would replace", start)
+    if len(start) > 1 and params.end_to_end:
+        raise ArgumentError("--from", "one network without --two-stage: several image networks don't learn", len(start))
     began, description, folder = datetime.now(UTC), architecture(segmenter, preset), Path(folder)
     check_folder(folder, resume)
     # What can't be is refused before the data are prepared, which takes minutes.
+    params = replace(params, image_iterations=0) if len(start) > 1 else params
     like_it, resumed = build_segmenter(segmenter, n_classes=1, preset=preset), (folder / CHECKPOINT).exists()
     if imagenet:
         load_imagenet(like_it, imagenet)
-    if start:
-        found = read_architecture(start)
-        _check_alike(start, replace(found, label_set=description.label_set), description)
+    for path in start:
+        _check_alike(path, replace(read_architecture(path), label_set=description.label_set), description)
     folders = [data] if isinstance(data, str | Path) else list(data)
     with process_group(device) as chosen:
         with first_process_first():
             dataset = _open(folders, description, truth)
         description = replace(description, label_set=dataset.label_set.name)
-        net = build_net(description, dataset.camera, seed)
+        net = _starts_as(start, description, dataset.camera) if start else build_net(description, dataset.camera, seed)
         if imagenet:
             load_imagenet(net.segmenter, imagenet)
-        if start:
-            net.load_state_dict(_weights_to_start_from(start, description, dataset.camera))
         train(net, dataset, folder, params, seed, resume, chosen)
         processes, is_first = world_size(), rank() == 0
     if is_first:
@@ -182,7 +182,7 @@ def train_network(
             "params": {name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
             "dataset": hashes[0] if len(hashes) == 1 else hashes,
             **({"imagenet": sha256(imagenet)} if imagenet else {}),
-            **({"from": sha256(start)} if start else {}),
+            **({"from": [sha256(path) for path in start]} if start else {}),
             **({"truth": asdict(truth)} if truth else {}),
         }
         command = _command(folders, folder, description, imagenet, start, seed, params, truth)
@@ -196,11 +196,12 @@ def _open(folders: Sequence[str | Path], description: Architecture, truth: Lidar
     return mixture.parts[0] if len(mixture.parts) == 1 else mixture
 
 
-def _weights_to_start_from(path: str | Path, description: Architecture, camera: Camera) -> dict[str, Tensor]:
-    """Read the weights of another training run, and refuse those of another architecture."""
-    net = load_net(path, camera)
-    _check_alike(path, net.architecture, description)
-    return net.state_dict()
+def _starts_as(paths: Sequence[str | Path], description: Architecture, camera: Camera) -> SemanticGridNet:
+    """Return the network of another training run, or the mean of several, and refuse those of another architecture."""
+    nets = [load_net(path, camera) for path in paths]
+    for path, net in zip(paths, nets, strict=True):
+        _check_alike(path, net.architecture, description)
+    return with_mean_scores(nets)
 
 
 def _check_alike(path: str | Path, found: Architecture, description: Architecture) -> None:
@@ -214,7 +215,7 @@ def _command(
     folder: str | Path,
     description: Architecture,
     imagenet: str | Path | None,
-    start: str | Path | None,
+    start: Sequence[str | Path],
     seed: int,
     params: TrainingParams,
     truth: LidarTruth | None,
@@ -226,7 +227,7 @@ def _command(
         f"--out {_name(folder)} --segmenter {description.segmenter}",
         f"--preset {description.preset}" if description.preset != Architecture.preset else "",
         f"--imagenet {_name(imagenet)}" if imagenet else "",
-        f"--from {_name(start)}" if start else "",
+        *(f"--from {_name(path)}" for path in start),
         f"--seed {seed} --iterations {params.grid_iterations}",
         f"--tint {params.tint:g}" if params.tint else "",
         "" if params.end_to_end else "--two-stage",

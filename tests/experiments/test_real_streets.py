@@ -15,7 +15,7 @@ from semgrid_edu.datasets.samples import samples_dir
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.networks import WEIGHTS, Architecture
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture
 from semgrid_edu.training import TrainingParams
 from semgrid_edu.workshop.scoring.score_with_interval import shown
 from semgrid_edu.workshop.studies.training import real_streets
@@ -71,12 +71,15 @@ def streets(tmp_path_factory):
 
 @pytest.fixture
 def small(monkeypatch, streets):
-    """Two cameras, and two ways of which one takes two steps, the second with simulated frames."""
-    once = WayToTrain(Architecture(), params=TrainingParams(0, 2), with_simulated=True)
+    """Two cameras, and three ways: one takes two steps, one of them with simulated frames; one fuses its scores."""
+    once = WayToTrain(Architecture(), params=TrainingParams(1, 1), with_simulated=True)
+    mean = WayToTrain(Architecture(), mean_of="once", params=TrainingParams(0, 1, end_to_end=False))
     monkeypatch.setattr(real_streets, "sets_by_camera", lambda *_: [streets])
     monkeypatch.setattr(real_streets, "CAMERAS", ("front_camera", "left_camera"))
-    monkeypatch.setattr(real_streets, "WAYS", {"as shipped": WayToTrain(Architecture(), "segnet"), "once": once})
-    chosen = {"left_out": [["left_camera"], ["front_camera"]], "later": ["once"], "seeds": 1}
+    monkeypatch.setattr(
+        real_streets, "WAYS", {"as shipped": WayToTrain(Architecture(), "segnet"), "once": once, "mean": mean}
+    )
+    chosen = {"left_out": [["left_camera"], ["front_camera"]], "later": ["once", "mean"], "seeds": 1}
     monkeypatch.setattr(real_streets, "TABLE", real_streets.TABLE | chosen)
 
 
@@ -84,20 +87,27 @@ def test_every_way_is_scored_and_a_run_that_has_ended_is_not_repeated(small, roo
     before = sorted(root.rglob("*"))
     result = compare_real(root, SCENE, "simulated", tmp_path)
     (by_side, in_time), runs = result["scores"].values(), sorted((tmp_path / SCENE).glob(f"*/{WEIGHTS}"))
-    assert list(by_side) == [STATE_TABLE, "as shipped", "as shipped + CRF", "once", "once + CRF"]
-    assert list(in_time) == [STATE_TABLE, "once", "once + CRF"]
+    learned = ["once", "once + CRF", "mean", "mean + CRF"]
+    assert list(by_side) == [STATE_TABLE, "as shipped", "as shipped + CRF", *learned]
+    assert list(in_time) == [STATE_TABLE, *learned]
     assert len({scores["cells"] for scores in by_side.values()}) == 1
-    assert [run.parent.name for run in runs] == [
-        f"{LEFT_OUT} 0, once, 0",
-        f"{LEFT_OUT} 1, once, 0",
-        f"{LATER} 0, once, 0",
-    ]
+    rounds = [f"{LEFT_OUT} 0", f"{LEFT_OUT} 1", f"{LATER} 0"]
+    assert [run.parent.name for run in runs] == [f"{one}, {way}, 0" for one in rounds for way in ("mean", "once")]
     assert list(by_side["once"]["cameras"]) == ["left_camera", "front_camera"]
     assert sorted(root.rglob("*")) == before
     written = [run.stat().st_mtime_ns for run in runs]
     assert compare_real(root, SCENE, "simulated", tmp_path)["scores"] == result["scores"]
     assert [run.stat().st_mtime_ns for run in runs] == written
     json.dumps(result)
+
+
+def test_the_mean_is_of_the_image_networks_of_all_seeds_of_the_same_round(monkeypatch, tmp_path):
+    monkeypatch.setattr(real_streets, "_trained", lambda way, starts, *_: starts)
+    name = "simulated, then real, mean of three image networks"
+    found = real_streets._networks(name, [([], []), ([], [])], [], tmp_path / LEFT_OUT, range(3, 6), 4, "cpu")
+    runs = [[f"{LEFT_OUT} {r}, simulated, then real, two stages, {seed}" for seed in (3, 4, 5)] for r in (0, 1)]
+    assert list(found) == [f"{LEFT_OUT} {r}, {name}, 4" for r in (0, 1)]
+    assert list(found.values()) == [[tmp_path / run / IMAGE_STAGE for run in one] for one in runs]
 
 
 def _counted(drives, road_right, road_called_car, car_right=0):

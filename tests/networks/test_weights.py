@@ -9,7 +9,15 @@ from safetensors.torch import load_file, save_file
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net, load_net, save_net
+from semgrid_edu.networks import (
+    SEGMENTERS,
+    Architecture,
+    SemanticGridNet,
+    build_net,
+    load_net,
+    save_net,
+    with_mean_scores,
+)
 from semgrid_edu.storage.files import sha256
 
 SMALL = Architecture(image_size=(24, 80), grid=GridSpec(0, 30, -6, 6, 1.0), heights=(0.0, 0.5, 1.0))
@@ -52,6 +60,27 @@ def test_a_network_without_occupancy_comes_back_without(camera, tmp_path):
     loaded = load_net(path, camera)
     assert not loaded.architecture.uses_occupancy
     assert not loaded.fusion.uses_occupancy
+
+
+def test_several_image_networks_come_back_and_their_scores_are_averaged(net, camera, tmp_path):
+    mean = with_mean_scores([net, build_net(SMALL, camera, seed=4).eval()]).eval()
+    save_net(mean, tmp_path / "mean.safetensors")
+    loaded = load_net(tmp_path / "mean.safetensors", camera)
+    assert loaded.architecture == replace(SMALL, n_segmenters=2)
+    image, occupancy = _inputs(SMALL)
+    each = [member(image) for member in loaded.segmenter.members]
+    assert not torch.equal(*each)
+    torch.testing.assert_close(loaded.stages(image, occupancy).scores, torch.stack(each).mean(dim=0))
+    assert torch.equal(loaded(image, occupancy), mean(image, occupancy))
+
+
+def test_as_many_image_networks_as_one_wants_have_other_first_weights(camera):
+    one, other = build_net(replace(SMALL, n_segmenters=2), camera, seed=3).segmenter.members
+    alone = build_net(SMALL, camera, seed=3).segmenter
+    assert all(map(torch.equal, one.parameters(), alone.parameters()))
+    assert not all(map(torch.equal, one.parameters(), other.parameters()))
+    with pytest.raises(ArgumentError, match=r"n_segmenters: expected 1 to 9, found 0"):
+        replace(SMALL, n_segmenters=0)
 
 
 def test_shipped_networks_are_written_again_byte_for_byte(camera, tmp_path):

@@ -180,8 +180,34 @@ def test_a_network_starts_from_another_and_says_so(monkeypatch, tmp_path):
     assert all(torch.equal(tensor, built[name]) for name, tensor in start.state_dict().items())
     provenance = json.loads((tmp_path / "out" / "provenance.json").read_text())
     assert "--data minikitti --data minikitti --out out --segmenter segnet --from first.saf" in provenance["command"]
-    assert provenance["from"] == sha256(first)
+    assert provenance["from"] == [sha256(first)]
     assert provenance["dataset"] == 2 * [sha256(data / "dataset.json")]
+
+
+def test_the_mean_of_several_networks_starts_from_them_and_only_its_fusion_learns(monkeypatch, tmp_path):
+    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+    data, files = tmp_path / "minikitti", [tmp_path / f"{seed}.safetensors" for seed in (5, 6)]
+    write_text(data / "dataset.json", "{}")
+    starts = [build_net(Architecture(), _Noise.camera, seed=seed).eval() for seed in (5, 6)]
+    for start, file in zip(starts, files, strict=True):
+        save_net(start, file)
+    given = {}
+    monkeypatch.setattr(experiment, "train", lambda net, *others: given.update(net=net.eval(), params=others[2]))
+    options = ["--data", str(data), "--from", str(files[0]), "--from", str(files[1]), "--out", str(tmp_path / "out")]
+    with pytest.raises(ArgumentError, match=r"--from: expected one network without --two-stage"):
+        CliRunner().invoke(app, ["train", *options], catch_exceptions=False)
+    result = CliRunner().invoke(app, ["train", *options, "--two-stage"])
+    assert result.exit_code == 0, result.output
+    image = torch.rand(1, 3, *Architecture().image_size)
+    with torch.no_grad():
+        mean = (starts[0].segmenter(image) + starts[1].segmenter(image)) / 2
+        torch.testing.assert_close(given["net"].segmenter(image), mean)
+    learned = given["net"].fusion.state_dict()
+    assert all(torch.equal(tensor, learned[name]) for name, tensor in starts[0].fusion.state_dict().items())
+    assert (given["params"].image_iterations, given["params"].end_to_end) == (0, False)
+    provenance = json.loads((tmp_path / "out" / "provenance.json").read_text())
+    assert "--from 5.safetensors --from 6.safetensors" in provenance["command"]
+    assert provenance["from"] == [sha256(file) for file in files]
 
 
 def test_a_network_of_another_kind_is_no_start(monkeypatch, tmp_path):
@@ -195,7 +221,7 @@ def test_a_network_of_another_kind_is_no_start(monkeypatch, tmp_path):
 def test_a_network_starts_from_one_kind_of_weights(tmp_path):
     params = experiment.training_params("compact", iterations=1)
     with pytest.raises(ArgumentError, match="start: expected no other network beside the ImageNet weights"):
-        experiment.train_network(tmp_path, tmp_path, "segnet", params, imagenet=tmp_path / "a", start=tmp_path / "b")
+        experiment.train_network(tmp_path, tmp_path, "segnet", params, imagenet=tmp_path / "a", start=[tmp_path / "b"])
 
 
 @pytest.mark.parametrize("name", ["weights.safetensors", "log.csv", "image_stage.safetensors"])

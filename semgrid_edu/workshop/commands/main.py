@@ -109,7 +109,7 @@ def train(
     segmenter: Annotated[str, typer.Option(help="The image network.")] = "segnet",
     preset: Annotated[str, typer.Option(help="compact or paper (published size, 0.2 m cells).")] = "compact",
     imagenet: Annotated[Path | None, typer.Option(help="ImageNet weights from which --preset paper starts.")] = None,
-    start: Annotated[Path | None, typer.Option("--from", help="A trained network of this kind to start from.")] = None,
+    start: Annotated[list[Path] | None, typer.Option("--from", help="A trained network; the mean of several.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
     iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
     tint: Annotated[float, typer.Option(help="How far each colour of an image varies: 0.15 is 15 % either way.")] = 0.0,
@@ -128,8 +128,8 @@ def train(
 
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
-    choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth), "start": start}
-    train_network(data, out, segmenter, params, seed, resume, **choices)
+    choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
+    train_network(data, out, segmenter, params, seed, resume, start=start or (), **choices)
 
 
 @app.command()

@@ -21,7 +21,7 @@ from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_came
 from semgrid_edu.errors import check_whole
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import WEIGHTS, Architecture, build_net, load_net
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, build_net, load_net, with_mean_scores
 from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import check_writable, sha256, table_beside
 from semgrid_edu.storage.provenance import made_by
@@ -49,6 +49,9 @@ class WayToTrain(NamedTuple):
         The network that starts from fresh weights, where it doesn't start from a shipped one.
     start : str, optional
         The image network of the shipped compact network to start from.
+    mean_of : str, optional
+        The way whose image networks, one for each seed, score the images together, while the fusion network alone
+        learns.
     params : TrainingParams, optional
         How it learns; left out, it is scored as it starts.
     with_simulated : bool
@@ -57,6 +60,7 @@ class WayToTrain(NamedTuple):
 
     architecture: Architecture
     start: str | None = None
+    mean_of: str | None = None
     params: TrainingParams | None = None
     with_simulated: bool = False
 
@@ -134,17 +138,17 @@ def compare_real(
     check_writable(runs / "run")
     streets = sets_by_camera(simulated, "train")
     views = {camera: _frames(drive, runs) for camera, drive in drives.items()}
-    found, weights = {}, {}
+    found, weights, seeds = {}, {}, range(seed, seed + TABLE["seeds"])
     for split, rounds in splits(views).items():
         table = _joined(_count_states(*one) for one in rounds)[STATE_TABLE]
         found[split] = {STATE_TABLE: _scores_of([table], table)}
         for name in TABLE["later"] if split == LATER else WAYS:
             counted = []
-            for k in range(seed, seed + (TABLE["seeds"] if WAYS[name].params else 1)):
-                folders = [runs / f"{split} {r}, {name}, {k}" for r in range(len(rounds))]
-                files = _networks(WAYS[name], rounds, streets, folders, k, computer)
-                weights |= {folder.name: sha256(file) for folder, file in zip(folders, files, strict=True)}
-                counted.append(_joined(_count(name, file, one[1]) for file, one in zip(files, rounds, strict=True)))
+            for k in seeds if WAYS[name].params else seeds[:1]:
+                files = _networks(name, rounds, streets, runs / split, seeds, k, computer)
+                weights |= {run: sha256(file) for run, file in files.items()}
+                tested = zip(files.values(), rounds, strict=True)
+                counted.append(_joined(_count(name, file, one[1]) for file, one in tested))
             found[split] |= {method: _scores_of([one[method] for one in counted], table) for method in counted[0]}
     command = f"semgrid-edu reproduce real-streets --scene {scene} --seed {seed} --device {device}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
@@ -196,25 +200,35 @@ class _Subset(TrainingSet):
 
 
 def _networks(
-    way: WayToTrain, rounds: list[Round], streets: list[TrainingSet], folders: list[Path], seed: int, on: torch.device
-) -> list[Path]:
-    """Return the files of the weights that are learned in each round."""
-    return [_trained(way, one[0], streets, at, seed, on) for one, at in zip(rounds, folders, strict=True)]
+    name: str, rounds: list[Round], streets: list[TrainingSet], split: Path, seeds: range, k: int, on: torch.device
+) -> dict[str, Path]:
+    """Return the files of the weights that are learned in each round with seed k, by the names of their runs."""
+    way, files = WAYS[name], {}
+    for r, (training, _) in enumerate(rounds):
+        of_runs = [split.with_name(f"{split.name} {r}, {way.mean_of}, {s}") / IMAGE_STAGE for s in seeds]
+        starts = of_runs if way.mean_of else [sample_weights(way.start)] if way.start else []
+        folder = split.with_name(f"{split.name} {r}, {name}, {k}")
+        files[folder.name] = _trained(way, starts, training, streets, folder, k, on) if way.params else starts[0]
+    return files
 
 
 def _trained(
-    way: WayToTrain, training: list[Part], streets: list[TrainingSet], folder: Path, seed: int, device: torch.device
+    way: WayToTrain,
+    starts: list[Path],
+    training: list[Part],
+    streets: list[TrainingSet],
+    folder: Path,
+    seed: int,
+    device: torch.device,
 ) -> Path:
-    """Return the file of a network's weights: the shipped one if it doesn't learn, else that of its training run."""
-    start, file = sample_weights(way.start) if way.start else None, folder / WEIGHTS
-    if start and not way.params:
-        return start
-    if not file.exists():
+    """Return the file of a network's weights after its training run, which is made if it hasn't been."""
+    if not (folder / WEIGHTS).exists():
         mixture = Mixture([[_Subset(*part) for part in training], *([streets] if way.with_simulated else [])])
-        net = load_net(start, mixture.camera) if start else build_net(way.architecture, mixture.camera, seed)
+        nets = [load_net(start, mixture.camera) for start in starts]
+        net = with_mean_scores(nets or [build_net(way.architecture, mixture.camera, seed)])
         params = replace(way.params, batch_size=min(way.params.batch_size, *map(len, mixture.parts)))
         train(net, mixture, folder, params, seed, resume=True, device=device)
-    return file
+    return folder / WEIGHTS
 
 
 def _count(name: str, weights: Path, test: list[Part]) -> Counted:
