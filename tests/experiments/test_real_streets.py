@@ -153,6 +153,7 @@ NAMES = {
     "SegNet, then real cells": "simulated, then real",
     "SegNet, then real pixels and cells": "simulated, then real, image stage on points",
     "SegNet, then real pixels and cells, image network frozen on cells": "simulated, then real, two stages",
+    "the mean scores of three such image networks, one fusion network on cells": "simulated, then real, mean of three image networks",
     "SegNet, then real and simulated pixels and cells in turn": "simulated and real in turn, image stage on points",
     "FCN, then real cells": "simulated, then real, FCN",
     "DeepLab, then real cells": "simulated, then real, DeepLab",
