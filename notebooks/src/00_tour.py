@@ -68,7 +68,7 @@ CAR, ROAD = KITTI_14.index("car"), KITTI_14.index("road")
 street = real_drive()
 net = load_net(real_weights(), street.camera)
 real = list(run_pipeline(street, Stages.of(net, keep_steps=True)))
-now, CELL = real[-1], (89, 35)
+now, CELL = real[-1], (79, 35)
 story = cell_story(now, CELL, net, past=real[:-1])
 fig = draw_cell_story(story, now.frame.image // 8 * 8)  # fewer colours: a smaller file
 for letter, ax in zip("ABDFGCE", fig.axes, strict=True):
@@ -92,10 +92,10 @@ assert story.pull.before[CAR] > 0.99
 #   lower ones fall on parked cars, one behind the other, the upper ones on a tree behind them. So the image alone doesn't say what stands in this cell.
 # - **B**, **C** What the filter believes of the cell: after each of its steps within this scan (B; *shown* is what it
 #   passes on), and scan by scan (C). It is sure that something stands there: STATIC. No return says *what* it is.
-# - **D**, **E**, **F** How much image and occupancy speak for *car* (violet) or for the runner-up, *road* (orange; the
-#   maps below have other colours): by kind of input, with the network's constants and the sum (D); the image's part by
+# - **D**, **E**, **F** How much image and occupancy speak for *car* (violet) or for the runner-up, *vegetation* (orange;
+#   the maps below have other colours): by kind of input, with the network's constants and the sum (D); the image's part by
 #   the score's class (E, the six largest) and by height (F).
-#   Each pixel has a score for every class, and the network may use each of them: a score for *vegetation*, too, can
+#   Each pixel has a score for every class, and the network may use each of them: a score for *sidewalk*, too, can
 #   speak for *car*.
 # - **G** What the CRF makes of it. The neighbours' push is in brackets: it is largest for *car*, which was nearly
 #   certain before.
@@ -314,7 +314,7 @@ plotting.animate_occupancy(
 for scores in (np.array([2.0, 1, 0]), np.array([7.0, 6, 5])):
     print((np.exp(scores) / np.exp(scores).sum()).round(2))
 
-# %% jupyter={"source_hidden": true} alt="the street coloured by the class of the highest score in each pixel, with the column of dots of our cell: road, cars, trees and houses have the colours of their classes; most of the sky is coloured as building, and patches at a fence on the left as pedestrian"
+# %% jupyter={"source_hidden": true} alt="the street coloured by the class of the highest score in each pixel, with the column of dots of our cell: road, cars, trees and houses have the colours of their classes; the sky is coloured partly as building, partly as vegetation and signage, and patches at a fence on the left as pedestrian"
 small = resize_image(now.frame.image, now.scores.shape[1:]) // 8 * 8
 fig, ax = plt.subplots(figsize=(8, 3), layout="constrained")
 plotting.image_labels(small, now.scores.argmax(axis=0), KITTI_14, ax=ax)
@@ -329,8 +329,8 @@ assert KITTI_14.index("sky") not in labelled
 # %% [markdown]
 # Each pixel has the colour of its highest score; the white dots are our cell's column of panel A. Of the pixels with a
 # label 98 % have the right colour. But the network has learned from this very image, and where no label ever was it
-# guesses: no LIDAR return comes back from the sky, so none of its pixels has a label, and most of it is coloured as
-# *building*. The system doesn't use the colours. It passes on all 14 scores of each pixel, without a soft-max. (They
+# guesses: no LIDAR return comes back from the sky, so none of its pixels has a label, and it is coloured as *building*,
+# *vegetation* or *signage*. The system doesn't use the colours. It passes on all 14 scores of each pixel, without a soft-max. (They
 # are the mean of three image networks', which last learned from labelled pixels. A network that the *map's* errors
 # trained last, as in the paper, may make signals of its scores that no longer name what a pixel shows: lectures 07, 08.)
 #
@@ -452,11 +452,12 @@ np.testing.assert_allclose(sum(parts.values()), why.score, rtol=1e-6)
 odds = now.grid[story.label, *CELL] / now.grid[story.rival, *CELL]
 np.testing.assert_allclose(np.exp(why.score), odds, rtol=0.01)
 assert parts["image"] > 0
-assert parts["occupancy"] > 0
+assert parts["occupancy"] > 0 > parts["constants"]
+assert KITTI_14.names[story.rival] == "vegetation"
 
 # %% [markdown]
 # Both sensors speak for *car*; the constants, which come from the network's biases and from no sensor, speak for
-# *road*. The parts add up (before rounding) to the difference of the two scores, and by the soft-max $e^\text{difference}$ is the odds of
+# *vegetation*. The parts add up (before rounding) to the difference of the two scores, and by the soft-max $e^\text{difference}$ is the odds of
 # *car* against the runner-up. (A part isn't what would change without this input; lecture 08 measures that.) The map on
 # the left shows the most probable class of each cell:
 
@@ -499,7 +500,7 @@ for name in ("road", "car", "vegetation", "building"):
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three label maps: before the CRF, after it, and only the cells that changed, which are crumbs, borders, distant cars and a strip of sidewalk along the left edge"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three label maps: before the CRF, after it, and only the cells that changed, which are crumbs, borders, distant cars and part of a strip of sidewalk along the left edge"
 before, after = now.grid.argmax(axis=0), now.refined.argmax(axis=0)
 changed = np.where(after != before, after, 255)
 plotting.label_maps(spec, {"before": before, "after": after, "what changed, and to what": changed}, KITTI_14)

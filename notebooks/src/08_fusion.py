@@ -957,10 +957,10 @@ plt.show()
 # %% [markdown]
 # Three times as many bits are shared as on the simulated drive, and here late fusion isn't nearly free: it loses three
 # points of all cells, and six of semantic ones, against the table, which knows how label and state occur together. By
-# class accuracy it is better here, too, by eight points. (The network has learnt from these very
+# class accuracy it is better here, too, by about seven points. (The network has learnt from these very
 # frames, so its row shows what it can hold, not how it does on a new street.) Over all ten frames late fusion finds
 # most of the road, half of the cells of cars and nearly three quarters of those of buildings, and gives these names to
-# many other cells (B shows the last frame). It names no vegetation, sidewalk, bicycle or pedestrian at all. The road
+# many other cells (B shows the last frame). It names no vegetation, sidewalk or bicycle at all, and hardly a pedestrian. The road
 # nearer than 13 m is missing, too: this camera doesn't see the ground so near, and a table can't ask the neighbours.
 #
 # ## Play with it

@@ -491,8 +491,8 @@ Markdown("In per cent:\n\n" + "\n".join(rows))
 # points, and the interval is far from zero. The two memories that one writes first, mean and product of the last five
 # maps, *lose* points there. The gain isn't one of simulated streets alone: the network from simulated streets gains
 # 3.9 points on the real scene, whose labels people made. The last rows are for a network that learned from these very
-# frames. In view it errs in fewer than 8 cells of 100, and the memory changes little: +0.4, with an interval from
-# 0.1 to 0.6.
+# frames. In view it errs in 6 cells of 100, and the memory changes little: +0.4, with an interval from
+# 0.2 to 0.6.
 #
 # Is this knowledge, or does the memory only say *unknown* less frequently? Ask both maps for the most probable
 # *semantic* class, also where an unknown one is more probable:
@@ -611,7 +611,7 @@ show_windows([(results, one) for results in (simulated, street) for one in windo
 # %% [markdown]
 # Forward is up. White cells of the truth are those that nobody labelled. In the simulated squares unknown cells become what they
 # are: vegetation, road, car. On the real street two of the three squares show the oncoming car of the opening;
-# the third gains nine cells.
+# the third gains five cells.
 #
 # ## The ledger's line, paid back
 #
@@ -659,9 +659,9 @@ for name, results in {"sample drive": simulated, "real street": street}.items():
 
 # %% [markdown]
 # On the sample drive the toy gets the order right: most of what memory gives lies where the camera doesn't look any
-# more, even more than predicted. On the real street both are next to nothing, and their sign is *negative*. Two things
-# are different there, of which the toy knew nothing. This network learned from these frames, so that one frame is right
-# in 93 of 100 cells in view. With the network from simulated streets (last column) both gains are positive, but small.
+# more, even more than predicted. On the real street both are next to nothing. Two things are different there, of which
+# the toy knew nothing. This network learned from these frames, so that one frame is right
+# in 94 of 100 cells in view. With the network from simulated streets (last column) both gains are positive, but small.
 # And the vehicle waits, so what is hidden now is hidden by traffic: 38 % of these cells have another class than when
 # they were last seen, on the sample drive 5 %. A prediction that fails tells where the model is too simple.
 #
@@ -708,7 +708,7 @@ Markdown("Pixel accuracy, per cent:\n\n" + "\n".join(rows))
 # %% [markdown]
 # On fresh streets the second pass gains 2.7 points in view and as many in cells seen before. In cells that are only
 # seen later it gains 51: from the past alone one in eight of them is right, with the whole drive five in eight. For
-# the network that knows the real street it gains 0.4 points in view, and in the other two groups the intervals
+# the network that knows the real street it gains 0.2 points in view, and in the other two groups the intervals
 # contain 0. And as labels even these maps would be wrong in 15 of 100 cells in view on fresh streets.
 #
 # ## Play with it
@@ -745,13 +745,13 @@ _ = interact(show_repeats, repeats=FloatSlider(value=0.6, min=0.0, max=0.95, ste
 #
 # **Far ahead.** The squares in which memory does most harm, three per drive:
 
-# %% jupyter={"source_hidden": true} alt="six squares of map in three rows, one frame, memory and truth, in which memory is worse: in the simulated ones, far ahead, vegetation or a wider strip of sidewalk stands where the truth is sidewalk or road; in the real ones a few cells at edges of sidewalk and building differ"
+# %% jupyter={"source_hidden": true} alt="six squares of map in three rows, one frame, memory and truth, in which memory is worse: in the simulated ones, far ahead, vegetation or a wider strip of sidewalk stands where the truth is sidewalk or road; in the real ones a few cells differ, most at the edge of a sidewalk"
 show_windows([(results, one) for results in (simulated, street) for one in windows(results, -1)])
 
 # %% [markdown]
 # In the first simulated square, 45 to 67 m ahead, earlier *vegetation* stays where the newest frame says sidewalk; in
-# the two others earlier *sidewalk* and *vegetation* stay where it says road or unobserved. On the real street it is a few cells, most at the edge of a sidewalk
-# or of a building.
+# the two others earlier *sidewalk* and *vegetation* stay where it says road or unobserved. On the real street it is a few cells, most
+# at the edge of a sidewalk.
 #
 # **A car that leaves.** And what of a car that was in a cell, and has left it while the camera looked elsewhere?
 

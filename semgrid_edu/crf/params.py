@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.errors import ArgumentError, types_named
+from semgrid_edu.errors import ArgumentError, check_fields, check_shape, types_named
 from semgrid_edu.occupancy import N_STATES
 
 LARGEST_WEIGHT = 1e30
@@ -78,14 +78,10 @@ class CrfParams:
     @types_named
     def __post_init__(self) -> None:
         """Refuse numbers for which eq. (4) has no meaning."""
-        for name in ("w_bilateral", "w_spatial"):
-            weight = getattr(self, name)
-            if not 0 <= weight <= LARGEST_WEIGHT:
-                raise ArgumentError(name, f"a weight of at least 0 and at most {LARGEST_WEIGHT:g}", weight)
-        for name in ("sigma_alpha", "sigma_beta", "sigma_gamma"):
-            sigma = getattr(self, name)
-            if not (np.isfinite(sigma) and sigma > 0):
-                raise ArgumentError(name, "a positive width", sigma)
+        weights = f"a weight of at least 0 and at most {LARGEST_WEIGHT:g}"
+        check_fields(self, weights, lambda weight: 0 <= weight <= LARGEST_WEIGHT, "w_bilateral", "w_spatial")
+        widths = "sigma_alpha", "sigma_beta", "sigma_gamma"
+        check_fields(self, "a positive width", lambda sigma: 0 < sigma < np.inf, *widths)
         if self.normalization not in ("symmetric", "none"):
             raise ArgumentError("normalization", '"symmetric" or "none"', repr(self.normalization))
 
@@ -155,8 +151,7 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
     unary, values = _floats("unary", unary), _floats("values", values)
     if unary.ndim != 3 or 0 in unary.shape:
         raise ArgumentError("unary", "shape (C, H, W), nothing empty", f"shape {unary.shape}")
-    if values.shape != (N_STATES, *unary.shape[1:]):
-        raise ArgumentError("values", f"shape {(N_STATES, *unary.shape[1:])}", f"shape {values.shape}")
+    check_shape("values", values, (N_STATES, *unary.shape[1:]))
     lowest = unary.min()  # NaN where any cost is NaN
     if np.isnan(lowest) or np.isneginf(lowest):
         raise ArgumentError("unary", "numbers, or inf for an impossible class", "NaN or -inf")

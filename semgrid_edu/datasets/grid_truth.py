@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets.readers.frames import visible_labels
+from semgrid_edu.datasets.readers.frames import LabelledDrive, visible_labels
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import FrameLabels
 from semgrid_edu.grid import GridSpec
@@ -54,6 +54,27 @@ def decided_truth(
         return fill_unlabelled(truth, belief_probability, label_set)
     unseen = fill_unlabelled(np.full_like(truth, IGNORE), belief_probability, label_set)
     return np.where(in_view, truth, unseen)
+
+
+def truth_to_learn(drive: LabelledDrive, k: int, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
+    """Return the class of each cell of a drive's frame; 255 where the camera may see something that nobody labelled.
+
+    Parameters
+    ----------
+    drive : LabelledDrive
+        The drive, whose label set is KITTI-14 or SYNTHIA-10.
+    k : int
+        Number of a labelled frame.
+    belief_probability : (4, H, W) float
+        Probability of FREE, STATIC, DYNAMIC and UNKNOWN in each cell.
+    spec : GridSpec
+        The grid, (H, W) cells.
+
+    Returns
+    -------
+    (H, W) uint8
+    """
+    return decided_truth(drive.truth(k, spec), drive.undecided(k, spec), belief_probability, drive.label_set)
 
 
 def fill_unlabelled(truth: NDArray[np.uint8], belief_probability: NDArray, label_set: LabelSet) -> NDArray[np.uint8]:

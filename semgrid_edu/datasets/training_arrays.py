@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_edu.datasets.grid_truth import decided_truth
+from semgrid_edu.datasets.grid_truth import truth_to_learn
 from semgrid_edu.datasets.readers.frames import LabelledDrive
 from semgrid_edu.datasets.readers.project_lidar import seen_returns
 from semgrid_edu.errors import DataError
@@ -82,15 +82,10 @@ def _frame_arrays(
         "image": resize_image(frame.image, recipe.image_size).transpose(2, 0, 1),
         "labels": drive.image_labels(k, recipe.image_size),
         "occupancy": occupancy.astype(np.float32),
-        "truth": _truth(drive, k, occupancy, recipe.spec),
+        "truth": truth_to_learn(drive, k, occupancy, recipe.spec),
         "return_pixels": pixels,
         "return_cells": cells,
     }
-
-
-def _truth(drive: LabelledDrive, k: int, occupancy: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
-    """Return the class of each cell of a frame; 255 where the camera may see something that nobody labelled."""
-    return decided_truth(drive.truth(k, spec), drive.undecided(k, spec), occupancy, drive.label_set)
 
 
 def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:

@@ -97,7 +97,8 @@ class FusionNet(nn.Module):
             What the conv-deconv network takes.
         """
         if not self.uses_occupancy:
-            occupancy = _unknown_everywhere(occupancy)
+            occupancy = torch.zeros_like(occupancy)  # as after a scan without a single beam
+            occupancy[:, State.UNKNOWN] = 1
         occupancy = occupancy.contiguous(memory_format=torch.channels_last)
         return torch.cat([reduced.squeeze(2), occupancy], dim=1)
 
@@ -125,13 +126,6 @@ class PlaneConvolution(nn.Conv3d):
         cells = planes.permute(0, 3, 4, 2, 1).flatten(3)
         weight = self.weight.flatten(2).transpose(1, 2).flatten(1)
         return F.linear(cells, weight, self.bias).permute(0, 3, 1, 2).unsqueeze(2)
-
-
-def _unknown_everywhere(occupancy: Tensor) -> Tensor:
-    """Return the occupancy grids of a scan without a single beam, in the shape of these."""
-    unknown = torch.zeros_like(occupancy)
-    unknown[:, State.UNKNOWN] = 1
-    return unknown
 
 
 def _reduction(n_scores: int, n_planes: int, n_reduced: int | None) -> nn.Module:

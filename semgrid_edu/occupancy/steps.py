@@ -115,10 +115,8 @@ def predict(
     particles = fly(particles, world.max_acceleration, dt, rng)
     cells = cells_of(particles.position, spec)
     came = by_origin(before, cells, going.size)
-    origin, ahead = (
-        cells_at(particles, cells, spec, time, world.clearing_cells)
-        for time in (-world.clearing_time, world.clearing_time)
-    )
+    time, fewest = world.clearing_time, world.clearing_cells
+    origin, ahead = (cells_at(particles, cells, spec, way * time, fewest) for way in (-1, 1))
     doubt = scale_in_cells(particles.weight, origin, mixed[STATIC])
     pace = world.pace(driven, dt, spec.cell)
     if pace.matters:
@@ -216,15 +214,11 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
         When the state is over cells other than `spec`, or the resampling doesn't return indices.
     """
     check_shape("state", state.newborn, spec.shape)
-    births = round(params.birth_share * params.n_particles)
-    drawn = (
-        draw_again(state.particles, params.n_particles - births, params.resampling, rng),
-        draw_newborn(state.newborn, spec, births, params.max_speed, params.resampling, rng),
-    )
-    position, velocity, weight = (
-        np.concatenate([getattr(p, name) for p in drawn]) for name in ("position", "velocity", "weight")
-    )
-    cells = cells_of(position, spec)
+    births, how = round(params.birth_share * params.n_particles), params.resampling
+    old = draw_again(state.particles, params.n_particles - births, how, rng)
+    new = draw_newborn(state.newborn, spec, births, params.max_speed, how, rng)
+    position, velocity = np.vstack([old.position, new.position]), np.vstack([old.velocity, new.velocity])
+    weight, cells = np.append(old.weight, new.weight), cells_of(position, spec)
     probability, factor = rescale_weights(state.probability, weight_in_cells(weight, cells, spec.shape))
     particles = Particles(position, velocity, scale_in_cells(weight, cells, factor))
     return FilterState(probability, particles, np.zeros_like(state.newborn))

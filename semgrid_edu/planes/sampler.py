@@ -65,9 +65,8 @@ class PlaneOperator:
         """
         n_pixels, n_points = prod(self.image_size), prod(self.planes_shape)
         matrix = self.matrix.block_diagonal(n_images, n_pixels)
-        return replace(
-            self, matrix=matrix, transpose=self.transpose.block_diagonal(n_images, n_points), n_images=n_images
-        )
+        transpose = self.transpose.block_diagonal(n_images, n_points)
+        return replace(self, matrix=matrix, transpose=transpose, n_images=n_images)
 
     def map(self, change: Callable[[Tensor], Tensor]) -> "PlaneOperator":
         """Return an operator with changed tensors, such as copies of them on a GPU.
@@ -178,10 +177,9 @@ class PlaneSampler(nn.Module):
         ArgumentError
             When the scores don't have the size that the sampler was built for.
         """
-        if scores.ndim != 4 or tuple(scores.shape[2:]) != self.image_size:
-            raise ArgumentError(
-                "scores", f"shape (B, C, {self.image_size[0]}, {self.image_size[1]})", tuple(scores.shape)
-            )
+        height, width = self.image_size
+        if scores.ndim != 4 or tuple(scores.shape[2:]) != (height, width):
+            raise ArgumentError("scores", f"shape (B, C, {height}, {width})", tuple(scores.shape))
         return self._operator_for(len(scores))(scores)
 
     def _operator_for(self, n_images: int) -> PlaneOperator:

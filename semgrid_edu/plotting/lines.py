@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, colour_legend
 
 TOP = 1.25
@@ -146,8 +146,7 @@ def state_history(times: NDArray, probability: NDArray, ax: Axes | None = None) 
     """
     if np.ndim(times) != 1 or len(times) < 2 or not (np.diff(times) > 0).all():
         raise ArgumentError("times", "two or more, ascending, shape (T,)", times)
-    if np.shape(probability) != (4, len(times)):
-        raise ArgumentError("probability", f"shape {(4, len(times))}", f"shape {np.shape(probability)}")
+    check_shape("probability", probability, (4, len(times)))
     ax = ax or plt.subplots(figsize=(6, 2.2), layout="constrained")[1]
     ax.stackplot(times, probability, colors=np.divide(STATE_COLOURS, 255), edgecolor="0.4", linewidth=0.5)
     ax.set(xlabel="time [s]", ylabel="probability", ylim=(0, 1), xlim=(times[0], times[-1]))

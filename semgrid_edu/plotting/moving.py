@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.offsetbox import AnnotationBbox, HPacker, OffsetImage, TextArea, VPacker
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, Particles, State
 from semgrid_edu.plotting.animations import Animation, animate
@@ -61,11 +61,9 @@ def wheel_colours(spec: GridSpec, probability: NDArray, velocity: NDArray) -> ND
 
     Parameters are those of `velocity_wheel`.
     """
-    if np.shape(velocity) != (2, *spec.shape):
-        raise ArgumentError("velocity", f"shape {(2, *spec.shape)}", f"shape {np.shape(velocity)}")
+    check_shape("velocity", velocity, (2, *spec.shape))
     painted = occupancy_colours(probability)
-    if painted.shape[:2] != spec.shape:
-        raise ArgumentError("probability", f"shape {(4, *spec.shape)}", f"shape {np.shape(probability)}")
+    check_shape("probability", probability, (4, *spec.shape))
     change = velocity_colours(velocity).astype(float) - STATE_COLOURS[State.DYNAMIC]
     return np.clip(np.rint(painted + probability[State.DYNAMIC][..., None] * change), 0, 255).astype(np.uint8)
 

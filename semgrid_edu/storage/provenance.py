@@ -100,10 +100,8 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
         What else a reader should know, such as a date, a duration or scores: whatever JSON can hold.
     """
     folder = Path(folder)
-    write_json(
-        folder / PROVENANCE,
-        {"command": command, "seed": seed, "versions": versions(*packages), **details, "sha256": _checksums(folder)},
-    )
+    record = {"command": command, "seed": seed, "versions": versions(*packages), **details}
+    write_json(folder / PROVENANCE, record | {"sha256": _checksums(folder)})
 
 
 def provenance_problems(folder: str | Path) -> list[str]:

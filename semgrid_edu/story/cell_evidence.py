@@ -284,6 +284,5 @@ def cell_memory(
     sight = last_sight(frames, [result.grid.argmax(axis=0) for result in results], spec, n_semantic)
     back = int(sight.back[cell])
     seconds = frames[-1].time - frames[-1 - max(back, 0)].time
-    return CellMemory(
-        label, float(remembered[label, *cell]), back, int(sight.label[cell]), float(seconds), len(results) - 1
-    )
+    sure, then = float(remembered[label, *cell]), int(sight.label[cell])
+    return CellMemory(label, sure, back, then, float(seconds), len(results) - 1)

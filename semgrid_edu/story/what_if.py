@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.frame import FrameLabels
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import LabelSet
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
@@ -88,7 +87,9 @@ def right_occupancy(o: NDArray, labels: FrameLabels, spec: GridSpec) -> NDArray[
     (4, H, W) float32
         They sum to 1 in each cell. Cells without a semantic class stay as they are.
     """
-    flat, standing = _flat_and_standing(grid_truth(labels, o, spec), labels.label_set)
+    truth, label_set = grid_truth(labels, o, spec), labels.label_set
+    flat = np.isin(truth, [label_set.index(name) for name in label_set.flat])
+    standing = (truth < label_set.n_semantic) & ~flat
     right = np.array(o, np.float32)
     right[State.STATIC] += np.where(standing, right[State.FREE] + right[State.UNKNOWN], 0)
     right[State.FREE] = np.where(flat, 1, np.where(standing, 0, right[State.FREE]))
@@ -96,9 +97,3 @@ def right_occupancy(o: NDArray, labels: FrameLabels, spec: GridSpec) -> NDArray[
         right[state][flat] = 0
     right[State.UNKNOWN][standing] = 0
     return right
-
-
-def _flat_and_standing(truth: NDArray, label_set: LabelSet) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which cells hold a class that lies on the ground, and which hold another semantic class."""
-    flat = np.isin(truth, [label_set.index(name) for name in label_set.flat])
-    return flat, (truth < label_set.n_semantic) & ~flat

@@ -70,9 +70,8 @@ def story_text(story: Any) -> str:
     story : CellStory
         The story; `str(story)` is the same. (Typed as anything: the class imports this module.)
     """
-    lines = [_place(story), _called(story), _fault(story), _image(story), _memory(story), _scan(story)]
-    lines.append(_otherwise(story))
-    return "\n".join(line for line in [*lines, _numbers(story)] if line)
+    parts = (_place, _called, _fault, _image, _memory, _scan, _otherwise, _numbers)
+    return "\n".join(filter(None, (part(story) for part in parts)))
 
 
 def counted(classes: Iterable[int], names: tuple[str, ...]) -> str:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from semgrid_edu.errors import ArgumentError, types_named
+from semgrid_edu.errors import check_fields, types_named
 
 
 @dataclass(frozen=True)
@@ -54,18 +54,12 @@ class TrainingParams:
     @types_named
     def __post_init__(self) -> None:
         """Refuse numbers that nothing can be learnt with."""
-        for name, expected, fits in (
-            ("image_iterations", "0 or more", self.image_iterations >= 0),
-            ("grid_iterations", "0 or more", self.grid_iterations >= 0),
-            ("batch_size", "at least one frame", self.batch_size >= 1),
-            ("learning_rate", "a positive number", 0 < self.learning_rate < math.inf),
-            ("momentum", "a share from 0 to below 1", 0 <= self.momentum < 1),
-            ("weight_limit", "1 or more", self.weight_limit >= 1),
-            ("jitter", "a share of at least 0", 0 <= self.jitter < math.inf),
-            ("tint", "a share of at least 0", 0 <= self.tint < math.inf),
-        ):
-            if not fits:
-                raise ArgumentError(name, expected, getattr(self, name))
+        check_fields(self, "0 or more", lambda steps: steps >= 0, "image_iterations", "grid_iterations")
+        check_fields(self, "at least one frame", lambda frames: frames >= 1, "batch_size")
+        check_fields(self, "a positive number", lambda rate: 0 < rate < math.inf, "learning_rate")
+        check_fields(self, "a share from 0 to below 1", lambda share: 0 <= share < 1, "momentum")
+        check_fields(self, "1 or more", lambda limit: limit >= 1, "weight_limit")
+        check_fields(self, "a share of at least 0", lambda share: 0 <= share < math.inf, "jitter", "tint")
 
     @property
     def iterations(self) -> int:

@@ -69,6 +69,9 @@ def streets(tmp_path_factory):
     return TrainingSet(index, "train")
 
 
+MEAN_OF_THREE = "simulated, then real, mean of three image networks"
+
+
 @pytest.fixture
 def small(monkeypatch, streets):
     """Two cameras, and three ways: one takes two steps, one of them with simulated frames; one fuses its scores."""
@@ -102,12 +105,13 @@ def test_every_way_is_scored_and_a_run_that_has_ended_is_not_repeated(small, roo
 
 
 def test_the_mean_is_of_the_image_networks_of_all_seeds_of_the_same_round(monkeypatch, tmp_path):
-    monkeypatch.setattr(real_streets, "_trained", lambda way, starts, *_: starts)
-    name = "simulated, then real, mean of three image networks"
-    found = real_streets._networks(name, [([], []), ([], [])], [], tmp_path / LEFT_OUT, range(3, 6), 4, "cpu")
+    started = []
+    monkeypatch.setattr(real_streets, "Mixture", lambda parts: parts)
+    monkeypatch.setattr(real_streets, "_train", lambda way, starts, *_: started.append(starts))
+    found = real_streets._networks(MEAN_OF_THREE, [([], []), ([], [])], [], tmp_path / LEFT_OUT, range(3, 6), 4, "cpu")
     runs = [[f"{LEFT_OUT} {r}, simulated, then real, two stages, {seed}" for seed in (3, 4, 5)] for r in (0, 1)]
-    assert list(found) == [f"{LEFT_OUT} {r}, {name}, 4" for r in (0, 1)]
-    assert list(found.values()) == [[tmp_path / run / IMAGE_STAGE for run in one] for one in runs]
+    assert started == [[tmp_path / run / IMAGE_STAGE for run in one] for one in runs]
+    assert list(found) == [f"{LEFT_OUT} {r}, {MEAN_OF_THREE}, 4" for r in (0, 1)]
 
 
 def _counted(drives, road_right, road_called_car, car_right=0):
@@ -153,7 +157,7 @@ NAMES = {
     "SegNet, then real cells": "simulated, then real",
     "SegNet, then real pixels and cells": "simulated, then real, image stage on points",
     "SegNet, then real pixels and cells, image network frozen on cells": "simulated, then real, two stages",
-    "the mean scores of three such image networks, one fusion network on cells": "simulated, then real, mean of three image networks",
+    "the mean scores of three such image networks, one fusion network on cells": MEAN_OF_THREE,
     "SegNet, then real and simulated pixels and cells in turn": "simulated and real in turn, image stage on points",
     "FCN, then real cells": "simulated, then real, FCN",
     "DeepLab, then real cells": "simulated, then real, DeepLab",

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import Camera, rigid_transform
 from semgrid_edu.datasets.ground_truth.window import EgoVelocity, ego_velocity, skew_scan
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import check_fields, not_negative
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import IGNORE, LabelSet
 
@@ -54,10 +54,9 @@ class TruthFlaws:
 
     def __post_init__(self) -> None:
         """Refuse sizes that are negative or infinite, and a probability above 1."""
-        for name in ("rotation", "translation", "outline", "small", "missed"):
-            value = getattr(self, name)
-            if not 0 <= value < np.inf or (name == "missed" and value > 1):
-                raise ArgumentError(name, "a finite number from 0 up, a probability up to 1", value)
+        expected = "a finite number from 0 up, a probability up to 1"
+        check_fields(self, expected, not_negative, "rotation", "translation", "outline", "small", "missed")
+        check_fields(self, expected, lambda share: share <= 1, "missed")
 
 
 NO_FLAWS = TruthFlaws(rotation=0, translation=0, outline=0, small=0, missed=0, skewed=False)

@@ -263,9 +263,8 @@ def read_benchmark_calibration(path: Path) -> BenchmarkCalibration:
         R = check_rotation(path, entry_of(path, entries, "R_rect", (3, 3)), "R_rect")
         T_camera0_from_lidar = rigid_transform(R, np.zeros(3)) @ _rigid(path, entries, "Tr_velo_cam")
         T_lidar_from_imu = _rigid(path, entries, "Tr_imu_velo")
-    return BenchmarkCalibration(
-        K, T_camera_from_rectified @ T_camera0_from_lidar, T_camera0_from_lidar, T_lidar_from_imu
-    )
+    T_camera_from_lidar = T_camera_from_rectified @ T_camera0_from_lidar
+    return BenchmarkCalibration(K, T_camera_from_lidar, T_camera0_from_lidar, T_lidar_from_imu)
 
 
 def parse_pose(path: Path, text: str, what: str) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 import operator
 import re
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Protocol, overload
@@ -109,15 +109,19 @@ class FrameSequence(Sequence[Frame]):
         return self._frame(k % len(self))
 
     def problems(self) -> list[str]:
-        """Read every frame and list all that is wrong or doubtful.
+        """Read everything and list all that is wrong or doubtful.
 
         Returns
         -------
         list of str
             One line for each problem, which names file or folder; empty when all frames are sound.
         """
-        found = [*(error_of(partial(self._frame, k)) for k in range(len(self))), *self.doubts()]
+        found = [*map(error_of, self._readers()), *self.doubts()]
         return [error for error in dict.fromkeys(found) if error]
+
+    def _readers(self) -> Iterator[Callable[[], object]]:
+        """Return what reads the drive piece by piece, so that no damaged piece hides another: here frame by frame."""
+        return (partial(self._frame, k) for k in range(len(self)))
 
     def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
         """Return what the bird's-eye labels of a frame say of the cells that the camera sees.
@@ -187,27 +191,25 @@ def read_scan(path: Path) -> NDArray[np.float32]:
     return points
 
 
-def count_frames(folder: Path, what: str, suffix: str) -> int:
-    """Count the frames of a drive whose files are numbered with six digits, such as 000000.png.
+def frame_numbers(folder: Path, what: str, suffix: str, digits: int = 6) -> tuple[int, ...]:
+    """Return the numbers of the files of a folder that are named by numbers, such as 000000.png, in ascending order.
 
     Parameters
     ----------
     folder : Path
-        The folder with one file per frame.
+        The folder with one file per frame; files of some frames may be missing.
     what : str
         What the files are, such as "images", for the error.
     suffix : str
         How their names end, such as ".png".
-
-    Returns
-    -------
-    int
-        One more than the highest number, since files of some frames may be missing.
+    digits : int
+        How many digits a name has.
     """
-    numbers = [int(path.stem) for path in folder.glob(f"*{suffix}") if re.fullmatch(r"\d{6}", path.stem)]
+    form = re.compile(rf"(\d{{{digits}}}){re.escape(suffix)}")
+    numbers = sorted(int(match[1]) for path in folder.glob(f"*{suffix}") if (match := form.fullmatch(path.name)))
     if not numbers:
-        raise DataError(folder, f"{what} such as 000000{suffix}", "none" if folder.is_dir() else "no folder")
-    return 1 + max(numbers)
+        raise DataError(folder, f"{what} such as {0:0{digits}}{suffix}", "none" if folder.is_dir() else "no folder")
+    return tuple(numbers)
 
 
 def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int], sparse: bool = False) -> NDArray[np.uint8]:

@@ -146,17 +146,6 @@ class KittiRawDrive(FrameSequence):
         """The calibration of the view, the same for all frames."""
         return read_camera(self.date_folder, self.view)
 
-    def problems(self) -> list[str]:
-        """Read every file of the drive and list all that is wrong with it.
-
-        Returns
-        -------
-        list of str
-            One line for each problem, which names the file; empty when the drive is sound.
-        """
-        found = [*map(error_of, self._readers()), *self.doubts()]
-        return [error for error in dict.fromkeys(found) if error]
-
     def doubts(self) -> list[str]:
         """List what is doubtful, as far as files' sizes, poses and a few frames show it.
 
@@ -199,9 +188,8 @@ class KittiRawDrive(FrameSequence):
     def _timestamp_files(self) -> list[Path]:
         """Return timestamps.txt of every sensor, and the LIDAR's times of start and end where they are given."""
         optional = [self.folder / "velodyne_points" / f"timestamps_{event}.txt" for event in ("start", "end")]
-        return [self.folder / sensor / "timestamps.txt" for sensor in self._sensors] + [
-            path for path in optional if path.exists()
-        ]
+        always = [self.folder / sensor / "timestamps.txt" for sensor in self._sensors]
+        return [*always, *filter(Path.exists, optional)]
 
     @cached_property
     def _times(self) -> dict[str, NDArray[np.datetime64]]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.readers.calibration import BenchmarkCalibration, camera_from, read_benchmark_calibration
-from semgrid_edu.datasets.readers.frames import FrameSequence, count_frames, read_scan
+from semgrid_edu.datasets.readers.frames import FrameSequence, frame_numbers, read_scan
 from semgrid_edu.datasets.readers.oxts import imu_pose, parse_packet
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
@@ -47,7 +47,7 @@ class KittiTrackingRun(FrameSequence):
     def __init__(self, root: str | Path, run: int) -> None:
         self.folder = Path(root) / "training"
         self.name = f"{run:04d}"
-        self._length = count_frames(self.folder / "image_02" / self.name, "images", ".png")
+        self._length = 1 + max(frame_numbers(self.folder / "image_02" / self.name, "images", ".png"))
 
     def __len__(self) -> int:
         """Return the number of frames, including those whose scans were never recorded."""

@@ -1,6 +1,7 @@
 """KITTI's timestamps, and poses from its GPS and inertial packets (OXTS) by the Mercator projection (section 4)."""
 
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -52,11 +53,9 @@ def _parse(path: Path, number: int, line: str) -> np.datetime64:
     """Return the time in one line."""
     if not line.strip():
         return np.datetime64("NaT", "ns")
-    try:
+    with suppress(ValueError):
         if _STAMP.fullmatch(line.strip()):
             return np.datetime64(line.strip(), "ns")
-    except ValueError:
-        pass
     raise DataError(path, "times like 2011-09-26 13:10:51.168593664", f"{line!r} in line {number}")
 
 

@@ -18,7 +18,7 @@ from semgrid_edu.datasets.readers import pandaset_files as files
 from semgrid_edu.datasets.readers.calibration import camera_from
 from semgrid_edu.datasets.readers.cuboids import LabelledScan, put_together
 from semgrid_edu.datasets.readers.drive_doubts import scans_again
-from semgrid_edu.datasets.readers.frames import FrameSequence, nothing_known
+from semgrid_edu.datasets.readers.frames import FrameSequence, frame_numbers, nothing_known
 from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, cells_in_view, closest_returns, unhidden
 from semgrid_edu.errors import ArgumentError, DataError, check_whole
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
@@ -96,7 +96,7 @@ class PandasetScene(FrameSequence):
             there = sorted(path.parent.name for path in Path(root).glob("*/lidar"))
             raise DataError(self.folder, "a scene", f"only {', '.join(there)}" if there else "no scene beside it")
         self.name, self._opened = f"{scene} {camera}", (root, scene, camera)
-        self.numbers = files.frame_numbers(self.view, "images", ".jpg")
+        self.numbers = frame_numbers(self.view, "images", ".jpg", digits=2)
         self._scan = lru_cache(_WINDOW)(partial(files.read_pandaset_scan, self.folder))
 
     def __len__(self) -> int:
@@ -223,7 +223,7 @@ class PandasetScene(FrameSequence):
     def _cloud(self, k: int, before: int = 0, after: int = 0) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return the returns of a window of scans in the LIDAR frame of frame k, and their classes."""
         check_whole(before=before, after=after)
-        number, scans = self.numbers[k], files.frame_numbers(self.folder / "lidar", "scans", ".pkl.gz")
+        number, scans = self.numbers[k], frame_numbers(self.folder / "lidar", "scans", ".pkl.gz", digits=2)
         earlier, later = [n for n in scans if n < number], [n for n in scans if n > number]
         others = earlier[max(len(earlier) - before, 0) :] + later[:after]
         now, *rest = (self._labelled_scan(n) for n in (number, *others))

@@ -4,7 +4,6 @@ Points, poses and cuboids are given in a world whose z axis points up, metres. T
 turns (d = 0), the PandarGT looks ahead (d = 1).
 """
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -117,25 +116,6 @@ def read_pandaset_scan(scene: Path, number: int) -> PandasetScan:
     cuboids = _read_cuboids(scene / "annotations" / "cuboids" / path.name)
     labelled = LabelledScan(*(array[numbers >= FIRST_THING] for array in arrays), cuboids)
     return PandasetScan(points, reflectance, lidars, labelled)
-
-
-def frame_numbers(folder: Path, what: str, suffix: str) -> tuple[int, ...]:
-    """Return the numbers of the files of a folder, which are named by two digits.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    what : str
-        What the files are, such as "images", for the error.
-    suffix : str
-        How their names end, such as ".jpg".
-    """
-    form = re.compile(rf"(\d\d){re.escape(suffix)}")
-    numbers = sorted(int(match[1]) for path in folder.glob(f"*{suffix}") if (match := form.fullmatch(path.name)))
-    if not numbers:
-        raise DataError(folder, f"{what} such as 00{suffix}", "none" if folder.is_dir() else "no folder")
-    return tuple(numbers)
 
 
 def read_poses(path: Path, least: int) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ from semgrid_edu.datasets.readers.calibration import (
     read_benchmark_calibration,
 )
 from semgrid_edu.datasets.readers.class_tables import ClassTable
-from semgrid_edu.datasets.readers.frames import FrameSequence, count_frames, nothing_known, read_scan
+from semgrid_edu.datasets.readers.frames import FrameSequence, frame_numbers, nothing_known, read_scan
 from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, seen_returns
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
@@ -116,7 +116,7 @@ class SemanticKittiSequence(FrameSequence):
 
     def __init__(self, root: str | Path, sequence: str) -> None:
         self.folder, self.name = Path(root) / "sequences" / sequence, sequence
-        self._length = count_frames(self.folder / "velodyne", "scans", ".bin")
+        self._length = 1 + max(frame_numbers(self.folder / "velodyne", "scans", ".bin"))
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -198,7 +198,8 @@ class SemanticKittiSequence(FrameSequence):
         return replace(frame, labels=self._labels(k, frame))
 
     def _without_labels(self, k: int) -> Frame:
-        return Frame(self._image(k), self.scan(k), self.camera, self._poses[k], self._times[k])
+        image = read_png(self._image_file(k), "RGB", self.camera.size) if self._has_images else None
+        return Frame(image, self.scan(k), self.camera, self._poses[k], self._times[k])
 
     def _labels(self, k: int, frame: Frame) -> FrameLabels | None:
         """Return the truth of the scan, None in a sequence without labels."""
@@ -218,9 +219,6 @@ class SemanticKittiSequence(FrameSequence):
     @property
     def _has_images(self) -> bool:
         return (self.folder / "image_2").exists()
-
-    def _image(self, k: int) -> NDArray[np.uint8] | None:
-        return read_png(self._image_file(k), "RGB", self.camera.size) if self._has_images else None
 
     def _image_file(self, k: int) -> Path:
         return self.folder / "image_2" / f"{k:06d}.png"

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
 from semgrid_edu.datasets.readers.calibration import camera_from, check_rotation
 from semgrid_edu.datasets.readers.class_tables import ClassTable
-from semgrid_edu.datasets.readers.frames import FrameSequence, count_frames, error_of
+from semgrid_edu.datasets.readers.frames import FrameSequence, error_of, frame_numbers
 from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, depth_scan, points_from_depth
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
@@ -35,8 +35,7 @@ from semgrid_edu.storage.reading import parse_numbers, read_png, read_text
 SYNTHIA_CLASSES = ClassTable(
     SYNTHIA_10,
     {
-        0: "void",
-        1: "void",  # sky
+        **dict.fromkeys((0, 1), "void"),  # nothing, sky
         2: "building",
         3: "road",
         4: "sidewalk",
@@ -45,12 +44,8 @@ SYNTHIA_CLASSES = ClassTable(
         7: "pole",
         8: "car",
         9: "sign",
-        10: "void",  # pedestrian
-        11: "void",  # bicycle
         12: "lane",
-        13: "void",  # reserved
-        14: "void",  # reserved
-        15: "void",  # traffic light
+        **dict.fromkeys((10, 11, 13, 14, 15), "void"),  # pedestrian, bicycle, two reserved numbers, traffic light
     },
 )
 """SYNTHIA-10's class of each number in the labels: the paper leaves sky, people, bicycles and traffic lights out."""
@@ -179,7 +174,7 @@ class SynthiaSequence(FrameSequence):
 
     def __init__(self, root: str | Path, sequence: str) -> None:
         self.folder, self.name = Path(root) / sequence, sequence
-        self._length = count_frames(self.folder / "RGB" / VIEW, "images", ".png")
+        self._length = 1 + max(frame_numbers(self.folder / "RGB" / VIEW, "images", ".png"))
 
     def __len__(self) -> int:
         """Return the number of frames."""

@@ -21,8 +21,10 @@ def height_above_ground_literal(points: NDArray, params: GroundParams) -> NDArra
     Parameters, result and errors are those of `height_above_ground`.
     """
     points = check_points(points).astype(np.float64)
-    sector, bin_ = _polar_cells(points, params)
-    distance = np.hypot(points[:, 0], points[:, 1])
+    x, y = points[:, 0], points[:, 1]
+    distance = np.hypot(x, y)
+    sector = ((np.arctan2(y, x) + np.pi) * (params.sectors / (2 * np.pi))).astype(int).clip(max=params.sectors - 1)
+    bin_ = np.minimum(distance / params.bin, params.bins - 1).astype(int)  # points beyond the last bin count to it
     own = [walk_sector(distance[sector == s], points[sector == s, 2], params) for s in range(params.sectors)]
     seen = set(sector)
     around = range(-params.neighbours, params.neighbours + 1)
@@ -74,14 +76,6 @@ def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[
             ground_at.append(distance[lowest])
             ground.append(z[lowest])
     return np.interp((np.arange(params.bins) + 0.5) * params.bin, ground_at, ground)
-
-
-def _polar_cells(points: NDArray, params: GroundParams) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return sector and bin of each point; points beyond the last bin count to it."""
-    x, y = points[:, 0], points[:, 1]
-    sector = ((np.arctan2(y, x) + np.pi) * (params.sectors / (2 * np.pi))).astype(int)
-    bin_ = np.minimum(np.hypot(x, y) / params.bin, params.bins - 1).astype(int)
-    return np.minimum(sector, params.sectors - 1), bin_
 
 
 def scan_evidence_literal(

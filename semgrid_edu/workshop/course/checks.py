@@ -103,16 +103,14 @@ def instructor_problems(folder: Path) -> list[str]:
     folder : Path
         The folder of the instructor's modules, `notebooks/instructor/semgrid_instructor`; its `close` may use it.
     """
-    lines = [
-        (path.name, line) for path in sorted(folder.glob("[!_]*.py")) for line in path.read_text("utf-8").splitlines()
-    ]
     rules = {
         BARE: "compare by `close` of semgrid_instructor, which demands equal shapes that aren't empty",
         QUOTES: "a sentence of a hidden test quotes no values",
     }
     return [
-        f"instructor/{name}: `{line.strip()}`: {says}"
-        for name, line in lines
+        f"instructor/{path.name}: `{line.strip()}`: {says}"
+        for path in sorted(folder.glob("[!_]*.py"))
+        for line in path.read_text("utf-8").splitlines()
         for rule, says in rules.items()
         if rule.search(line)
     ]

@@ -70,6 +70,18 @@ def reliability_key(method: str, truth: str) -> str:
     return method if truth == "true" else f"{method}, {truth} labels"
 
 
+def reliability_sums(probability: NDArray, truth: NDArray) -> NDArray[np.float64]:
+    """Return by bin of confidence the number of cells, the sum of their confidence, and how many are right, (3, B).
+
+    Parameters
+    ----------
+    probability, truth : array
+        As `reliability` takes them.
+    """
+    diagram = reliability(probability, truth)
+    return np.stack([diagram.cells, diagram.confidence * diagram.cells, diagram.accuracy * diagram.cells])
+
+
 def reliability_of_sums(sums: NDArray) -> Reliability:
     """Return how often a method is right by its confidence.
 
@@ -108,7 +120,7 @@ def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:
             if np.ndim(grid) == 3:
                 for truth, classes in truths.items():
                     key = reliability_key(method, truth)
-                    confidence[key] = confidence.get(key, 0) + _confidence(grid, classes[k])
+                    confidence[key] = confidence.get(key, 0) + reliability_sums(grid, classes[k])
                 grid = grid.argmax(axis=0)
             for truth, classes in truths.items():
                 for name, matrix in _by_band(classes[k], grid, band, len(frames.label_set)).items():
@@ -127,12 +139,6 @@ def truths_of_frames(frames: TrainingSet) -> dict[str, NDArray]:
     """
     truth, true = frames.arrays["truth"], frames.arrays["true"]
     return {"true": true} if truth is true else {"lidar": truth, "true": true}
-
-
-def _confidence(probability: NDArray, truth: NDArray) -> NDArray[np.float64]:
-    """Return by bin of confidence the number of cells, the sum of their confidence, and how many are right."""
-    diagram = reliability(probability, truth)
-    return np.stack([diagram.cells, diagram.confidence * diagram.cells, diagram.accuracy * diagram.cells])
 
 
 def _by_band(truth: NDArray, called: NDArray, band: NDArray, n_classes: int) -> dict[str, NDArray[np.int64]]:

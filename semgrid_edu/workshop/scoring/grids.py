@@ -67,9 +67,8 @@ def network_grids(net: SemanticGridNet, frames: TrainingSet, refinements: Mappin
         log_g = learned_log_g(net, sample)
         found = {NETWORK: np.exp(log_g)}
         for name, refine in (refinements or {}).items():
-            found[f"{NETWORK} + {name}"], _ = StageCheck("refine", refine, k).call(
-                log_g.shape, log_g, sample.occupancy.numpy()
-            )
+            check = StageCheck("refine", refine, k)
+            found[f"{NETWORK} + {name}"], _ = check.call(log_g.shape, log_g, sample.occupancy.numpy())
         return found
 
     return grids

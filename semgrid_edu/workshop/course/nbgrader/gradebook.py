@@ -211,9 +211,8 @@ def ungraded(course: Path, assignments: Sequence[str] = ()) -> list[tuple[str, s
 def _is_up_to_date(course: Path, assignment: str, student: str) -> bool:
     """Return whether nbgrader wrote all of a submission's graded notebook, and did so after it was handed in."""
     submitted, graded = (place(course, step, student, assignment) for step in ("submitted", "autograded"))
-    if has_begun(course, assignment, student):
-        return False
-    return graded.exists() and graded.stat().st_mtime >= submitted.stat().st_mtime
+    begun = has_begun(course, assignment, student)
+    return not begun and graded.exists() and graded.stat().st_mtime >= submitted.stat().st_mtime
 
 
 def _has_scores(gradebook: Gradebook, assignment: str, student: str) -> bool:

@@ -30,14 +30,12 @@ def drop_between_tables(runs: SimpleNamespace, counted: RunCounts) -> dict:
     dict
         By metric: the "paper"'s, "ours" on the routes of Table 2, and "ours, more routes" on those of claim 3.
     """
-    first, *others = (
+    usual, table2, new_routes = (
         {name: _mean(by_seed(some, counted, NETWORK, "lidar"), metric) for name, metric in METRICS.items()}
         for some in (runs.usual, runs.table2, runs.new_routes)
     )
     paper = (TABLE_2_SCORES[("segnet", False)], TABLE_1_SCORES[("segnet", False)])
-    pairs = {"paper": paper} | {
-        name: (one, first) for name, one in zip(("ours", "ours, more routes"), others, strict=True)
-    }
+    pairs = {"paper": paper, "ours": (table2, usual), "ours, more routes": (new_routes, usual)}
     return {name: {metric: b[metric] - a[metric] for metric in METRICS} for name, (b, a) in pairs.items()}
 
 
@@ -66,15 +64,12 @@ def drop_markdown(drop: dict) -> str:
 def _pattern(name: str, ours: dict[str, float], paper: dict[str, float]) -> str:
     """Return which of two metrics falls more, and whether it is the one that falls more in the paper."""
     more, papers = (min(COMPARED, key=row.get) for row in (ours, paper))
+    (other,) = set(COMPARED) - {more}
     text = f"{name.capitalize()}: {more} changes by {100 * ours[more]:+.1f} points, the other by "
-    text += f"{100 * ours[_other(more)]:+.1f}. In the paper {papers} falls most, by {-100 * paper[papers]:.1f}: "
+    text += f"{100 * ours[other]:+.1f}. In the paper {papers} falls most, by {-100 * paper[papers]:.1f}: "
     if more == papers:
         return text + "the same pattern."
     return text + f"the opposite pattern, which we can't explain from the paper. {_READ[more]}"
-
-
-def _other(metric: str) -> str:
-    return COMPARED[COMPARED.index(metric) == 0]
 
 
 _READ = {

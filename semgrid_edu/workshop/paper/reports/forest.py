@@ -46,8 +46,7 @@ def forest_plot(
     """
     if not rows:
         raise ArgumentError("rows", "one or more", "none")
-    if ax is None:
-        _, ax = plt.subplots(figsize=(8, 1.2 + 0.5 * len(rows)), layout="constrained")
+    ax = ax or plt.subplots(figsize=(8, 1.2 + 0.5 * len(rows)), layout="constrained")[1]
     if reference is not None:
         ax.axvline(100 * reference, color="0.5", linewidth=1, linestyle="--", zorder=0)
     draw_scores(ax, rows)

@@ -132,7 +132,8 @@ def figures_picture(result: dict, counted: RunCounts) -> Figure:
 
 def _draw(part: SubFigure, grids: dict[str, NDArray], label_set: LabelSet, columns: dict[str, str]) -> None:
     """Draw the rows of one figure."""
-    n_rows, spec = len(grids["frame"]), _spec_of(grids["true"].shape[1:])
+    n_rows, shape = len(grids["frame"]), grids["true"].shape[1:]
+    spec = next(spec for spec in (GridSpec.compact(), GridSpec.paper()) if spec.shape == shape)
     axes = part.subplots(n_rows, 1 + len(columns), width_ratios=[2.2] + [1] * len(columns), squeeze=False)
     for row, line in enumerate(axes):
         line[0].imshow(grids["image"][row].transpose(1, 2, 0))
@@ -145,11 +146,6 @@ def _draw(part: SubFigure, grids: dict[str, NDArray], label_set: LabelSet, colum
             ax.tick_params(labelleft=outer_left, labelbottom=lowest)
             ax.set(xlabel=ax.get_xlabel() * lowest, ylabel=ax.get_ylabel() * outer_left)
     class_legend(axes[0, -1], label_set, grids["true"])
-
-
-def _spec_of(shape: tuple[int, int]) -> GridSpec:
-    """Return the grid that has this many cells."""
-    return next(spec for spec in (GridSpec.compact(), GridSpec.paper()) if spec.shape == tuple(shape))
 
 
 def figures_markdown(result: dict) -> str:

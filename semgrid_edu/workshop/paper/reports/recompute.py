@@ -70,17 +70,12 @@ def differences_in(folder: Path, name: str) -> Iterator[str]:
     if not isinstance(size[0], str) or type(size[1]) is not int or size[1] < 1:
         raise DataError(scores, "a result of `semgrid-edu reproduce` with its scale and seeds", f"{size}")
     result = computed_result(name, experiment, scale_named(size[0]), size[1], counted)
-    yield from _differences(written, _as_json(result), scores.name)
+    yield from _differences(written, json.loads(json.dumps(result)), scores.name)  # as it comes back from its file
     yield from _differences(read_json(times), times_of(counted.records), times.name)
     lines = [read_bytes(words).decode(errors="replace").splitlines(), result_markdown(result, experiment).splitlines()]
     for number, (ours, computed) in enumerate(zip_longest(*lines), start=1):
         if ours != computed:
             yield f"{words.name}, line {number}"
-
-
-def _as_json(result: dict) -> dict:
-    """Return a result as it comes back from its file."""
-    return json.loads(json.dumps(result))
 
 
 def _differences(written: object, computed: object, place: str) -> Iterator[str]:

@@ -3,7 +3,6 @@
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS, pixel_accuracy
@@ -43,22 +42,13 @@ def structure(scale: Scale, seeds: int, counted: RunCounts) -> dict:
     for (learned, tested), runs in structure_runs(scale, seeds).items():
         counts = by_seed(runs, counted, NETWORK, "lidar")
         by_frame = np.stack([run.frame_confusions(counted, NETWORK, "lidar") for run in runs])
-        widths = dict(zip(UNITS, map(_half_width, (counts, by_frame)), strict=True))
+        taken = zip(UNITS, (counts, by_frame), strict=True)  # as if independent
+        widths = {unit: drive_estimate(some, pixel_accuracy).half_width(0.95) for unit, some in taken}
+        drives = [pixel_accuracy(matrix) for matrix in counts.sum(axis=0)]  # single ones, all seeds together
         scores = every_metric(score_with_interval, KITTI_14, counts)
         about = {"learned": learned, "tested": tested, "frames and drives": frame_counts(tested)["test"]}
-        rows.append(about | {"scores": scores, "half-width": widths, "drives": _ends(counts)})
+        rows.append(about | {"scores": scores, "half-width": widths, "drives": [min(drives), max(drives)]})
     return {"rows": rows}
-
-
-def _half_width(counts: NDArray) -> float:
-    """Return half the width of the 95 % interval of pixel accuracy, where (S, N, C, C) are taken as independent."""
-    return drive_estimate(counts, pixel_accuracy).half_width(0.95)
-
-
-def _ends(counts: NDArray) -> list[float]:
-    """Return the lowest and the highest pixel accuracy of single drives, all seeds together."""
-    shares = [pixel_accuracy(matrix) for matrix in counts.sum(axis=0)]
-    return [float(min(shares)), float(max(shares))]
 
 
 def structure_markdown(result: dict) -> str:

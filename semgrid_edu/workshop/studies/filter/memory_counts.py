@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.crf import expected_calibration_error
-from semgrid_edu.crf.temperature import reliability
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
@@ -15,7 +14,7 @@ from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.workshop.scoring.confusions import BANDS, band_names
-from semgrid_edu.workshop.scoring.counting import distance_bands, reliability_of_sums
+from semgrid_edu.workshop.scoring.counting import distance_bands, reliability_of_sums, reliability_sums
 from semgrid_edu.workshop.scoring.score_with_interval import (
     compared,
     markdown_table,
@@ -133,8 +132,7 @@ def count_cells(probability: NDArray, truth: NDArray) -> CellCounts:
     confusion, forbidden = (confusion_matrix(truth, of.argmax(axis=0), n) for of in (probability, semantic))
     if not len(truth):
         return CellCounts(confusion, forbidden, np.zeros((3, 15)), 0.0)
-    diagram = reliability(probability, truth)
-    sums = np.stack([diagram.cells, diagram.confidence * diagram.cells, diagram.accuracy * diagram.cells])
+    sums = reliability_sums(probability, truth)
     return CellCounts(confusion, forbidden, sums, float(np.square(probability - np.eye(n)[:, truth]).sum()))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.workshop.scoring.confusions import band_names
@@ -64,8 +64,7 @@ class TruthCounts:
             When a map doesn't fit the grid.
         """
         for name, grid in (("labels", labels), ("truth", truth), ("standing", standing)):
-            if np.shape(grid) != spec.shape:
-                raise ArgumentError(name, f"shape {spec.shape}", f"shape {np.shape(grid)}")
+            check_shape(name, grid, spec.shape)
         band, n = distance_bands(spec, BAND_EDGES), label_set.n_semantic
         chosen = (
             (truth, truth < n),

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import transform_points
-from semgrid_edu.datasets.grid_truth import decided_truth
+from semgrid_edu.datasets.grid_truth import truth_to_learn
 from semgrid_edu.datasets.readers.frames import FrameSequence
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
@@ -35,11 +35,7 @@ def semantic_truths(drive: FrameSequence, beliefs: Sequence[NDArray], spec: Grid
     (F, H, W) uint8
         Classes of KITTI-14; 255 where a cell is unknown or nobody labelled it.
     """
-    named = [
-        decided_truth(drive.truth(k, spec), drive.undecided(k, spec), belief, KITTI_14)
-        for k, belief in enumerate(beliefs)
-    ]
-    truths = np.stack(named)
+    truths = np.stack([truth_to_learn(drive, k, belief, spec) for k, belief in enumerate(beliefs)])
     return np.where(truths < KITTI_14.n_semantic, truths, np.uint8(IGNORE))
 
 

@@ -14,7 +14,7 @@ from semgrid_edu.frame import Frame
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 from semgrid_edu.workshop.studies.new_drive import drive_checks as checks
-from semgrid_edu.workshop.studies.new_drive.domain import colour_distance, mean_histograms, training_images
+from semgrid_edu.workshop.studies.new_drive.domain import distances, training_images
 from semgrid_edu.workshop.studies.new_drive.faults import YAWS
 from semgrid_edu.workshop.studies.new_drive.own_street import piece_confusions
 from semgrid_edu.workshop.studies.new_drive.scan_borders import edge_contrast
@@ -125,11 +125,8 @@ def _clock_line(drive: FrameSequence) -> Line:
 def _colour_line(frames: Sequence[Frame]) -> Line:
     """Compare the colours with those of the training images, of which one is the farthest from the others."""
     images = training_images()
-    known, apart = mean_histograms(images), []
-    for k in range(len(images)):
-        others = mean_histograms(images[:k] + images[k + 1 :])
-        apart.append(colour_distance(mean_histograms([images[k]]), others))
-    distance = colour_distance(mean_histograms([frame.need_image() for frame in frames[::4]]), known)
+    apart = [distances([images[k]], images[:k] + images[k + 1 :])["colour distance"] for k in range(len(images))]
+    distance = distances([frame.need_image() for frame in frames[::4]], images)["colour distance"]
     return Line("colours", f"{distance:.2f} from simulated ones (limit {max(apart):.2f})", distance <= max(apart))
 
 

@@ -50,8 +50,7 @@ class WayToTrain(NamedTuple):
     start : str, optional
         The image network of the shipped compact network to start from.
     mean_of : str, optional
-        The way whose image networks, one for each seed, score the images together, while the fusion network alone
-        learns.
+        The way whose image networks, one for each seed, score images together; the fusion network alone learns.
     params : TrainingParams, optional
         How it learns; left out, it is scored as it starts.
     with_simulated : bool
@@ -85,13 +84,10 @@ BLOCK = 2.0
 """Seconds of one camera that count as one drive in an interval: neighbouring frames look alike."""
 
 Part = tuple[TrainingSet, list[int]]
-"""The frames of one camera, and the numbers of those that are meant."""
-
 Round = tuple[list[Part], list[Part]]
-"""What is learned from, and what is scored."""
-
 Counted = dict[str, list[tuple[str, GridCounts]]]
-"""For each method and camera, what the method is called in the counts, and the counts."""
+"""The frames of one camera, and the numbers of those that are meant; what is learned from, and what is scored; for each
+method and camera, what the method is called in the counts, and the counts."""
 
 
 def compare_real(
@@ -120,9 +116,8 @@ def compare_real(
     Returns
     -------
     dict
-        "scores": by split and method "pixel accuracy" and "class accuracy" with intervals over seeds and blocks of two
-        seconds, each also as "above the table" of occupancy states, the recall of each class, the pixel accuracy in the
-        view of each camera, and the "ECE"; and all that made them. JSON can hold it.
+        "scores": by split and method both accuracies with intervals over seeds and blocks of two seconds, each also as
+        "above the table" of occupancy states, recalls, pixel accuracies by camera, and "ECE"; and what made them; JSON.
 
     Raises
     ------
@@ -140,15 +135,14 @@ def compare_real(
     views = {camera: _frames(drive, runs) for camera, drive in drives.items()}
     found, weights, seeds = {}, {}, range(seed, seed + TABLE["seeds"])
     for split, rounds in splits(views).items():
-        table = _joined(_count_states(*one) for one in rounds)[STATE_TABLE]
+        table, tests = _joined(_count_states(*one) for one in rounds)[STATE_TABLE], [test for _, test in rounds]
         found[split] = {STATE_TABLE: _scores_of([table], table)}
         for name in TABLE["later"] if split == LATER else WAYS:
             counted = []
             for k in seeds if WAYS[name].params else seeds[:1]:
                 files = _networks(name, rounds, streets, runs / split, seeds, k, computer)
                 weights |= {run: sha256(file) for run, file in files.items()}
-                tested = zip(files.values(), rounds, strict=True)
-                counted.append(_joined(_count(name, file, one[1]) for file, one in tested))
+                counted.append(_joined(_count(name, *one) for one in zip(files.values(), tests, strict=True)))
             found[split] |= {method: _scores_of([one[method] for one in counted], table) for method in counted[0]}
     command = f"semgrid-edu reproduce real-streets --scene {scene} --seed {seed} --device {device}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
@@ -208,27 +202,19 @@ def _networks(
         of_runs = [split.with_name(f"{split.name} {r}, {way.mean_of}, {s}") / IMAGE_STAGE for s in seeds]
         starts = of_runs if way.mean_of else [sample_weights(way.start)] if way.start else []
         folder = split.with_name(f"{split.name} {r}, {name}, {k}")
-        files[folder.name] = _trained(way, starts, training, streets, folder, k, on) if way.params else starts[0]
+        if way.params and not (folder / WEIGHTS).exists():
+            mixture = Mixture([[_Subset(*part) for part in training], *([streets] if way.with_simulated else [])])
+            _train(way, starts, mixture, folder, k, on)
+        files[folder.name] = folder / WEIGHTS if way.params else starts[0]
     return files
 
 
-def _trained(
-    way: WayToTrain,
-    starts: list[Path],
-    training: list[Part],
-    streets: list[TrainingSet],
-    folder: Path,
-    seed: int,
-    device: torch.device,
-) -> Path:
-    """Return the file of a network's weights after its training run, which is made if it hasn't been."""
-    if not (folder / WEIGHTS).exists():
-        mixture = Mixture([[_Subset(*part) for part in training], *([streets] if way.with_simulated else [])])
-        nets = [load_net(start, mixture.camera) for start in starts]
-        net = with_mean_scores(nets or [build_net(way.architecture, mixture.camera, seed)])
-        params = replace(way.params, batch_size=min(way.params.batch_size, *map(len, mixture.parts)))
-        train(net, mixture, folder, params, seed, resume=True, device=device)
-    return folder / WEIGHTS
+def _train(way: WayToTrain, starts: list[Path], mixture: Mixture, folder: Path, seed: int, on: torch.device) -> None:
+    """Train a network, or go on where an interrupted run was."""
+    nets = [load_net(start, mixture.camera) for start in starts]
+    net = with_mean_scores(nets or [build_net(way.architecture, mixture.camera, seed)])
+    params = replace(way.params, batch_size=min(way.params.batch_size, *map(len, mixture.parts)))
+    train(net, mixture, folder, params, seed, resume=True, device=on)
 
 
 def _count(name: str, weights: Path, test: list[Part]) -> Counted:
