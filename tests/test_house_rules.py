@@ -31,7 +31,7 @@ SHARED_OPTIONS = ("Force", "Resume", "Runs")
 """Options of several commands, which declare their help text once."""
 
 
-MOST_MODULES, MOST_LINES = {"book": 160, "workshop": 133}, {"book": 12_600, "workshop": 11_500}
+MOST_MODULES, MOST_LINES = {"book": 160, "workshop": 133}, {"book": 12_610, "workshop": 11_500}
 """The limits of CONTRIBUTING for each storey."""
 
 

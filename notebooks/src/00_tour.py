@@ -89,7 +89,7 @@ assert story.pull.before[CAR] > 0.99
 # them.
 #
 # - **A** The dots are points above the cell, one every 20 cm from the ground up, drawn where the camera sees them. The
-#   lower ones fall on parked cars, one behind the other, the upper ones on a tree behind them. So the image alone doesn't say what stands in this cell.
+#   lowest falls on the road, those above it on parked cars, the upper ones on a tree behind them. So the image alone doesn't say what stands in this cell.
 # - **B**, **C** What the filter believes of the cell: after each of its steps within this scan (B; *shown* is what it
 #   passes on), and scan by scan (C). It is sure that something stands there: STATIC. No return says *what* it is.
 # - **D**, **E**, **F** How much image and occupancy speak for *car* (violet) or for the runner-up, *vegetation* (orange;
@@ -330,8 +330,8 @@ assert KITTI_14.index("sky") not in labelled
 # Each pixel has the colour of its highest score; the white dots are our cell's column of panel A. Of the pixels with a
 # label 98 % have the right colour. But the network has learned from this very image, and where no label ever was it
 # guesses: no LIDAR return comes back from the sky, so none of its pixels has a label, and it is coloured as *building*,
-# *vegetation* or *signage*. The system doesn't use the colours. It passes on all 14 scores of each pixel, without a soft-max. (They
-# are the mean of three image networks', which last learned from labelled pixels. A network that the *map's* errors
+# *vegetation* or *signage*. The system doesn't use the colours. It passes on all 14 scores of each pixel, without a soft-max. (Each
+# is the mean over three image networks, which last learned from labelled pixels. A network that the *map's* errors
 # trained last, as in the paper, may make signals of its scores that no longer name what a pixel shows: lectures 07, 08.)
 #
 # ## Stage 3, $s \to p$: from pixels to places
@@ -515,8 +515,8 @@ assert spoiled > mended > 0
 
 # %% [markdown]
 # More than nine cells in ten keep their class, ours among them (panel G). The map looks tidier, and it has become
-# worse: of the labelled cells that changed, more were right before than are right now. Look at the left edge: the strip
-# of sidewalk has become road.
+# worse: of the labelled cells that changed, more were right before than are right now. Look at the left edge: half
+# of the strip of sidewalk has become road.
 #
 # ## How good is it?
 #

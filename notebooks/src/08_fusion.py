@@ -917,8 +917,8 @@ Markdown("\n".join([head, *rows]))
 # $o$ brings 14 points; by real labels 33. The judges differ, too: a real cell is labelled only where a *LIDAR return*
 # lies, and there $o$ has evidence. And look at the last column: in the view of cameras that a network hasn't learned
 # from, a table of $o$ alone gets *more* cells right, by 6 points (2 to 10). Of seven ways that go on from simulated
-# streets five come within two points of it; one, the mean of three image networks' scores, is clearly above it, but
-# only after the CRF ([results](../docs/results.md)). The second row is
+# streets five come within two points of it; one, the mean of three image networks' scores, is above it after
+# the CRF, by 2 points (0.2 to 4.7, chance in these three left out; [results](../docs/results.md)). The second row is
 # a surprise of its own: a network that was trained with the ground plane alone loses one point against one with twenty.
 # So on these simulated streets, with these labels, the number of planes is hardly what a network has over a table.
 #
@@ -960,7 +960,7 @@ plt.show()
 # class accuracy it is better here, too, by about seven points. (The network has learnt from these very
 # frames, so its row shows what it can hold, not how it does on a new street.) Over all ten frames late fusion finds
 # most of the road, half of the cells of cars and nearly three quarters of those of buildings, and gives these names to
-# many other cells (B shows the last frame). It names no vegetation, sidewalk or bicycle at all, and hardly a pedestrian. The road
+# many other cells (B shows the last frame). It finds next to nothing of vegetation, sidewalk, bicycles and pedestrians. The road
 # nearer than 13 m is missing, too: this camera doesn't see the ground so near, and a table can't ask the neighbours.
 #
 # ## Play with it

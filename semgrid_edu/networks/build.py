@@ -52,9 +52,9 @@ def build_net(architecture: Architecture, camera: Camera, seed: int = 0) -> Sema
 class MeanSegmenter(nn.Module):
     """Several image networks that score an image together: s is the mean of their scores.
 
-    Networks that learned from the same few frames, each in another order, are wrong about different pixels; their mean
-    is wrong less often than one of them. The soft-max of mean scores is the networks' geometric mean of probabilities,
-    normalised.
+    Where networks that learned from the same few frames err in different pixels, their mean errs less often;
+    `reproduce real-streets` compares it with one of them. The soft-max of mean scores is the networks' geometric mean
+    of probabilities, normalised.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def with_mean_scores(nets: Sequence[SemanticGridNet]) -> SemanticGridNet:
     Parameters
     ----------
     nets : sequence of SemanticGridNet
-        Networks of one architecture and for one camera. Their parts aren't copied.
+        At least one; of the same architecture and for one camera. Their parts aren't copied.
 
     Returns
     -------
@@ -95,9 +95,9 @@ def with_mean_scores(nets: Sequence[SemanticGridNet]) -> SemanticGridNet:
     first = nets[0]
     if len(nets) == 1:
         return first
-    architecture = replace(first.need_architecture(), n_segmenters=len(nets))
-    mean = MeanSegmenter([net.segmenter for net in nets])
-    joined = SemanticGridNet(mean, first.sampler, first.n_classes, architecture=architecture)
+    members = [member for net in nets for member in getattr(net.segmenter, "members", [net.segmenter])]
+    architecture = replace(first.need_architecture(), n_segmenters=len(members))
+    joined = SemanticGridNet(MeanSegmenter(members), first.sampler, first.n_classes, architecture=architecture)
     joined.fusion = first.fusion
     return joined
 

@@ -16,7 +16,7 @@ MOST_PIXELS, MOST_POINTS = 2**22, 2**24
 asks for more is a mistake, or a damaged file, and would take all memory."""
 
 MOST_SEGMENTERS = 9
-"""Image networks of one network: nine of the published size take a gigabyte."""
+"""Image networks of one network: nine of the published size take one gigabyte (SegNet) to five (FCN)."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Architecture:
     reduces : bool
         Whether the 1x1 convolution reduces the planes. Without, all D x C of them go into the conv-deconv network.
     n_segmenters : int
-        How many such image networks there are, 1 to 9; the scores are the mean of theirs, see `MeanSegmenter`.
+        How many image networks score an image, 1 to 9; the scores are the mean of theirs, see `MeanSegmenter`.
     """
 
     segmenter: str = "segnet"

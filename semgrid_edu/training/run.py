@@ -14,6 +14,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, SemanticGridNet, build_net, build_segmenter, load_imagenet, load_net
 from semgrid_edu.networks.build import with_mean_scores
+from semgrid_edu.networks.semantic_grid import MOST_SEGMENTERS
 from semgrid_edu.networks.weights import read_architecture
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import write_provenance
@@ -108,7 +109,7 @@ def train_network(
     imagenet: str | Path | None = None,
     device: str = "cpu",
     truth: LidarTruth | None = None,
-    start: Sequence[str | Path] = (),
+    start: str | Path | Sequence[str | Path] = (),
 ) -> None:
     """Train a network on the split "train" of data sets; under torchrun, in all of its processes.
 
@@ -134,9 +135,10 @@ def train_network(
         "cpu", "cuda", "cuda:N" or "auto", see `choose_device`.
     truth : LidarTruth, optional
         How to make the truth from image labels and LIDAR; the data sets' own truth when left out.
-    start : sequence of path-like
-        A trained network of the same architecture to start from, in place of `imagenet`; of several the image networks'
-        mean scores are fused, see `with_mean_scores`, and there is no first stage. Without any, the weights are fresh.
+    start : path-like or sequence of path-like
+        A trained network of the same architecture to start from, in place of `imagenet`. Of several the image networks'
+        mean scores are fused, see `with_mean_scores`; they don't learn, so there is no first stage. Without any, the
+        weights are fresh.
 
     Raises
     ------
@@ -147,25 +149,30 @@ def train_network(
         When a file is missing or damaged, `start` has another architecture, or the folder holds a run that would be
         overwritten.
     """
-    if imagenet and start:
-        raise ArgumentError("start", "no other network beside the ImageNet weights, which it would replace", start)
-    if len(start) > 1 and params.end_to_end:
-        raise ArgumentError("--from", "one network without --two-stage: several image networks don't learn", len(start))
+    starts = [start] if isinstance(start, str | Path) else list(start)
+    if imagenet and starts:
+        raise ArgumentError("--from", "no network beside the ImageNet weights, which it would replace", str(starts[0]))
+    if len(starts) > 1 and params.end_to_end:
+        expected = "one network, or --two-stage beside several: their image networks don't learn"
+        raise ArgumentError("--from", expected, f"{len(starts)} networks without --two-stage")
     began, description, folder = datetime.now(UTC), architecture(segmenter, preset), Path(folder)
     check_folder(folder, resume)
     # What can't be is refused before the data are prepared, which takes minutes.
-    params = replace(params, image_iterations=0) if len(start) > 1 else params
+    params = replace(params, image_iterations=0) if len(starts) > 1 else params
     like_it, resumed = build_segmenter(segmenter, n_classes=1, preset=preset), (folder / CHECKPOINT).exists()
     if imagenet:
         load_imagenet(like_it, imagenet)
-    for path in start:
+    for path in starts:
         _check_alike(path, replace(read_architecture(path), label_set=description.label_set), description)
+    if sum(read_architecture(path).n_segmenters for path in starts) > MOST_SEGMENTERS:
+        raise ArgumentError("--from", f"at most {MOST_SEGMENTERS} image networks together", f"{len(starts)} files")
     folders = [data] if isinstance(data, str | Path) else list(data)
     with process_group(device) as chosen:
         with first_process_first():
             dataset = _open(folders, description, truth)
         description = replace(description, label_set=dataset.label_set.name)
-        net = _starts_as(start, description, dataset.camera) if start else build_net(description, dataset.camera, seed)
+        camera = dataset.camera
+        net = _starts_as(starts, description, camera) if starts else build_net(description, camera, seed)
         if imagenet:
             load_imagenet(net.segmenter, imagenet)
         train(net, dataset, folder, params, seed, resume, chosen)
@@ -182,10 +189,10 @@ def train_network(
             "params": {name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
             "dataset": hashes[0] if len(hashes) == 1 else hashes,
             **({"imagenet": sha256(imagenet)} if imagenet else {}),
-            **({"from": [sha256(path) for path in start]} if start else {}),
+            **({"from": [sha256(path) for path in starts]} if starts else {}),
             **({"truth": asdict(truth)} if truth else {}),
         }
-        command = _command(folders, folder, description, imagenet, start, seed, params, truth)
+        command = _command(folders, folder, description, imagenet, starts, seed, params, truth)
         write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)
 
 
@@ -205,8 +212,8 @@ def _starts_as(paths: Sequence[str | Path], description: Architecture, camera: C
 
 
 def _check_alike(path: str | Path, found: Architecture, description: Architecture) -> None:
-    """Refuse a network of another architecture."""
-    if found != description:
+    """Refuse a network of another architecture; one with several image networks is of the same."""
+    if replace(found, n_segmenters=1) != description:
         raise DataError(path, f"a network like the one to train, {description}", found)
 
 

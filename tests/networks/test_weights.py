@@ -74,6 +74,16 @@ def test_several_image_networks_come_back_and_their_scores_are_averaged(net, cam
     assert torch.equal(loaded(image, occupancy), mean(image, occupancy))
 
 
+def test_the_mean_of_means_is_of_all_image_networks(camera):
+    one, other, third = (build_net(SMALL, camera, seed=seed) for seed in (3, 4, 5))
+    both = with_mean_scores([one, other])
+    assert with_mean_scores([one]) is one
+    assert both.fusion is one.fusion
+    joined = with_mean_scores([both, third])
+    assert [*joined.segmenter.members] == [one.segmenter, other.segmenter, third.segmenter]
+    assert joined.architecture.n_segmenters == 3
+
+
 def test_as_many_image_networks_as_one_wants_have_other_first_weights(camera):
     one, other = build_net(replace(SMALL, n_segmenters=2), camera, seed=3).segmenter.members
     alone = build_net(SMALL, camera, seed=3).segmenter

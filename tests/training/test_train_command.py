@@ -194,8 +194,14 @@ def test_the_mean_of_several_networks_starts_from_them_and_only_its_fusion_learn
     given = {}
     monkeypatch.setattr(experiment, "train", lambda net, *others: given.update(net=net.eval(), params=others[2]))
     options = ["--data", str(data), "--from", str(files[0]), "--from", str(files[1]), "--out", str(tmp_path / "out")]
-    with pytest.raises(ArgumentError, match=r"--from: expected one network without --two-stage"):
+    with pytest.raises(
+        ArgumentError, match=r"--from: expected one network, or --two-stage .* found 2 networks without"
+    ):
         CliRunner().invoke(app, ["train", *options], catch_exceptions=False)
+    with pytest.raises(ArgumentError, match=r"--from: expected at most 9 image networks together, found 10 files"):
+        CliRunner().invoke(
+            app, ["train", *options, *8 * ["--from", str(files[0])], "--two-stage"], catch_exceptions=False
+        )
     result = CliRunner().invoke(app, ["train", *options, "--two-stage"])
     assert result.exit_code == 0, result.output
     image = torch.rand(1, 3, *Architecture().image_size)
@@ -220,8 +226,8 @@ def test_a_network_of_another_kind_is_no_start(monkeypatch, tmp_path):
 
 def test_a_network_starts_from_one_kind_of_weights(tmp_path):
     params = experiment.training_params("compact", iterations=1)
-    with pytest.raises(ArgumentError, match="start: expected no other network beside the ImageNet weights"):
-        experiment.train_network(tmp_path, tmp_path, "segnet", params, imagenet=tmp_path / "a", start=[tmp_path / "b"])
+    with pytest.raises(ArgumentError, match="--from: expected no network beside the ImageNet weights"):
+        experiment.train_network(tmp_path, tmp_path, "segnet", params, imagenet=tmp_path / "a", start=tmp_path / "b")
 
 
 @pytest.mark.parametrize("name", ["weights.safetensors", "log.csv", "image_stage.safetensors"])

@@ -109,7 +109,9 @@ def train(
     segmenter: Annotated[str, typer.Option(help="The image network.")] = "segnet",
     preset: Annotated[str, typer.Option(help="compact or paper (published size, 0.2 m cells).")] = "compact",
     imagenet: Annotated[Path | None, typer.Option(help="ImageNet weights from which --preset paper starts.")] = None,
-    start: Annotated[list[Path] | None, typer.Option("--from", help="A trained network; the mean of several.")] = None,
+    start: Annotated[
+        list[Path] | None, typer.Option("--from", help="A trained network to start from; again: their mean.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
     iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
     tint: Annotated[float, typer.Option(help="How far each colour of an image varies: 0.15 is 15 % either way.")] = 0.0,

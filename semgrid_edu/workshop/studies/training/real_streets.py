@@ -86,8 +86,8 @@ BLOCK = 2.0
 Part = tuple[TrainingSet, list[int]]
 Round = tuple[list[Part], list[Part]]
 Counted = dict[str, list[tuple[str, GridCounts]]]
-"""The frames of one camera, and the numbers of those that are meant; what is learned from, and what is scored; for each
-method and camera, what the method is called in the counts, and the counts."""
+"""A part: frames of one camera, and the numbers of those that are meant. A round: what is learned from, what is scored.
+Counted: for each method and camera what the method is called in the counts, and the counts."""
 
 
 def compare_real(
