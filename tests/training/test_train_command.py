@@ -167,11 +167,12 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     assert provenance["imagenet"] == sha256(imagenet)
 
 
-def test_a_network_starts_from_another_and_says_so(monkeypatch, tmp_path):
+@pytest.mark.parametrize("members", [1, 2])
+def test_a_network_starts_from_another_and_says_so(monkeypatch, tmp_path, members):
     monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
     data, first = tmp_path / "minikitti", tmp_path / "first.safetensors"
     write_text(data / "dataset.json", "{}")
-    save_net(start := build_net(Architecture(), _Noise.camera, seed=5), first)
+    save_net(start := build_net(Architecture(n_segmenters=members), _Noise.camera, seed=5), first)
     monkeypatch.setattr(experiment, "train", lambda net, *_: built.update(net.state_dict()))
     built = {}
     options = ["--data", str(data), "--data", str(data), "--from", str(first), "--out", str(tmp_path / "out")]
