@@ -73,6 +73,11 @@ class Architecture:
             found = f"{rows} x {columns} cells on {len(self.heights)} planes"
             raise ArgumentError("grid, heights", f"at most {MOST_POINTS} points of planes", found)
 
+    @property
+    def layout(self) -> tuple[str, tuple[int, int], GridSpec, tuple[float, ...]]:
+        """Label set, image size, grid and heights: what two networks share whose stages can be mixed or compared."""
+        return self.label_set, self.image_size, self.grid, self.heights
+
 
 class NetOutputs(NamedTuple):
     """What the network computes on its way from image to grid; each part is a symbol of Fig. 2.

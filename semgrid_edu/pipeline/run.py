@@ -132,7 +132,7 @@ def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tupl
     frames : iterable of Frame
         What `run_pipeline` takes.
     *several : Stages
-        Complete sets of stages with the same architecture, such as `own = Stages.of(net)` and `mine.over(own)`.
+        Complete sets of stages with one `Architecture.layout`, such as `own = Stages.of(net)` and `mine.over(own)`.
 
     Yields
     ------
@@ -142,7 +142,7 @@ def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tupl
     Raises
     ------
     ArgumentError
-        When a set isn't complete, two have different architectures, or a frame has no image.
+        When a set isn't complete, two have different layouts, or a frame has no image.
     StageError
         As for `run_pipeline`.
     """
@@ -150,7 +150,7 @@ def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tupl
     for stages in several:
         if not set(STAGES) <= set(stages.given):
             raise ArgumentError("several", "complete sets of stages, see `Stages.over`", f"only {stages.given}")
-        if stages.architecture is None or stages.architecture != architecture:
+        if stages.architecture is None or stages.architecture.layout != architecture.layout:
             raise ArgumentError("several", f"one architecture, such as {architecture}", stages.architecture)
     trackers = {id(stages.track): TrackerAdapter(stages.track, architecture.grid) for stages in several}
     memories = [MemoryAdapter(stages.remember, architecture.grid) if stages.remember else None for stages in several]

@@ -159,9 +159,9 @@ class Stages:
         Raises
         ------
         ArgumentError
-            When both have an architecture and the two differ, so that they can't be mixed.
+            When both have an architecture and their layouts differ, so that they can't be mixed.
         """
-        if self.architecture not in (None, other.architecture):
+        if self.architecture and self.architecture.layout != other.architecture.layout:
             raise ArgumentError("architecture", f"that of the other stages, {other.architecture}", self.architecture)
         return replace(other, **{name: getattr(self, name) for name in self.given})
 

@@ -9,7 +9,7 @@ from tiny_drive import DATE, write_tiny_drive
 
 from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.samples import sample_weights
+from semgrid_edu.datasets.samples import real_weights, sample_weights
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
@@ -114,6 +114,18 @@ def test_sets_of_stages_side_by_side_give_what_each_gives_alone_and_share_the_sa
         assert_equal_results(a, expected)
         assert_equal_results(b, replace(expected, refined=expected.grid))
     assert len(calls) == len(drive)
+
+
+def test_networks_with_other_image_networks_are_mixed_and_compared(drive, net):
+    """The shipped real network has three image networks, and FCN is another one: their stages pass the same arrays."""
+    own = Stages.of(net, FEW)
+    real = Stages.of(load_net(real_weights(), drive.camera), FEW)
+    fcn = Stages.of(build_net(Architecture("fcn"), drive.camera).eval(), FEW)
+    mixed = replace(real, segment=None, sample=None).over(own)
+    for a, b, c, d in run_side_by_side(drive[:1], own, real, fcn, mixed):
+        assert a.grid.shape == b.grid.shape == c.grid.shape
+        np.testing.assert_array_equal(d.scores, a.scores)
+        assert not np.array_equal(d.grid, a.grid)
 
 
 def test_only_complete_sets_of_one_architecture_run_side_by_side(drive, net):
