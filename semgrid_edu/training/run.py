@@ -162,9 +162,10 @@ def train_network(
     like_it, resumed = build_segmenter(segmenter, n_classes=1, preset=preset), (folder / CHECKPOINT).exists()
     if imagenet:
         load_imagenet(like_it, imagenet)
-    for path in starts:
-        _check_alike(path, replace(read_architecture(path), label_set=description.label_set), description)
-    if sum(read_architecture(path).n_segmenters for path in starts) > MOST_SEGMENTERS:
+    kinds = [read_architecture(path) for path in starts]
+    for path, kind in zip(starts, kinds, strict=True):
+        _check_alike(path, replace(kind, label_set=description.label_set), description)
+    if sum(kind.n_segmenters for kind in kinds) > MOST_SEGMENTERS:
         raise ArgumentError("--from", f"at most {MOST_SEGMENTERS} image networks together", f"{len(starts)} files")
     folders = [data] if isinstance(data, str | Path) else list(data)
     with process_group(device) as chosen:

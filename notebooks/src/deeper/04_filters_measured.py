@@ -408,7 +408,7 @@ assert share < 5
 #    car is found, with 30,000 it isn't.
 # 3. On twenty simulated drives CMCDOT finds 61.6 % of all cells that move, and more than 96 % of those with returns,
 #    within 25 m, that have been in view for 1.5 s; a binary grid finds none.
-# 4. A person who sets out at 1.4, 2.8 or 5 m/s is noticed after about 1.5 m, and one at 0.7 m/s isn't within 3 s.
+# 4. A person who sets out at 1.4, 2.8 or 5 m/s is noticed after about 1.5 m; at 0.7 m/s nobody is within 3 s.
 # 5. Behind a van 3.5 m wide a car's particles last until it comes out; behind one of 6 m they fade, and the car counts
 #    as new. Without objects nothing says that what went in comes out.
 #

@@ -117,7 +117,7 @@ def compare_real(
     -------
     dict
         "scores": by split and method both accuracies with intervals over seeds and blocks of two seconds, each also as
-        "above the table" of occupancy states, recalls, pixel accuracies by camera, and "ECE"; and what made them; JSON.
+        "above the table" of occupancy states, recalls, pixel accuracies by camera, and "ECE"; and what made them.
 
     Raises
     ------
@@ -199,8 +199,8 @@ def _networks(
     """Return the files of the weights that are learned in each round with seed k, by the names of their runs."""
     way, files = WAYS[name], {}
     for r, (training, _) in enumerate(rounds):
-        of_runs = [split.with_name(f"{split.name} {r}, {way.mean_of}, {s}") / IMAGE_STAGE for s in seeds]
-        starts = of_runs if way.mean_of else [sample_weights(way.start)] if way.start else []
+        of_runs = [split.with_name(f"{split.name} {r}, {way.mean_of}, {s}") / IMAGE_STAGE for s in seeds if way.mean_of]
+        starts = of_runs or ([sample_weights(way.start)] if way.start else [])
         folder = split.with_name(f"{split.name} {r}, {name}, {k}")
         if way.params and not (folder / WEIGHTS).exists():
             mixture = Mixture([[_Subset(*part) for part in training], *([streets] if way.with_simulated else [])])
