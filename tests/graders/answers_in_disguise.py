@@ -1,7 +1,8 @@
 """Answers that give away too little or the right thing in other types: code that a student could add to any answer.
 
 It wraps each function of an answer, so that one list tries all exercises: what a submission gives for inputs that it
-doesn't know (`POINTLESS`), and the types of numbers in which an honest one may calculate (`HONEST`).
+doesn't know (`POINTLESS`), the types of numbers in which an honest one may calculate (`HONEST`), and one that leaves
+nothing of its arguments (`SPOILING`).
 """
 
 import ast
@@ -80,9 +81,47 @@ HONEST = {
 }
 """The right result in another type."""
 
+SPOILING = """
+def _spoil(value):
+    import dataclasses, numpy as np
+    if isinstance(value, np.ndarray) and value.flags.writeable:
+        value[...] = np.zeros_like(value)
+    elif dataclasses.is_dataclass(value):
+        _spoil(vars(value))
+    elif isinstance(value, (list, tuple, dict)):
+        for part in value.values() if isinstance(value, dict) else value:
+            _spoil(part)
+    if isinstance(value, list):
+        value.clear()
+
+def _spoiling(answer):
+    import functools
+
+    @functools.wraps(answer)
+    def spoiling(*arguments, **named):
+        result = answer(*arguments, **named)
+        _spoil((arguments, named))
+        return result
+
+    return spoiling
+
+for _name in NAMES:
+    globals()[_name] = _spoiling(globals()[_name])
+"""
+"""Each function zeroes the arrays that it was given, and empties the lists."""
+
 
 def disguise(code, change, pointless):
     """Return the code that wraps the functions of an answer; "" for an answer without functions."""
+    return _around(code, WRAPPING.replace("CHANGE", change).replace("NUMBER", "0" if pointless else "None"))
+
+
+def spoil(code):
+    """Return an answer whose functions spoil what they are given."""
+    return code + _around(code, SPOILING)
+
+
+def _around(code, wrapping):
+    """Return the code that wraps the functions of an answer; "" for an answer without functions."""
     names = [node.name for node in ast.parse(code).body if isinstance(node, ast.FunctionDef) and node.name[0] != "_"]
-    wrapping = WRAPPING.replace("NAMES", repr(names)).replace("CHANGE", change)
-    return wrapping.replace("NUMBER", "0" if pointless else "None") if names else ""
+    return wrapping.replace("NAMES", repr(names)) if names else ""

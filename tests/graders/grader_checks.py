@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from unittest import mock
 
 import pytest
-from answers_in_disguise import HONEST, POINTLESS, disguise
+from answers_in_disguise import HONEST, POINTLESS, disguise, spoil
 from nbgrader_scores import autograde, tasks
 from warm import grade_warm, warm_processes
 
@@ -117,21 +117,28 @@ class GraderChecks:
     def graded(cls, source, students, start):
         """Every student's (score, points, message) by student and task, from one warm session.
 
-        Beside an endless loop the other answers have its short time too; on a busy machine that may not be enough for
-        a right one, and the notebook is graded again with the time of an answer.
+        Before them all comes a student who spoils what tests call her functions with: nobody may miss it. Of a packed
+        student the tests of the entries alone are run; of one who leaves a task to the reference, all.
         """
-        loops = {f"student-{n}": set(own) for n, own in enumerate(pack(cls.entries)) if kind(own) == "endless loop"}
+        spoilt = {code: spoil(code) for code in coded(source, students["reference"])}
+        greedy = {task: spoilt.get(code, code) for task, code in students["reference"].items()}
+        grade_warm(source, greedy, start, TIMEOUT["answer"])
+        grade_warm(source, students["reference"], start, TIMEOUT["answer"], unseen=spoilt)
+        own = {f"student-{n}": answers for n, answers in enumerate(pack(cls.entries))}
+        tested = own | {cls.incomplete(): None}
 
-        def grade(name, timeout):
-            return cls.by_task(source, grade_warm(source, students[name], start, TIMEOUT[timeout]))
+        def grade(name):
+            timeout = TIMEOUT[kind(own[name]) if name in own else "answer"]
+            return cls.by_task(source, grade_warm(source, students[name], start, timeout, tested=tested.get(name)))
 
-        scores = {name: grade(name, "endless loop" if name in loops else "answer") for name in students}
-        late = [
-            name
-            for name, own in loops.items()
-            if any(words in scores[name][task][2] for task in scores[name].keys() - own for words in ENDLESS)
-        ]
-        return scores | {name: grade(name, "answer") for name in late}
+        return {name: grade(name) for name in students}
+
+    @classmethod
+    def incomplete(cls):
+        """The first packed student without an endless loop who leaves a task to the reference."""
+        everything = {entry.task for entry in cls.entries}
+        packed = enumerate(pack(cls.entries))
+        return next(f"student-{n}" for n, own in packed if own.keys() < everything and kind(own) == "answer")
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -158,7 +165,7 @@ class GraderChecks:
                 "\n".join(cells[name].message for name in names),
             )
             for task, names in tasks(source).items()
-            if all(cells[name].score is not None for name in names)
+            if all(name in cells and cells[name].score is not None for name in names)
         }
 
     def test_reference_earns_full_marks(self, graded_by_nbgrader):
@@ -179,9 +186,11 @@ class GraderChecks:
         assert re.sub(r"\s+", " ", entry.says) in re.sub(r"\s+", " ", message)
 
     def test_other_tasks_keep_their_points(self, graded):
-        for number, answers in enumerate(pack(self.entries)):
-            for task, (score, points, message) in graded[f"student-{number}"].items():
-                assert task in answers or score == points, f"student-{number}, {task}: {message}"
+        student = self.incomplete()
+        own = pack(self.entries)[int(student.removeprefix("student-"))]
+        others = {task: result for task, result in graded[student].items() if task not in own}
+        assert others
+        assert {task: message for task, (score, points, message) in others.items() if score < points} == {}
 
     @pytest.mark.parametrize("kind", POINTLESS)
     def test_known_inputs_alone_earn_nothing(self, source, reference, start, kind):

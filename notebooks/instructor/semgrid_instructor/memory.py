@@ -1,5 +1,6 @@
 """Hidden tests of exercise 14, memory for classes: other frames, other maps, and the simulated drive, which moves."""
 
+import copy
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -111,7 +112,7 @@ def _driven() -> tuple[list[Frame], list[NDArray], GridSpec]:
 @hidden
 def check_remember(maps: Callable) -> None:
     """Ten frames of the simulated drive, against one frame: nothing lost in view, much gained in cells seen before."""
-    frames, (occupancy, grids, truth, since), spec = _driven()
+    frames, (occupancy, grids, truth, since), spec = copy.deepcopy(_driven())  # an answer may change what it gets
     got = answer_array(maps(frames, occupancy, grids, spec))
     assert got.shape == truth.shape, "maps of another shape, or for another number of frames"
     one = grids.argmax(axis=1)

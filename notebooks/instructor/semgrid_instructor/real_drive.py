@@ -10,10 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.camera import invert_rigid, rigid_transform, transform_points
-from semgrid_edu.datasets.samples import real_drive, sample_weights
-from semgrid_edu.networks import load_net
-from semgrid_edu.pipeline import run_pipeline
-from semgrid_edu.workshop.studies.new_drive.own_street import semantic_truths
+from semgrid_edu.datasets.samples import real_drive
+from semgrid_edu.workshop.studies.new_drive.own_street import semantic_truths, street_results
 from semgrid_instructor import close, generator, hidden
 
 
@@ -110,10 +108,9 @@ def check_refine(refine: Callable) -> None:
 @cache
 def _street() -> list[tuple[NDArray, NDArray, NDArray]]:
     """Return map, occupancy and truth of the street's first six frames; the same for every answer."""
-    drive = real_drive()
-    net = load_net(sample_weights(), drive.camera)
-    grids, beliefs = zip(*((one.grid, one.belief.probability) for one in run_pipeline(drive[:6], net)), strict=True)
-    return list(zip(grids, beliefs, semantic_truths(drive, beliefs, net.architecture.grid), strict=True))
+    results, spec = street_results()
+    grids, beliefs = zip(*((one.grid, one.belief.probability) for one in results[:6]), strict=True)
+    return list(zip(grids, beliefs, semantic_truths(real_drive(), beliefs, spec), strict=True))
 
 
 @hidden

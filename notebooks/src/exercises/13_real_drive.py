@@ -24,13 +24,16 @@ import warnings
 import numpy as np
 
 from semgrid_edu.answers import answer_array, answer_number
-from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_weights
+from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import load_net
-from semgrid_edu.pipeline import run_pipeline
 from semgrid_edu.workshop.scoring.statistics import paired_interval
 from semgrid_edu.workshop.studies.new_drive.drive_checks import motion_between, standing_points
-from semgrid_edu.workshop.studies.new_drive.own_street import piece_confusions, semantic_truths, street_pieces
+from semgrid_edu.workshop.studies.new_drive.own_street import (
+    piece_confusions,
+    semantic_truths,
+    street_pieces,
+    street_results,
+)
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 
@@ -358,13 +361,12 @@ _test()
 @functools.cache
 def _street(drive=None, stop=10):
     """Return what a stage `refine` gets in the first frames of a labelled drive, the truths, the pieces, and the map as it is."""
+    results, spec = street_results(drive, stop)
     drive = real_drive() if drive is None else drive
-    frames, net = drive[:stop], load_net(sample_weights(), drive.camera)
-    results = list(run_pipeline(frames, net))
-    beliefs, spec = [result.belief.probability for result in results], net.architecture.grid
+    beliefs = [result.belief.probability.copy() for result in results]
     inputs = [(np.log(np.maximum(result.grid, 1e-12)), o) for result, o in zip(results, beliefs, strict=True)]
     called = np.stack([result.grid.argmax(axis=0) for result in results])
-    return inputs, semantic_truths(drive, beliefs, spec), street_pieces(frames, spec), called
+    return inputs, semantic_truths(drive, beliefs, spec), street_pieces(drive[:stop], spec), called
 
 
 def _gains(refine, drive=None, stop=10):

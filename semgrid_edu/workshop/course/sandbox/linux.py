@@ -14,6 +14,9 @@ from pathlib import Path
 
 from semgrid_edu.storage.files import table_beside
 
+LIBRARY = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
+"""The C library, looked up once: among the libraries of a process with torch that takes milliseconds."""
+
 NO_NEW_PRIVILEGES = 38
 """The argument of prctl without which the kernel refuses both."""
 
@@ -92,7 +95,7 @@ def give_up_files(look: Iterable[Path], read: Iterable[Path], write: Iterable[Pa
     for rights, paths in ((READ_DIR, look), (READ, read), (files, write)):
         for path in filter(Path.exists, paths):
             _allow(rules, path, rights & files)
-    ctypes.CDLL(None).prctl(NO_NEW_PRIVILEGES, 1, 0, 0, 0)
+    LIBRARY.prctl(NO_NEW_PRIVILEGES, 1, 0, 0, 0)
     _call(RESTRICT, rules, 0)
     os.close(rules)
     return ["files", *(["network"] if known >= 4 else []), *(["signals"] if known >= 6 else [])]
@@ -109,9 +112,8 @@ def _allow(rules: int, path: Path, rights: int) -> None:
 
 def _call(number: int, *arguments: bytes | int | None) -> int:
     """Do a system call; one that fails raises OSError."""
-    library = ctypes.CDLL(None, use_errno=True)
     passed = [ctypes.c_long(one) if isinstance(one, int) else one for one in arguments]
-    result = library.syscall(ctypes.c_long(number), *passed)
+    result = LIBRARY.syscall(ctypes.c_long(number), *passed)
     if result < 0:
         raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
     return result
@@ -126,12 +128,11 @@ def give_up_calls() -> bool:
     program = ctypes.create_string_buffer(code)
     # struct sock_fprog: the number of instructions, and where they are.
     described = struct.pack("HP", len(code) // 8, ctypes.addressof(program))
-    library = ctypes.CDLL(None)
-    library.prctl(NO_NEW_PRIVILEGES, 1, 0, 0, 0)
+    LIBRARY.prctl(NO_NEW_PRIVILEGES, 1, 0, 0, 0)
     for kept in (READ_ANY, 0):  # Docker's root hasn't got the first
-        if library.capset(struct.pack("Ii", CAPABILITIES, 0), struct.pack("6I", kept, kept, 0, 0, 0, 0)) == 0:
+        if LIBRARY.capset(struct.pack("Ii", CAPABILITIES, 0), struct.pack("6I", kept, kept, 0, 0, 0, 0)) == 0:
             break
-    return library.prctl(SET_SECCOMP, FILTER, described, 0, 0) == 0
+    return LIBRARY.prctl(SET_SECCOMP, FILTER, described, 0, 0) == 0
 
 
 def _filter(audit: int, refused: dict[str, int], unknown: dict, idle: dict, refused_if: dict) -> bytes:
