@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
+from stat import S_ISDIR
 
 import pytest
 import typer
@@ -46,7 +47,7 @@ def write_dataset(root: Path) -> None:
 
 @pytest.fixture(scope="module")
 def prepared(tmp_path_factory) -> Path:
-    """What every row of the table works on a copy of."""
+    """What every row of the table finds."""
     root = tmp_path_factory.mktemp("prepared")
     write_dataset(root / "TINY")
     for split in ("train", "test", "validation"):
@@ -69,16 +70,49 @@ def copied(source: str, target: str) -> None:
     (os.link if large else shutil.copy2)(source, target)
 
 
+@pytest.fixture(scope="module")
+def spoilt(prepared, tmp_path_factory) -> Path:
+    """A copy for the rows to spoil, one after the other."""
+    return shutil.copytree(prepared, tmp_path_factory.mktemp("rows") / "place", copy_function=copied)
+
+
 @pytest.fixture
-def place(prepared, tmp_path, monkeypatch) -> Iterator[Path]:
+def place(prepared, spoilt, monkeypatch) -> Iterator[Path]:
     """A copy to spoil, as the current folder."""
-    shutil.copytree(prepared, tmp_path / "place", copy_function=copied)
-    monkeypatch.chdir(tmp_path / "place")
+    monkeypatch.chdir(spoilt)
     monkeypatch.setenv(CACHE_VARIABLE, "")  # so that what --cache sets is undone afterwards
-    yield tmp_path / "place"
+    yield spoilt
     while HELD:
         HELD.pop().__exit__(None, None, None)
-    shutil.rmtree(tmp_path / "place")
+    mend(spoilt, prepared)
+    assert states(spoilt) == states(prepared)
+
+
+def states(folder: Path) -> dict[Path, tuple[int, ...]]:
+    """What shows that a file or folder was changed: its kind and rights, and of a file size and time."""
+    found = {}
+    for root, folders, files in os.walk(folder):
+        for path in (Path(root, name) for name in folders + files):
+            stat = path.lstat()
+            file = () if S_ISDIR(stat.st_mode) else (stat.st_size, stat.st_mtime_ns)
+            found[path.relative_to(folder)] = stat.st_mode, *file
+    return found
+
+
+def mend(folder: Path, original: Path) -> None:
+    """Make a spoilt copy as it was, which is faster than a new copy of hundreds of files."""
+    now, was = states(folder), states(original)
+    for name in sorted(now, reverse=True):  # what lies in a folder comes before the folder
+        if S_ISDIR(now[name][0]) and not S_ISDIR(was.get(name, (0,))[0]):
+            (folder / name).rmdir()
+        elif not S_ISDIR(now[name][0]) and now[name] != was.get(name):
+            (folder / name).unlink()
+    for name in sorted(was):
+        if S_ISDIR(was[name][0]):
+            (folder / name).mkdir(exist_ok=True)
+            (folder / name).chmod(was[name][0])
+        elif now.get(name) != was[name]:
+            copied(str(original / name), str(folder / name))
 
 
 @pytest.fixture
