@@ -11,8 +11,9 @@ from itertools import cycle, islice
 from pathlib import Path
 
 import psutil
+from submissions import reference_answers, submission
 
-from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place, reference_answers, submission
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place
 from semgrid_edu.workshop.course.nbgrader.build import build_course, exercise_sources
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course
 from semgrid_edu.workshop.course.notebooks.build import write_notebook

@@ -9,18 +9,12 @@ import nbformat
 import pytest
 from nbgrader.api import Gradebook
 from nbgrader_scores import autograde
+from submissions import reference_answers, submission
 from tiny_course import tiny_notebooks
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
-from semgrid_edu.workshop.course.nbgrader.autograde import (
-    GradeSettings,
-    UngradedError,
-    autograde_one,
-    place,
-    reference_answers,
-    submission,
-)
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError, autograde_one, place
 from semgrid_edu.workshop.course.nbgrader.build import (
     build_course,
     build_exercise,

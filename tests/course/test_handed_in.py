@@ -12,19 +12,13 @@ import pytest
 from nbconvert import HTMLExporter
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
 from nbgrader.utils import is_grade
+from submissions import reference_answers, submission
 from tiny_course import tiny_notebooks
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.workshop.course.nbgrader.autograde import (
-    GradeSettings,
-    UnfitError,
-    place,
-    reference_answers,
-    student_variant,
-    submission,
-)
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UnfitError, place, student_variant
 from semgrid_edu.workshop.course.nbgrader.build import MARKER, build_course, exercise_sources
 from semgrid_edu.workshop.course.nbgrader.cleaning import without_scripts
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one

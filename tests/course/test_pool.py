@@ -3,9 +3,10 @@
 import tempfile
 
 import pytest
+from submissions import reference_answers, submission
 from tiny_course import tiny_notebooks
 
-from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place, reference_answers, submission
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place
 from semgrid_edu.workshop.course.nbgrader.build import build_course
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course
 from semgrid_edu.workshop.course.notebooks.build import write_notebook

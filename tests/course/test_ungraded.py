@@ -11,6 +11,7 @@ import pytest
 from nbconvert.writers import FilesWriter
 from nbgrader.api import Gradebook, InvalidEntry
 from sqlalchemy.exc import PendingRollbackError
+from submissions import reference_answers, submission
 from tiny_course import tiny_notebooks
 from typer.testing import CliRunner
 
@@ -19,13 +20,7 @@ from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.commands import main as cli
 from semgrid_edu.workshop.course.nbgrader import autograde as grading
 from semgrid_edu.workshop.course.nbgrader import preprocessors as nbgrader_steps
-from semgrid_edu.workshop.course.nbgrader.autograde import (
-    GradeSettings,
-    UngradedError,
-    place,
-    reference_answers,
-    submission,
-)
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError, place
 from semgrid_edu.workshop.course.nbgrader.build import build_course
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, grade_one, missing_limits
 from semgrid_edu.workshop.course.nbgrader.gradebook import misplaced, ungraded, write_graded

@@ -1,8 +1,9 @@
 """Submissions as students hand them in, odd ones too, graded by nbgrader as an instructor would."""
 
 from nbformat.v4 import new_code_cell
+from submissions import reference_answers, submission
 
-from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place, reference_answers, submission
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, write_notebook
 from semgrid_edu.workshop.course.sandbox.notebook import cell_name

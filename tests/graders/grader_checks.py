@@ -11,10 +11,10 @@ from unittest import mock
 import pytest
 from answers_in_disguise import HONEST, POINTLESS, disguise, spoil
 from nbgrader_scores import autograde, tasks
+from submissions import reference_answers, submission
 from warm import grade_warm, warm_processes
 
 from semgrid_edu.workshop.course.nbgrader import preprocessors
-from semgrid_edu.workshop.course.nbgrader.autograde import reference_answers, submission
 from semgrid_edu.workshop.course.nbgrader.preprocessors import prepare, prepared_folder
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 from semgrid_edu.workshop.course.sandbox.limits import Limits

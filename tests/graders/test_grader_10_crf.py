@@ -8,6 +8,7 @@ import pytest
 from grader_checks import GraderChecks, mistake, right
 from scipy.ndimage import gaussian_filter
 from scipy.special import log_softmax
+from submissions import reference_answers
 
 from semgrid_edu.crf import (
     CrfParams,
@@ -20,7 +21,6 @@ from semgrid_edu.crf import (
 )
 from semgrid_edu.pipeline import load_stages
 from semgrid_edu.stage_models.crf import all_free
-from semgrid_edu.workshop.course.nbgrader.autograde import reference_answers
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 

@@ -19,9 +19,9 @@ from unittest import mock
 from nbgrader.utils import determine_grade, is_grade, is_solution
 from nbgrader_scores import CellScore, error_message, tasks
 from numba.core.caching import UserProvidedCacheLocator
+from submissions import submission
 
 from semgrid_edu.storage.compiled import PACKAGE
-from semgrid_edu.workshop.course.nbgrader.autograde import submission
 from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells, use_instructor
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.limits import Limits
