@@ -750,6 +750,11 @@ def others_say(blur, Q, shape, reach):
             ),
         ),
         right(
+            "the occupancy changed in place",
+            task="refine",
+            code=crf(before="o /= 0.2", features="np.hstack([place / 3.2, o.reshape(4, -1).T])"),
+        ),
+        right(
             "a lattice of one's own, of sparse matrices",
             task="refine",
             code="""

@@ -184,16 +184,16 @@ def check_refine(refine: Callable) -> None:
 def check_refine_memory(refine: Callable) -> None:
     """Whether memory grows with the number of cells, not of pairs; what one cell says must reach its neighbours."""
     log_g, o = _street(128, 4, (45, 44))
-    refined, megabytes = peak_megabytes(refine, log_g, o)
+    refined, megabytes = peak_megabytes(refine, log_g.copy(), o.copy())
     refined = answer_array(refined)
     assert refined.shape == log_g.shape, "another shape"
     assert np.isfinite(refined).all(), "NaN or infinity on a large map"
-    assert close(answer_array(refine(log_g, o)), refined, atol=1e-3), "another map for the same input"
+    assert close(answer_array(refine(log_g.copy(), o.copy())), refined, atol=1e-3), "another map for the same input"
     turned = log_g.copy()
     turned[:, 20, 20] = log_g[[1, 2, 3, 0], 20, 20]
     elsewhere = np.ones(o.shape[1:], bool)
     elsewhere[20, 20] = False
-    moved = np.abs(answer_array(refine(turned, o)) - refined)[:, elsewhere]
+    moved = np.abs(answer_array(refine(turned, o.copy())) - refined)[:, elsewhere]
     assert moved.max() > 1e-5 * np.abs(refined).max(), "what one cell says doesn't reach any other"
     assert megabytes < 25, (
         "1980 cells took more memory than passes along rows and columns need: are all pairs written down?"

@@ -103,6 +103,8 @@ def test_arguments_beside_a_function_are_changed_too(answer):
 def test_an_error_of_a_function_that_is_given_reaches_the_answer(answer):
     f = answer("def f(g):\n    try:\n        g()\n    except ValueError as error:\n        return str(error)")
     assert "ZeroDivisionError" in f(lambda: 1 / 0)
+    assert "more than can be sent" in f(lambda: np.ones(2_000_000)), "and the next call gets its own reply"
+    assert "IndexError" in f(lambda: [][0])
 
 
 @pytest.mark.parametrize(
@@ -306,6 +308,22 @@ def test_a_first_call_is_not_measured(answer):
     """A function that is compiled takes far more memory then."""
     f = answer("kept = []\ndef f(a):\n    kept or kept.append(bytes(b'1' * 10**8))\n    return a")
     assert f.peak_megabytes(np.arange(3.0))[1] < 5
+
+
+def test_the_measured_call_cannot_be_foreseen(answer):
+    """Else its result could be worked out before, with all the memory of the world."""
+    f = answer("seen = []\ndef f(*arguments):\n    seen.append(arguments)\n    return seen[-2:]")
+    a, b = np.arange(100.0).reshape(4, 25), np.arange(25) % 2 == 1
+    (warm_a, warm_b), _ = f.peak_megabytes(a, b)[0]
+    assert not any(np.array_equal(warm_a, one) for one in (a, np.flip(a), a[::-1], a[:, ::-1]))
+    np.testing.assert_array_equal(warm_a[0] % 25 % 2 == 1, warm_b)  # columns of both go together
+
+
+def test_nobody_looks_at_memory_after_a_measured_call_has_failed(session, answer):
+    f = answer("calls = []\ndef f(n):\n    calls.append(n)\n    if len(calls) == 2: raise ValueError(n)")
+    with pytest.raises(ValueError, match="3"):
+        f.peak_megabytes(3)
+    assert session.process.family is None or session.process.family.ended.is_set()
 
 
 def test_a_child_is_not_measured_in_place_of_the_worker(session, answer, monkeypatch):

@@ -93,6 +93,7 @@ class StudentProcess:
         beside: Path | None = None,
     ) -> None:
         self.prepared, self.keeps, self.contained, self.namespace = prepared, keeps, bool(container), ""
+        self.family: Sampled | None = None
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
         if prepared is not None:
             shutil.copytree(prepared, self.folder / around.PREPARED, ignore=around.ONLY_WHOLE)
@@ -206,7 +207,7 @@ class StudentProcess:
             reply = self._exchange(data, deadline, callbacks)
             if "callback" not in reply:
                 return reply
-            data = encode(_called(callbacks, reply))
+            data = _called(callbacks, reply)
 
     def _exchange(self, data: bytes, deadline: float, callbacks: list[Callable]) -> dict[str, Any]:
         """Send bytes, and return what comes back."""
@@ -251,6 +252,8 @@ class StudentProcess:
 
     def stop(self) -> None:
         """End the process with all that it has started, and delete its folder."""
+        if self.family:
+            self.family.ended.set()
         self.sent.put(None)
         self._kill()
         self.process.wait()
@@ -271,12 +274,12 @@ class StudentProcess:
             time.sleep(0.01)
 
 
-def _called(callbacks: list[Callable], reply: dict) -> dict[str, Any]:
-    """Work out a function for the student's process."""
+def _called(callbacks: list[Callable], reply: dict) -> bytes:
+    """Work out a function for the student's process; return what it is sent, an error when the result can't be."""
     try:
-        return {"result": callbacks[reply["callback"]](*reply["arguments"], **reply["named"])}
+        return encode({"result": callbacks[reply["callback"]](*reply["arguments"], **reply["named"])})
     except Exception as error:
-        return {"error": f"{type(error).__name__}: {error}"}
+        return encode({"error": f"{type(error).__name__}: {error}"})
 
 
 @cache

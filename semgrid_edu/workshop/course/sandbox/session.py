@@ -3,6 +3,7 @@
 import builtins
 import time
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -152,10 +153,10 @@ class Session:
         self.printed += reply.get("streams", {}).get("stdout", "")
         if "changed" in reply:
             put_back((arguments, named), reply["changed"])
+        megabytes = self._alive().megabytes() if measured and not inside else reply.get("megabytes", float("nan"))
         if "error" in reply:
             raise self._as_error(reply["error"])
-        outside = measured and not inside
-        return reply["result"], self._alive().megabytes() if outside else reply.get("megabytes", float("nan"))
+        return reply["result"], megabytes
 
     def _as_error(self, error: dict[str, Any]) -> Exception:
         """Return the error that an answer raised; where its inputs are secret, no more of it than the line."""
@@ -277,8 +278,10 @@ class RemoteFunction:
         *arguments
             What it is called with.
         """
-        # What is compiled or loaded on a first call isn't counted; the same call would find its result remembered.
-        self(*(np.flip(one).copy() if isinstance(one, np.ndarray) else one for one in arguments))
+        # What is compiled or loaded on a first call isn't counted. It has no order from which the next can be foreseen.
+        order = cache(np.random.default_rng().permutation)  # axes of one length belong together
+        arrays = (one[np.ix_(*map(order, one.shape))] if isinstance(one, np.ndarray) else one for one in arguments)
+        self(*arrays)
         return self.session.call(self.__name__, arguments, {}, measured=True)
 
 
