@@ -108,7 +108,7 @@ def check_refine(refine: Callable) -> None:
 @cache
 def _street() -> list[tuple[NDArray, NDArray, NDArray]]:
     """Return map, occupancy and truth of the street's first six frames; the same for every answer."""
-    results, spec = street_results()
+    results, spec = street_results(None, 10)
     grids, beliefs = zip(*((one.grid, one.belief.probability) for one in results[:6]), strict=True)
     return list(zip(grids, beliefs, semantic_truths(real_drive(), beliefs, spec), strict=True))
 

@@ -9,7 +9,7 @@
 # - compute how fast a map blurs that is moved by parts of a cell, and say why scrolling doesn't blur;
 # - tell convergence to BOF from convergence to the truth;
 # - read a table of recall and precision, and say which of a filter's errors it hides;
-# - say how long the filter needs to notice somebody who sets out, and what it loses without objects.
+# - say how long the filter takes to call a person DYNAMIC who starts walking, and what it loses without objects.
 #
 # **Prerequisites.** Lecture [04](../04_cmcdot.ipynb).
 #
@@ -408,7 +408,7 @@ assert share < 5
 #    car is found, with 30,000 it isn't.
 # 3. On twenty simulated drives CMCDOT finds 61.6 % of all cells that move, and more than 96 % of those with returns,
 #    within 25 m, that have been in view for 1.5 s; a binary grid finds none.
-# 4. A person who sets out at 1.4, 2.8 or 5 m/s is noticed after about 1.5 m; at 0.7 m/s nobody is within 3 s.
+# 4. A person who starts walking at 1.4, 2.8 or 5 m/s is called DYNAMIC after about 1.5 m; at 0.7 m/s not within 3 s.
 # 5. Behind a van 3.5 m wide a car's particles last until it comes out; behind one of 6 m they fade, and the car counts
 #    as new. Without objects nothing says that what went in comes out.
 #

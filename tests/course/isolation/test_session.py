@@ -105,6 +105,7 @@ def test_an_error_of_a_function_that_is_given_reaches_the_answer(answer):
     assert "ZeroDivisionError" in f(lambda: 1 / 0)
     assert "more than can be sent" in f(lambda: np.ones(2_000_000)), "and the next call gets its own reply"
     assert "IndexError" in f(lambda: [][0])
+    assert len(f(lambda: {}["x" * 20_000_000])) < 2000
 
 
 @pytest.mark.parametrize(

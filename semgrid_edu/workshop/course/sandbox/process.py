@@ -51,6 +51,9 @@ STARTED = 60.0
 ENDING = 5.0
 """Seconds that the system may take to end a process."""
 
+MOST_SAID = 1000
+"""Characters of an error that are sent back to a student's process, whose arguments it may quote."""
+
 
 class ProcessEndedError(Exception):
     """A student's process is no more: it ended itself, or was ended because it took too long."""
@@ -279,7 +282,7 @@ def _called(callbacks: list[Callable], reply: dict) -> bytes:
     try:
         return encode({"result": callbacks[reply["callback"]](*reply["arguments"], **reply["named"])})
     except Exception as error:
-        return encode({"error": f"{type(error).__name__}: {error}"})
+        return encode({"error": f"{type(error).__name__}: {error}"[:MOST_SAID]})
 
 
 @cache

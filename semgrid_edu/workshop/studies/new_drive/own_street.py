@@ -23,15 +23,15 @@ PIECE = 8.0
 
 
 @cache
-def street_results(drive: FrameSequence | None = None, stop: int = 10) -> tuple[tuple[FrameResult, ...], GridSpec]:
+def street_results(drive: FrameSequence | None, stop: int) -> tuple[tuple[FrameResult, ...], GridSpec]:
     """Run the pipeline on a drive's first frames, with the network that knows simulated streets only.
 
     This is done once in a process. Whoever grades many submissions shares it among them, so its grids can't be written.
 
     Parameters
     ----------
-    drive : FrameSequence, optional
-        The drive; without one, the real street that ships.
+    drive : FrameSequence or None
+        The drive; None for the real street that ships.
     stop : int
         The number of frames.
 
