@@ -11,7 +11,7 @@ import tempfile
 from pathlib import Path
 
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
-from semgrid_edu.workshop.course.sandbox.values import MOST_INPUT, MOST_JSON, Wire
+from semgrid_edu.workshop.course.sandbox.values import Wire
 from semgrid_edu.workshop.course.sandbox.worker import Shell, Worker
 
 
@@ -55,7 +55,7 @@ def be_student(folder, pipes):
     for stream in (0, 1, 2):
         os.dup2(nothing, stream)
     Shell.clear_instance()
-    Worker(Wire(os.fdopen(pipes[0], "rb"), os.fdopen(pipes[1], "wb"), MOST_INPUT + MOST_JSON)).serve()
+    Worker(Wire(os.fdopen(pipes[0], "rb"), os.fdopen(pipes[1], "wb"))).serve()
     os._exit(0)
 
 

@@ -139,8 +139,7 @@ def stage_table() -> str:
 
 def _code_link(name: str) -> str:
     """Link a function or class to the module that defines it."""
-    module = find_code(name).__module__
-    return f"[`{name.rpartition('.')[2]}`](../{module.replace('.', '/')}.py)"
+    return f"[`{name.rpartition('.')[2]}`](../{find_code(name).__module__.replace('.', '/')}.py)"
 
 
 def _check(stage: StageModel) -> str:

@@ -230,8 +230,7 @@ def cell_places(spec: GridSpec, heights: ArrayLike, camera: Camera) -> StoryMaps
     """
     pixels, visible = plane_pixels(spec, heights, camera)
     steps = np.where(visible[..., None], np.rint(pixels / STEPS["pixel"]), NOT_SEEN)
-    distance = spec.distances()[None]
-    alike = {"distance": _wide(np.rint(distance / STEPS["distance"]))}
+    alike = {"distance": _wide(np.rint(spec.distances()[None] / STEPS["distance"]))}
     return StoryMaps(alike, {"pixels": _wide(np.moveaxis(steps, -1, 0).reshape(-1, *spec.shape))})
 
 

@@ -180,8 +180,7 @@ class Record:
     @property
     def start(self) -> int:
         """The number of the view with which the page begins: the one in which most moves, of those with stories."""
-        told = [k for k, view in enumerate(self.views) if view.details] or [0]
-        return max(told, key=self._moving.__getitem__)
+        return max([k for k, view in enumerate(self.views) if view.details] or [0], key=self._moving.__getitem__)
 
     @property
     def gaps(self) -> bool:

@@ -112,7 +112,7 @@ def count_methods(
     """
     learned = network_grids(net, test, {_name(refine): refine or Stages.of(net).refine})
     baselines = baseline_grids(training, test, segmenters)
-    return count_grids(lambda k: {**learned(k), **baselines(k)}, test)
+    return count_grids(lambda k: learned(k) | baselines(k), test)
 
 
 def scores_of_counts(counted: GridCounts, test: TrainingSet) -> dict[str, object]:

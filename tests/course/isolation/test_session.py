@@ -100,6 +100,32 @@ def test_arguments_beside_a_function_are_changed_too(answer):
     assert given == [abs]
 
 
+def test_in_changed_arguments_nan_stands_for_what_cannot_be_sent(answer):
+    f = answer(
+        "class Own: pass\ndef f(values, table, array):\n    values[1], table['n'] = Own(), iter([])\n    array += 1"
+    )
+    values, table, array = [1, 2, [3]], {"n": 0, "m": (1,)}, np.zeros(2)
+    f(values, table, array)
+    np.testing.assert_equal((values, table), ([1, math.nan, [3]], {"n": math.nan, "m": (1,)}))
+    np.testing.assert_array_equal(array, [1, 1])
+
+
+def test_images_that_became_floats_come_back(answer):
+    frames = [{"image": np.ones((800, 1200), np.uint8)} for _ in range(5)]
+    f = answer("def f(frames):\n    for frame in frames:\n        frame['image'] = frame['image'] / 255\n    return 1")
+    assert f(frames) == 1
+    assert all(frame["image"].dtype == float for frame in frames)
+
+
+def test_a_function_that_is_given_is_not_called_with_more_than_it_can_work_out(answer, monkeypatch):
+    monkeypatch.setattr(process_module, "LONGEST_REPLY", 1000)
+    calls, f = [], answer("def f(g, n):\n    return g([0] * n)")
+    assert f(lambda x: calls.append(len(x)), 10) is None
+    with pytest.raises(AnswerEndedError):
+        f(lambda x: calls.append(len(x)), 1000)
+    assert calls == [10]
+
+
 def test_an_error_of_a_function_that_is_given_reaches_the_answer(answer):
     f = answer("def f(g):\n    try:\n        g()\n    except ValueError as error:\n        return str(error)")
     assert "ZeroDivisionError" in f(lambda: 1 / 0)

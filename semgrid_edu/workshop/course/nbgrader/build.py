@@ -220,8 +220,7 @@ def course_api(directory: Path) -> Iterator[NbGraderAPI]:
     """
     before = dict(os.environ)
     try:
-        config = PyFileConfigLoader("nbgrader_config.py", path=str(directory)).load_config()
-        api = NbGraderAPI(config=config)
+        api = NbGraderAPI(config=PyFileConfigLoader("nbgrader_config.py", path=str(directory)).load_config())
         api.log.setLevel(logging.ERROR)
         yield api
     finally:

@@ -33,8 +33,7 @@ def without_scripts(html: str) -> str:
     html = MACROS.sub(r"\1", strip_files_prefix(html))
     if html.count("<") > MOST_TAGS:
         return f"<pre>{escape(html)}</pre>"
-    protocols = {*bleach.ALLOWED_PROTOCOLS, "data"}
-    return bleach.clean(html, tags=SHOWN_TAGS, attributes=_is_shown, protocols=protocols)
+    return bleach.clean(html, tags=SHOWN_TAGS, attributes=_is_shown, protocols={*bleach.ALLOWED_PROTOCOLS, "data"})
 
 
 def _is_shown(tag: str, name: str, value: str) -> bool:

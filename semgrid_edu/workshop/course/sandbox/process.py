@@ -34,7 +34,7 @@ from semgrid_edu.workshop.course.sandbox.taken import (
     takes_too_much,
     threads_of,
 )
-from semgrid_edu.workshop.course.sandbox.values import MOST_INPUT, Wire, check_reply, decode, encode
+from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES, MOST_INPUT, Wire, check_reply, decode, encode
 
 WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
 """What Python is started with."""
@@ -50,6 +50,9 @@ STARTED = 60.0
 
 ENDING = 5.0
 """Seconds that the system may take to end a process."""
+
+LONGEST_REPLY = 2 * MOST_BYTES
+"""Bytes of a message without changed arguments: results and what given functions are called with are never as long."""
 
 MOST_SAID = 1000
 """Characters of an error that are sent back to a student's process, whose arguments it may quote."""
@@ -223,6 +226,8 @@ class StudentProcess:
         try:
             reply = dict(decode(received or b"", callbacks.__getitem__))
             check_reply(reply)
+            if "changed" not in reply and len(received) > LONGEST_REPLY:
+                raise ValueError(f"{len(received)} bytes")
             return reply
         except (ArgumentError, TypeError, ValueError):
             self.stop()

@@ -27,7 +27,7 @@ MOST_BYTES = 10_000_000
 """Bytes of all arrays of a result, a hundred times what exercises return: a test may broadcast them against its own."""
 
 MOST_INPUT = 150_000_000
-"""Bytes of all arrays that the grader sends: a drive of several frames with their images is more than a result."""
+"""Bytes of all arrays that are arguments: a drive of several frames with their images is more than a result."""
 
 MOST_JSON = 10_000_000
 """Bytes of a message outside its arrays: room for lists of half a million numbers."""
@@ -44,8 +44,8 @@ REPLIES: dict[str, type | tuple[type, ...]] = {
 }
 """What the parts of a reply must be, by their names; all others are texts."""
 
-LONGEST = 25_000_000
-"""Bytes of a message that the grader still reads."""
+LONGEST = MOST_INPUT + MOST_JSON
+"""Bytes of a message that is still read: arguments that an answer changed come back, images perhaps as float64."""
 
 
 class NotPlainError(TypeError):
@@ -98,8 +98,7 @@ def decode(data: bytes, callback: Callable[[int], Callable] | None = None) -> An
         if len(head) > MOST_JSON:
             raise ValueError(f"{len(head)} bytes of JSON")
         message = json.loads(head)
-        arrays = _arrays(message["arrays"], rest)
-        return _value(message["value"], arrays, callback)
+        return _value(message["value"], _arrays(message["arrays"], rest), callback)
     except (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError, MemoryError) as error:
         raise ArgumentError("data", "a message of plain values", f"{type(error).__name__}: {error}") from error
 
@@ -242,7 +241,8 @@ def put_back(original: Any, changed: Any) -> Any:
     """
     if type(original) is not type(changed):
         return changed
-    if isinstance(original, np.ndarray) and original.shape == changed.shape and original.flags.writeable:
+    alike = isinstance(original, np.ndarray) and (original.shape, original.dtype) == (changed.shape, changed.dtype)
+    if alike and original.flags.writeable:
         original[...] = changed
     elif isinstance(original, list):
         original[:] = [*map(put_back, original, changed), *changed[len(original) :]]
@@ -264,12 +264,10 @@ class Wire:
     ----------
     incoming, outgoing : binary file
         The two pipes.
-    longest : int
-        Bytes of a message that are still read.
     """
 
-    def __init__(self, incoming: BinaryIO, outgoing: BinaryIO, longest: int = LONGEST) -> None:
-        self.incoming, self.outgoing, self.longest = incoming, outgoing, longest
+    def __init__(self, incoming: BinaryIO, outgoing: BinaryIO) -> None:
+        self.incoming, self.outgoing = incoming, outgoing
 
     def send(self, message: bytes) -> None:
         """Send a message.
@@ -286,7 +284,7 @@ class Wire:
         """Return the next message; None when the other side has hung up, or sends what is no message."""
         head = self.incoming.read(8)
         length = int.from_bytes(head, "big")
-        if len(head) < 8 or length > self.longest:
+        if len(head) < 8 or length > LONGEST:
             return None
         message = self.incoming.read(length)
         return message if len(message) == length else None

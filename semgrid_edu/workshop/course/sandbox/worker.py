@@ -19,7 +19,7 @@ from IPython.utils.capture import RichOutput, capture_output
 from traitlets.config import Config
 
 from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_this_process
-from semgrid_edu.workshop.course.sandbox.values import MOST_INPUT, MOST_JSON, NotPlainError, Wire, decode, encode
+from semgrid_edu.workshop.course.sandbox.values import MOST_INPUT, NotPlainError, Wire, decode, encode
 
 MOST_TEXT = 20_000
 """Characters of a text that are kept."""
@@ -78,7 +78,7 @@ class Worker:
                 message["sent"] = data
             try:
                 # Functions that were given go back by their numbers, among arguments that were changed.
-                reply = encode(getattr(self, message.pop("do"))(**message), [])
+                reply = encode(getattr(self, message.pop("do"))(**message), [], MOST_INPUT)
             except NotPlainError as error:
                 reply = encode({"error": _report(error)})
             self.wire.send(reply)
@@ -161,9 +161,9 @@ class Worker:
             except BaseException as error:
                 reply = {"error": _report(error)}
         before = decode(sent, self._callback)
-        given, now = (before["arguments"], before["named"]), (arguments, named)
+        given, now = (before["arguments"], before["named"]), _what_passes((arguments, named))
         if encode(given, [], MOST_INPUT) != encode(now, [], MOST_INPUT):
-            reply["changed"] = arguments, named
+            reply["changed"] = now
         return reply | {"streams": _streams(captured)}
 
     def _callback(self, number: int) -> Callable:
@@ -179,13 +179,24 @@ class Worker:
         return call
 
 
-def _passes(value: Any) -> bool:
-    """Return whether a value can be sent."""
+def _passes(value: Any, *options: Any) -> bool:
+    """Return whether a value can be sent, with options of `encode`."""
     try:
-        encode(value)
+        encode(value, *options)
     except NotPlainError:
         return False
     return True
+
+
+def _what_passes(value: Any) -> Any:
+    """Return a value with NaN for each part that can't be sent: equal to nothing, so that a test sees the change."""
+    if _passes(value, [], MOST_INPUT):
+        return value
+    if isinstance(value, dict):
+        return dict(_what_passes(pair) for pair in value.items())
+    if isinstance(value, list | tuple):
+        return (list if isinstance(value, list) else tuple)(map(_what_passes, value))
+    return float("nan")
 
 
 @contextmanager
@@ -233,7 +244,7 @@ def _report(error: BaseException) -> dict[str, Any]:
 
 def _main() -> None:
     """Talk to the grader over standard input and output, which the student's code doesn't get."""
-    wire = Wire(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"), MOST_INPUT + MOST_JSON)
+    wire = Wire(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(nothing, stream)

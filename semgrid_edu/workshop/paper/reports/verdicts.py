@@ -136,7 +136,6 @@ def verdict(statements: Sequence[Statement], seeds: int, drives: int, expectatio
     """
     if seeds < MIN_SEEDS or drives < MIN_DRIVES:
         return TOO_SMALL
-    judged = [one for one in statements if one.judged]
-    found = which_hold(judged)
+    found = which_hold([one for one in statements if one.judged])
     said = NOT_REPRODUCED if False in found else REPRODUCED if all(found) else CANNOT_TELL
     return EXPECTED.get(said, said) if expectation else said

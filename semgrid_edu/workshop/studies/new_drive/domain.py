@@ -46,8 +46,7 @@ def image_histograms(image: NDArray) -> dict[str, NDArray[np.float64]]:
     """
     grey = image.mean(axis=2)
     found = {name: np.histogram(image[..., k], BINS, (0, 256))[0] for k, name in enumerate(COLOURS)}
-    gradient = np.minimum(gaussian_gradient_magnitude(grey, 1), STEEPEST)
-    found["edges"] = np.histogram(gradient, BINS, (0, STEEPEST))[0]
+    found["edges"] = np.histogram(gaussian_gradient_magnitude(grey, 1).clip(max=STEEPEST), BINS, (0, STEEPEST))[0]
     return {name: counts / grey.size for name, counts in found.items()}
 
 

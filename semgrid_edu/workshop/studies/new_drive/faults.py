@@ -64,8 +64,7 @@ def _pose_in(axes: str) -> Fault:
 
 def _images_late(frames: Sequence[Frame]) -> list[Frame]:
     """Give each frame the image of an earlier one."""
-    pairs = zip(frames[:-LATE], frames[LATE:], strict=True)
-    return [replace(now, image=before.image) for before, now in pairs]
+    return [replace(now, image=before.image) for before, now in zip(frames[:-LATE], frames[LATE:], strict=True)]
 
 
 FAULTS: dict[str, Fault] = {

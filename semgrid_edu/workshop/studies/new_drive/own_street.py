@@ -107,8 +107,7 @@ def piece_confusions(truths: NDArray, called: NDArray, pieces: NDArray) -> NDArr
         Row: truth. Pieces without a cell that counts are left out.
     """
     some = np.unique(pieces[truths != IGNORE])
-    counts = [confusion_matrix(truths[pieces == v], called[pieces == v], len(KITTI_14)) for v in some]
-    return np.stack(counts)[None]
+    return np.stack([confusion_matrix(truths[pieces == v], called[pieces == v], len(KITTI_14)) for v in some])[None]
 
 
 def best_table(truths: NDArray, beliefs: Sequence[NDArray]) -> NDArray[np.int64]:

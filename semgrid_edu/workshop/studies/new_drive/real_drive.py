@@ -224,5 +224,4 @@ def moving_hits(frame: Frame, belief: Belief, boxes: Iterable[Sequence[float]], 
     hit, inside = hit_cells(frame.points_grid, spec), np.zeros(spec.shape, np.bool_)
     for x_min, x_max, y_min, y_max in boxes:
         inside |= (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max)
-    moves = belief.probability[State.DYNAMIC] > belief.probability[State.STATIC]
-    return moves[hit & inside]
+    return (belief.probability[State.DYNAMIC] > belief.probability[State.STATIC])[hit & inside]

@@ -295,6 +295,5 @@ def _table(split: str, methods: dict[str, dict]) -> str:
     rows = [[f"{split}: {first['frames']} frames, {first['cells']} cells", "pixels", "classes", *classes, "ECE"]]
     for name, scores in methods.items():
         metrics = [shown(scores[metric]) for metric in ("pixel accuracy", "class accuracy")]
-        recall = [per_cent(scores["recall"][c], 0) for c in classes]
-        rows.append([name, *metrics, *recall, per_cent(scores["ECE"])])
+        rows.append([name, *metrics, *(per_cent(scores["recall"][c], 0) for c in classes), per_cent(scores["ECE"])])
     return markdown_table(rows)
