@@ -97,6 +97,9 @@ class Frame:
         Seconds since the first LIDAR scan of the drive.
     labels : FrameLabels or None
         The truth, where it is known.
+    own : (N,) bool or None
+        Which returns come from the vehicle itself. None where the reader doesn't know: then a filter takes those within
+        the vehicle's outline for its own (`SensorModel.vehicle`), which must lie along the grid.
     """
 
     image: NDArray[np.uint8] | None
@@ -105,6 +108,7 @@ class Frame:
     T_world_from_lidar: NDArray[np.float64]
     time: float
     labels: FrameLabels | None = None
+    own: NDArray[np.bool_] | None = None
 
     def need_image(self) -> NDArray[np.uint8]:
         """Return the image, (h, w, 3) RGB, for callers that can't do without one."""
@@ -114,9 +118,9 @@ class Frame:
 
     @property
     def points_grid(self) -> NDArray[np.float32]:
-        """(N, 4) float32: the returns in the grid frame, so that z is the height above flat ground."""
-        shift = np.array([0, 0, self.camera.lidar_height, 0], dtype=self.points.dtype)
-        return self.points + shift
+        """(N, 4) float32: the returns in the grid frame, z is the height above flat ground; a fifth column is `own`."""
+        points = self.points + np.array([0, 0, self.camera.lidar_height, 0], dtype=self.points.dtype)
+        return points if self.own is None else np.column_stack([points, self.own])
 
 
 def blocks(fine: NDArray, spec: GridSpec) -> NDArray:

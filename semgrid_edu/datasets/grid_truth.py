@@ -121,5 +121,4 @@ def unknown_classes(belief_probability: NDArray) -> NDArray[np.uint8]:
     (..., H, W) uint8
         Classes of KITTI-14.
     """
-    states = np.argmax(belief_probability, axis=-3)
-    return np.array(UNKNOWN_OF_STATE, dtype=np.uint8)[states]
+    return np.array(UNKNOWN_OF_STATE, dtype=np.uint8)[np.argmax(belief_probability, axis=-3)]

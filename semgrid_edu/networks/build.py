@@ -45,8 +45,7 @@ def build_net(architecture: Architecture, camera: Camera, seed: int = 0) -> Sema
         for k in range(architecture.n_segmenters)
     )
     segmenter = MeanSegmenter([first, *others]) if others else first
-    sampler = plane_sampler(architecture, camera)
-    return SemanticGridNet(segmenter, sampler, n_classes, seed, architecture=architecture)
+    return SemanticGridNet(segmenter, plane_sampler(architecture, camera), n_classes, seed, architecture=architecture)
 
 
 class MeanSegmenter(nn.Module):

@@ -205,8 +205,7 @@ def check_points(points: NDArray) -> NDArray:
         raise ArgumentError("points", "shape (N, 3+): x, y, z in metres", f"shape {points.shape}")
     if points.dtype.kind not in "biuf":
         raise ArgumentError("points", "real numbers", f"type {points.dtype}")
-    single = np.can_cast(points.dtype, np.float32)
-    points = points.astype(np.float32 if single else np.float64, copy=False)
+    points = points.astype(np.float32 if np.can_cast(points.dtype, np.float32) else np.float64, copy=False)
     if not _all_finite(points):
         bad = int((~np.isfinite(points[:, :3]).all(axis=1)).sum())
         raise ArgumentError("points", "finite coordinates", f"{bad} of {len(points)} points with NaN or infinity")

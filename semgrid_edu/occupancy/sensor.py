@@ -42,9 +42,9 @@ class SensorModel:
         A ground return up to this far behind the first obstacle of its beam may come from below that obstacle, from
         between a car's wheels, so it says nothing, metres. The default is the length of a car.
     vehicle : (float, float, float, float)
-        Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres. An obstacle inside it is
-        the vehicle's own bonnet or mirror. The default is the outline of KITTI's estate car, whose LIDAR sees the end
-        of its bonnet 2.5 m ahead.
+        Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres. Unless the points say which
+        are the vehicle's own (`Frame.own`), an obstacle inside it is the vehicle's own bonnet or mirror. The default is
+        the outline of KITTI's estate car, whose LIDAR sees the end of its bonnet 2.5 m ahead.
     edge : float
         Up to how far outside the outline an obstacle whose reflectance is 0 counts as the vehicle's own, metres. A
         beam that grazes the vehicle's edge is split, and its two echoes merge into one range in between while they are
@@ -187,7 +187,8 @@ def without_own_returns(
     Parameters
     ----------
     points : (N, 3+) float
-        Returns in the grid frame of the vehicle, metres; a fourth column is reflectance.
+        Returns in the grid frame of the vehicle, metres; a fourth column is reflectance. A fifth column says which
+        returns are the vehicle's own, not 0; outline and edge then tell nothing.
     vehicle : (float, float, float, float)
         Outline of the vehicle: x_min, x_max, y_min, y_max in its grid frame, metres.
     edge : float
@@ -201,12 +202,12 @@ def without_own_returns(
         x, y and z of the other returns, in their order.
     """
     x_min, x_max, y_min, y_max = vehicle
-    others, n, measured = np.empty((len(points), 3), points.dtype), 0, points.shape[1] > 3
+    others, n, columns = np.empty((len(points), 3), points.dtype), 0, points.shape[1]
     for i in range(len(points)):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        around = edge if measured and points[i, 3] == 0 else 0.0
+        around = edge if columns > 3 and points[i, 3] == 0 else 0.0
         beside = x_min - around < x < x_max + around and y_min - around < y < y_max + around
-        if not (beside and z >= low):
+        if not (points[i, 4] if columns > 4 else beside and z >= low):
             others[n, 0], others[n, 1], others[n, 2] = x, y, z
             n += 1
     return others[:n]

@@ -169,8 +169,7 @@ def read_jpeg(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
     """
     content = read_bytes(path)
     try:
-        image = Image.open(io.BytesIO(content), formats=["JPEG"])
-        pixels = np.asarray(image.convert("RGB"))
+        pixels = np.asarray(Image.open(io.BytesIO(content), formats=["JPEG"]).convert("RGB"))
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise DataError(path, "a sound JPEG image", f"{str(error).partition(' <')[0]!r}") from error
     if pixels.shape[:2] != size:

@@ -32,6 +32,8 @@ from semgrid_edu.datasets.training_set import TrainingSet, sets_by_camera
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
+from semgrid_edu.occupancy import SensorModel, scan_evidence
+from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.storage.pickled_tables import read_pickled_table
 
 SPEC = GridSpec(x_min=0, x_max=24, y_min=-8, y_max=8, cell=0.5)
@@ -89,6 +91,22 @@ def test_the_filter_gets_the_turning_lidar_alone(scene):
     assert (scan.lidars == 1).sum() == 1
     assert len(scene[0].points) == len(scan.points) - 1
     assert len(scan.labelled.points) == len(scan.points) - 1  # the reflection isn't labelled
+
+
+@pytest.mark.parametrize(("camera", "beside"), [("front_camera", (0.25, 1.25)), ("left_camera", (1.25, -0.25))])
+def test_the_vehicles_own_returns_are_those_on_its_roof_whichever_way_the_grid_looks(copy, camera, beside):
+    """What stands 1.25 m to the left is inside the outline of a vehicle that looks there, and yet it is no bonnet."""
+    shutil.rmtree(copy / SCENE / "annotations")
+    scan = read_pandaset_scan(copy / SCENE, 0)
+    roof, thing = np.add(LIDAR, (0.3, -1.0, -0.4)), np.add(LIDAR, (-1.25, 0.25, -1.0))
+    points = np.concatenate([scan.points, [roof, thing]])
+    columns = dict(zip("xyz", points.T, strict=True)) | {"i": np.zeros(len(points)), "t": np.full(len(points), 100.0)}
+    write_table(copy / SCENE / "lidar/00.pkl.gz", columns | {"d": np.append(scan.lidars, [0, 0])})
+    frame = PandasetScene(copy, SCENE, camera)[0]
+    assert np.flatnonzero(frame.own).tolist() == [len(frame.points) - 2]
+    evidence = scan_evidence(frame.points_grid, SPEC, SensorModel())
+    assert class_at(evidence.occupied > evidence.free, *beside)
+    assert not np.isin(roof[2] - GROUND, prepare_scan(frame.points_grid, SensorModel(ground=None))[:, 2])
 
 
 def test_the_kept_rows_of_an_image_have_the_camera_that_took_them(scene):

@@ -196,6 +196,14 @@ def test_a_beam_that_the_vehicles_edge_splits_is_no_obstacle(evidence_of, y, ref
     assert (evidence.occupied > evidence.free).sum() == obstacles
 
 
+@TWINS
+@pytest.mark.parametrize(("own", "x", "obstacles"), [(1, 3.2, 0), (0, 1.4, 1)], ids=["far ahead", "where a bonnet is"])
+def test_who_knows_the_vehicles_own_returns_needs_no_outline(evidence_of, own, x, obstacles):
+    returns = np.array([[3.75, 0.25, 0.0, 0.3, 0], [x, 0.2, 1.0, 0.0, own]])
+    evidence = evidence_of(returns, GridSpec(0, 4, -3, 3, 0.5), SENSOR)
+    assert (evidence.occupied > evidence.free).sum() == obstacles
+
+
 def test_wide_gaps_stay_blind_and_narrow_ones_see_no_farther_than_their_neighbours():
     reach = np.array([0.0, 7.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0, 9.0])
     assert fill_gaps(reach, 2).tolist() == [7.0, 7.0, 4.0, 4.0, 4.0, 0.0, 0.0, 0.0, 9.0]

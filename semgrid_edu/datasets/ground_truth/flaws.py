@@ -123,8 +123,7 @@ def _without_small_things(
         missed |= gone[things] & (things > 0)
     if not missed.any() or missed.all():
         return labels
-    nearest = distance_transform_edt(missed, return_distances=False, return_indices=True)
-    return labels[tuple(nearest)]
+    return labels[tuple(distance_transform_edt(missed, return_distances=False, return_indices=True))]
 
 
 def flawed_drive(frames: Sequence[Frame], flaws: TruthFlaws, seed: int, number: int = 0) -> list[Frame]:

@@ -93,5 +93,4 @@ class KittiTrackingRun(FrameSequence):
 
     def _pose(self, k: int) -> NDArray[np.float64]:
         """Return T_world_from_lidar; the world is the frame of the IMU at the run's first packet."""
-        T_imu_from_lidar = invert_rigid(self._calibration.T_lidar_from_imu)
-        return imu_pose(self._packets[0], self._packets[k]) @ T_imu_from_lidar
+        return imu_pose(self._packets[0], self._packets[k]) @ invert_rigid(self._calibration.T_lidar_from_imu)

@@ -34,11 +34,6 @@ IMAGE_SIZE = (1080, 1920)
 ROWS = slice(216, 796)
 """The rows of an image that are kept. They have KITTI's aspect; sky above and the vehicle's bonnet below are cut."""
 
-LIDAR_IN_POSE = np.array([0.0, 0.79, 1.86])
-"""Where the Pandar64 stands in the frame of lidar/poses.json (x right, y ahead, z up), metres. Measured on scene 002 as
-the place from which the returns of each laser have one elevation; the published extrinsics of the cameras say the same
-within 2 cm. The poses themselves are of a point near the ground."""
-
 LIDAR_HEIGHT = 2.13
 """Height of the Pandar64 above the ground where no labels show the ground, metres: as measured on scene 002."""
 
@@ -209,7 +204,8 @@ class PandasetScene(FrameSequence):
         points = np.column_stack([points, scan.reflectance[turning]]).astype(np.float32)
         image = read_jpeg(self.view / f"{self.numbers[k]:02d}.jpg", IMAGE_SIZE)[ROWS]
         start, now = self._camera_times[[self.numbers[0], self.numbers[k]]]
-        return Frame(image, points, camera, T_world_from_lidar, float(now - start))
+        own = files.on_the_roof(scan.points[turning], self._poses[self.numbers[k]])
+        return Frame(image, points, camera, T_world_from_lidar, float(now - start), own=own)
 
     def _labels(self, k: int, camera: Camera) -> FrameLabels | None:
         if self._scan(self.numbers[k]).labelled is None:
@@ -257,7 +253,7 @@ class PandasetScene(FrameSequence):
     def _T_world_from_lidar(self, k: int) -> NDArray[np.float64]:
         """Return the pose of the Pandar64 at the instant of the image, turned to where the camera looks."""
         number, poses, times = self.numbers[k], self._poses, self._times
-        places = poses[:, :3, :3] @ LIDAR_IN_POSE + poses[:, :3, 3]
+        places = poses[:, :3, :3] @ files.LIDAR_IN_POSE + poses[:, :3, 3]
         velocity = np.gradient(places, times, axis=0)[number]
         ahead = self._camera_poses[number][:3, 2]
         turn = Rotation.from_euler("z", np.arctan2(ahead[1], ahead[0])).as_matrix()

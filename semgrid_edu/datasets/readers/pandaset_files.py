@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from semgrid_edu.camera import rigid_transform
+from semgrid_edu.camera import invert_rigid, rigid_transform, transform_points
 from semgrid_edu.datasets.readers.class_tables import ClassTable
 from semgrid_edu.datasets.readers.cuboids import Cuboids, LabelledScan
 from semgrid_edu.errors import DataError
@@ -25,6 +25,15 @@ CREDIT = "PandaSet by Hesai and Scale AI, CC BY 4.0 (creativecommons.org/license
 
 TURNING = 0
 """The number d of the Pandar64, the only LIDAR that the occupancy filter gets."""
+
+LIDAR_IN_POSE = np.array([0.0, 0.79, 1.86])
+"""Where the Pandar64 stands in the frame of lidar/poses.json (x right, y ahead, z up), metres. Measured on scene 002 as
+the place from which the returns of each laser have one elevation; the published extrinsics of the cameras say the same
+within 2 cm. The poses themselves are of a point near the ground."""
+
+ROOF = (-0.9, -1.7), (0.9, 1.4)
+"""Least and most metres to the right and ahead of the Pandar64 of returns from the vehicle itself: on scene 002 some
+630 in each scan come from the roof, 1.6 to 2 m above the ground."""
 
 FIRST_THING = 5
 """Below this number are smoke, exhaust, spray and reflections: returns from where nothing is."""
@@ -88,6 +97,20 @@ def semseg_folder(scene: Path) -> Path:
         The folder of the scene.
     """
     return scene / "annotations" / "semseg"
+
+
+def on_the_roof(points: NDArray[np.float64], T_world_from_vehicle: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which returns come from the vehicle itself, (N,): its heading isn't that of all cameras.
+
+    Parameters
+    ----------
+    points : (N, 3) float64
+        Returns in the world, metres.
+    T_world_from_vehicle : (4, 4) float64
+        The scan's row of lidar/poses.json.
+    """
+    from_lidar = (transform_points(invert_rigid(T_world_from_vehicle), points) - LIDAR_IN_POSE)[:, :2]
+    return ((ROOF[0] < from_lidar) & (from_lidar < ROOF[1])).all(axis=1)
 
 
 def read_pandaset_scan(scene: Path, number: int) -> PandasetScan:

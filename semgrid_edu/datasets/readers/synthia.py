@@ -219,8 +219,7 @@ class SynthiaSequence(FrameSequence):
         path = self.folder / "CameraParams" / "intrinsics.txt"
         K = read_synthia_intrinsics(path)
         T_camera_from_lidar = rigid_transform(_CAMERA_FROM_LIDAR, np.zeros(3))
-        lidar_height = self._camera_height(K, (height, width))
-        return camera_from(path, K, T_camera_from_lidar, (height, width), lidar_height)
+        return camera_from(path, K, T_camera_from_lidar, (height, width), self._camera_height(K, (height, width)))
 
     def _camera_height(self, K: NDArray[np.float64], size: tuple[int, int]) -> float:
         """Return how far below the camera the nearby road of the first image lies, in the median."""
