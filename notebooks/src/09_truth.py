@@ -1062,15 +1062,30 @@ plt.show()
 #
 # ## Another truth: labels on the points themselves
 #
-# SemanticKITTI (Behley et al., 2019) went another way. People labelled the LIDAR *points* of KITTI's odometry drives,
-# in scans that were added up over many metres. No pixel carries a label there, so there is no camera, no hidden return
-# with the label of a fence, and no calibration between the two. Points of moving things have classes of their own
-# ("moving-car"), so one can carve them out without a filter's guess. From such points the package makes a bird's-eye
-# truth as well: `SemanticKittiSequence(FOLDER, "00").truth(k, spec, before, after)`, from one scan or accumulated by
-# the poses. You need the data on your disk for that; the course doesn't ship it.
+# SemanticKITTI (Behley et al., 2019) and PandaSet (Xiao et al., 2021), whose street other lectures show, went another
+# way. People labelled the LIDAR *points*. So there is no hidden return with the label of a fence, and no calibration
+# that moves a label. What moves has classes or boxes of its own, so no filter has to guess it. With the data on your
+# disk, `PandasetScene(FOLDER, "002").truth(k, spec, before, after)` makes a bird's-eye truth of such points.
 #
-# What remains are errors of the poses, gaps where no scan ever measured, and people's mistakes. And one thing is lost:
-# a truth from all directions also labels what this camera, at this instant, couldn't see.
+# How wrong is that? The same recipe on twenty simulated drives: with nine scans before and after, 67 % of the cells that
+# the camera sees get their class, and 5.2 % of the labels are wrong; if only cells that the camera sees keep theirs, 45 and 4.7 %; with one
+# scan, 28 and 5.5 %. Where moving things are smeared over their way, 16 % are wrong. The worst are small or thin: 45 %
+# of the labels *signage* and 24 % of *building* are wrong, walls being lines on this map. Real labels also have people's
+# mistakes and errors of the poses, which the simulated ones don't.
+
+# %% jupyter={"source_hidden": true}
+on_points = json.loads(Path("../docs/results/point_labels.json").read_text(encoding="utf-8"))
+shares = {name: counts_of(on_points, name).shares(axis=(0, 1)) for name in on_points["sums"]}
+many = "9 before and after"
+said = {many: (67, 5.2), f"{many}, seen by the camera": (45, 4.7), "one scan": (28, 5.5)}
+for name, (found, wrong) in said.items():
+    assert np.allclose(100 * np.array([shares[name]["found"], shares[name]["wrong"]]), (found, wrong), atol=(0.5, 0.05))
+assert round(100 * shares[f"{many}, movers smeared"]["wrong"]) == 16
+by_class = np.round(100 * counts_of(on_points, many).shares(axis=0)["wrong"])
+assert [KITTI_14.names[c] for c in np.argsort(-np.nan_to_num(by_class))[:2]] == ["signage", "building"]
+assert by_class[[KITTI_14.index("signage"), KITTI_14.index("building")]].tolist() == [45, 24]
+
+# %% [markdown]
 #
 # ## Where this breaks
 #

@@ -800,7 +800,7 @@ for name, one in agreement.items():
 # %% [markdown]
 # On the simulated sample drive the network from simulated streets agrees with the LIDAR in more than 95 of 100
 # returns, in both columns; on this street and on both stretches of drive 0013 it agrees less. It also grows less
-# sure, but from its sureness of 0.76 on this street you can't see that 45 % of the map's labelled cells are wrong.
+# sure, but from its confidence of 0.76 on this street you can't see that 45 % of the map's labelled cells are wrong.
 # Two classes are a coarse check: they can't tell a car from a fence. And what lies lower than 30 cm counts as ground: on
 # this street that takes in the lower edge of the car ahead. Returns there are labelled *car*, and the network that knows
 # the street says so: one reason why it agrees in only 68 of 100. The companion [the domain gap,

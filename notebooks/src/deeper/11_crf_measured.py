@@ -206,12 +206,12 @@ Markdown(crf_error_tables(error))
 # %% [markdown]
 # ## Do other weights and widths save class accuracy?
 #
-# The default CRF costs six to seven points of class accuracy on 110 test frames (lectures 10 and 11), and with the
+# The default CRF costs five points of class accuracy on 110 test frames (lectures 10 and 11), and with the
 # exact kernel small classes don't come back (lecture 11). Are its weights and widths to blame? Better ones must not be
 # chosen on the test frames, because whatever is chosen on some frames looks better on them than it is. Two ways were
 # tried with 72 other simulated drives, from which no network has learned (*validation data*):
 #
-# - **Search** (`semgrid-edu search-crf`). First the scores are divided by a temperature, 1.16 for SegNet, chosen such
+# - **Search** (`semgrid-edu search-crf`). First the scores are divided by a temperature, 1.23 for SegNet, chosen such
 #   that of the cells called with 80 % certainty about 80 % are right (*calibration*). Then 120 settings of two weights
 #   and three widths are tried (left picture), and one is chosen for each of the two metrics.
 # - **Learning** (`semgrid-edu reproduce learned-crf`). Five iterations of mean field are a chain of differentiable

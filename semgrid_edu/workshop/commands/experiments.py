@@ -117,7 +117,7 @@ def point_labels(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the simulated drives.")] = 0,
     drives: Annotated[int, typer.Option(min=1, max=1000, help="Number of drives, of two seconds each.")] = 20,
     grid: Annotated[str, typer.Option(help="compact or paper.")] = "compact",
-    lidar: Annotated[str, typer.Option(help="HDL-64E, or coarse, which the simulated data sets have.")] = "HDL-64E",
+    lidar: Annotated[str, typer.Option(help="HDL-64E, KITTI's, or coarse, with a fifth of its columns.")] = "HDL-64E",
     out: Annotated[Path, typer.Option(help="Where to write the counts.")] = Path("point_labels.json"),
 ) -> None:
     """Measure how wrong the truth from labelled returns and cuboids is, such as PandaSet's (lecture 09)."""

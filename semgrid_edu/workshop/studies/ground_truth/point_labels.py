@@ -42,7 +42,7 @@ def point_labels(seed: int = 0, drives: int = 20, grid: str = "compact", lidar: 
     grid : str
         "compact" or "paper".
     lidar : str
-        "HDL-64E", or "coarse" for the LIDAR of the simulated data sets.
+        "HDL-64E", KITTI's, or "coarse", with a fifth of its columns.
 
     Returns
     -------

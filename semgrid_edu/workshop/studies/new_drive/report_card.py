@@ -80,8 +80,7 @@ def motion_verdict(errors: dict[str, float]) -> bool | None:
     bool or None
         None when another motion fits as well, within 5 cm: a vehicle that stands, or drives straight on for the mirror.
     """
-    others = [error for name, error in errors.items() if name != "as the poses say"]
-    margin = min(others) - errors["as the poses say"]
+    margin = min(error for name, error in errors.items() if name != "as the poses say") - errors["as the poses say"]
     return None if abs(margin) <= SHIFTED else margin > 0
 
 
@@ -154,7 +153,7 @@ def map_lines(name: str, truths: NDArray, grids: NDArray, table: NDArray, pieces
     more = f"{100 * gain:+.0f} points ({100 * low:+.0f} to {100 * high:+.0f})"
     return [
         Line(f"{name} against the table", f"{right}; {more}", None if low <= 0 <= high else bool(gain > 0)),
-        Line(f"{name}: sureness", f"off by {100 * error:.0f} points", bool(error <= OVERSURE)),
+        Line(f"{name}: confidence", f"off by {100 * error:.0f} points", bool(error <= OVERSURE)),
     ]
 
 

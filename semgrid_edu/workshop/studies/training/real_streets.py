@@ -144,7 +144,8 @@ def compare_real(
                 weights |= {run: sha256(file) for run, file in files.items()}
                 counted.append(_joined(_count(name, *one) for one in zip(files.values(), tests, strict=True)))
             found[split] |= {method: _scores_of([one[method] for one in counted], table) for method in counted[0]}
-    command = f"semgrid-edu reproduce real-streets --scene {scene} --seed {seed} --device {device}"
+    command = f"semgrid-edu reproduce real-streets --pandaset FOLDER --scene {scene} --simulated MINIKITTI --runs RUNS"
+    command += f" --seed {seed} --device {device}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
 
 
