@@ -918,7 +918,7 @@ Markdown("\n".join([head, *rows]))
 # lies, and there $o$ has evidence. And look at the last column: in the view of cameras that a network hasn't learned
 # from, a table of $o$ alone gets *more* cells right, by 6 points (2 to 10). Of seven ways that go on from simulated
 # streets five come within two points of it; one, the mean of three image networks' scores, is above it after
-# the CRF, by 2 points (0.2 to 4.7, chance in these three left out; [results](../docs/results.md)). The second row is
+# the CRF, by 2 points (0.1 to 4.5, chance in these three left out; [results](../docs/results.md)). The second row is
 # a surprise of its own: a network that was trained with the ground plane alone loses one point against one with twenty.
 # So on these simulated streets, with these labels, the number of planes is hardly what a network has over a table.
 #
