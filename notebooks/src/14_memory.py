@@ -490,9 +490,9 @@ Markdown("In per cent:\n\n" + "\n".join(rows))
 # Read the rows *in view* first, and in them pixel accuracy. On streets that are new to it, the memory gains 4.9
 # points, and the interval is far from zero. The two memories that one writes first, mean and product of the last five
 # maps, *lose* points there. The gain isn't one of simulated streets alone: the network from simulated streets gains
-# 3.9 points on the real scene, whose labels people made. The last rows are for a network that learned from these very
+# 3.8 points on the real scene, whose labels people made. The last rows are for a network that learned from these very
 # frames. In view it errs in 6 cells of 100, and the memory changes little: +0.4, with an interval from
-# 0.2 to 0.6.
+# 0.2 to 0.5.
 #
 # Is this knowledge, or does the memory only say *unknown* less frequently? Ask both maps for the most probable
 # *semantic* class, also where an unknown one is more probable:
