@@ -235,7 +235,7 @@ def _command(
         f"--out {_name(folder)} --segmenter {description.segmenter}",
         f"--preset {description.preset}" if description.preset != Architecture.preset else "",
         f"--imagenet {_name(imagenet)}" if imagenet else "",
-        *(f"--from {_name(path)}" for path in start),
+        *(f"--from {_name(Path(path).parent)}/{_name(path)}" for path in start),
         f"--seed {seed} --iterations {params.grid_iterations}",
         f"--tint {params.tint:g}" if params.tint else "",
         "" if params.end_to_end else "--two-stage",
