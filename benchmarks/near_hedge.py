@@ -18,6 +18,7 @@ from semgrid_edu.plotting.grids import velocity_arrows
 from semgrid_edu.workshop.simulation.named_streets import named_street
 from semgrid_edu.workshop.simulation.street import plan
 from semgrid_edu.workshop.studies.filter.scenes import known_scenes
+from semgrid_edu.workshop.studies.filter.streets import LEAST_DYNAMIC
 
 SPLIT, FAST, PERIOD, FRAMES = 60, 6.0, 0.1, 30
 DRAWN = plan._side
@@ -55,7 +56,7 @@ def count(spec: GridSpec, number: int, edge: float) -> tuple[float, int, int, in
         if scene.frame.time >= 1:
             hedge = scene.hit & (scene.truth.state == State.STATIC) & (x > 2) & (x < 40) & (y < 0.4 - distance)
             dynamic = belief.probability[State.DYNAMIC]
-            called += int((hedge & (dynamic > belief.probability[State.STATIC]) & (dynamic > 0.3)).sum())
+            called += int((hedge & (dynamic > belief.probability[State.STATIC]) & (dynamic > LEAST_DYNAMIC)).sum())
             cells += int(hedge.sum())
     return distance, arrows, called, cells
 

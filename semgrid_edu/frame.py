@@ -118,7 +118,10 @@ class Frame:
 
     @property
     def points_grid(self) -> NDArray[np.float32]:
-        """(N, 4) float32: the returns in the grid frame, z is the height above flat ground; a fifth column is `own`."""
+        """(N, 4) float32: the returns in the grid frame, so that z is the height above flat ground.
+
+        (N, 5) where `own` is known, which is the last column.
+        """
         points = self.points + np.array([0, 0, self.camera.lidar_height, 0], dtype=self.points.dtype)
         return points if self.own is None else np.column_stack([points, self.own])
 

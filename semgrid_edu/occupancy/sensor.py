@@ -158,8 +158,8 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
     Parameters
     ----------
     points : (N, 3+) float
-        Returns: x forward, y left, z above the ground on which the vehicle stands (m), in its grid frame, and
-        reflectance where it is known; N may be 0.
+        Returns: x forward, y left, z above the ground on which the vehicle stands (m), in its grid frame, then
+        reflectance and which are the vehicle's own (`Frame.own`), where these are known; N may be 0.
     sensor : SensorModel
         The sensor, with the outline of its vehicle, and how the ground is found.
 
@@ -187,8 +187,8 @@ def without_own_returns(
     Parameters
     ----------
     points : (N, 3+) float
-        Returns in the grid frame of the vehicle, metres; a fourth column is reflectance. A fifth column says which
-        returns are the vehicle's own, not 0; outline and edge then tell nothing.
+        Returns in the grid frame of the vehicle, metres; a fourth column is reflectance. A fifth column isn't 0 for the
+        vehicle's own returns; then they are left out, whatever their height, and outline and edge aren't asked.
     vehicle : (float, float, float, float)
         Outline of the vehicle: x_min, x_max, y_min, y_max in its grid frame, metres.
     edge : float

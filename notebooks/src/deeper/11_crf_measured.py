@@ -206,7 +206,7 @@ Markdown(crf_error_tables(error))
 # %% [markdown]
 # ## Do other weights and widths save class accuracy?
 #
-# The default CRF costs five points of class accuracy on 110 test frames (lectures 10 and 11), and with the
+# The default CRF costs about five points of class accuracy on 110 test frames (lectures 10 and 11), and with the
 # exact kernel small classes don't come back (lecture 11). Are its weights and widths to blame? Better ones must not be
 # chosen on the test frames, because whatever is chosen on some frames looks better on them than it is. Two ways were
 # tried with 72 other simulated drives, from which no network has learned (*validation data*):
@@ -221,8 +221,7 @@ Markdown(crf_error_tables(error))
 #   where rare classes weigh more).
 #
 # **Predict before you run.** Does any of these CRFs clearly gain in both pixel accuracy and class accuracy on the test
-# frames?
-# And what becomes of the weights, which begin at 4 and 3, when class accuracy is the goal, or when they are learned?
+# frames? And what becomes of the weights, which begin at 4 and 3, when class accuracy is the goal, or when they are learned?
 #
 # <details><summary>Answer</summary>
 #
@@ -359,8 +358,8 @@ Markdown("\n".join(table))
 
 # %% [markdown]
 # Class accuracy falls in every row, by more than a point. With pixel accuracy it depends: the three trained on LIDAR
-# labels gain by either judge, a little more by LIDAR labels. Trained on true labels, the three gain a tenth of a point
-# or less, and each interval holds both signs.
+# labels gain by either judge, a little more by LIDAR labels. Trained on true labels, the three gain 0.03 to 0.12 points,
+# and each interval holds both signs.
 #
 # ## Where this breaks
 #

@@ -100,7 +100,7 @@ def semseg_folder(scene: Path) -> Path:
 
 
 def on_the_roof(points: NDArray[np.float64], T_world_from_vehicle: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which returns come from the vehicle itself, (N,): its heading isn't that of all cameras.
+    """Return which returns come from the vehicle itself, whose heading only the front camera's grid shares.
 
     Parameters
     ----------
@@ -108,6 +108,11 @@ def on_the_roof(points: NDArray[np.float64], T_world_from_vehicle: NDArray[np.fl
         Returns in the world, metres.
     T_world_from_vehicle : (4, 4) float64
         The scan's row of lidar/poses.json.
+
+    Returns
+    -------
+    (N,) bool
+        Whether each lies above `ROOF`.
     """
     from_lidar = (transform_points(invert_rigid(T_world_from_vehicle), points) - LIDAR_IN_POSE)[:, :2]
     return ((ROOF[0] < from_lidar) & (from_lidar < ROOF[1])).all(axis=1)
