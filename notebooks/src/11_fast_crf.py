@@ -1009,10 +1009,10 @@ Markdown("\n".join(rows))
 # %% [markdown]
 # With the default weights all three intervals of pixel accuracy hold both signs. So the rise on our ten frames isn't the
 # rule. Class accuracy falls for all three. Where networks learn from LIDAR labels, pixel accuracy rises for all three,
-# by LIDAR labels and by true ones (lecture [12](12_experiments.ipynb)). So whether a CRF "helps" depends on the metric
-# and on what the network learned from. Weights searched for pixel accuracy raise it for all three, and still cost class
-# accuracy. The companion [the CRF, measured](deeper/11_crf_measured.ipynb) shows the search, and weights that are
-# learned.
+# by LIDAR labels and by true ones (lecture [12](12_experiments.ipynb)). So whether a CRF "helps" depends on the metric,
+# on what the network learned from, and on the labels that judge it. Weights searched for pixel accuracy raise it for all
+# three, and still cost class accuracy. The companion [the CRF, measured](deeper/11_crf_measured.ipynb) shows the search,
+# and weights that are learned.
 #
 # ## In five lines
 #

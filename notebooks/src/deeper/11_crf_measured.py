@@ -318,8 +318,8 @@ for name, values in learned["learnt"].items():
 # (The box in the right picture shows what lies at zero, enlarged.)
 #
 # **A searched CRF gains pixel accuracy and still costs class accuracy.** Chosen for pixel accuracy, it gains 0.4 to 0.5
-# points of it for each of the three networks, and loses 1.7 to 1.8 points of class accuracy, about a third of what the
-# default loses. Chosen for class accuracy, it hardly does anything: all changes are below 0.1 point,
+# points of it for each of the three networks, and loses 1.7 to 1.8 points of class accuracy, a bit more than a third of
+# what the default loses. Chosen for class accuracy, it hardly does anything: all changes are below 0.1 point,
 # and the weights are a tenth or less. **Learning ends in the same place**: all weights shrink from 4 and 3 to below
 # 0.3. The variant that gains most class accuracy, 0.17 points, has learned which labels may stand beside each other,
 # and loses 0.10 points of pixel accuracy. None of these fourteen CRFs clearly gains in both metrics. (One search for each
