@@ -240,8 +240,7 @@ def load_crf(path: str | Path) -> CrfLayer:
     header, tensors = read_tensors(path)
     try:
         description = parse_json(path, header["crf"])
-        start = CrfParams(normalization=description.pop("normalization"))
-        layer = CrfLayer(start, **description)
+        layer = CrfLayer(CrfParams(normalization=description.pop("normalization")), **description)
     except (KeyError, TypeError, ValueError, OverflowError, RuntimeError) as error:
         raise DataError(path, "the description of a CRF in the header", f"{header}: {error}") from error
     check_tensors(path, tensors, layer.state_dict())

@@ -81,8 +81,7 @@ class PlaneOperator:
 
     def __call__(self, scores: Tensor) -> Tensor:
         """Return the planes of each image, (B, C, h, w) -> (B, C, D, H, W), differentiable; B is `n_images`."""
-        rows = scores.permute(0, 2, 3, 1).flatten(0, 2)
-        planes = SparseProduct.apply(rows, self.matrix, self.transpose)
+        planes = SparseProduct.apply(scores.permute(0, 2, 3, 1).flatten(0, 2), self.matrix, self.transpose)
         n_planes, *shape = self.planes_shape
         return planes.unflatten(0, (self.n_images, *shape, n_planes)).permute(0, 4, 3, 1, 2)
 

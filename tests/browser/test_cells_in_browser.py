@@ -338,6 +338,13 @@ class TestTogether:
         assert inset.locator("circle").count() == points > 0
         assert all(in_sight(page, one) for one in inset.locator("circle").all())
 
+    @pytest.mark.parametrize("place", ["h1", ".story", ".tables"])
+    def test_no_inset_lies_over_a_phones_text_but_beside_the_grids(self, shipped, place):
+        page = shipped(f"#{FRAME}/100/24", viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True)
+        told(page, self.CELL)
+        page.locator(place).evaluate("(one) => one.scrollIntoView({ block: 'start' })")
+        assert not in_sight(page, page.locator("#inset"))
+
 
 class TestErrors:
     def test_red_where_the_class_is_not_the_truth(self, shipped, shipped_frames):

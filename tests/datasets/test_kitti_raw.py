@@ -303,8 +303,8 @@ def test_problems_lists_every_broken_file_at_once(root):
     files = [path for path in (root / DATE).rglob("*") if path.is_file() and path.suffix in (".bin", ".txt", ".png")]
     sound = {"0000000000.bin", "label_set.txt"}
     broken = [path for path in files if path.name not in sound]
-    for path in broken:
-        path.write_bytes(b"?")
+    for k, path in enumerate(broken):
+        path.write_bytes(b"?" * (k + 1))  # no file is that before it again
     problems = KittiRawDrive(root, DATE, "0001").problems()
     assert len(broken) == 18
     assert len(problems) == len(broken)

@@ -1,7 +1,9 @@
 """What is doubtful about a drive, as its layout, sizes of files, poses and a few of its frames show it at once."""
 
+import filecmp
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from itertools import groupby, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -148,42 +150,41 @@ def frame_doubts(
     """
     found: dict[str, str] = {}
     read, n = read or frames.__getitem__, len(frames)
-    for k in _looked_at(n):
+    for k in sorted({0, n // 2, max(n - 2, 0)} & set(range(n))):
         with suppress(DataError):
             for expected, what in _doubts_of(read, k, n):
                 found.setdefault(expected, f"{what} (frame {k})")
     return [str(DataError(place, expected, what)) for expected, what in found.items()]
 
 
-def _looked_at(n_frames: int) -> list[int]:
-    """Return the numbers of the frames that are compared with the one after them, if there is one."""
-    return sorted({0, n_frames // 2, max(n_frames - 2, 0)} & set(range(n_frames)))
-
-
-def scans_again(paths: Sequence[Path], points: Callable[[int], NDArray]) -> list[str]:
-    """Name scans that come again, where returns are kept in world coordinates.
-
-    In the vehicle's frame, which `frame_doubts` compares, they differ as soon as it moves.
+def repeats(paths: Iterable[Path], what: str) -> list[str]:
+    """Name each file, anywhere in a drive, from which on a sensor repeats itself.
 
     Parameters
     ----------
-    paths : sequence of Path
-        The files of a drive's scans.
-    points : callable
-        k -> the returns of scan k, (N, 3) float, as the file has them.
+    paths : iterable of Path
+        The files of one sensor in order; those that are missing are passed over.
+    what : str
+        What the files hold, in the plural.
 
     Returns
     -------
     list of str
-        One line for each scan that repeats the one before it. The second one, one in the middle and the last are looked
-        at.
+        One line for each run of files that are that before them.
     """
-    again = []
-    for k in _looked_at(len(paths) - 1):
-        with suppress(DataError):  # what can't be read is an error of the frame, and no doubt
-            if np.array_equal(points(k), points(k + 1)):
-                again.append(str(DataError(paths[k + 1], "scans that differ", "the same scan again")))
-    return again
+    found = []
+    for same, run in groupby(pairwise(path for path in paths if path.is_file()), key=_equal):
+        if same:
+            (before, first), (_, last) = (pairs := list(run))[0], pairs[-1]
+            found.append(str(DataError(first, f"{what} that differ", f"{before.name} again, up to {last.name}")))
+    return found
+
+
+def _equal(pair: tuple[Path, Path]) -> bool:
+    """Whether two files hold the same; what gzip packed is compared by the checksum and the length at its end."""
+    if pair[0].suffix == ".gz":
+        return len({path.read_bytes()[-8:] for path in pair}) == 1
+    return filecmp.cmp(*pair, shallow=False)
 
 
 def _doubts_of(read: Callable[[int], Frame], k: int, n_frames: int) -> Iterator[tuple[str, str]]:

@@ -116,8 +116,7 @@ class FrameSequence(Sequence[Frame]):
         list of str
             One line for each problem, which names file or folder; empty when all frames are sound.
         """
-        found = [*map(error_of, self._readers()), *self.doubts()]
-        return [error for error in dict.fromkeys(found) if error]
+        return [error for error in dict.fromkeys([*map(error_of, self._readers()), *self.doubts()]) if error]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
         """Return what reads the drive piece by piece, so that no damaged piece hides another: here frame by frame."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.readers.calibration import read_camera, read_rectification, read_rigid
-from semgrid_edu.datasets.readers.drive_doubts import jumps, short_scans, what_is
+from semgrid_edu.datasets.readers.drive_doubts import jumps, repeats, short_scans, what_is
 from semgrid_edu.datasets.readers.frames import FrameSequence, error_of, read_scan
 from semgrid_edu.datasets.readers.kitti_labels import (
     KINDS,
@@ -152,8 +152,9 @@ class KittiRawDrive(FrameSequence):
         Returns
         -------
         list of str
-            One line, which names the file, for each scan that is missing between others or was probably cut short, and
-            for each pose that no car can have reached since the one before; then those of `frame_doubts`.
+            One line, which names the file, for each scan that is missing between others or was probably cut short, for
+            each run of scans or of images that repeat the one before them, and for each pose that no car can have
+            reached since the one before; then those of `frame_doubts`.
         """
         scans, packets, known = [self._file("velodyne_points", k, ".bin") for k in range(len(self))], {}, []
         for k in range(len(self)):
@@ -162,7 +163,9 @@ class KittiRawDrive(FrameSequence):
                 known.append(k)
         missing = [str(DataError(scans[k], "a scan", "none: the filter predicts over the gap")) for k in self.gaps]
         far = jumps(packets, self._seconds("oxts")[np.array(known, int)])
-        return [*missing, *short_scans(scans), *far, *super().doubts()]
+        images = [self._file(self.view, k, ".png") for k in range(len(self))]
+        again = [*repeats(scans, "scans"), *repeats(images, "images")]
+        return [*missing, *again, *short_scans(scans), *far, *super().doubts()]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
         """Yield a reader for each file, so that no damaged file hides another."""

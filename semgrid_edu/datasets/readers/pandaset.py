@@ -17,7 +17,7 @@ from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_tran
 from semgrid_edu.datasets.readers import pandaset_files as files
 from semgrid_edu.datasets.readers.calibration import camera_from
 from semgrid_edu.datasets.readers.cuboids import LabelledScan, put_together
-from semgrid_edu.datasets.readers.drive_doubts import scans_again
+from semgrid_edu.datasets.readers.drive_doubts import repeats
 from semgrid_edu.datasets.readers.frames import FrameSequence, frame_numbers, nothing_known
 from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, cells_in_view, closest_returns, unhidden
 from semgrid_edu.errors import ArgumentError, DataError, check_whole
@@ -191,7 +191,8 @@ class PandasetScene(FrameSequence):
         expected = f"an image, since there is one every {min(np.diff(self.numbers), default=1)} frames"
         missing = [str(DataError(self.view / f"{number:02d}.jpg", expected, "none")) for number in self.gaps]
         scans = [self.folder / "lidar" / f"{number:02d}.pkl.gz" for number in self.numbers]
-        return [*missing, *scans_again(scans, lambda k: self._scan(self.numbers[k]).points), *super().doubts()]
+        images = [self.view / f"{number:02d}.jpg" for number in self.numbers]
+        return [*missing, *repeats(scans, "scans"), *repeats(images, "images"), *super().doubts()]
 
     def _frame(self, k: int) -> Frame:
         frame = self._without_labels(k)
