@@ -92,8 +92,7 @@ def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGr
 
 def _two_slices(world: CellsInARow, cell: int) -> GraphicalModel:
     M = transition_matrix(world.params.world, DT)
-    seen = world.scans[0][cell - 1] != NOT_SEEN
-    first_sight = [*world.first_sight, 0] if seen else np.eye(N_STATES)[UNKNOWN]
+    first_sight = [*world.first_sight, 0] if world.scans[0][cell - 1] != NOT_SEEN else np.eye(N_STATES)[UNKNOWN]
     read = hit_probability(world.params.world.sensor)[[Cell.FREE, Cell.STATIC, Cell.LEFT, Cell.UNKNOWN]]
     factors = [
         Factor("q0", _first_place(world.belief, cell)),

@@ -120,8 +120,7 @@ def occlusion_cost(world: RayWorld | None = None) -> NDArray[np.float64]:
     world = world or RayWorld()
     model, off = pixel_ray(world).model, np.zeros(world.n_cells)
     for labels in every_combination((0, 1), repeat=world.n_cells):
-        known = {f"a{k}": label for k, label in enumerate(labels, 1)}
-        weight = eliminate(model, (), known).table
+        weight = eliminate(model, (), {f"a{k}": label for k, label in enumerate(labels, 1)}).table
         off += weight * np.abs(exact_ray(labels, world) - cell_by_cell(labels, world))
     return off
 

@@ -165,8 +165,7 @@ def depth_for_the_image() -> Price:
 
 def _log_loss(of: NDArray, cells: tuple[str, ...], given: tuple[str, ...]) -> float:
     """Return the mean of -log P(something | readings), nats: the entropy of what the contents of cells say."""
-    joint = eliminate(street(SystemWorld()), (*cells, *given)).table.reshape(of.shape[1], -1)
-    told = of @ joint
+    told = of @ eliminate(street(SystemWorld()), (*cells, *given)).table.reshape(of.shape[1], -1)
     return float(-(told * np.log(np.where(told > 0, told / told.sum(axis=0), 1))).sum())
 
 

@@ -106,9 +106,8 @@ def zoomed(frames: Sample, zoom: float, rng: np.random.Generator) -> Sample:
     Sample
         The same frames; `occupancy` and `truth` stay as they are.
     """
-    size = len(frames.image)
-    shown = (1 + zoom) ** rng.uniform(-1, 1, size)  # the share of the image's width that is shown
-    middle = rng.uniform(-1, 1, (size, 2)) * np.abs(1 - shown)[:, None]
+    shown = (1 + zoom) ** rng.uniform(-1, 1, len(frames.image))  # the share of the image's width that is shown
+    middle = rng.uniform(-1, 1, (len(shown), 2)) * np.abs(1 - shown)[:, None]
     transform = np.concatenate([shown[:, None, None] * np.eye(2), middle[..., None]], axis=2).astype(np.float32)
     places = F.affine_grid(torch.from_numpy(transform), [*frames.image.shape], align_corners=False)
     image = F.grid_sample(frames.image, places, align_corners=False)

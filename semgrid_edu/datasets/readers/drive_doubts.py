@@ -174,8 +174,8 @@ def repeats(paths: Iterable[Path], what: str) -> list[str]:
     """
     found = []
     for same, run in groupby(pairwise(path for path in paths if path.is_file()), key=_equal):
+        (before, first), (_, last) = (pairs := list(run))[0], pairs[-1]
         if same:
-            (before, first), (_, last) = (pairs := list(run))[0], pairs[-1]
             found.append(str(DataError(first, f"{what} that differ", f"{before.name} again, up to {last.name}")))
     return found
 
