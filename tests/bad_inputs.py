@@ -718,7 +718,6 @@ EXPERIMENTS = (
         "none.safetensors: expected a safetensors file, found no such file",
     ),
     Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "tint: expected a share of at least 0"),
-    Row("a zoom that can't be", "train --data TINY --out OUT --zoom -1", "zoom: expected a share of at least 0"),
     Row("no drives", "reproduce occupancy --drives 0", "Invalid value for '--drives'"),
     Row("no draws", "reproduce crf-coupling --draws 0", "Invalid value for '--draws'"),
     Row("a result in a folder", "reproduce overfit --out TINY", "TINY: expected a file to write, found a folder"),

@@ -5,12 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 from numpy.typing import NDArray
 from torch import Tensor
 
 from semgrid_edu.datasets.training_set import Mixture, Sample
-from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import SemanticGridNet, unit_image
 from semgrid_edu.planes import PlaneSampler
 
@@ -42,7 +40,6 @@ def draw_batch(
     seed: int,
     mirror: bool = True,
     tint: float = 0.0,
-    zoom: float = 0.0,
 ) -> Batch:
     """Return the frames of a step, with jittered brightness and contrast, mirrored by chance (data augmentation).
 
@@ -65,9 +62,6 @@ def draw_batch(
         Whether about half of the batches are mirrored.
     tint : float
         How far each colour of an image varies by itself, as a share.
-    zoom : float
-        How far images and their labels are enlarged or shrunk: 0.6 is by a factor from 1/1.6 to 1.6. Such images don't
-        fit the grid any more, so it is for the image stage alone.
 
     Returns
     -------
@@ -82,37 +76,7 @@ def draw_batch(
     image = (unit_image(frames.image) - 0.5) * (1 + torch.from_numpy(contrast)) + 0.5 + torch.from_numpy(brightness)
     mirrored = mirror and bool(rng.random() < 0.5)
     tints = 1 + torch.from_numpy(rng.uniform(-tint, tint, (size, 3, 1, 1)).astype(np.float32))
-    frames = frames._replace(image=(image * tints).clamp(0, 1))
-    return Batch(zoomed(frames, zoom, rng) if zoom else frames, mirrored)
-
-
-def zoomed(frames: Sample, zoom: float, rng: np.random.Generator) -> Sample:
-    """Enlarge or shrink images and their labels, each by a factor and about a point of its own.
-
-    Things of a street then come in more sizes and places than one drive shows.
-
-    Parameters
-    ----------
-    frames : Sample
-        B frames; `image` is float.
-    zoom : float
-        The logarithm of the factor is uniform between those of 1 / (1 + zoom) and 1 + zoom.
-    rng : numpy.random.Generator
-        What draws factor and point. An enlarged image shows a part of the old one; a shrunk one lies all in the new
-        one, between black pixels without a label.
-
-    Returns
-    -------
-    Sample
-        The same frames; `occupancy` and `truth` stay as they are.
-    """
-    shown = (1 + zoom) ** rng.uniform(-1, 1, len(frames.image))  # the share of the image's width that is shown
-    middle = rng.uniform(-1, 1, (len(shown), 2)) * np.abs(1 - shown)[:, None]
-    transform = np.concatenate([shown[:, None, None] * np.eye(2), middle[..., None]], axis=2).astype(np.float32)
-    places = F.affine_grid(torch.from_numpy(transform), [*frames.image.shape], align_corners=False)
-    image = F.grid_sample(frames.image, places, align_corners=False)
-    labels = F.grid_sample(frames.labels[:, None] - float(IGNORE), places, "nearest", align_corners=False) + IGNORE
-    return frames._replace(image=image, labels=labels[:, 0].round().to(frames.labels.dtype))
+    return Batch(frames._replace(image=(image * tints).clamp(0, 1)), mirrored)
 
 
 def frames_of_step(n_frames: int, size: int, iteration: int, seed: int) -> NDArray[np.int64]:

@@ -95,8 +95,7 @@ def train(
         return _objective(net, stage, alpha[stage].to(device), params.end_to_end)
 
     def batch(iteration: int) -> Batch:
-        zoom = params.zoom if params.stage(iteration)[0] == "image" else 0.0
-        drawn = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror, params.tint, zoom)
+        drawn = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror, params.tint)
         if isinstance(dataset, Mixture):
             drawn = drawn._replace(sampler=samplers[dataset.turn(iteration)[0]])
         return share_of_batch(drawn, rank(), world_size(), device)

@@ -32,8 +32,6 @@ class TrainingParams:
         show few kinds of light.
     tint : float
         How far red, green and blue vary, each by itself, as a share: light and cameras differ from street to street.
-    zoom : float
-        How far images and labels of the first stage are enlarged or shrunk, see `draw_batch`.
     end_to_end : bool
         Whether the loss on the grid teaches the image network too. If not, training has two separate stages, as in the
         authors' earlier work, and the second stage doesn't change the image network.
@@ -50,7 +48,6 @@ class TrainingParams:
     weight_limit: float = 4.0
     jitter: float = 0.2
     tint: float = 0.0
-    zoom: float = 0.0
     end_to_end: bool = True
     mirror: bool = True
 
@@ -62,7 +59,7 @@ class TrainingParams:
         check_fields(self, "a positive number", lambda rate: 0 < rate < math.inf, "learning_rate")
         check_fields(self, "a share from 0 to below 1", lambda share: 0 <= share < 1, "momentum")
         check_fields(self, "1 or more", lambda limit: limit >= 1, "weight_limit")
-        check_fields(self, "a share of at least 0", lambda share: 0 <= share < math.inf, "jitter", "tint", "zoom")
+        check_fields(self, "a share of at least 0", lambda share: 0 <= share < math.inf, "jitter", "tint")
 
     @property
     def iterations(self) -> int:

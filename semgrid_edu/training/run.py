@@ -50,7 +50,7 @@ def architecture(segmenter: str, preset: str = "compact") -> Architecture:
 
 
 def training_params(
-    preset: str, iterations: int, end_to_end: bool = True, from_imagenet: bool = False, **augmentation: float
+    preset: str, iterations: int, end_to_end: bool = True, from_imagenet: bool = False, tint: float = 0.0
 ) -> TrainingParams:
     """Return the training parameters that a preset stands for.
 
@@ -65,8 +65,8 @@ def training_params(
         Whether the loss on the grid teaches the image network too.
     from_imagenet : bool
         Whether the image network starts from ImageNet weights. Training end to end then needs no first stage.
-    **augmentation : float
-        `tint` and `zoom` of `TrainingParams`.
+    tint : float
+        How far each colour varies, see `TrainingParams`.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def training_params(
         What `train` takes.
     """
     image_iterations = 0 if from_imagenet and end_to_end else iterations
-    params = TrainingParams(image_iterations, iterations, end_to_end=end_to_end, **augmentation)
+    params = TrainingParams(image_iterations, iterations, end_to_end=end_to_end, tint=tint)
     return params if preset == "compact" else replace(params, learning_rate=1e-3, weight_limit=math.inf)
 
 
@@ -237,7 +237,7 @@ def _command(
         f"--imagenet {_name(imagenet)}" if imagenet else "",
         *(f"--from {_name(Path(path).parent)}/{_name(path)}" for path in start),
         f"--seed {seed} --iterations {params.grid_iterations}",
-        *(f"--{name} {share:g}" for name in ("tint", "zoom") if (share := getattr(params, name))),
+        f"--tint {params.tint:g}" if params.tint else "",
         "" if params.end_to_end else "--two-stage",
         f"--truth {next(named, 'lidar')}" if truth else "",
     ]

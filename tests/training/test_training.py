@@ -14,7 +14,7 @@ from safetensors.torch import load_file, save_file
 from sklearn.metrics import accuracy_score
 from tiny_streets import CAMERA, SMALL, tiny_streets
 
-from semgrid_edu.datasets.training_set import Mixture, Sample
+from semgrid_edu.datasets.training_set import Mixture
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.networks import SEGMENTERS, SemanticGridNet, build_net
@@ -22,7 +22,7 @@ from semgrid_edu.storage.files import sole_writer
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 from semgrid_edu.training import TrainingParams, checkpoint, train
 from semgrid_edu.training import loop as training
-from semgrid_edu.training.batches import Batch, draw_batch, grid_logits, image_scores, zoomed
+from semgrid_edu.training.batches import Batch, draw_batch, grid_logits, image_scores
 from semgrid_edu.training.log import read_log
 from semgrid_edu.training.loss import median_frequency_weights
 
@@ -74,36 +74,6 @@ def test_each_colour_of_a_frame_varies_by_itself(streets):
     found = torch.stack([factor[0] for factor in factors if len(factor)])
     assert found.sub(1).abs().max() <= 0.3 + 1e-6
     assert len(found.unique()) == len(found) > 6
-
-
-def test_a_zoomed_image_keeps_its_labels_beside_it():
-    """A street whose brightness is its column and whose label is its row tells where each pixel was before."""
-    height, width = 96, 320
-    row, column = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
-    image = ((column + 1) / 400).expand(200, 3, height, width)
-    frames = Sample(image, row.to(torch.uint8).expand(200, height, width), torch.zeros(200, 1), torch.zeros(200, 1))
-    new = zoomed(frames, 0.6, np.random.default_rng(0))
-    assert new.occupancy is frames.occupancy
-    factors = []
-    for seen, rows in zip(new.image[:, 0], new.labels.double(), strict=True):
-        of_row, columns = rows.median(dim=1).values, 400 * seen[height // 2].double() - 1
-        shown, inside = of_row != IGNORE, columns > 0.5
-        down = np.polyfit(row[shown, 0], of_row[shown], 1)[0]
-        along = np.median(np.diff(columns[inside]))
-        assert along == pytest.approx(down, abs=0.02)  # enlarged alike both ways: labels have whole rows
-        assert shown.all() or (shown.sum() * down == pytest.approx(height, abs=3))  # all of a shrunk image is seen
-        assert not seen[~(shown | shown.roll(1) | shown.roll(-1))].any()  # black beside it, but for the row between
-        factors.append(down)
-    assert 1 / 1.6 - 0.04 < min(factors) < 0.7 < 1.4 < max(factors) < 1.6 + 0.04
-    assert abs(np.log(factors).mean()) < 0.1
-
-
-def test_images_are_zoomed_in_the_image_stage_alone(streets, tmp_path, monkeypatch):
-    seen = []
-    monkeypatch.setattr(training, "draw_batch", lambda *given: (seen.append(given[-1]), draw_batch(*given))[1])
-    params = replace(QUICK, image_iterations=2, grid_iterations=1, zoom=0.6)
-    train(build_net(SMALL, CAMERA), streets, tmp_path, params)
-    assert seen == [0.6, 0.6, 0.0]
 
 
 def test_each_frame_has_a_brightness_and_a_contrast_of_its_own(streets):
@@ -449,7 +419,6 @@ def test_a_loss_that_is_not_finite_stops_the_run(streets, tmp_path):
         ({"weight_limit": 0.5}, "weight_limit: expected 1 or more, found 0.5"),
         ({"jitter": -0.1}, "jitter: expected a share of at least 0, found -0.1"),
         ({"tint": math.nan}, "tint: expected a share of at least 0, found nan"),
-        ({"zoom": -0.1}, "zoom: expected a share of at least 0, found -0.1"),
     ],
 )
 def test_numbers_that_nothing_is_learnt_with_are_refused(numbers, message):

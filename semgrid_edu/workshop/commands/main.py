@@ -115,7 +115,6 @@ def train(
     seed: Annotated[int, typer.Option(min=0, help="Seed for the initial weights and the order of the frames.")] = 0,
     iterations: Annotated[int, typer.Option(min=1, help="Steps of each of the two stages.")] = 2000,
     tint: Annotated[float, typer.Option(help="How far each colour of an image varies: 0.15 is 15 % either way.")] = 0.0,
-    zoom: Annotated[float, typer.Option(help="How far the image stage zooms: 0.6 is by 1/1.6 to 1.6.")] = 0.0,
     two_stage: Annotated[bool, typer.Option("--two-stage", help="Train the fusion on a fixed image network.")] = False,
     truth: Annotated[str, typer.Option(help="true, lidar, or another way, such as no-cleanup.")] = "true",
     resume: Resume = False,
@@ -129,7 +128,7 @@ def train(
     from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.training.run import chosen_truth, train_network, training_params
 
-    params = training_params(preset, iterations, not two_stage, imagenet is not None, tint=tint, zoom=zoom)
+    params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
     choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
     train_network(data, out, segmenter, params, seed, resume, start=start or (), **choices)
