@@ -68,7 +68,7 @@ CAR, ROAD = KITTI_14.index("car"), KITTI_14.index("road")
 street = real_drive()
 net = load_net(real_weights(), street.camera)
 real = list(run_pipeline(street, Stages.of(net, keep_steps=True)))
-now, CELL = real[-1], (79, 35)
+now, CELL = real[-1], (81, 36)
 story = cell_story(now, CELL, net, past=real[:-1])
 fig = draw_cell_story(story, now.frame.image // 8 * 8)  # fewer colours: a smaller file
 for letter, ax in zip("ABDFGCE", fig.axes, strict=True):
@@ -89,13 +89,13 @@ assert story.pull.before[CAR] > 0.99
 # them.
 #
 # - **A** The dots are points above the cell, one every 20 cm from the ground up, drawn where the camera sees them. The
-#   lowest falls on the road, those above it on parked cars, the upper ones on a tree behind them. So the image alone doesn't say what stands in this cell.
+#   lowest lies at the foot of parked cars, those above it on the cars, the upper ones on a tree behind them. So the image alone doesn't say what stands in this cell.
 # - **B**, **C** What the filter believes of the cell: after each of its steps within this scan (B; *shown* is what it
 #   passes on), and scan by scan (C). It is sure that something stands there: STATIC. No return says *what* it is.
 # - **D**, **E**, **F** How much image and occupancy speak for *car* (violet) or for the runner-up, *vegetation* (orange;
 #   the maps below have other colours): by kind of input, with the network's constants and the sum (D); the image's part by
 #   the score's class (E, the six largest) and by height (F).
-#   Each pixel has a score for every class, and the network may use each of them: a score for *sidewalk*, too, can
+#   Each pixel has a score for every class, and the network may use each of them: a score for *road*, too, can
 #   speak for *car*.
 # - **G** What the CRF makes of it. The neighbours' push is in brackets: it is largest for *car*, which was nearly
 #   certain before.
@@ -451,13 +451,12 @@ for name, part in (parts | {"sum": why.score}).items():
 np.testing.assert_allclose(sum(parts.values()), why.score, rtol=1e-6)
 odds = now.grid[story.label, *CELL] / now.grid[story.rival, *CELL]
 np.testing.assert_allclose(np.exp(why.score), odds, rtol=0.01)
-assert parts["image"] > 0
-assert parts["occupancy"] > 0 > parts["constants"]
+assert min(parts.values()) > 0
 assert KITTI_14.names[story.rival] == "vegetation"
 
 # %% [markdown]
-# Both sensors speak for *car*; the constants, which come from the network's biases and from no sensor, speak for
-# *vegetation*. The parts add up (before rounding) to the difference of the two scores, and by the soft-max $e^\text{difference}$ is the odds of
+# Both sensors speak for *car*, and so do the constants, which come from the network's biases and from no sensor. The
+# parts add up (before rounding) to the difference of the two scores, and by the soft-max $e^\text{difference}$ is the odds of
 # *car* against the runner-up. (A part isn't what would change without this input; lecture 08 measures that.) The map on
 # the left shows the most probable class of each cell:
 
@@ -500,7 +499,7 @@ for name in ("road", "car", "vegetation", "building"):
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three label maps: before the CRF, after it, and only the cells that changed, which are crumbs, borders, distant cars and part of a strip of sidewalk along the left edge"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three label maps: before the CRF, after it, and only the cells that changed, which are crumbs, borders, distant cars and most of a strip of sidewalk along the left edge"
 before, after = now.grid.argmax(axis=0), now.refined.argmax(axis=0)
 changed = np.where(after != before, after, 255)
 plotting.label_maps(spec, {"before": before, "after": after, "what changed, and to what": changed}, KITTI_14)
@@ -515,7 +514,7 @@ assert spoiled > mended > 0
 
 # %% [markdown]
 # More than nine cells in ten keep their class, ours among them (panel G). The map looks tidier, and it has become
-# worse: of the labelled cells that changed, more were right before than are right now. Look at the left edge: half
+# worse: of the labelled cells that changed, more were right before than are right now. Look at the left edge: most
 # of the strip of sidewalk has become road.
 #
 # ## How good is it?

@@ -803,7 +803,7 @@ for name, one in agreement.items():
 # sure, but from its confidence of 0.76 on this street you can't see that 45 % of the map's labelled cells are wrong.
 # Two classes are a coarse check: they can't tell a car from a fence. And what lies lower than 30 cm counts as ground: on
 # this street that takes in the lower edge of the car ahead. Returns there are labelled *car*, and the network that knows
-# the street says so: one reason why it agrees in only 68 of 100. The companion [the domain gap,
+# the street says so: one reason why it agrees in only 64 of 100. The companion [the domain gap,
 # measured](deeper/13_domain_gap.ipynb) takes this further: how far these images are from those learned from, and why
 # that distance isn't the damage.
 #
