@@ -52,7 +52,8 @@ def decided_truth(
     """
     if not in_view.any():
         return fill_unlabelled(truth, belief_probability, label_set)
-    return np.where(in_view, truth, fill_unlabelled(np.full_like(truth, IGNORE), belief_probability, label_set))
+    unseen = fill_unlabelled(np.full_like(truth, IGNORE), belief_probability, label_set)
+    return np.where(in_view, truth, unseen)
 
 
 def truth_to_learn(drive: LabelledDrive, k: int, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:

@@ -118,7 +118,8 @@ class TrainingSet(Dataset[Sample]):
         arrays = cached_arrays(index, split, recipe)
         self.arrays = arrays | {"true": arrays["truth"]}
         if truth:
-            self.arrays["truth"] = cached_labels(drives, recipe, truth, Path(arrays["truth"].filename).parent)
+            folder = Path(arrays["truth"].filename).parent
+            self.arrays["truth"] = cached_labels(drives, recipe, truth, folder)
 
     def __len__(self) -> int:
         """Return the number of labelled frames."""

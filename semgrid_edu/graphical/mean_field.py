@@ -103,7 +103,8 @@ def _best(model: GraphicalModel, q: Independent, name: str) -> NDArray[np.float6
             log += _expected(_finite_log(factor.table), factor, q, keep=name)
     # No tolerance where some states are allowed outright: it would let forbidden ones in, and F would be infinite.
     fewest = forbidden.min()
-    return softmax(np.where(forbidden <= fewest + (TOLERANCE if fewest > 0 else 0), log, -np.inf))
+    allowed = forbidden <= fewest + (TOLERANCE if fewest > 0 else 0)
+    return softmax(np.where(allowed, log, -np.inf))
 
 
 def _free_energy(model: GraphicalModel, q: Independent) -> float:

@@ -52,7 +52,8 @@ class VelocityLattice:
         """(V, 2): the velocities of the lattice, m/s, from slow to fast; the first is zero."""
         steps = int(self.max_speed / self.spacing + 1e-9)
         x, y = (axis.ravel() for axis in np.mgrid[-steps : steps + 1, -steps : steps + 1])
-        lattice = np.stack([x, y], axis=1)[np.lexsort((y, x, x**2 + y**2))] * float(self.spacing)
+        order = np.lexsort((y, x, x**2 + y**2))
+        lattice = np.stack([x, y], axis=1)[order] * float(self.spacing)
         return lattice[np.hypot(*lattice.T) <= self.max_speed * (1 + 1e-9)]
 
     @cached_property
@@ -62,7 +63,8 @@ class VelocityLattice:
         The density of `resampling.draw_velocities`, any heading and a speed that is the square of a uniform number, is
         proportional to ``|v|^(-3/2)`` in the plane of velocities.
         """
-        density = np.append(0, np.hypot(*self.velocities.T)[1:] ** -1.5)
+        speed = np.hypot(*self.velocities.T)
+        density = np.append(0, speed[1:] ** -1.5)
         return density / density.sum()
 
     @cached_property

@@ -115,7 +115,8 @@ def close_and_spread(grid: NDArray, cell: float, label_set: LabelSet = KITTI_14)
     fillable = (grid >= label_set.n_semantic) & (grid != unknown_numbers(label_set)[State.UNKNOWN])
     closed = np.where(fillable, spread, grid)
     for c in set(range(label_set.n_semantic)) - set(flat.tolist()):
-        closed[fillable & binary_closing(np.pad(grid == c, margin), square)[margin:-margin, margin:-margin]] = c
+        thing = np.pad(grid == c, margin)
+        closed[fillable & binary_closing(thing, square)[margin:-margin, margin:-margin]] = c
     return closed
 
 

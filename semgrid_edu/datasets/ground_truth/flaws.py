@@ -119,7 +119,8 @@ def _without_small_things(
     for c in sorted(set(np.unique(labels).tolist()) - flat - {IGNORE}):
         things, count = label(labels == c)
         areas = np.bincount(things.ravel(), minlength=count + 1)
-        missed |= ((areas < flaws.small) & (rng.random(count + 1) < flaws.missed))[things] & (things > 0)
+        gone = (areas < flaws.small) & (rng.random(count + 1) < flaws.missed)
+        missed |= gone[things] & (things > 0)
     if not missed.any() or missed.all():
         return labels
     return labels[tuple(distance_transform_edt(missed, return_distances=False, return_indices=True))]

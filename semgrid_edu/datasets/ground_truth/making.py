@@ -42,7 +42,8 @@ def in_sight(frame: Frame, spec: GridSpec) -> NDArray[np.bool_]:
     pixels, ahead = project(transform_points(T_camera_from_grid, centers), frame.camera)
     height, width = frame.camera.size
     strips = np.where(ahead, np.nan_to_num(pixels[..., 0]) * SIGHT_COLUMNS / width, 0).astype(int)
-    distance = np.hypot(*np.moveaxis(spec.centers() - invert_rigid(T_camera_from_grid)[:2, 3], -1, 0))
+    eye = invert_rigid(T_camera_from_grid)[:2, 3]
+    distance = np.hypot(*np.moveaxis(spec.centers() - eye, -1, 0))
     seen_pixels, seen_cells = seen_returns(frame, spec, (height, width))
     farthest = np.zeros(SIGHT_COLUMNS)
     np.maximum.at(farthest, seen_pixels % width * SIGHT_COLUMNS // width, distance.ravel()[seen_cells])

@@ -190,7 +190,8 @@ def sweep_times(points: NDArray) -> NDArray[np.float64]:
     >>> sweep_times(np.array([[5.0, 0.0], [0.0, 5.0], [0.0, -5.0]])).tolist()
     [-0.0, -0.025, 0.025]
     """
-    return -np.arctan2(points[:, 1].astype(np.float64), points[:, 0]) / (2 * np.pi) * LIDAR_PERIOD
+    azimuth = np.arctan2(points[:, 1].astype(np.float64), points[:, 0])
+    return -azimuth / (2 * np.pi) * LIDAR_PERIOD
 
 
 def deskew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:

@@ -158,7 +158,7 @@ def frame_doubts(
 
 
 def repeats(paths: Iterable[Path], what: str) -> list[str]:
-    """Name each file, anywhere in a drive, from which on a sensor repeats itself.
+    """Name each file, anywhere in a drive, from which on files are equal to the one before them.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def repeats(paths: Iterable[Path], what: str) -> list[str]:
     Returns
     -------
     list of str
-        One line for each run of files that are that before them.
+        One line for each run of such files, which names the first and the last.
     """
     found = []
     for same, run in groupby(pairwise(path for path in paths if path.is_file()), key=_equal):

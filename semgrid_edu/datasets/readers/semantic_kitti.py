@@ -188,7 +188,8 @@ class SemanticKittiSequence(FrameSequence):
         """Return scan j in the grid frame of frame k, and its classes, without what has moved between them."""
         points, classes = self.scan(j)[:, :3].astype(np.float64), self.classes(j)
         if j != k:
-            points = transform_points(invert_rigid(self._poses[k]) @ self._poses[j], points)
+            T_lidar_k_from_lidar_j = invert_rigid(self._poses[k]) @ self._poses[j]
+            points = transform_points(T_lidar_k_from_lidar_j, points)
             classes = np.where(self.moving(j), np.uint8(IGNORE), classes)
         return transform_points(invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT)), points), classes
 

@@ -55,7 +55,8 @@ def _walls(house: House) -> list[tuple[NDArray, NDArray, float]]:
     w, d = house.width / 2, house.depth
     corners = np.array([[-w, 0, 0], [w, 0, 0], [w, d, 0], [-w, d, 0]])
     edges = np.roll(corners, -1, axis=0) - corners
-    return [(c, e / n, n) for c, e, n in zip(corners, edges, np.linalg.norm(edges, axis=1), strict=True)]
+    lengths = np.linalg.norm(edges, axis=1)
+    return [(c, e / n, n) for c, e, n in zip(corners, edges, lengths, strict=True)]
 
 
 def _panel(corner, right, up, out: float, colour, material=Material.MATTE) -> Shape:
