@@ -66,7 +66,8 @@ def automatic(model: GraphicalModel) -> dict[str, Place]:
         columns = in_rows(*_layers(_distances(model), model.neighbours))
         return {name: (-y, x) for name, (x, y) in columns.items()}
     rows = in_rows(*_layers(_depths(model.parents), model.parents))
-    return _cleared(rows, [(above, child) for child, family in model.parents.items() for above in family])
+    edges = [(above, child) for child, family in model.parents.items() for above in family]
+    return _cleared(rows, edges)
 
 
 def _depths(parents: Mapping[str, tuple[str, ...]]) -> dict[str, int]:

@@ -58,7 +58,8 @@ def bof_beliefs(world: CellsInARow) -> NDArray[np.float64]:
     for step in range(1, len(world.scans) + 1):
         predicted = bof_predict_literal(state, world.spec, params, DT)
         state = bof_update(predicted, world.spec, world.evidence(step), params)
-        beliefs.append(np.concatenate([state.free, *state.occupied[_used(state.velocity)], state.unknown]).T)
+        planes = [state.free, *state.occupied[_used(state.velocity)], state.unknown]
+        beliefs.append(np.concatenate(planes).T)
     return np.array(beliefs)
 
 

@@ -205,8 +205,7 @@ def _left_out(confusions: NDArray, metric: Metric) -> tuple[NDArray, NDArray]:
     """Return the metric of each seed on all drives (S,), and on all but one of them (S, V)."""
     totals = confusions.sum(axis=1)
     scores = np.array([metric(total) for total in totals])
-    others = totals[:, None] - confusions
-    without = np.array([[metric(matrix) for matrix in matrices] for matrices in others])
+    without = np.array([[metric(matrix) for matrix in matrices] for matrices in totals[:, None] - confusions])
     if not (np.isfinite(scores).all() and np.isfinite(without).all()):
         raise ArgumentError("metric", "a finite number for all drives, and for all but one of them", "NaN or infinity")
     return scores, without
