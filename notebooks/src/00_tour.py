@@ -499,7 +499,7 @@ for name in ("road", "car", "vegetation", "building"):
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three label maps: before the CRF, after it, and only the cells that changed, which are crumbs, borders, distant cars and most of a strip of sidewalk along the left edge"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three label maps: before the CRF, after it, and only the cells that changed, which are crumbs, borders, distant cars, a patch of sidewalk far ahead and most of a strip of it along the left edge"
 before, after = now.grid.argmax(axis=0), now.refined.argmax(axis=0)
 changed = np.where(after != before, after, 255)
 plotting.label_maps(spec, {"before": before, "after": after, "what changed, and to what": changed}, KITTI_14)

@@ -959,7 +959,7 @@ plt.show()
 # points of all cells, and six of semantic ones, against the table, which knows how label and state occur together. By
 # class accuracy it is better here, too, by about seven points. (The network has learnt from these very
 # frames, so its row shows what it can hold, not how it does on a new street.) Over all ten frames late fusion finds
-# most of the road, half of the cells of cars and nearly three quarters of those of buildings, and gives these names to
+# most of the road, two fifths of the cells of cars and nearly three quarters of those of buildings, and gives these names to
 # many other cells (B shows the last frame). It finds next to nothing of vegetation, sidewalk, bicycles and pedestrians. The road
 # nearer than 13 m is missing, too: this camera doesn't see the ground so near, and a table can't ask the neighbours.
 #

@@ -1020,7 +1020,7 @@ for before_crf, after_crf in correct.values():
 states = np.stack([cells.argmax(axis=0) for _, cells, _ in grids])[on_sidewalk]
 print(f"of the sidewalk's cells {(states == State.FREE).mean():.0%} are FREE")
 
-# %% jupyter={"source_hidden": true} alt="three maps of a real street: the network's has a strip of sidewalk one or two cells wide along its left border, the refined one keeps one piece of it, less than a quarter, the labels show parts of the strip too"
+# %% jupyter={"source_hidden": true} alt="three maps of a real street: the network's has a strip of sidewalk one or two cells wide along its left border, the refined one keeps one piece of it and a lone cell, less than a quarter, the labels show parts of the strip too"
 plotting.label_maps(
     whole,
     {

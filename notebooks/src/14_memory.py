@@ -611,7 +611,7 @@ show_windows([(results, one) for results in (simulated, street) for one in windo
 # %% [markdown]
 # Forward is up. White cells of the truth are those that nobody labelled. In the simulated squares unknown cells become what they
 # are: vegetation, road, car. On the real street two of the three squares show the oncoming car of the opening;
-# the third gains five cells.
+# the third gains four cells.
 #
 # ## The ledger's line, paid back
 #
@@ -661,7 +661,7 @@ for name, results in {"sample drive": simulated, "real street": street}.items():
 # On the sample drive the toy gets the order right: most of what memory gives lies where the camera doesn't look any
 # more, even more than predicted. On the real street both are next to nothing. Two things are different there, of which
 # the toy knew nothing. This network learned from these frames, so that one frame is right
-# in 94 of 100 cells in view. With the network from simulated streets (last column) both gains are positive, but small.
+# in 93 of 100 cells in view. With the network from simulated streets (last column) both gains are positive, but small.
 # And the vehicle waits, so what is hidden now is hidden by traffic: 38 % of these cells have another class than when
 # they were last seen, on the sample drive 5 %. A prediction that fails tells where the model is too simple.
 #
