@@ -187,7 +187,7 @@ class PandasetScene(FrameSequence):
         return cells_in_view(self._camera(k), spec)
 
     def doubts(self) -> list[str]:
-        """List images that are missing between others, scans and images that repeat, and what is doubtful of a few frames."""
+        """List images missing between others, scans and images that repeat, and what is doubtful about a few frames."""
         expected = f"an image, since there is one every {min(np.diff(self.numbers), default=1)} frames"
         missing = [str(DataError(self.view / f"{number:02d}.jpg", expected, "none")) for number in self.gaps]
         scans = [self.folder / "lidar" / f"{number:02d}.pkl.gz" for number in self.numbers]
