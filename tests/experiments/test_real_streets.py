@@ -158,12 +158,14 @@ NAMES = {
     "SegNet, then real pixels and cells": "simulated, then real, image stage on points",
     "SegNet, then real pixels and cells, image network frozen on cells": "simulated, then real, two stages",
     "the mean scores of three such image networks, one fusion network on cells": MEAN_OF_THREE,
+    "one such image network, each colour varied by up to 15 %": "simulated, then real, two stages, tinted",
     "SegNet, then real and simulated pixels and cells in turn": "simulated and real in turn, image stage on points",
     "FCN, then real cells": "simulated, then real, FCN",
     "DeepLab, then real cells": "simulated, then real, DeepLab",
     "SegNet, real pixels and cells alone": "real only",
-    "the same without occupancy": "real only, without occupancy",
-    "the same with one plane": "real only, one plane",
+    "U-Net, real pixels and cells alone": "real only, U-Net",
+    "SegNet, real pixels and cells alone, without occupancy": "real only, without occupancy",
+    "SegNet, real pixels and cells alone, with one plane": "real only, one plane",
 }
 
 
