@@ -14,6 +14,7 @@ from semgrid_edu.workshop.course import checks
 from semgrid_edu.workshop.course.notebooks.build import (
     WakefulChannel,
     build_lecture,
+    execute,
     lecture_sources,
     named,
     read_percent,
@@ -80,6 +81,13 @@ def test_executed_lecture_keeps_outputs_and_nothing_of_this_machine(source, only
     assert str(path.parent) not in path.read_text()
     assert checks.lecture_problems(source) == []
     assert build_lecture(source).read_bytes() == path.read_bytes()
+
+
+def test_what_a_cell_prints_in_parts_is_one_output_and_stays_in_its_place(source):
+    prints = "import time\nprint('a', end='', flush=True)\ntime.sleep(0.5)\nprint('b')\ndisplay(1)\nprint('c')"
+    source.write_text(f"# %%\n{prints}\n")
+    (cell,) = execute(read_percent(source), source.parent).cells
+    assert [output.get("text") for output in cell.outputs] == ["ab\n", None, "c\n"]
 
 
 def run(source, change):

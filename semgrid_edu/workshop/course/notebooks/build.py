@@ -12,6 +12,7 @@ import nbformat
 from jupyter_client.asynchronous.client import AsyncKernelClient
 from jupyter_client.channels import AsyncZMQSocketChannel
 from nbclient import NotebookClient
+from nbconvert.preprocessors import CoalesceStreamsPreprocessor
 from nbformat import NotebookNode
 from traitlets import Type
 
@@ -88,8 +89,7 @@ def built_path(source: Path) -> Path:
     >>> built_path(Path("notebooks/src/deeper/graphical_models.py")).as_posix()
     'notebooks/deeper/graphical_models.ipynb'
     """
-    sources = next(folder for folder in source.parents if folder.name == "src")
-    return sources.parent / f"{notebook_name(source)}.ipynb"
+    return next(folder for folder in source.parents if folder.name == "src").parent / f"{notebook_name(source)}.ipynb"
 
 
 def named(sources: list[Path], names: list[str] | None) -> list[Path]:
@@ -213,14 +213,14 @@ def execute(notebook: NotebookNode, folder: Path, timeout: int = 300) -> Noteboo
     nbclient.exceptions.CellExecutionError
         When a cell raises an error; the message names the cell.
     """
-    place = {"metadata": {"path": folder}}
-    client = NotebookClient(notebook, timeout=timeout, record_timing=False, resources=place)
+    client = NotebookClient(notebook, timeout=timeout, record_timing=False, resources={"metadata": {"path": folder}})
     client.km = client.create_kernel_manager()
     client.km.client_factory = WakefulClient
     client.execute()
     for cell in notebook.cells:
         if cell.cell_type == "code":
             cell.outputs = [output for output in cell.outputs if LIVE not in output.get("data", {})]
+            CoalesceStreamsPreprocessor().preprocess_cell(cell, {}, 0)  # print's parts come as they were flushed
             finish_figures(cell)
     notebook.metadata = nbformat.from_dict(METADATA)
     return notebook
