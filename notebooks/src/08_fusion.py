@@ -913,14 +913,14 @@ Markdown("\n".join([head, *rows]))
 # In brackets 95 % intervals. The simulated rows' networks learnt in 500 steps from labels made with the LIDAR (lecture
 # 09), on a GPU, so don't compare their 54 % with the 73 % above. For the real row six cameras made three pairs
 # (right, left, front and back). Each pair was left out once, three networks learned from the four others, and the two
-# were scored: all on one street corner. By true labels
-# $o$ brings 14 points; by real labels 42, with a wide interval. The judges differ, too: a real cell is labelled only
-# where a *LIDAR return* lies, and there $o$ has evidence. And look at the last column: in the view of cameras that a
-# network hasn't learned from, a table of $o$ alone gets *more* cells right, by 6 points (1 to 11). Of eight ways that
-# go on from simulated streets six come within two points of it; the highest, the mean of three image networks' scores,
-# has 2 more after the CRF, and that may be chance (-1 to 4; [results](../docs/results.md)). The second row is
-# a surprise of its own: a network that was trained with the ground plane alone loses one point against one with twenty.
-# So on these simulated streets, with these labels, the number of planes is hardly what a network has over a table.
+# were scored: all on one street corner. By true labels $o$ brings 14 points; by real labels 43, and the score without
+# it has a wide interval. The judges differ, too: a real cell is labelled only where a *LIDAR return* lies, and there
+# $o$ has evidence. And look at the last column: in the view of cameras that a network hasn't learned from, a table of
+# $o$ alone gets *more* cells right, by 6 points (1 to 11). Of eight ways that go on from simulated streets six come
+# within two points of it; the highest, the mean of three image networks' scores, has 2 more after the CRF, and that may
+# be chance (-1 to 4; [results](../docs/results.md)). The second row is a surprise of its own: a network that was
+# trained with the ground plane alone loses one point against one with twenty. So on these simulated streets, with these
+# labels, the number of planes is hardly what a network has over a table.
 #
 # Is late fusion nearly free on the real street, too? Labels by the shipped real network, state by the filter, truth by
 # people:
