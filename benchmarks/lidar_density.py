@@ -2,13 +2,12 @@
 
     python benchmarks/lidar_density.py --pandaset FOLDER --simulated DIR/minikitti --runs RUNS
 
-A fusion network learns from either on the scores of the shipped network's first stage, and is scored on the labelled
+A fusion network learns from either on the scores of the first stage of `segnet_compact`, and is scored on the labelled
 returns of PandaSet's scene 002; then it learns from four of the scene's cameras and is scored on the two others, as in
 `reproduce real-streets`. A run that has ended isn't repeated.
 """
 
 import argparse
-import os
 import shutil
 from pathlib import Path
 
@@ -23,28 +22,29 @@ from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture
 from semgrid_edu.training import TrainingParams
 from semgrid_edu.workshop.scoring.score_with_interval import compared, on_cells, shown
+from semgrid_edu.workshop.simulation.sensors.rig import HDL64E_AHEAD
 from semgrid_edu.workshop.studies.training import real_streets as study
 
-STEP, KEPT = 0.18, 5
-"""Degrees between the simulated scanner's columns, and which of them a thinned scan keeps: one of so many."""
+FIFTH = 5
+"""A thinned scan keeps one of so many columns."""
 
-SEEDS, COMPARED = range(3), ("pixel accuracy", "class accuracy")
+SEEDS, COMPARED = range(study.TABLE["seeds"]), ("pixel accuracy", "class accuracy")
 FUSION = study.WayToTrain(Architecture(), params=TrainingParams(0, 400, end_to_end=False))
-REAL = study.WayToTrain(Architecture(), params=TrainingParams(100, 200, end_to_end=False))
+REAL = study.WAYS["simulated, then real, two stages"]
 
 
 def thinned(points: np.ndarray) -> np.ndarray:
     """Keep the returns (N, 4) of every fifth column."""
-    column = np.rint(np.degrees(np.arctan2(points[:, 1], points[:, 0])) / STEP).astype(int)
-    return points[column % KEPT == 0]
+    column = np.rint(np.degrees(np.arctan2(points[:, 1], points[:, 0])) / HDL64E_AHEAD.azimuth_step).astype(int)
+    return points[column % FIFTH == 0]
 
 
 def thin_data_set(folder: Path, out: Path) -> Path:
-    """Write a data set with thinned scans, whose other files are links; one that is there is left as it is."""
+    """Copy a simulated data set with thinned scans; a copy that is there is left as it is."""
     if not out.exists():
         half = out.with_name(f"{out.name} under way")
         shutil.rmtree(half, ignore_errors=True)
-        shutil.copytree(folder, half, copy_function=os.link, ignore=shutil.ignore_patterns("*.bin", "cache"))
+        shutil.copytree(folder, half, ignore=shutil.ignore_patterns("*.bin", "cache"))
         for scan in sorted(folder.glob("*/*/velodyne_points/data/*.bin")):
             points = np.fromfile(scan, np.float32).reshape(-1, 4)
             thinned(points).tofile(half / scan.relative_to(folder))
