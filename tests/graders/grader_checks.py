@@ -19,7 +19,7 @@ from semgrid_edu.workshop.course.nbgrader.preprocessors import prepare, prepared
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 
-TIMEOUT = {"answer": 30, "endless loop": 2}
+TIMEOUT = {"answer": 30, "endless loop": 1}
 """Seconds for a cell: enough for any answer on a busy machine; what each call of an endless loop costs."""
 
 ENDLESS = ("before timeout", "does not come to an end")
