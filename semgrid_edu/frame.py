@@ -53,8 +53,8 @@ class FrameLabels:
         spec : GridSpec
             The extent of `LABEL_GRID`, a multiple of its cell.
         """
-        fine = blocks(self.birdseye, spec)
-        counts = np.stack([(fine == c).sum(axis=-1) for c in range(len(self.label_set))])
+        fine = np.moveaxis(blocks(self.birdseye, spec), -1, 0).copy()  # to add up a few maps, not many short rows
+        counts = np.stack([(fine == c).sum(axis=0) for c in range(len(self.label_set))])
         return self.label_set.most_voted(counts, otherwise=IGNORE)
 
     def visible_on(self, spec: GridSpec) -> NDArray[np.bool_]:

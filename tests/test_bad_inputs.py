@@ -76,16 +76,23 @@ def spoilt(prepared, tmp_path_factory) -> Path:
     return shutil.copytree(prepared, tmp_path_factory.mktemp("rows") / "place", copy_function=copied)
 
 
+@pytest.fixture(scope="module")
+def unspoilt(prepared, spoilt) -> dict[Path, tuple[int, ...]]:
+    """The state in which every row leaves the copy behind."""
+    assert states(spoilt) == states(prepared)
+    return states(prepared)
+
+
 @pytest.fixture
-def place(prepared, spoilt, monkeypatch) -> Iterator[Path]:
+def place(prepared, spoilt, unspoilt, monkeypatch) -> Iterator[Path]:
     """A copy to spoil, as the current folder."""
     monkeypatch.chdir(spoilt)
     monkeypatch.setenv(CACHE_VARIABLE, "")  # so that what --cache sets is undone afterwards
     yield spoilt
     while HELD:
         HELD.pop().__exit__(None, None, None)
-    mend(spoilt, prepared)
-    assert states(spoilt) == states(prepared)
+    mend(spoilt, prepared, unspoilt)
+    assert states(spoilt) == unspoilt
 
 
 def states(folder: Path) -> dict[Path, tuple[int, ...]]:
@@ -99,9 +106,9 @@ def states(folder: Path) -> dict[Path, tuple[int, ...]]:
     return found
 
 
-def mend(folder: Path, original: Path) -> None:
+def mend(folder: Path, original: Path, was: dict[Path, tuple[int, ...]]) -> None:
     """Make a spoilt copy as it was, which is faster than a new copy of hundreds of files."""
-    now, was = states(folder), states(original)
+    now = states(folder)
     for name in sorted(now, reverse=True):  # what lies in a folder comes before the folder
         if S_ISDIR(now[name][0]) and not S_ISDIR(was.get(name, (0,))[0]):
             (folder / name).rmdir()

@@ -100,8 +100,7 @@ def free_energy(Q: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
         raise ArgumentError("Q", f"distributions over axis 0, shape {unary.shape}", f"an array of shape {Q.shape}")
     q = Q.reshape(len(Q), -1)
     own = (q * np.where(q > 0, unary.reshape(q.shape), 0)).sum()
-    disagree = 1 - q.T @ q
-    return float(own + np.triu(pair_weights(values, params) * disagree).sum() + xlogy(q, q).sum())
+    return float(own + np.triu(pair_weights(values, params) * (1 - q.T @ q)).sum() + xlogy(q, q).sum())
 
 
 MAX_ENERGY = 700

@@ -16,6 +16,7 @@ from semgrid_edu.metrics import confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import run_pipeline
+from semgrid_edu.planes import plane_heights, plane_pixels
 from semgrid_edu.storage.provenance import provenance_problems
 
 SPEC = GridSpec.compact()
@@ -83,6 +84,11 @@ def test_what_moves_is_the_street_not_the_camera(drive):
     standing = [np.unique((frame.points[:, :3] // 1.0).astype(int), axis=0) for frame in (first, last)]
     both = {tuple(one) for one in standing[0]} & {tuple(one) for one in standing[1]}
     assert len(both) > 0.75 * min(map(len, standing))
+
+
+def test_a_cell_is_in_view_when_some_plane_has_a_point_of_it_in_the_image(drive):
+    _, visible = plane_pixels(SPEC, plane_heights(), drive.camera)
+    np.testing.assert_array_equal(cells_in_view(drive.camera, SPEC), visible.any(axis=0))
 
 
 def test_cells_in_view_without_a_label_are_left_out_and_the_others_are_unknown(drive, results):

@@ -33,8 +33,7 @@ def read_camera(folder: Path, name: str = "image_02") -> Camera:
         Name of the folder that its images lie in, "image_00" to "image_03".
     """
     K, T_camera_from_camera0, size = read_rectification(folder / "calib_cam_to_cam.txt", name)
-    T_camera0_from_lidar = read_rigid(folder / "calib_velo_to_cam.txt")
-    return Camera(K, T_camera_from_camera0 @ T_camera0_from_lidar, size)
+    return Camera(K, T_camera_from_camera0 @ read_rigid(folder / "calib_velo_to_cam.txt"), size)
 
 
 def camera_from(

@@ -8,7 +8,7 @@ from semgrid_edu.camera import Camera, invert_rigid, project, transform_points
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LabelSet
-from semgrid_edu.planes import plane_heights, plane_pixels
+from semgrid_edu.planes import plane_heights
 
 HIDING_ANGLE = 0.2
 """Angle between two neighbouring returns of a scanner with 64 lasers, about, degrees."""
@@ -86,7 +86,11 @@ def cells_in_view(camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
     spec : GridSpec
         The grid, (H, W) cells.
     """
-    return plane_pixels(spec, plane_heights(), camera)[1].any(axis=0)
+    centers, in_view = spec.centers(), np.zeros(spec.shape, np.bool_)
+    for height in plane_heights():
+        points = np.insert(centers[~in_view], 2, height, axis=1)  # not again where a lower point is in the image
+        in_view[~in_view] = project(transform_points(camera.T_camera_from_grid, points), camera)[1]
+    return in_view
 
 
 def unhidden(points: NDArray, hiding: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:

@@ -61,7 +61,7 @@ class StoryMaps(NamedTuple):
         alike, smooth = (np.concatenate([*maps.values()]) for maps in self)
         rows = np.diff(smooth, axis=1, prepend=np.uint8(0))  # bytes wrap around, and so does their sum in the script
         raw = np.ascontiguousarray(alike.transpose(1, 2, 0)).tobytes() + rows.tobytes()
-        compressor = zlib.compressobj(9, strategy=zlib.Z_FILTERED)
+        compressor = zlib.compressobj(8, strategy=zlib.Z_FILTERED)
         stream = compressor.compress(raw) + compressor.flush()
         return f"data:application/zlib;base64,{base64.b64encode(stream).decode()}"
 
