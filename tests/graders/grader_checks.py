@@ -107,9 +107,9 @@ class GraderChecks:
 
     @pytest.fixture(scope="class")
     @classmethod
-    def start(cls, source, course):
+    def start(cls, nursery, source, course):
         """A function that returns a warm process."""
-        with warm_processes(source, prepared_folder(course, cls.exercise)) as start:
+        with warm_processes(nursery, source, prepared_folder(course, cls.exercise)) as start:
             yield start
 
     @pytest.fixture(scope="class")

@@ -13,8 +13,8 @@ from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
 
 @pytest.fixture(scope="module")
-def start(tmp_path_factory):
-    with warm_processes(SOURCE, tmp_path_factory.mktemp(NAME)) as start:
+def start(nursery, tmp_path_factory):
+    with warm_processes(nursery, SOURCE, tmp_path_factory.mktemp(NAME)) as start:
         yield start
 
 

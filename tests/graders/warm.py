@@ -1,7 +1,8 @@
 """Grading without nbgrader: the same sandbox and test cells, with students' processes forked from one that is ready.
 
-A server (`warm_server`) runs an exercise's source once, so that everything is imported and compiled. From then on it
-forks a new process for each student, with a fresh namespace, and with its own folder and limits as in real grading.
+One process (`warm_server`) loads the large libraries, and forks a server for each exercise, which runs its source once,
+so that everything is imported and compiled. From then on that forks a new process for each student, with a fresh
+namespace, and with its own folder and limits as in real grading.
 """
 
 import os
@@ -28,7 +29,7 @@ from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.session import Session
-from semgrid_edu.workshop.course.sandbox.surroundings import ONLY_WHOLE, PREPARED, keep_compiled, worker_environment
+from semgrid_edu.workshop.course.sandbox.surroundings import PREPARED, keep_compiled, worker_environment
 
 SERVER = Path(__file__).with_name("warm_server.py")
 
@@ -69,35 +70,42 @@ def _score(cell):
     return CellScore(points, score, error_message(cell))
 
 
-def share_compiled(folder):
-    """Copy what numba keeps beside the package's modules to where a process looks that keeps it in `folder`."""
-    for file in PACKAGE.rglob("__pycache__/*.nb[ic]"):
-        place = folder / UserProvidedCacheLocator.get_suitable_cache_subpath(str(file.parents[1] / "module.py"))
-        place.mkdir(parents=True, exist_ok=True)
-        shutil.copy(file, place)
+@contextmanager
+def nursery():
+    """Load the large libraries in a process; give its folder of what is compiled, and a socket that takes exercises."""
+    with tempfile.TemporaryDirectory() as folder:
+        for file in PACKAGE.rglob("__pycache__/*.nb[ic]"):
+            # Where a process looks that keeps in a folder of its own what numba compiles.
+            subfolder = UserProvidedCacheLocator.get_suitable_cache_subpath(str(file.parents[1] / "module.py"))
+            place = Path(folder, PREPARED, subfolder)
+            place.mkdir(parents=True, exist_ok=True)
+            shutil.copy(file, place)
+        ours, theirs = socket.socketpair()
+        command = [sys.executable, SERVER, str(theirs.fileno())]
+        environment = worker_environment(Path(folder)) | {"NUMBA_THREADING_LAYER": "workqueue"}
+        with subprocess.Popen(command, cwd=folder, env=environment, pass_fds=[theirs.fileno()]), ours:
+            theirs.close()
+            yield Path(folder, PREPARED), ours
 
 
 @contextmanager
-def warm_processes(source, prepared):
+def warm_processes(nursery, source, prepared):
     """Start a server for an exercise; give a function that returns a new process.
 
     `prepared` is the folder of what is compiled already, and takes what the server compiles.
     """
-    share_compiled(prepared)
     use_instructor(NOTEBOOKS / "instructor")
     if not hasattr(os, "pidfd_open"):
         yield lambda: StudentProcess(Limits(), prepared)
         return
-    with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(prepared, Path(folder, PREPARED), ignore=ONLY_WHOLE)
-        ours, theirs = socket.socketpair()
-        command = [sys.executable, SERVER, source, str(theirs.fileno())]
-        environment = worker_environment(Path(folder)) | {"NUMBA_THREADING_LAYER": "workqueue"}
-        with subprocess.Popen(command, cwd=folder, env=environment, pass_fds=[theirs.fileno()]), ours:
-            theirs.close()
-            assert ours.recv(1), "the exercise has run"
-            keep_compiled(Path(folder, PREPARED), prepared)
-            yield lambda: ForkedProcess(ours)
+    compiled, exercises = nursery
+    ours, theirs = socket.socketpair()
+    with ours:
+        socket.send_fds(exercises, [str(source).encode()], [theirs.fileno()])
+        theirs.close()
+        assert ours.recv(1), "the exercise has run"
+        keep_compiled(compiled, prepared)
+        yield lambda: ForkedProcess(ours)
 
 
 class ForkedProcess(StudentProcess):

@@ -1,6 +1,6 @@
-"""Run an exercise once; then fork a student's process for each folder and pair of pipes that come in.
+"""Load the large libraries once; fork a server for each exercise, which runs it once and forks a process a student.
 
-python warm_server.py SOURCE SOCKET
+python warm_server.py SOCKET
 """
 
 import gc
@@ -9,11 +9,31 @@ import signal
 import socket
 import sys
 import tempfile
+from importlib import import_module
 from pathlib import Path
 
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.values import Wire
 from semgrid_edu.workshop.course.sandbox.worker import Shell, Worker
+
+LIBRARIES = ("matplotlib.pyplot", "scipy.stats", "semgrid_edu.crf", "semgrid_edu.networks", "semgrid_edu.pipeline")
+
+
+def hatch(nursery):
+    """Fork a server for each exercise and socket that come in."""
+    for name in LIBRARIES:
+        import_module(name)
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+    while True:
+        source, sockets, _, _ = socket.recv_fds(nursery, 4096, 1)
+        if not source:
+            return
+        if os.fork() == 0:
+            nursery.close()
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            run(Path(source.decode()))
+            return serve(socket.socket(fileno=sockets[0]))
+        os.close(sockets[0])
 
 
 def run(source):
@@ -62,5 +82,4 @@ def be_student(folder, pipes):
 
 
 if __name__ == "__main__":
-    run(Path(sys.argv[1]))
-    serve(socket.socket(fileno=int(sys.argv[2])))
+    hatch(socket.socket(fileno=int(sys.argv[1])))
