@@ -144,32 +144,23 @@ def _update(rewards, phi, own, part, logits, Q, cells):
     of the way to the reward minus the unary term, see `mean_field_update`.
     """
     n_classes, height, width = phi.shape
-    lanes, change = cells.shape[1], np.zeros(height, np.float32)
-    rewards, cells = rewards.reshape(height, -1), cells.reshape(height, -1)
+    change = np.zeros(height, np.float32)
+    rewards, cells = rewards.reshape(height, width, -1), cells.reshape(height, width, -1)
     for r in prange(height):
         fresh, moved = np.empty((n_classes, width), np.float32), np.zeros(width, np.float32)
+        for c in range(width):  # here the filters' order is left, and below taken again: cell after cell is faster
+            for k in range(n_classes):
+                fresh[k, c] = rewards[r, c, k]
         for k in range(n_classes):
-            _take_lane(rewards[r], k, lanes, fresh[k])
             _approach(logits[k, r], fresh[k], own[r], Q[k, r], phi[k, r], part[r])
         _softmax(logits, r, fresh)
         for k in range(n_classes):
             _replace(Q[k, r], fresh[k], moved)
-            _put_lane(cells[r], k, lanes, fresh[k])
+        for c in range(width):
+            for k in range(n_classes):
+                cells[r, c, k] = fresh[k, c]
         change[r] = moved.max()
     return change.max()
-
-
-# A row of the filters holds each cell's classes side by side: these two carry one class out of it and back.
-@njit(cache=True, inline="always")
-def _take_lane(row, lane, lanes, out):
-    for c in range(len(out)):
-        out[c] = row[c * lanes + lane]
-
-
-@njit(cache=True, inline="always")
-def _put_lane(row, lane, lanes, values):
-    for c in range(len(values)):
-        row[c * lanes + lane] = values[c]
 
 
 @njit(cache=True, fastmath=FAST, inline="always")
