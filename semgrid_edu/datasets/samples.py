@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.readers.pandaset_files import CREDIT
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.provenance import PROVENANCE, provenance_problems, shipped_folder
+from semgrid_edu.storage.files import shipped_folder
+from semgrid_edu.storage.provenance import PROVENANCE, provenance_problems
 
 if TYPE_CHECKING:
     from semgrid_edu.datasets.training_set import Sample

@@ -1,4 +1,4 @@
-"""Files written whole or not at all, their checksums, tables beside modules, and one writer at a time in a folder."""
+"""Files written whole or not at all, checksums, tables beside modules, one writer in a folder, and shipped folders."""
 
 import hashlib
 import json
@@ -14,6 +14,9 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from semgrid_edu.errors import DataError
+
+PACKAGE = Path(__file__).resolve().parents[1]
+"""The folder of the package, without symbolic links."""
 
 
 @contextmanager
@@ -252,3 +255,25 @@ def sole_writer(folder: str | Path) -> Iterator[None]:
         with suppress(OSError):  # Windows keeps files that are open
             (folder / LOCK).unlink()
         lock.release()  # only now: `filelock` refuses a file that was removed while it waited
+
+
+def shipped_folder(name: str) -> Path:
+    """Return where a shipped folder is.
+
+    Parameters
+    ----------
+    name : str
+        Its name in a clone, such as "data_samples". A wheel holds only the parts that pyproject.toml names.
+
+    Returns
+    -------
+    Path
+        The folder inside the package where there is one, as in a wheel; else the one beside the package.
+
+    Examples
+    --------
+    >>> (shipped_folder("data_samples") / "sample").is_dir()
+    True
+    """
+    inside = PACKAGE / name
+    return inside if inside.is_dir() else PACKAGE.parent / name

@@ -1,4 +1,4 @@
-"""Provenance: how a result was made, a hash of the code behind it, checksums, and where shipped folders lie."""
+"""Provenance: how a result was made, a hash of the code behind it, and checksums."""
 
 import ast
 import hashlib
@@ -13,9 +13,6 @@ from pathlib import Path
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.reading import read_json
-
-PACKAGE = Path(__file__).resolve().parents[1]
-"""The folder of the package, without symbolic links."""
 
 ROOT = Path(__file__).parents[2]
 """The folder that holds the package, by the path that Python imports it from."""
@@ -136,28 +133,6 @@ def _checksums(folder: Path) -> dict[str, str]:
         for name, path in files.items()
         if name.parts[0] not in left_out and not any(part.startswith(".") for part in name.parts)
     }
-
-
-def shipped_folder(name: str) -> Path:
-    """Return where a shipped folder is.
-
-    Parameters
-    ----------
-    name : str
-        Its name in a clone, such as "data_samples". A wheel holds only the parts that pyproject.toml names.
-
-    Returns
-    -------
-    Path
-        The folder inside the package where there is one, as in a wheel; else the one beside the package.
-
-    Examples
-    --------
-    >>> (shipped_folder("data_samples") / "sample").is_dir()
-    True
-    """
-    inside = PACKAGE / name
-    return inside if inside.is_dir() else PACKAGE.parent / name
 
 
 def short_path(weights: str | Path) -> str:

@@ -7,8 +7,8 @@ import pytest
 
 from semgrid_edu.datasets import samples
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage import provenance as shipped
-from semgrid_edu.storage.provenance import shipped_folder
+from semgrid_edu.storage import files as shipped
+from semgrid_edu.storage.files import shipped_folder
 
 CLONE = shipped.PACKAGE.parent
 LARGEST = 25_000_000

@@ -17,8 +17,7 @@ from nbformat import NotebookNode
 from traitlets import Type
 
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.files import write_text
-from semgrid_edu.storage.provenance import shipped_folder
+from semgrid_edu.storage.files import shipped_folder, write_text
 from semgrid_edu.workshop.course.notebooks.figures import finish_figures
 
 NOTEBOOKS = shipped_folder("notebooks")

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import semgrid_edu
-from semgrid_edu.storage.files import table_beside
-from semgrid_edu.storage.provenance import shipped_folder
+from semgrid_edu.storage.files import shipped_folder, table_beside
 from semgrid_edu.workshop.course.sandbox import linux
 
 PARTS = ("memory", "written files", "processes", "files", "modes and dates of files", "network", "signals")

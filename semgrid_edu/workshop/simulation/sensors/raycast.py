@@ -30,17 +30,14 @@ class RayMesh:
         All F triangles, in the world.
     instance : (F,) int32
         Number of the object that each triangle belongs to; 0 for scenery.
-    embree : EmbreeScene
-        The search tree over the triangles.
     """
 
     shape: Shape
     instance: NDArray[np.int32]
-    embree: EmbreeScene
 
     @classmethod
     def of(cls, shapes: Sequence[Shape], instances: Sequence[int]) -> "RayMesh":
-        """Build the search tree of several shapes.
+        """Put several shapes into one.
 
         Parameters
         ----------
@@ -49,11 +46,14 @@ class RayMesh:
         instances : sequence of int
             For each shape the number of its object; 0 for scenery.
         """
-        whole = merge(shapes)
-        sizes = [len(s.faces) for s in shapes]
+        return cls(merge(shapes), np.repeat(np.asarray(instances, np.int32), [len(s.faces) for s in shapes]))
+
+    @cached_property
+    def embree(self) -> EmbreeScene:
+        """The search tree over the triangles, built when the first ray is tried: not every street is looked at."""
         embree = EmbreeScene()
-        TriangleMesh(embree, np.ascontiguousarray(whole.vertices), np.ascontiguousarray(whole.faces))
-        return cls(whole, np.repeat(np.asarray(instances, np.int32), sizes), embree)
+        TriangleMesh(embree, np.ascontiguousarray(self.shape.vertices), np.ascontiguousarray(self.shape.faces))
+        return embree
 
 
 @dataclass(frozen=True, eq=False)
