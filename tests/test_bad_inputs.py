@@ -77,10 +77,12 @@ def spoilt(prepared, tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def unspoilt(prepared, spoilt) -> dict[str, tuple[int, ...]]:
-    """The state in which every row leaves the copy behind."""
-    assert states(spoilt) == states(prepared)
-    return states(prepared)
+def unspoilt(prepared, spoilt) -> Iterator[dict[str, tuple[int, ...]]]:
+    """The state in which every row leaves the copy behind, and that no row changes in what was copied."""
+    found = states(prepared)
+    assert states(spoilt) == found
+    yield found
+    assert states(prepared) == found
 
 
 @pytest.fixture

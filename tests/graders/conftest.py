@@ -10,7 +10,7 @@ from class_of import NAME, SOURCE
 from filelock import FileLock
 from nbgrader_scores import alembic_asked_once  # noqa: F401 (a fixture for all tests here)
 from typer.testing import CliRunner
-from warm import nursery, warm_processes
+from warm import open_nursery, warm_processes
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import samples_dir
@@ -73,10 +73,10 @@ def course(new_course):
     return new_course()
 
 
-@pytest.fixture(scope="session", name="nursery")
-def one_nursery():
+@pytest.fixture(scope="session")
+def nursery():
     """The process from which servers for exercises are forked."""
-    with nursery() as found:
+    with open_nursery() as found:
         yield found
 
 

@@ -71,7 +71,7 @@ def _score(cell):
 
 
 @contextmanager
-def nursery():
+def open_nursery():
     """Load the large libraries in a process; give its folder of what is compiled, and a socket that takes exercises."""
     with tempfile.TemporaryDirectory() as folder:
         for file in PACKAGE.rglob("__pycache__/*.nb[ic]"):
@@ -92,7 +92,7 @@ def nursery():
 def warm_processes(nursery, source, prepared):
     """Start a server for an exercise; give a function that returns a new process.
 
-    `prepared` is the folder of what is compiled already, and takes what the server compiles.
+    `nursery` is what `open_nursery` gives; the folder `prepared` takes what is compiled there.
     """
     use_instructor(NOTEBOOKS / "instructor")
     if not hasattr(os, "pidfd_open"):
