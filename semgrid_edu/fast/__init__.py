@@ -1,0 +1,28 @@
+"""The fast twins: the same names and signatures as in the book, for commands, the demo and long runs.
+
+Nothing here is needed to understand a stage. Each twin is held equal to the book's version by a property test. The
+compiled ones need numba, the extra `fast`: ``pip install semgrid_edu[fast]``.
+
+Examples
+--------
+>>> from semgrid_edu import fast
+>>> tracker = fast.Cmcdot(spec, seed=0)                                                 # doctest: +SKIP
+"""
+
+from importlib import import_module
+
+_WHERE: dict[str, str] = {
+    # occupancy
+    # planes and memory
+    # crf
+}
+"""The module that each name comes from: it is loaded when the name is first used."""
+
+__all__ = sorted(_WHERE)
+
+
+def __getattr__(name: str) -> object:
+    """Load a twin when it is first used."""
+    if name not in _WHERE:
+        raise AttributeError(f"module 'semgrid_edu.fast' has no attribute {name!r}")
+    return getattr(import_module(f"semgrid_edu.fast.{_WHERE[name]}"), name)
