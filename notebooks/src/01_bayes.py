@@ -36,8 +36,8 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, PlanarMotion, SensorModel, State
 from semgrid_edu.occupancy import scan_evidence, track_drive, transition_matrix
 from semgrid_edu.occupancy import update as update_grid
-from semgrid_edu.stage_models import ledger, ledger_table
-from semgrid_edu.stage_models.line import bayes_on_a_line, filtered, most_likely_path, smoothed
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_01_line import bayes_on_a_line, filtered, most_likely_path, smoothed
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 

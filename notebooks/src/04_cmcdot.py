@@ -39,11 +39,6 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.plotting.colours import HEADING_COLOURS, colour_patches
 from semgrid_edu.plotting.grids import draw_map
 from semgrid_edu.plotting.moving import wheel_colours
-from semgrid_edu.stage_models import cmcdot_stage, ledger, ledger_table
-from semgrid_edu.stage_models.bof import bof_beliefs
-from semgrid_edu.stage_models.cells_in_a_row import Cell
-from semgrid_edu.stage_models.cmcdot import LEFT_OR_RIGHT, particle_beliefs, sampling_error
-from semgrid_edu.stage_models.joint_row import exact_beliefs
 from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 
 # %% jupyter={"source_hidden": true}
@@ -54,7 +49,12 @@ from semgrid_edu.occupancy import (
 from semgrid_edu.occupancy.planar_motion import scroll
 from semgrid_edu.occupancy.resampling import systematic_resample
 from semgrid_edu.occupancy.steps import initialise_unknown
+from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
+from worlds.lecture_03_bof import bof_beliefs
+from worlds.lecture_03_row import Cell, exact_beliefs
+from worlds.lecture_04_cmcdot import LEFT_OR_RIGHT, particle_beliefs, sampling_error
+from worlds.lecture_04_cmcdot_graph import cmcdot_stage
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State

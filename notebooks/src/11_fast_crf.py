@@ -44,7 +44,6 @@ from semgrid_edu.crf.lattice.simplices import elevation, peak
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.graphical import d_separated, draw
-from semgrid_edu.stage_models import crf_stage
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.grid import GridSpec
@@ -53,6 +52,7 @@ from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.pipeline import Stages, network_image
+from worlds.lecture_10_crf import crf_stage
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 drive, spec = sample_drive(), GridSpec.compact()

@@ -5,12 +5,12 @@ import json
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from worlds.lecture_10_crf import all_free, coupled, two_classes
 
 from semgrid_edu import plotting
 from semgrid_edu.crf import crf_model, exact_marginals, mean_field_naive, most_likely
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.graphical import loopy_max_product, sum_product
-from semgrid_edu.stage_models.crf import all_free, coupled, two_classes
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.studies.crf import crf_coupling as study
 from semgrid_edu.workshop.studies.crf.other_ways import potts_messages, visit_labellings
