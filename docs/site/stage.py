@@ -202,7 +202,7 @@ def write_graphs(folder: Path) -> None:
     parts = [
         "# Graphs, ledger, equations",
         "Each stage is exact inference in some model. Dashed edges are those that the system cuts. The numbers on them",
-        "are the price, on a toy world small enough for exact inference: the exact answer, an arrow, the system's answer.",
+        "are the price on a toy world small enough for exact inference: exact answer, arrow, the system's answer.",
     ]
     for entry in STAGES:
         one_cell = "scans" in signature(entry.build).parameters

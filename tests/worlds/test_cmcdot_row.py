@@ -12,6 +12,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, why_dependent
 from semgrid_edu.metrics import total_variation
 from semgrid_edu.occupancy import State, WorldModel
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 NUMBERS = [100, 400, 1600, 6400]
 
@@ -117,3 +118,23 @@ def test_the_graph_separates_the_scan_from_the_past():
 def test_more_than_one_thing_on_the_move_is_refused():
     with pytest.raises(ArgumentError, match="at most one moving thing"):
         cmcdot_stage(CellsInARow(({"right": 0.8}, {}, {"left": 0.5}), ("...",)))
+
+
+def exercise_filter():
+    """The filter that exercise 04 hands out, from its locked cell."""
+    cells = read_percent(NOTEBOOKS / "src" / "exercises" / "04_cmcdot.py").cells
+    names = {}
+    exec(next(cell.source for cell in cells if "def package_filter" in cell.source), names)
+    return names["package_filter"]
+
+
+@pytest.mark.parametrize(
+    "cells",
+    [
+        *(({"right": 0.5}, {}, {"left": 0.5}), ({"right": 0.8}, {"static": 0.5}, {})),
+        *(({"static": 0.3, "right": 0.5}, UNSEEN, UNSEEN), BESIDE_A_WALL, ({}, {"unknown": 0.5}, {"left": 0.3})),
+    ],
+)
+def test_the_filter_of_exercise_04_is_the_limit_of_the_packages(cells):
+    bof = bof_beliefs(CellsInARow(cells, ("???",), clearing_time=DT))[0, 1, [Cell.LEFT, Cell.RIGHT]].sum()
+    assert exercise_filter()(*cells) == pytest.approx(bof, abs=1e-6)
