@@ -50,6 +50,7 @@ from semgrid_edu.occupancy.planar_motion import scroll
 from semgrid_edu.occupancy.resampling import systematic_resample
 from semgrid_edu.occupancy.steps import initialise_unknown
 from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_01_lines import state_history
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 from worlds.lecture_03_bof import bof_beliefs
 from worlds.lecture_03_row import Cell, exact_beliefs
@@ -407,7 +408,7 @@ assert rates[[FREE, DYNAMIC, STATIC], UNKNOWN].tolist() == [0.3, 0.5, 0.1]
 assert rates[[FREE, STATIC], DYNAMIC].tolist() == [0.01, 0.01]
 fig, axes = plt.subplots(1, 3, figsize=(9.5, 2.2), layout="constrained", sharey=True)
 for ax, state in zip(axes, (FREE, STATIC, DYNAMIC), strict=True):
-    plotting.state_history(times, chain[:, state].T, ax=ax)
+    state_history(times, chain[:, state].T, ax=ax)
     ax.set_title(f"it was {state.name}", fontsize=10)
     if state != DYNAMIC:
         ax.get_legend().remove()
@@ -773,7 +774,7 @@ for ax, name, place in zip(
     for _, x, _, belief in run:
         row, col, _ = near.cells(np.array([[place[0] - x, place[1]]]))
         past.append(belief.probability[:, row[0], col[0]])
-    plotting.state_history(np.arange(25) / 10, np.array(past).T, ax=ax)
+    state_history(np.arange(25) / 10, np.array(past).T, ax=ax)
     ax.set_title(f"a cell {name}", fontsize=10)
 axes[0].get_legend().remove()
 plt.show()
@@ -997,7 +998,7 @@ for ax, letter, ahead in zip(axes[1:], "GH", (3.2, 12.2), strict=True):
     axes[0].plot(3.2, ahead, "o", mfc="white", color="#6a1b9a", ms=8)
     axes[0].text(2.3, ahead, letter, weight="bold", va="center")
     past = np.array([belief.probability[:, row[0], col[0]] for *_, belief in seen])
-    plotting.state_history(np.arange(30) / 10, past.T, ax=ax)
+    state_history(np.arange(30) / 10, past.T, ax=ax)
     ax.set_title(f"cell {letter}, {ahead:.0f} m ahead", fontsize=10)
     if letter == "G":
         assert past[:21, STATIC].min() > 0.8

@@ -6,8 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from worlds.lecture_10_crf import all_free, coupled, two_classes
+from worlds.lecture_11_charts import coupling_errors
 
-from semgrid_edu import plotting
 from semgrid_edu.crf import crf_model, exact_marginals, mean_field_naive, most_likely
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.graphical import sum_product
@@ -102,7 +102,7 @@ def test_mean_field_picks_a_side_where_the_exact_marginal_stays_undecided():
 
 
 def test_the_figures_show_each_way_once_per_size(result):
-    figure = plotting.coupling_errors(result[1])
+    figure = coupling_errors(result[1])
     above, below = (figure.axes[row * 2] for row in (0, 1))
     assert [len(ax.get_lines()) for ax in (above, below)] == [4, 6]
     assert len(figure.axes) == 4

@@ -32,6 +32,7 @@ from semgrid_edu.metrics import total_variation
 sys.path.append("..")  # for worlds/, in the folder above
 from worlds.lecture_00_stage_graph import directed
 from worlds.lecture_01_line import bayes_on_a_line
+from worlds.lecture_01_lines import belief_history
 from worlds.lecture_03_bof import (
     AT_THE_EDGE, HEAD_ON, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, bof_stage, expected_things,
 )  # fmt: skip
@@ -472,7 +473,7 @@ assert sampled.to_bof[-1] < 0.3 * sampled.to_bof[0]
 def show(n, ax=None):
     """Draw the particle filter's belief over the trip."""
     belief, _ = particle_filter(n, np.random.default_rng(1))
-    return plotting.belief_history(belief, ax).set_title(f"{n} particles", fontsize=10)
+    return belief_history(belief, ax).set_title(f"{n} particles", fontsize=10)
 
 
 _ = interact(lambda n: (show(n), plt.show())[1], n=IntSlider(value=30, min=2, max=300))
