@@ -26,7 +26,8 @@ def whole_system(world: SystemWorld | None = None) -> StageGraph:
     factors = list(street(world).factors)
     for t in range(world.steps):
         o, s, p, g = f"o{t}", f"s{t}", f"p{t}", f"g{t}"
-        history, n = (f"o{t - 1}",) * (t > 0), 3 ** (t + 1)
+        history = (f"o{t - 1}",) * (t > 0)
+        n = 3 ** (t + 1)
         remember = np.eye(n).reshape(*[n // 3] * (t > 0), 3, n)
         factors += [
             Factor((*history, f"l{t}", o), remember),

@@ -26,9 +26,10 @@ def mean_field_graph(
     """Optimise one variable's distribution after the other, with all others fixed.
 
     The best q_i is proportional to exp(E[log factors]), so no update raises the free energy. It has several minima, and
-    the start decides which is found. Without a seed each variable starts from the factors over it alone (uniform without
-    any), as the CRF of the paper does. When these don't prefer a state, a symmetric model may stay at its symmetric
-    start, although breaking the symmetry would lower the free energy; a seed starts from random distributions instead.
+    the start decides which is found. Without a seed each variable starts from the factors over it alone (uniform
+    without any), as the CRF of the paper does. When these don't prefer a state, a symmetric model may stay at its
+    symmetric start, although breaking the symmetry would lower the free energy; a seed starts from random distributions
+    instead.
 
     A zero in a factor forbids a combination. The logarithm of zero is taken as the limit of ever larger penalties: an
     update first minimises the expected number of forbidden combinations, and weighs only the states that do. While Q
