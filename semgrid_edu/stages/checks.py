@@ -1,86 +1,81 @@
-"""Checks of what each stage hands to the next one; the errors say what is probably wrong."""
+"""Checks of what one stage hands to the next; the error says which stage, where, and what is probably wrong."""
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.pipeline.hints import file_of, in_short, kind_of, log_sum_hint, shape_hint, sum_hint, where
+from semgrid_edu.stages.hints import file_of, in_short, kind_of, log_sum_hint, shape_hint, sum_hint, where
 
 TOLERANCE = 1e-3
-"""The most by which the probabilities of a cell may miss a sum of 1; the CRF allows the same."""
-
-OWN = __name__.rpartition(".")[0]
-"""The package in which the package's own stages are written."""
+"""How far the probabilities of a cell may be from a sum of 1; the CRF allows the same."""
 
 
 class StageError(ArgumentError):
     """A stage raised an error, or returned what the next one can't use; it says which stage, where, at which frame."""
 
 
-@dataclass(frozen=True)
-class StageCheck:
-    """One call of a stage, and what its result must look like. Its methods raise `StageError`.
+class CheckedStage:
+    """A stage that checks its results. Its methods raise `StageError`.
 
-    A function that isn't the package's own gets copies of its arguments, and its result is copied too. So it may change
-    its arguments, and return the same array at each frame.
+    A function of your own gets copies of its arguments, and its result is copied too. So it may change its arguments,
+    and return the same array at each frame.
 
     Parameters
     ----------
-    stage : str
-        Name of the stage: "track", "segment", "sample", "fuse", "refine" or "remember".
-    function : callable
-        The stage, the package's own or a student's.
-    frame : int
-        Number of the frame.
+    name : str
+        Name of the stage.
+    stage : callable or Tracker
+        The stage, the package's own or yours.
+    shape : tuple of int
+        Shape that the result must have.
+    first_frame : int
+        Number of the frame of the first call, for messages; each call counts one on.
     """
 
-    stage: str
-    function: Callable
-    frame: int
+    def __init__(self, name: str, stage: Any, shape: tuple[int, ...], first_frame: int = 0) -> None:
+        self.name = name
+        self.stage = stage
+        self.shape = shape
+        self.frame = first_frame - 1
+        module = getattr(stage, "__module__", None) or type(stage).__module__
+        self.is_ours = str(module).startswith("semgrid_edu.")
 
     def __str__(self) -> str:
         """Say which stage, where it is written, and at which frame: "refine (my_stages.py, line 12), frame 3"."""
-        return f"{self.stage} ({where(self.function)}), frame {self.frame}"
+        return f"{self.name} ({where(self.stage)}), frame {self.frame}"
 
-    @property
-    def own(self) -> bool:
-        """Whether the function is one of those that `Stages.of` makes."""
-        return str(getattr(self.function, "__module__", "")).startswith(OWN)
-
-    def call(self, shape: tuple[int, ...], *inputs: NDArray) -> tuple[NDArray[np.float32], float]:
-        """Call a stage that takes arrays and returns one, and check what it returns.
+    def __call__(self, *inputs: NDArray) -> NDArray[np.float32]:
+        """Call the stage and check what it returns.
 
         Parameters
         ----------
-        shape : tuple of int
-            Shape that the result must have.
         *inputs : array
             What the stage takes.
 
         Returns
         -------
-        result : (*shape) float32
+        (*shape) float32
             What the stage returned.
-        seconds : float
-            How long the function took, without checks and copies.
         """
-        given = inputs if self.own else [np.copy(array) for array in inputs]
-        start = time.perf_counter()
+        self.frame += 1
+        given = inputs if self.is_ours else [np.copy(array) for array in inputs]
         with self.blamed():
-            value = self.function(*given)
-        seconds = time.perf_counter() - start
-        result = self.array(value, shape)
-        if self.stage in _VALUES:
-            _VALUES[self.stage](self, result)
-        return result, seconds
+            value = self.stage(*given)
+        result = self.array(value, self.shape)
+        if self.name == "segment":
+            self.finite(result)
+        elif self.name == "fuse":
+            self.log_probabilities(result, inputs[0])
+        elif self.name == "refine":
+            self.probabilities(result, "classes")
+        return result  # the planes hold too many numbers to search them at each frame: see `log_probabilities`
 
     def error(self, expected: object, found: object) -> StageError:
-        """Return an error that names this call.
+        """Return an error that names this stage and this frame.
 
         Parameters
         ----------
@@ -91,18 +86,18 @@ class StageCheck:
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
-        """Turn an exception of a function that isn't the package's own into one that says where it comes from."""
+        """Turn an exception of a stage of your own into one that says where it comes from."""
         try:
             yield
         except StageError:
             raise
         except (Exception, SystemExit) as error:
-            if self.own:
+            if self.is_ours:
                 raise
-            raise self.error("a result", f"an error: {in_short(error, file_of(self.function))}") from error
+            raise self.error("a result", f"an error: {in_short(error, file_of(self.stage))}") from error
 
     def array(self, value: object, shape: tuple[int, ...]) -> NDArray[np.float32]:
-        """Return a result as float32 in its own memory layout; refuse all but an array of floats of this shape.
+        """Return a result as float32 in its own memory layout; reject all but an array of floats of this shape.
 
         Parameters
         ----------
@@ -117,11 +112,11 @@ class StageCheck:
             raise self.error(f"shape {shape}", f"shape {value.shape}{shape_hint(value.shape, shape)}")
         if value.dtype.kind != "f":
             raise self.error("floating-point numbers", f"{value.dtype}")
-        with np.errstate(over="ignore"):  # what is too large becomes infinite, and is refused as such
-            return value.astype(np.float32, order="K", copy=not self.own)
+        with np.errstate(over="ignore"):  # what is too large becomes infinite, which is rejected next
+            return value.astype(np.float32, order="K", copy=not self.is_ours)
 
     def finite(self, values: NDArray) -> None:
-        """Refuse NaN and infinity.
+        """Reject NaN and infinity.
 
         Parameters
         ----------
@@ -132,8 +127,8 @@ class StageCheck:
             place = _first(~np.isfinite(values))
             raise self.error("finite numbers", f"{values[place]} at index {place}")
 
-    def probabilities(self, values: NDArray, axis: str = "classes") -> None:
-        """Refuse values that aren't a distribution in each cell.
+    def probabilities(self, values: NDArray, axis: str) -> None:
+        """Reject values that aren't a distribution in each cell.
 
         Parameters
         ----------
@@ -150,37 +145,38 @@ class StageCheck:
             cell = _first((values < -TOLERANCE).any(axis=0))
             raise self.error("probabilities from 0 to 1", f"{values[:, *cell].min():.4g} in cell {cell}")
 
-    def log_probabilities(self, values: NDArray) -> None:
-        """Refuse values that aren't logarithms of a distribution over the classes in each cell.
+    def log_probabilities(self, values: NDArray, planes: NDArray) -> None:
+        """Reject values that aren't logarithms of a distribution over the classes in each cell.
 
         Parameters
         ----------
         values : (C, H, W) float32
-            What the stage returned, natural logarithms.
+            What the stage `fuse` returned, natural logarithms.
+        planes : (C, D, H, W) float32
+            What it was given. If these aren't finite, the stage `sample` is to blame.
         """
         with np.errstate(over="ignore"):
             cell, total = _wrong_sum(np.exp(values))
         if cell is not None:
+            if not np.isfinite(planes).all():
+                place = _first(~np.isfinite(planes))
+                raise self.error("finite numbers from `sample`", f"{planes[place]} at index {place}")
             found = f"that exp of the {len(values)} classes of cell {cell} sums to {total:.4g}"
             wanted = "log-probabilities, whose exp sums to 1 in each cell"
             raise self.error(wanted, f"{found}: {log_sum_hint(values, total)}")
 
 
-_VALUES = {"segment": StageCheck.finite, "fuse": StageCheck.log_probabilities, "refine": StageCheck.probabilities}
-"""What is checked beyond the shape. The planes hold too many numbers to check them at each frame: see `FrameRunner`."""
+def _first(wrong: NDArray) -> tuple[int, ...]:
+    """Return the index of the first True."""
+    return tuple(map(int, np.argwhere(wrong)[0]))
 
 
 def _wrong_sum(values: NDArray) -> tuple[tuple[int, int] | None, float]:
     """Return the first cell of (K, H, W) whose values don't sum to 1, or None, and its sum."""
     with np.errstate(invalid="ignore"):
         total = values.sum(axis=0)
-    wrong = ~(np.abs(total - 1) <= TOLERANCE)  # NaN is
+    wrong = ~(np.abs(total - 1) <= TOLERANCE)  # true for NaN as well
     if not wrong.any():
         return None, 1.0
     cell = _first(wrong)
     return cell, float(total[cell])
-
-
-def _first(where: NDArray) -> tuple[int, ...]:
-    """Return the index of the first True."""
-    return tuple(map(int, np.argwhere(where)[0]))

@@ -1,85 +1,65 @@
-"""A student's own stages: read from a Python file, and what error messages say of them."""
+"""What the stages are called, and what an error message can guess about a stage that went wrong."""
 
 import inspect
-import sys
 import traceback
 from collections.abc import Callable
 from functools import partial
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import CodeType
 
 import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from semgrid_edu.crf.doctor.distributions import sum_to_one
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy import N_STATES
-from semgrid_edu.pipeline.stages import REMEMBER, STAGES, Stages
 
-NAMES = ", ".join(STAGES | REMEMBER)
-"""The names of the stages, for messages."""
+STAGES = {
+    "track": ("frames", "spec"),
+    "segment": ("image",),
+    "sample": ("s",),
+    "fuse": ("p", "o"),
+    "refine": ("log_g", "o"),
+}
+"""The names of the paper's stages, in their order, and of the arguments that a function for each of them takes."""
+
+REMEMBER = {"remember": ("views", "spec")}
+"""The stage that the paper leaves out: without it, classes are forgotten at every frame."""
 
 
-def load_stages(path: str | Path) -> Stages:
-    """Read stages from a Python file: its functions named track, segment, sample, fuse, refine and remember.
+def check_usage(name: str, stage: object) -> None:
+    """Reject what can't be called as a stage is.
 
     Parameters
     ----------
-    path : path-like
-        The file, which is executed. While it is, Python also looks for imports in its folder, so the file can import
-        others that lie beside it.
-
-    Returns
-    -------
-    Stages
-        The stages of the file; the others are left out.
+    name : str
+        Name of the stage, a key of `STAGES` or `REMEMBER`.
+    stage : object
+        A function, or for a stage with a memory an object with `step(frame)`.
 
     Raises
     ------
-    DataError
-        When there is no such file, Python can't import it, it has none of these functions, or one of them doesn't
-        take the right number of arguments.
-
-    Examples
-    --------
-    >>> list(run_pipeline(drive, load_stages("my_stages.py")))                          # doctest: +SKIP
+    ArgumentError
+        When it is neither, or takes another number of arguments.
     """
-    path = Path(path)
-    if path.suffix != ".py" or not path.is_file():
-        found = "another file" if path.is_file() else "a folder" if path.is_dir() else "no such file"
-        raise DataError(path, f"a Python file with functions named {NAMES}", found)
-    module = _imported(path)
-    found = {name: getattr(module, name) for name in STAGES | REMEMBER if hasattr(module, name)}
-    if not found:
-        others = [name for name, value in vars(module).items() if callable(value) and not name.startswith("_")]
-        raise DataError(path, f"at least one function named {NAMES}", ", ".join(others) or "no function at all")
+    takes = (STAGES | REMEMBER)[name]
+    usage = f"a function {name}({', '.join(takes)})"
+    if "spec" in takes:
+        usage += " or an object with step(frame)"
+    if isinstance(stage, type):
+        raise ArgumentError(name, usage, f"the class {stage.__name__} itself: write {name} = {stage.__name__}(...)")
+    if "spec" in takes and hasattr(stage, "step"):
+        return
+    if not callable(stage):
+        raise ArgumentError(name, usage, f"a {type(stage).__name__}")
     try:
-        return Stages(**found)
-    except ArgumentError as error:
-        name, expected, wrong = error.args
-        raise DataError(path, f"{name} to be {expected}", wrong) from error
-
-
-def _imported(path: Path) -> ModuleType:
-    """Execute a file as a module; meanwhile its own folder is searched for imports too."""
-    spec = spec_from_file_location(f"_stages_in_{path.stem}", path)
-    module = module_from_spec(spec)
-    sys.modules[spec.name] = module  # a dataclass in the file looks up its module there
-    searched = sys.path[:]
-    sys.path.insert(0, str(path.resolve().parent))
+        signature = inspect.signature(stage)
+    except ValueError:  # some functions written in C don't say what they take
+        return
     try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
-        raise DataError(path, "a file that Python can import", in_short(error, spec.origin)) from error
-    finally:
-        sys.path[:] = searched
-    return module
-
-
-AXES = {"classes": "class", "states": "state"}
-"""What the first axis of an array of probabilities is called."""
+        signature.bind(*takes)
+    except TypeError as error:
+        raise ArgumentError(name, usage, f"{name}{signature}") from error
 
 
 def where(function: Callable) -> str:
@@ -88,7 +68,7 @@ def where(function: Callable) -> str:
     Parameters
     ----------
     function : callable
-        A function, or an object that can be called.
+        A function, or an object that can be called or stepped.
     """
     code = _code(function)
     if code is None:
@@ -122,19 +102,21 @@ def in_short(error: BaseException, file: str) -> str:
 
 
 def _code(function: Callable) -> CodeType | None:
+    """Return the code of a function, or of the `step` or `__call__` of an object."""
     while isinstance(function, partial):
         function = function.func
     function = inspect.unwrap(function)
-    return getattr(function, "__code__", None) or getattr(type(function).__call__, "__code__", None)
+    method = getattr(type(function), "step", type(function).__call__)
+    return getattr(function, "__code__", None) or getattr(method, "__code__", None)
 
 
 def _place(file: str, line: int) -> str:
-    """Name a line of a file, or of a cell of a notebook, whose file has a name that means nothing to a student."""
+    """Name a line of a file, or of a cell of a notebook, whose file name means nothing to a student."""
     return f"{'a cell of the notebook' if 'ipykernel' in file else Path(file).name}, line {line}"
 
 
 def kind_of(value: object) -> str:
-    """Name what a stage returned in place of an array, and the usual cause, as the end of "found ...".
+    """Name what a stage returned instead of an array, and the usual cause, as the end of "found ...".
 
     Parameters
     ----------
@@ -146,7 +128,7 @@ def kind_of(value: object) -> str:
     if isinstance(value, Tensor):
         return "a torch Tensor: end with `.detach().numpy()`"
     if inspect.isgenerator(value):
-        return "a generator: this stage returns its result, only track yields"
+        return "a generator: this stage returns its result, only track and remember yield"
     return type(value).__name__
 
 
@@ -191,18 +173,28 @@ def sum_hint(values: NDArray, total: float, axis: str) -> str:
     """
     if np.isnan(total):
         return "was something divided by a sum of 0?"
-    if (values <= 0).all() and sum_to_one(np.exp(values).sum(axis=0)):
+    if (values <= 0).all() and _sum_to_one(np.exp(values)):
         return "are these log-probabilities? Return np.exp of them"
-    return f"did you normalise over the {AXES[axis]} axis (axis 0)?"
+    return f"did you normalise over the {'class' if axis == 'classes' else 'state'} axis (axis 0)?"
 
 
 def log_sum_hint(values: NDArray, total: float) -> str:
     """Return the probable cause of log-probabilities whose exponentials don't sum to 1.
 
-    Parameters are those of `sum_hint`.
+    Parameters
+    ----------
+    values : (C, H, W) float
+        The values of all cells.
+    total : float
+        The sum of exponentials in a cell where it is wrong; may be NaN.
     """
     if np.isnan(total):
         return "is there a logarithm of a negative number?"
-    if (values >= 0).all() and sum_to_one(values.sum(axis=0)):
+    if (values >= 0).all() and _sum_to_one(values):
         return "are these probabilities? Return np.log of them"
     return "are these scores? Subtract scipy.special.logsumexp(scores, axis=0)"
+
+
+def _sum_to_one(values: NDArray) -> bool:
+    """Tell whether nearly all cells of (K, H, W) sum to nearly 1."""
+    return bool(np.mean(np.abs(values.sum(axis=0) - 1) <= 0.01) >= 0.99)
