@@ -108,6 +108,25 @@ def test_tests_in_a_browser_are_apart(clone, ran):
     assert "--ignore=tests/browser" in ran[2]
 
 
+def test_real_data_is_named_by_variables(clone, ran, monkeypatch):
+    for name in make.REAL_DATA:
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(SystemExit, match="usage: make test-real KITTI="):
+        make.test_real()
+    monkeypatch.setenv("PANDASET", str(clone))
+    make.test_real()
+    assert ran[-1][-1]["PANDASET"] == str(clone)
+    assert ran[-1][2:-1] == ("pytest", "-m", "real", "tests")
+
+
+def test_the_quick_job_leaves_notebooks_and_graders_out(clone, ran):
+    make.quick()
+    words = ran[-1][:-1]
+    assert "tests" in words
+    assert "--ignore=tests/graders" in words
+    assert not any(word.endswith(".ipynb") for word in words)
+
+
 def test_an_old_python_is_refused(clone, monkeypatch):
     monkeypatch.setattr(make, "OLDEST", (sys.version_info[0], sys.version_info[1] + 1))
     with pytest.raises(SystemExit, match="or later is needed"):

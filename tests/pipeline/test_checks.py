@@ -122,7 +122,9 @@ def test_nan_among_the_planes_is_blamed_on_the_stage_that_made_them(frames):
         sample=lambda s: changed("sample", (1, 2), np.nan),
         fuse=lambda p, o: RIGHT["fuse"] + p.sum(axis=1),
     )
-    with pytest.raises(StageError, match=r"^fuse .* expected finite numbers from `sample`, found nan at index \(0, 0, 1, 2\)"):
+    with pytest.raises(
+        StageError, match=r"^fuse .* expected finite numbers from `sample`, found nan at index \(0, 0, 1, 2\)"
+    ):
         next(run_pipeline(frames, stages))
 
 
@@ -288,7 +290,11 @@ class TestFunctions:
         [
             ("refine", lambda log_g: log_g, r"refine: expected a function refine\(log_g, o\), found refine\(log_g\)"),
             ("segment", lambda: None, r"segment: expected a function segment\(image\), found segment\(\)"),
-            ("track", "cmcdot", r"track: expected a function track\(frames, spec\) or an object with step\(frame\), found a str"),
+            (
+                "track",
+                "cmcdot",
+                r"track: expected a function track\(frames, spec\) or an object with step\(frame\), found a str",
+            ),
         ],
     )
     def test_that_cannot_be_called_are_refused_at_once(self, name, function, message):
