@@ -13,7 +13,6 @@ from semgrid_edu.datasets.samples import real_weights, sample_weights
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import mean_field, track_drive
 from semgrid_edu.frame import Frame
-from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, build_net, load_net
 from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.pipeline import STAGES, Stages, network_image, run_frame, run_pipeline
