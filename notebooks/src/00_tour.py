@@ -50,9 +50,10 @@ from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.planes import sample_planes_naive
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, class_legend, colour_patches
 from semgrid_edu.plotting.story import draw_cell_story
-from semgrid_edu.stage_models import ledger, ledger_table, whole_system
 from semgrid_edu.story import cell_story
-from semgrid_edu.workshop.course.registers import equation_table, stage_table
+from worlds.lecture_00_equations import equation_table
+from worlds.lecture_00_ledger import ledger, ledger_table, stage_table
+from worlds.lecture_00_system import whole_system
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 spec = GridSpec.compact()

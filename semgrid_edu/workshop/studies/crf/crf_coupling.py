@@ -16,7 +16,6 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_probability
 from semgrid_edu.errors import check_whole
-from semgrid_edu.stage_models.crf import coupled
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
@@ -132,7 +131,7 @@ def measure_coupling(
     variation: dict[str, list] = {way: [] for way in WAYS if way not in ONLY_LABELS}
     labels: dict[str, list] = {way: [] for way in ("exact marginals", *WAYS)}
     for coupling, draw in tqdm(list(product(couplings, range(draws))), desc=name, unit="CRF"):
-        crf = *random_crf(shape, seed + draw), coupled(coupling)
+        crf = *random_crf(shape, seed + draw), CrfParams(w_bilateral=coupling, w_spatial=0.75 * coupling)
         exact, best = visit_labellings(*crf)
         found = {"exact marginals": exact} | {way: infer(*crf) for way, infer in WAYS.items()}
         for way, Q in found.items():
