@@ -4,7 +4,6 @@ A return counts as an obstacle by its height above the ground, but no street is 
 verges slope. So the ground has to be found first.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,8 +101,10 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray[np.flo
     distance = np.hypot(x, y)
     sector = beams_of(x, y, params.sectors)
     profile = np.full((params.sectors, params.bins), np.nan)
-    for s, of_sector in _groups(sector):
-        profile[s] = walk_sector(distance[of_sector], z[of_sector], params)
+    order = np.argsort(sector, kind="stable")
+    seen, first = np.unique(sector[order], return_index=True)
+    for s, returns in zip(seen, np.split(order, first[1:]), strict=False):
+        profile[s] = walk_sector(distance[returns], z[returns], params)
     ground = _median_of_neighbours(profile, params.neighbours)
     return z - ground[sector, _bins_of(distance, params)]
 
@@ -136,17 +137,20 @@ def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[
     >>> walk_sector(distance, z, GroundParams(bin=4, farthest=16)).round(2)
     array([0.06, 0.18, 0.27, 0.27])
     """
+    bins = _bins_of(distance, params)
+    order = np.lexsort((z, bins))  # outward bin by bin, in each the lowest return first
+    first = np.flatnonzero(np.diff(bins[order], prepend=-1))
+    last = np.append(first[1:], len(z)) - 1
+    lowest = order[first]
+    spread = z[order[last]] - z[lowest]
     ground_at = [0.0]
     ground = [0.0]
-    for _, here in _groups(_bins_of(distance, params)):
-        lowest = here[z[here].argmin()]
-        if z[here].max() - z[lowest] > params.rise:
-            continue
-        farther = min(distance[lowest] - ground_at[-1], params.gap)
+    for at, height, rise in zip(distance[lowest].tolist(), z[lowest].tolist(), spread.tolist(), strict=True):
+        farther = min(at - ground_at[-1], params.gap)
         allowed = min(params.step + params.slope * farther, params.rise + params.grade * farther)
-        if abs(z[lowest] - ground[-1]) <= allowed:
-            ground_at.append(distance[lowest])
-            ground.append(z[lowest])
+        if rise <= params.rise and abs(height - ground[-1]) <= allowed:
+            ground_at.append(at)
+            ground.append(height)
     middles = (np.arange(params.bins) + 0.5) * params.bin
     return np.interp(middles, ground_at, ground)
 
@@ -154,13 +158,6 @@ def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[
 def _bins_of(distance: NDArray, params: GroundParams) -> NDArray[np.int64]:
     """Return the bin of each return, (N,); returns beyond the last bin count to it."""
     return np.minimum(distance / params.bin, params.bins - 1).astype(np.int64)
-
-
-def _groups(keys: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """Yield each key in ascending order, and the indices at which it occurs."""
-    order = np.argsort(keys, kind="stable")
-    found, first = np.unique(keys[order], return_index=True)
-    yield from zip(found.tolist(), np.split(order, first[1:]), strict=True)
 
 
 def _median_of_neighbours(profile: NDArray, neighbours: int) -> NDArray[np.float64]:

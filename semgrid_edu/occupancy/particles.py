@@ -36,7 +36,7 @@ def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, int]) -> 
     """
     inside = cells != OUTSIDE
     total = np.bincount(cells[inside], weights=weight[inside], minlength=shape[0] * shape[1])
-    return total.reshape(shape)
+    return total.astype(np.float64).reshape(shape)  # of no particles, bincount makes integers
 
 
 def at_cells(plane: NDArray, cells: NDArray) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ def beams_of(x: NDArray, y: NDArray, beams: int) -> NDArray[np.int64]:
     beams : int
         Number of beams in a turn, B. Beam 0 begins straight behind the vehicle, and the beams go counter-clockwise.
     """
-    azimuth = np.arctan2(np.asarray(y, np.float64), np.asarray(x, np.float64))
+    azimuth = np.arctan2(y, x).astype(np.float64)
     beam = (azimuth + np.pi) * (beams / (2 * np.pi))
     return np.minimum(beam.astype(np.int64), beams - 1)  # an azimuth of exactly pi closes the last beam
 
@@ -43,7 +43,7 @@ def polar_profile(
     last_ground : (B,) float64
         Range of the farthest ground return, metres; zero without one.
     """
-    x, y, z = points[:, :3].T.astype(np.float64)
+    x, y, z = points[:, :3].T
     beam = beams_of(x, y, beams)
     distance = np.hypot(x, y)
     obstacle = (z >= low) & (z <= high)

@@ -172,7 +172,7 @@ def count_in_cells(xy: NDArray, spec: GridSpec) -> NDArray[np.int64]:
     return np.bincount(cells, minlength=height * width).reshape(spec.shape)
 
 
-def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.float64]:
+def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.floating]:
     """Prepare a scan for evidence: check it, remove the vehicle's own returns, and measure heights from the ground.
 
     Parameters
@@ -185,11 +185,10 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.float64]:
 
     Returns
     -------
-    (M, 3) float64
+    (M, 3) float32 or float64
         The other returns, in their order: x, y, and the height above the ground at that place (m).
     """
     points = without_own_returns(check_points(points), sensor.vehicle, sensor.edge, sensor.obstacle_min)
-    points = points.astype(np.float64)
     if sensor.ground is not None:
         points[:, 2] = height_above_ground(points, sensor.ground)
     return points
