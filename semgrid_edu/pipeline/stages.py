@@ -13,12 +13,13 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.memory import MemoryParams, View, remember_drive
 from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
-from semgrid_edu.occupancy import Belief, CmcdotParams, track_drive
+from semgrid_edu.occupancy import Belief, CmcdotParams
 
 STAGES = {
     "track": ("frames", "spec"),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.metrics import total_variation
-from semgrid_edu.occupancy import BofState, bof_predict_literal, bof_update
+from semgrid_edu.occupancy import BofState, bof_predict, bof_update
 from semgrid_edu.stage_models.cells_in_a_row import DT, SPEED, Cell, CellsInARow
 from semgrid_edu.stage_models.joint_row import exact_beliefs, row_evidence, row_model
 from semgrid_edu.stage_models.stage_graph import StageGraph, cut_edges
@@ -56,7 +56,7 @@ def bof_beliefs(world: CellsInARow) -> NDArray[np.float64]:
     params, state = world.params, _first_state(world)
     beliefs = []
     for step in range(1, len(world.scans) + 1):
-        predicted = bof_predict_literal(state, world.spec, params, DT)
+        predicted = bof_predict(state, world.spec, params, DT)
         state = bof_update(predicted, world.spec, world.evidence(step), params)
         planes = [state.free, *state.occupied[_used(state.velocity)], state.unknown]
         beliefs.append(np.concatenate(planes).T)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import BofParams, Evidence, State, VelocityLattice, WorldModel, transition_matrix
+from semgrid_edu.occupancy import BofParams, Evidence, State, VelocityLattice, Walls, WorldModel, transition_matrix
 
 SPEED = 5.0
 """Speed of everything that moves, m/s: exactly one cell per step."""
@@ -61,7 +61,7 @@ class CellsInARow:
     first_sight : (float, float, float)
         What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC and DYNAMIC, the last 0.
     clearing_time : float
-        How far back and ahead the filters look, seconds, as in `WorldModel`; exact inference doesn't need it. The
+        How far back and ahead the filters look, seconds, as in `Walls`; exact inference doesn't need it. The
         default reaches five cells far, so it makes no difference in a row of at most five. `DT` reaches the next cell.
         (`clearing_cells` is 0 here, because everything that moves is equally fast.)
 
@@ -75,7 +75,7 @@ class CellsInARow:
     scans: tuple[str, ...]
     rates: tuple[tuple[float, ...], ...] = NO_CHANGE
     first_sight: tuple[float, float, float] = (0.85, 0.15, 0.0)
-    clearing_time: float = WorldModel.clearing_time
+    clearing_time: float = Walls.clearing_time
 
     def __post_init__(self) -> None:
         """Refuse a world that the joint model doesn't describe."""
@@ -106,8 +106,7 @@ class CellsInARow:
         world = WorldModel(
             rates=self.rates,
             first_sight=self.first_sight,
-            clearing_time=self.clearing_time,
-            clearing_cells=0.0,
+            walls=Walls(clearing_time=self.clearing_time, clearing_cells=0.0),
             max_acceleration=0.0,
             stop_rate=0.0,
         )
