@@ -46,9 +46,9 @@ from semgrid_edu.stage_models import ledger_table, one_log_odds_cell, package_lo
 from semgrid_edu.stage_models import scan_with_pose_error, thick_walls
 from semgrid_edu.stage_models.beam import range_state
 from semgrid_edu.stage_models.thick_walls import same_sensor
-from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
+from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 GHOST = (225, 20, 30)  # occupied in the map, although the road there is empty

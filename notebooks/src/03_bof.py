@@ -47,7 +47,7 @@ from semgrid_edu.stage_models import bof_stage, ledger, ledger_table
 from semgrid_edu.stage_models.bof import HEAD_ON, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, expected_things
 from semgrid_edu.stage_models.cells_in_a_row import Cell, CellsInARow
 from semgrid_edu.stage_models.joint_row import exact_beliefs, row_evidence, row_model
-from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
+from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State

@@ -43,7 +43,7 @@ from semgrid_edu.stage_models import ledger, ledger_table, post_pixels
 from semgrid_edu.stage_models.pixel_ray import believed_of_post
 
 # %% jupyter={"source_hidden": true}
-from semgrid_edu.workshop.illustrations.thin_pole import (
+from worlds.lecture_07_thin_pole import (
     MECHANISMS,
     apply_mechanism,
     draw_poles,

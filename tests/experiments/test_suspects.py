@@ -1,21 +1,16 @@
 """The companion on real streets: what is switched off is off, and the rest of the street stays."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from worlds.lecture_04_suspects import BEFORE, GROUPS, SUSPECTS, arrivals_barred, counts, opaque, without_pillars
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import FilterState, Particles, State, predict
 from semgrid_edu.workshop.simulation.named_streets import named_street
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.streets import StreetScores
-
-sys.path.append(str(Path(__file__).parents[2] / "notebooks" / "deeper"))
-
-from phantom_suspects import BEFORE, GROUPS, SUSPECTS, arrivals_barred, counts, opaque, without_pillars
 
 
 def points_of(change, street="mesh"):

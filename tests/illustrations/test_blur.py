@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from worlds.lecture_04_blur import SCHEMES, measure_blur, winding_road
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.occupancy import PlanarMotion
-from semgrid_edu.workshop.illustrations.blur import SCHEMES, measure_blur, winding_road
 
 FEW = {"drops": 8}
 

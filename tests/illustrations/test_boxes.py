@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
 
 BOX = Box.around(20, 3, 4, 2, 1.8)
 """Higher than the scanner, which doesn't see its top."""

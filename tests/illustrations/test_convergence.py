@@ -1,9 +1,8 @@
 """CMCDOT tends to the BOF, at the rate of the central limit theorem."""
 
 import numpy as np
-
-from semgrid_edu.workshop.illustrations.boxes import cells_in
-from semgrid_edu.workshop.illustrations.convergence import (
+from worlds.lecture_02_boxes import cells_in
+from worlds.lecture_04_convergence import (
     SPEC,
     evidence_of_boxes,
     measure_convergence,

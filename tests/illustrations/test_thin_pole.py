@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 import torch
 from torch import nn
-
-from semgrid_edu.errors import ArgumentError
-from semgrid_edu.workshop.illustrations.thin_pole import (
+from worlds.lecture_07_thin_pole import (
     MECHANISMS,
     PoleNet,
     apply_mechanism,
@@ -17,6 +15,8 @@ from semgrid_edu.workshop.illustrations.thin_pole import (
     score_poles,
     train_pole_net,
 )
+
+from semgrid_edu.errors import ArgumentError
 
 
 @pytest.fixture(autouse=True)

@@ -15,6 +15,7 @@
 # **Time.** 31 minutes, of which the computer needs less than one.
 
 # %% jupyter={"source_hidden": true}
+import sys
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
@@ -29,11 +30,13 @@ from semgrid_edu.occupancy import scan_evidence, scan_evidence_literal, update_l
 from semgrid_edu.occupancy.literal.evidence import walk_sector
 from semgrid_edu.occupancy.polar import beyond_reach
 from semgrid_edu.plotting.colours import STATE_COLOURS, colour_legend
-from semgrid_edu.workshop.illustrations.boxes import Box, scan_boxes
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import named_street
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.things.materials import Kind
+
+sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_02_boxes import Box, scan_boxes
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 RED = (225, 20, 30)

@@ -15,6 +15,7 @@
 # **Time.** 25 minutes, of which the computer needs less than one.
 
 # %% jupyter={"source_hidden": true}
+import sys
 import time
 
 import matplotlib.pyplot as plt
@@ -27,7 +28,9 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import BofParams, BofState, Evidence, State, VelocityLattice, WorldModel
 from semgrid_edu.occupancy import bof_predict, bof_predict_literal, bof_update, bof_velocity, scan_evidence
 from semgrid_edu.occupancy import transition_matrix
-from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
+
+sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State

@@ -18,6 +18,7 @@
 
 # %% jupyter={"source_hidden": true}
 import json
+import sys
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -30,9 +31,6 @@ from IPython.display import Markdown
 from semgrid_edu import plotting
 from semgrid_edu.workshop.studies.filter.occupancy import markdown_table, per_cent
 from semgrid_edu.workshop.studies.filter.streets import LEAST_DYNAMIC, StreetScores
-from phantom_suspects import (  # beside this notebook
-    BARRED, BEFORE, MENDED, SUSPECTS, Suspect, counts, run_filter, scenes_of,
-)  # fmt: skip
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
@@ -41,6 +39,11 @@ from semgrid_edu.occupancy import (
 from semgrid_edu.occupancy.cellwise import clear_wakes, collide
 from semgrid_edu.occupancy.particles import keeps_pace
 from semgrid_edu.occupancy.planar_motion import look_up
+
+sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_04_suspects import (
+    BARRED, BEFORE, MENDED, SUSPECTS, Suspect, counts, run_filter, scenes_of,
+)  # fmt: skip
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State
