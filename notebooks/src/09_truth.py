@@ -46,12 +46,13 @@ from semgrid_edu.stage_models import LabelWorld, ledger, ledger_table, lidar_lab
 from semgrid_edu.stage_models.ground_truth_label import STATE_GIVEN_CONTENT
 
 # %% jupyter={"source_hidden": true}
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.frame import Frame
 from semgrid_edu.workshop.studies.ground_truth.laboratory import simulated_drive
 from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, TruthCounts, counts_of
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
-from semgrid_edu.occupancy import State, track_drive
+from semgrid_edu.occupancy import State
 from worlds.lecture_09_pictures import DIFFERENCES, difference_kinds, policy_errors, truth_difference, truth_errors
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI

@@ -47,11 +47,11 @@ from semgrid_edu.graphical import d_separated, draw
 from semgrid_edu.stage_models import crf_stage
 
 # %% jupyter={"source_hidden": true}
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.pipeline import Stages, network_image
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI

@@ -25,8 +25,9 @@ import numpy as np
 
 from semgrid_edu.answers import answer_array, answer_arrays
 from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import CmcdotParams, track_drive
+from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.stage_models.bof import bof_beliefs
 from semgrid_edu.stage_models.cells_in_a_row import DT, Cell, CellsInARow
 from semgrid_edu.stage_models.joint_row import exact_beliefs
