@@ -43,12 +43,13 @@ from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, d_separated, draw, eliminate
 
 # %% jupyter={"source_hidden": true}
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.frame import Frame
 from semgrid_edu.workshop.studies.ground_truth.laboratory import simulated_drive
 from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, TruthCounts, counts_of
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
-from semgrid_edu.occupancy import State, track_drive
+from semgrid_edu.occupancy import State
 from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_09_label import STATE_GIVEN_CONTENT, LabelWorld, lidar_label_stage, wrong_label
 from worlds.lecture_09_pictures import DIFFERENCES, difference_kinds, policy_errors, truth_difference, truth_errors

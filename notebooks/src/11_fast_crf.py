@@ -46,11 +46,11 @@ from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.graphical import d_separated, draw
 
 # %% jupyter={"source_hidden": true}
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.pipeline import Stages, network_image
 from worlds.lecture_10_crf import crf_stage
 from worlds.lecture_11_lattice import draw_lattice_frame, draw_triangles, lattice_story, vertex_places

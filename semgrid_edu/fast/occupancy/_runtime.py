@@ -1,4 +1,4 @@
-"""What `Cmcdot.step` asks of the machine: a second core, an undo after errors, memory that stays.
+"""What `Cmcdot.step` needs from the machine: a second core, an undo after errors, memory that is kept.
 
 Nothing here changes a number.
 """
@@ -19,7 +19,7 @@ M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
 def on_another_core(function: Callable, *arguments: object) -> Iterator[Future]:
     """Run a function in a thread while the body of `with` runs, and hand out its future result.
 
-    Evidence doesn't depend on what `move` and `predict` do, and takes about as long. Both spend their time in compiled
+    Evidence doesn't depend on `move` and `predict`, and takes about as long. Both spend their time in compiled
     loops, which release Python's lock, so a thread is enough to use two cores.
 
     Parameters
@@ -35,8 +35,8 @@ def on_another_core(function: Callable, *arguments: object) -> Iterator[Future]:
 def undo_after_errors(rng: np.random.Generator) -> Iterator[None]:
     """Put the generator back when the body of `with` fails.
 
-    `predict` has drawn random numbers by the time a sensor or a resampling is refused. If these were lost, the same
-    seed would give another drive after an error that was caught.
+    `predict` has drawn random numbers by the time a sensor or a resampling fails. If these were lost, the same seed
+    would give another drive after an error that was caught.
 
     Parameters
     ----------
