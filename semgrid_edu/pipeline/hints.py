@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
-from semgrid_edu.crf.doctor.distributions import sum_to_one
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, sum_to_one
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.pipeline.stages import REMEMBER, STAGES, Stages
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
+from semgrid_edu.crf import CrfParams, unary_from_log_probability
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import mean_field
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
