@@ -7,10 +7,11 @@ import pytest
 import torch
 from tiny_drive import DATE, write_tiny_drive
 
-from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
+from semgrid_edu.crf import CrfParams, unary_from_log_probability
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import real_weights, sample_weights
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import mean_field
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, build_net, load_net
