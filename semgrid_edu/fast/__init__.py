@@ -29,6 +29,10 @@ _WHERE: dict[str, str] = {
     "update": "occupancy.steps",
     # planes and memory
     # crf
+    "PermutohedralLattice": "crf.lattice",
+    "SeparableGaussian": "crf.spatial",
+    "bilateral_kernel": "crf.mean_field",
+    "mean_field": "crf.mean_field",
 }
 """The module that each name comes from: it is loaded when the name is first used."""
 

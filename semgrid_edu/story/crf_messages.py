@@ -6,10 +6,11 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.crf import CrfParams, SeparableGaussian, WindowedGaussian, mean_field, unary_from_probability
-from semgrid_edu.crf.accurate import RADIUS
+from semgrid_edu.crf import CrfParams, unary_from_probability
 from semgrid_edu.crf.kernel import gaussian
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import SeparableGaussian, mean_field
+from semgrid_edu.fast.crf.windowed import RADIUS, WindowedGaussian
 
 
 @dataclass(frozen=True, eq=False)

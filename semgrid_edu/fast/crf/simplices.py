@@ -7,64 +7,22 @@ j-th, from which it takes d.
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
-from semgrid_edu.crf.lattice.arithmetic import HALF
+from semgrid_edu.fast.crf.arithmetic import HALF
 
 FORWARD, BACKWARD = 0, 1
 """Index of the vertex one step forward, and of the one a step back, on the second axis of `neighbours`."""
 
 
-def elevation(d: int) -> NDArray[np.float64]:
-    """Return the matrix that takes d features to the hyperplane of zero sum.
-
-    It is scaled so that the whole filter has unit variance: splat and slice have variance (d + 1)^2 / 12 along each
-    axis, the blur (d + 1)^2 / 2 (Adams 2010, section 3.1).
-
-    Parameters
-    ----------
-    d : int
-        Number of features of a point.
-
-    Returns
-    -------
-    (d + 1, d) float64
-        The matrix; its columns are orthogonal.
-    """
-    basis = np.zeros((d + 1, d))
-    for j in range(d):
-        basis[: j + 1, j] = 1
-        basis[j + 1, j] = -(j + 1)
-    return (d + 1) * np.sqrt(2 / 3) * basis / np.linalg.norm(basis, axis=0)
-
-
-def peak(d: int) -> float:
-    """Return the factor that gives the filter of d features the integral of the Gaussian, (2 pi)^(d/2).
-
-    Without it the integral is the volume of feature space that belongs to one vertex, (3/2)^(d/2) / sqrt(d + 1).
-
-    Parameters
-    ----------
-    d : int
-        Number of features of a point.
-
-    Returns
-    -------
-    float
-        The factor.
-    """
-    return (4 * np.pi / 3) ** (d / 2) * np.sqrt(d + 1)
-
-
-# `enclosing_simplex_literal` for one point after the other: compiled, no step needs an array over all points.
+# The book's `enclosing_simplices`, point after point: no step needs an array over all points.
 @njit(cache=True, parallel=True)
-def enclosing_simplices(elevated):
+def origins_and_ranks(elevated):
     """Find the simplex around each point.
 
     Parameters
     ----------
     elevated : (N, d + 1) float
-        The points on the hyperplane of zero sum, see `elevation`.
+        The points on the hyperplane of zero sum, see `elevated`.
 
     Returns
     -------
@@ -120,7 +78,7 @@ def responses(simplices, ranks, neighbours):
     simplices : (S, d + 1) int32
         The vertices at the corners of each simplex, see `Vertices`.
     ranks : (S, d + 1) int32
-        Order of the coordinates in each simplex, see `enclosing_simplices`.
+        Order of the coordinates in each simplex, see `origins_and_ranks`.
     neighbours : (d + 1, 2, M) int32
         The vertices one step forward and back along each direction; M where there is none.
 
@@ -181,14 +139,14 @@ def survivors(neighbours, sign):
 
 @njit(cache=True, parallel=True)
 def self_responses(members, weights, response):
-    """Compute what share of its own value the filter gives back to each point, without the factor of `peak`.
+    """Compute what share of its own value the filter gives back to each point, without the factor `peak`.
 
     Parameters
     ----------
     members : (N,) int32
         The simplex of each point, see `Vertices`.
     weights : (N, d + 1) float64
-        Barycentric weights of its corners, see `enclosing_simplices`.
+        Barycentric weights of its corners, see `origins_and_ranks`.
     response : (S, d + 1, d + 1) float32
         See `responses`.
 

@@ -12,10 +12,11 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from semgrid_edu.crf.lattice.arithmetic import FAST, HALF
-from semgrid_edu.crf.lattice.simplices import elevation, enclosing_simplices, peak, responses, self_responses
-from semgrid_edu.crf.lattice.vertices import number_vertices, sort_by_vertex
+from semgrid_edu.crf.lattice import FARTHEST, elevated, peak
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast.crf.arithmetic import FAST, HALF
+from semgrid_edu.fast.crf.simplices import origins_and_ranks, responses, self_responses
+from semgrid_edu.fast.crf.vertices import number_vertices, sort_by_vertex
 
 
 @dataclass(frozen=True)
@@ -69,15 +70,11 @@ class PermutohedralLattice:
         ArgumentError
             When `features` isn't a table of finite numbers, or they are too large for the lattice's integers.
         """
-        features = np.asarray(features, dtype=np.float64)
-        if features.ndim != 2 or 0 in features.shape or not np.isfinite(features).all():
-            raise ArgumentError("features", "finite numbers of shape (N, d)", f"shape {features.shape}")
-        dimensions = features.shape[1]
-        # einsum, not @: the threads of BLAS would compete with numba's for the same cores.
-        elevated = np.einsum("nd,jd->nj", features, elevation(dimensions))
-        if np.abs(elevated).max() > 2**30:
+        points = elevated(features)
+        if np.abs(points).max() > FARTHEST:
             raise ArgumentError("features", "fewer standard deviations, or a larger sigma", np.abs(features).max())
-        origins, ranks, weights = enclosing_simplices(np.asfortranarray(elevated))
+        dimensions = points.shape[1] - 1
+        origins, ranks, weights = origins_and_ranks(np.asfortranarray(points))
         vertices = number_vertices(origins, ranks)
         corners = vertices.simplices.take(vertices.members, axis=0)
         starts, members = sort_by_vertex(corners.ravel(), vertices.neighbours.shape[2])

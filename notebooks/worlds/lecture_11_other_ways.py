@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_softmax, logsumexp
 
-from semgrid_edu.crf import CrfParams, SeparableGaussian, pair_weights
-from semgrid_edu.crf.accurate import filtered_updates
+from semgrid_edu.crf import CrfParams, pair_weights
 from semgrid_edu.crf.kernel import kernels
-from semgrid_edu.crf.naive import settled
-from semgrid_edu.crf.params import check_inputs, check_stop
+from semgrid_edu.crf.params import check_inputs
 from semgrid_edu.errors import ArgumentError
+from worlds.lecture_11_accurate import filtered
 
 MOST_LABELLINGS = 10**8
 """The table of their energies takes less than a gigabyte."""
@@ -78,10 +77,10 @@ def _all_energies(phi: NDArray, weights: NDArray) -> NDArray[np.float64]:
 
 
 def potts_messages(unary: NDArray, values: NDArray, params: CrfParams, best: bool = False) -> NDArray[np.float64]:
-    """Approximate the marginals by loopy sum-product, all messages at once: a fast twin of that in `graphical`.
+    """Approximate the marginals by loopy sum-product, all messages at once, as `graphical.sum_product` does.
 
-    A factor of the CRF lies between two cells, so its two messages make one from cell to cell, and all cells are pairs:
-    the messages are one table (N, N, C).
+    A factor of the CRF joins two cells, so its two messages become one from cell to cell. All cells are pairs, so the
+    messages are one table (N, N, C).
 
     Parameters
     ----------
@@ -206,9 +205,6 @@ def mean_field_low_rank(
         When shapes don't fit or numbers aren't what they should be.
     """
     unary, values = check_inputs(unary, values)
-    check_stop(iterations, tolerance)
     cells = values[0].size
     landmarks = np.random.default_rng(seed).choice(cells, min(rank, cells), replace=False)
-    spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
-    kernels = LowRankGaussian.build(values, params, landmarks), spatial
-    return settled(filtered_updates(unary, kernels), iterations, tolerance)
+    return filtered(unary, params, LowRankGaussian.build(values, params, landmarks), iterations, tolerance)

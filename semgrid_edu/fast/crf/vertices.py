@@ -11,8 +11,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from semgrid_edu.crf.lattice.simplices import BACKWARD, FORWARD
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast.crf.simplices import BACKWARD, FORWARD
 
 MOST_DIMENSIONS = 8
 """The largest number of features of a point: with 8, `survivors` holds 2^9 answers for each vertex."""
@@ -28,7 +28,7 @@ class Vertices(NamedTuple):
     simplices : (S, d + 1) int32
         The vertices at the corners of each simplex, in the order of their remainders.
     ranks : (S, d + 1) int32
-        Order of the coordinates in each simplex, see `enclosing_simplices`.
+        Order of the coordinates in each simplex, see `origins_and_ranks`.
     neighbours : (d + 1, 2, M) int32
         The vertex one step forward and one step back along each direction; M where there is none.
     """
@@ -45,7 +45,7 @@ def number_vertices(origins: NDArray[np.int32], ranks: NDArray[np.int32]) -> Ver
     Parameters
     ----------
     origins, ranks : (N, d + 1) int32
-        The simplex around each point, see `enclosing_simplices`.
+        The simplex around each point, see `origins_and_ranks`.
 
     Returns
     -------

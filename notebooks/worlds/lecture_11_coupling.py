@@ -4,6 +4,8 @@ The coupling is the weight w1 of the bilateral kernel; the weight w2 of the spat
 by default. So 4 stands for the default parameters, and 0 for no pairs at all.
 """
 
+import json
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import product
@@ -15,12 +17,9 @@ from scipy.special import softmax
 from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_probability
-from semgrid_edu.errors import check_whole
-from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
-from semgrid_edu.storage.reading import resumable_json
-from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
-from semgrid_edu.workshop.studies.crf.other_ways import potts_messages, visit_labellings
+from worlds.lecture_10_crf import coupled
+from worlds.lecture_11_other_ways import potts_messages, visit_labellings
 
 COUPLINGS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
 """From no pairs to the default weights."""
@@ -42,43 +41,6 @@ WAYS: Mapping[str, Inference] = {
 """What is compared with exact inference."""
 ONLY_LABELS = ("loopy max-product",)
 """Ways that don't say how probable a class is, so that only their labels are compared."""
-
-
-def crf_coupling(log: str | Path, seed: int = 0, draws: int = 20) -> dict:
-    """Compare every way with exact inference on random tiny grids, coupling by coupling.
-
-    Parameters
-    ----------
-    log : path-like
-        Takes each size as soon as it is done. If the file exists, sizes that it holds aren't measured again.
-    seed : int
-        Seed for the random CRFs.
-    draws : int
-        Number of random CRFs of each size, at least one.
-
-    Returns
-    -------
-    dict
-        "cases": by name from `measure_coupling`; with seed, command and versions. JSON can hold it.
-
-    Raises
-    ------
-    ArgumentError
-        When the seed is negative, or nothing is to be drawn.
-    DataError
-        When the log is something else, or was begun with another seed or other numbers.
-    """
-    check_whole(seed=seed)
-    check_whole(1, draws=draws)
-    identity = {"seed": seed, "draws": draws, "couplings": list(COUPLINGS)}
-    command = f"semgrid-edu reproduce crf-coupling --seed {seed} --draws {draws}"
-    done = resumable_json(log, identity, "cases")
-    for (height, width), n in product(GRIDS, CLASSES):
-        name = f"{height} x {width} cells, {n} classes"
-        if name not in done:
-            done[name] = measure_coupling((n, height, width), COUPLINGS, draws, seed, name)
-            write_json(log, identity | {"cases": done})
-    return identity | {"cases": done, **made_by(command, "numpy", "scipy", "numba")}
 
 
 def random_crf(shape: tuple[int, int, int], seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -131,7 +93,7 @@ def measure_coupling(
     variation: dict[str, list] = {way: [] for way in WAYS if way not in ONLY_LABELS}
     labels: dict[str, list] = {way: [] for way in ("exact marginals", *WAYS)}
     for coupling, draw in tqdm(list(product(couplings, range(draws))), desc=name, unit="CRF"):
-        crf = *random_crf(shape, seed + draw), CrfParams(w_bilateral=coupling, w_spatial=0.75 * coupling)
+        crf = *random_crf(shape, seed + draw), coupled(coupling)
         exact, best = visit_labellings(*crf)
         found = {"exact marginals": exact} | {way: infer(*crf) for way, infer in WAYS.items()}
         for way, Q in found.items():
@@ -144,22 +106,26 @@ def measure_coupling(
     }
 
 
-def crf_coupling_tables(result: dict) -> str:
-    """Return the means over the draws, one table per size.
+def main(out: Path, seed: int = 0, draws: int = 20) -> None:
+    """Measure every size, and write the result.
 
     Parameters
     ----------
-    result : dict
-        From `crf_coupling`, or from the JSON file that it was written to.
-
-    Returns
-    -------
-    str
-        Mean total variation and share of wrong labels, per cent.
+    out : Path
+        A JSON file.
+    seed : int
+        Seed for the first random CRF of each size.
+    draws : int
+        Number of random CRFs of each size.
     """
-    titles = {"variation": "mean total variation", "labels": "labels unlike the most likely labelling"}
-    head, tables = ["coupling", *(f"{coupling:g}" for coupling in result["couplings"])], []
-    for (name, case), (part, title) in product(result["cases"].items(), titles.items()):
-        rows = [[way, *(f"{100 * np.mean(e):.1f}" for e in errors)] for way, errors in case[part].items()]
-        tables.append(f"{name}, {title}, per cent\n\n{markdown_table([head, *rows])}")
-    return "\n\n".join(tables)
+    cases = {}
+    for (height, width), n in product(GRIDS, CLASSES):
+        name = f"{height} x {width} cells, {n} classes"
+        cases[name] = measure_coupling((n, height, width), COUPLINGS, draws, seed, name)
+    made = made_by("python notebooks/worlds/lecture_11_coupling.py", "numpy", "scipy")
+    found = {"seed": seed, "draws": draws, "couplings": list(COUPLINGS), "cases": cases, **made}
+    out.write_text(json.dumps(found, indent=1))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -3,9 +3,13 @@
 Two things separate a result from the fixed point of exact mean field. Its kernel may differ from the Gaussian: the
 *kernel error* compares it with the exact kernel after the same number of updates. And it may have been stopped early:
 the *convergence error* compares it with the same kernel when nothing changes any more. Both are measured on the shipped
-drive, on the compact grid and on crops of the paper's.
+drive, on the compact grid and on crops of the paper's. docs/results/crf_error.json was made by
+
+    PYTHONPATH=.:notebooks python notebooks/worlds/lecture_11_error.py docs/results/crf_error.json
 """
 
+import json
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -17,17 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import CrfParams, mean_field, mean_field_accurate, mean_field_naive, unary_from_log_probability
+from semgrid_edu.crf import CrfParams, mean_field_naive, unary_from_log_probability
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
-from semgrid_edu.errors import check_whole
+from semgrid_edu.fast import mean_field
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import build_net, load_net
 from semgrid_edu.pipeline import Stages, network_image
-from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
-from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
-from semgrid_edu.workshop.studies.crf.other_ways import mean_field_low_rank
+from worlds.lecture_11_accurate import mean_field_accurate
+from worlds.lecture_11_other_ways import mean_field_low_rank
 
 ITERATIONS = (1, 2, 3, 5, 10, 20, 50, 100)
 """Numbers of updates at which each way is timed and compared."""
@@ -142,39 +145,6 @@ def crf_ways(seed: int = 0) -> dict[str, Way]:
     }
 
 
-def crf_error(log: str | Path, seed: int = 0) -> dict:
-    """Measure error and time of every way on every scene.
-
-    Parameters
-    ----------
-    log : path-like
-        Takes each scene as soon as it is done. If the file exists, scenes that it holds aren't measured again.
-    seed : int
-        Seed for the particles of the filter and for the landmarks.
-
-    Returns
-    -------
-    dict
-        "scenes": by name from `measure_scene`; with seed, command and versions. JSON can hold it.
-
-    Raises
-    ------
-    ArgumentError
-        When the seed is negative.
-    DataError
-        When the log is something else, or was begun with another seed.
-    """
-    check_whole(seed=seed)
-    identity = {"seed": seed, "iterations": list(ITERATIONS)}
-    done = resumable_json(log, identity, "scenes")
-    for name, problems in crf_scenes(seed).items():
-        if name not in done:
-            done[name] = measure_scene(problems, seed, name)
-            write_json(log, identity | {"scenes": done})
-    made = made_by(f"semgrid-edu reproduce crf-error --seed {seed}", "numpy", "scipy", "numba", "torch")
-    return identity | {"scenes": done, **made}
-
-
 def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "") -> dict:
     """Measure error and time of every way on some grids of the same shape.
 
@@ -266,7 +236,7 @@ def crf_error_tables(result: dict, iterations: int = 10) -> str:
     Parameters
     ----------
     result : dict
-        From `crf_error`, or from the JSON file that it was written to.
+        What docs/results/crf_error.json holds.
     iterations : int
         One of `ITERATIONS`.
 
@@ -285,3 +255,24 @@ def crf_error_tables(result: dict, iterations: int = 10) -> str:
         title = f"{name}, {grid} cells, {iterations} updates, against {scene['reference']}"
         tables.append(f"{title}\n\n{markdown_table(rows)}")
     return "\n\n".join(tables)
+
+
+def main(out: Path, seed: int = 0) -> None:
+    """Measure every scene, write the result and print it.
+
+    Parameters
+    ----------
+    out : Path
+        A JSON file.
+    seed : int
+        Seed for the particles of the filter and for the landmarks.
+    """
+    scenes = {name: measure_scene(problems, seed, name) for name, problems in crf_scenes(seed).items()}
+    made = made_by("python notebooks/worlds/lecture_11_error.py", "numpy", "scipy", "numba", "torch")
+    found = {"seed": seed, "iterations": list(ITERATIONS), "scenes": scenes, **made}
+    out.write_text(json.dumps(found, indent=1))
+    print(crf_error_tables(found))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

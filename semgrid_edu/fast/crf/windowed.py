@@ -1,102 +1,24 @@
-"""Mean field with nearly exact kernels on grids too large for a matrix of all pairs (eq. (3), (4)).
+"""The bilateral kernel of eq. (4) pair by pair, between each cell and all cells of a window around it.
 
-The bilateral kernel is computed pair by pair, between each cell and all cells of a window around it, by compiled loops.
+No twin in the book has it: lecture 11 measures the lattice against it, and the demo's page asks it which neighbours
+pulled a cell.
 """
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from semgrid_edu.crf.kernel import gaussian
-from semgrid_edu.crf.lattice.arithmetic import HALF, exponential
-from semgrid_edu.crf.naive import above_best, all_updates, damping, settled
-from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
-from semgrid_edu.crf.spatial import SeparableGaussian
+from semgrid_edu.crf.params import CrfParams
+from semgrid_edu.fast.crf.arithmetic import HALF, exponential
 
 RADIUS = 4.0
 """Reach of the window, in widths `sigma_alpha`: cells further up, down, left or right are left out."""
 
 _SHARPEST = np.float32(1e15)
 """The largest 1 / sigma_beta: its square still is a float32, and equal states stay equal."""
-
-
-def mean_field_accurate(
-    unary: ArrayLike,
-    values: ArrayLike,
-    params: CrfParams,
-    iterations: int = 10,
-    tolerance: float = 0.0,
-    radius: float = RADIUS,
-) -> NDArray[np.float32]:
-    """Approximate the CRF's marginals by mean field with nearly exact kernels: the updates of `mean_field_naive`.
-
-    Where `mean_field` asks the permutohedral lattice, this function computes the bilateral kernel pair by pair, in a
-    window around each cell (`WindowedGaussian`, which says what the window can cost). The time grows with the number
-    of cells times that of cells in a window, the memory with the number of cells alone.
-    The other Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
-
-    Parameters
-    ----------
-    radius : float
-        Reach of the bilateral window in widths `sigma_alpha`; infinite for all pairs, exact but for rounding.
-
-    Returns
-    -------
-    (C, H, W) float32
-        Q, the distribution over classes in each cell; the same bits whatever the number of threads.
-    """
-    unary, values = check_inputs(unary, values)
-    check_stop(iterations, tolerance)
-    spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
-    updates = filtered_updates(unary, (WindowedGaussian.build(values, params, radius), spatial))
-    return settled(updates, iterations, tolerance)
-
-
-class Kernel(Protocol):
-    """A kernel of eq. (4) as a filter, such as `SeparableGaussian`, `WindowedGaussian` and `PermutohedralLattice`.
-
-    Parameters
-    ----------
-    diagonal : (N,) float32
-        k_ii, the share of its own value that each cell gets back.
-    """
-
-    diagonal: NDArray[np.float32]
-
-    def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return sum_j k_ij values_j, the cell itself included; one row per cell, (N, K)."""
-
-
-def filtered_updates(unary: NDArray, kernels: Sequence[Kernel]) -> Iterator[NDArray[np.float32]]:
-    """Yield Q at first and after each update, without end, as `mean_field_updates` does, with filters for the sums.
-
-    The cost of disagreeing differs from the negative reward of agreeing only by a constant that is the same for all
-    classes, which the soft-max cancels. Filters include the cell itself, which is no pair, so its part is subtracted.
-
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u; inf where a class is impossible.
-    kernels : sequence of Kernel
-        The kernels of eq. (4), with their weights and normalisation; one is enough to try it alone.
-
-    Yields
-    ------
-    (C, H, W) float32
-        Q, the distribution over classes in each cell.
-    """
-    phi, own = above_best(unary).astype(np.float32), sum(kernel.diagonal for kernel in kernels)
-
-    def disagreement(Q: NDArray[np.float32]) -> NDArray[np.float32]:
-        cells = np.ascontiguousarray(Q.T)
-        return own * Q - sum(kernel(cells) for kernel in kernels).T
-
-    for Q in all_updates(phi, disagreement, damping(own)):
-        yield Q.reshape(unary.shape)
 
 
 @dataclass(frozen=True)
