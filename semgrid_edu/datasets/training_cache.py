@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets import label_policies, training_arrays
+from semgrid_edu.datasets.frames import LabelledDrive
 from semgrid_edu.datasets.index import DatasetIndex
 from semgrid_edu.datasets.label_policies import LidarTruth, drive_labels
-from semgrid_edu.datasets.readers.frames import LabelledDrive
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.compiled import cache_folder

@@ -1,7 +1,6 @@
 """A drive through every stage, from LIDAR scans and images to refined semantic grids (paper, Fig. 2)."""
 
-import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -12,7 +11,6 @@ from torch import Tensor
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.crf import CrfParams
-from semgrid_edu.datasets.readers.drive_doubts import frame_doubts
 from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
@@ -68,9 +66,6 @@ def run_pipeline(
 ) -> Iterator[FrameResult]:
     """Send the frames of a drive through every stage, one after the other, and check what each stage hands on.
 
-    Before the work, a `UserWarning` says what is doubtful about the frames: `frame_doubts` of a sequence, or of the
-    first frame when the frames can be read only once.
-
     Parameters
     ----------
     frames : iterable of Frame
@@ -108,14 +103,12 @@ def run_pipeline(
     >>> [result.refined.argmax(axis=0) for result in run_pipeline(drive, net)]          # doctest: +SKIP
     >>> [result.grid for result in run_pipeline(drive, Stages(track=my_filter))]        # doctest: +SKIP
     """
-    known, frames = frames, iter(frames)
+    frames = iter(frames)
     first = next(frames, None)
     if first is None:
         return
     if not isinstance(first, Frame):
         raise ArgumentError("frames", "the frames of a drive", repr(first)[:100])
-    for doubt in frame_doubts(known if isinstance(known, Sequence) else [first]):
-        warnings.warn(doubt, stacklevel=2)
     complete = _complete(stages, first.camera, occupancy, crf, seed, memory)
     for (result,) in run_side_by_side(chain([first], frames), complete):
         yield result

@@ -5,7 +5,6 @@ from functools import partial
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array, answer_arrays
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, track_drive
@@ -15,6 +14,7 @@ from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
 from semgrid_edu.occupancy.resampling import systematic_resample
 from semgrid_edu.stage_models.bof import bof_beliefs
 from semgrid_edu.stage_models.cells_in_a_row import DT, Cell, CellsInARow
+from semgrid_edu.workshop.course.answers import answer_array, answer_arrays
 from semgrid_instructor import close, generator, hidden, keeping
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from semgrid_edu.answers import answer_array, answer_number, peak_megabytes
 from semgrid_edu.crf.lattice.literal import enclosing_simplex_literal
+from semgrid_edu.workshop.course.answers import answer_array, answer_number, peak_megabytes
 from semgrid_instructor import close, generator, hidden, keeping
 
 

@@ -87,7 +87,7 @@ def learned_crf(
     out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("learned_crf.json"),
 ) -> None:
     """Learn a CRF's weights, widths and label costs in eight ways, and score them on test frames (lecture 11)."""
-    from semgrid_edu.datasets.index import dataset_doubts
+    from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
     from semgrid_edu.workshop.studies.crf.learned_crf import compare_learned_crfs, learned_crf_table
 
     def scored() -> dict:

@@ -11,7 +11,7 @@ from tqdm.auto import tqdm
 from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
 from semgrid_edu.crf.temperature import at_temperature, expected_calibration_error, negative_log_likelihood, reliability
 from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex, load_index
-from semgrid_edu.datasets.readers.kitti_raw import drive_folder
+from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError
 from semgrid_edu.metrics import METRICS, confusion_matrix
