@@ -20,7 +20,7 @@ import semgrid_edu.workshop.training_run
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.networks import Architecture, build_net, save_net
-from semgrid_edu.storage.compiled import CACHE_VARIABLE
+from semgrid_edu.storage.files import CACHE_VARIABLE
 from semgrid_edu.training.log import Step
 from semgrid_edu.workshop import demo
 from semgrid_edu.workshop.commands import main as cli

@@ -95,7 +95,7 @@ def excerpt(
     frames: Annotated[int, typer.Option(min=1, help="Number of frames.")] = 6,
 ) -> None:
     """Keep a few labelled frames of a data set, in the form that a network takes."""
-    from semgrid_edu.datasets.training_set import write_excerpt
+    from semgrid_edu.workshop.commands.excerpt import write_excerpt
 
     write_excerpt(data, frames, folder)
 

@@ -11,7 +11,8 @@ from typer.core import TyperCommand
 
 from semgrid_edu import __version__
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.compiled import CACHE_VARIABLE, keep_compiled_functions
+from semgrid_edu.fast.numba_cache import keep_compiled_functions
+from semgrid_edu.storage.files import CACHE_VARIABLE
 from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
