@@ -36,7 +36,7 @@ from scipy.spatial.transform import Rotation
 from semgrid_edu import plotting
 from semgrid_edu.camera import rigid_transform
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import (
     real_drive,
     real_weights,

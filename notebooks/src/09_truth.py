@@ -35,9 +35,11 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
-from semgrid_edu.datasets.ground_truth import NO_FLAWS, Moment, TruthFlaws, TruthPolicy, carry_labels, close_and_spread
-from semgrid_edu.datasets.ground_truth import drive_truth, flawed_drive, gather_returns, lidar_truth
-from semgrid_edu.datasets.readers.project_lidar import closest_returns
+from semgrid_edu.datasets.ground_truth import Moment, TruthPolicy, carry_labels, close_and_spread
+from semgrid_edu.workshop.flaws import NO_FLAWS, TruthFlaws
+from semgrid_edu.datasets.ground_truth import drive_truth, gather_returns, lidar_truth
+from semgrid_edu.workshop.flaws import flawed_drive
+from semgrid_edu.datasets.project_lidar import closest_returns
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, d_separated, draw, eliminate

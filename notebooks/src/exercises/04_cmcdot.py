@@ -23,7 +23,7 @@ import warnings
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array, answer_arrays
+from semgrid_edu.workshop.course.answers import answer_array, answer_arrays
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec

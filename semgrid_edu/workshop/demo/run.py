@@ -8,7 +8,7 @@ from typing import NamedTuple
 from numba.core.event import Listener, install_listener
 from tqdm.auto import tqdm
 
-from semgrid_edu.datasets.readers.frames import FrameSequence
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec

@@ -5,8 +5,8 @@ import stat
 
 import pytest
 
-from semgrid_edu.storage import compiled
-from semgrid_edu.storage.compiled import NUMBA_VARIABLE, keep_compiled_functions
+from semgrid_edu.fast import numba_cache
+from semgrid_edu.fast.numba_cache import NUMBA_VARIABLE, keep_compiled_functions
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "getuid"), reason="this system has other rights to files")
 
@@ -15,19 +15,19 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "getuid"), reason="this system h
 def nothing_set(monkeypatch, tmp_path):
     monkeypatch.setenv(NUMBA_VARIABLE, "")
     monkeypatch.delenv(NUMBA_VARIABLE)
-    monkeypatch.setattr(compiled.tempfile, "gettempdir", lambda: str(tmp_path))
-    monkeypatch.setattr(compiled.tempfile, "mkdtemp", lambda prefix: str(tmp_path / f"{prefix}other"))
+    monkeypatch.setattr(numba_cache.tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(numba_cache.tempfile, "mkdtemp", lambda prefix: str(tmp_path / f"{prefix}other"))
 
 
 def test_a_folder_that_takes_files_is_left_to_numba(tmp_path, monkeypatch):
-    monkeypatch.setattr(compiled, "PACKAGE", tmp_path / "package")
+    monkeypatch.setattr(numba_cache, "PACKAGE", tmp_path / "package")
     assert keep_compiled_functions() == ""
     assert NUMBA_VARIABLE not in os.environ
 
 
 def test_without_any_a_folder_of_the_user_alone_is_named_in_one_line(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
-    monkeypatch.setattr(compiled, "_usual_folders", lambda: [tmp_path / "file" / "__pycache__"])
+    monkeypatch.setattr(numba_cache, "_usual_folders", lambda: [tmp_path / "file" / "__pycache__"])
     said = keep_compiled_functions()
     folder = tmp_path / f"semgrid_edu-{os.getuid()}"
     assert str(folder) in said
@@ -37,7 +37,7 @@ def test_without_any_a_folder_of_the_user_alone_is_named_in_one_line(tmp_path, m
 
 
 def test_a_folder_that_others_can_write_to_is_not_used(tmp_path, monkeypatch):
-    monkeypatch.setattr(compiled, "_usual_folders", list)
+    monkeypatch.setattr(numba_cache, "_usual_folders", list)
     folder = tmp_path / f"semgrid_edu-{os.getuid()}"
     folder.mkdir()
     folder.chmod(0o777)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pooch
 import requests
 
-from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive, drive_folder
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive, drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.download import ResumingDownloader, unpack_zip
 from semgrid_edu.storage.files import sha256, write_text

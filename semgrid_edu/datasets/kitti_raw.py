@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -11,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
-from semgrid_edu.datasets.readers.calibration import read_camera, read_rectification, read_rigid
-from semgrid_edu.datasets.readers.drive_doubts import jumps, repeats, short_scans, what_is
-from semgrid_edu.datasets.readers.frames import FrameSequence, error_of, read_scan
-from semgrid_edu.datasets.readers.kitti_labels import (
+from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
+from semgrid_edu.datasets.frames import FrameSequence, error_of, read_scan
+from semgrid_edu.datasets.kitti_labels import (
     KINDS,
     have_gaps,
     is_labelled,
@@ -22,8 +20,9 @@ from semgrid_edu.datasets.readers.kitti_labels import (
     read_label_set,
     read_labels,
 )
-from semgrid_edu.datasets.readers.oxts import imu_pose, read_packet, read_timestamps
-from semgrid_edu.datasets.readers.project_lidar import cells_in_view
+from semgrid_edu.datasets.layouts import what_is
+from semgrid_edu.datasets.oxts import imu_pose, read_packet, read_timestamps
+from semgrid_edu.datasets.project_lidar import cells_in_view
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import LabelSet
@@ -137,7 +136,7 @@ class KittiRawDrive(FrameSequence):
     @cached_property
     def gaps(self) -> tuple[int, ...]:
         """Numbers of the frames without a scan that lie between frames with one."""
-        scans = [k for k in range(len(self)) if self._file("velodyne_points", k, ".bin").exists()]
+        scans = [k for k in range(len(self)) if self.file("velodyne_points", k, ".bin").exists()]
         between = range(scans[0], scans[-1]) if scans else range(0)
         return tuple(sorted(set(between) - set(scans)))
 
@@ -145,27 +144,6 @@ class KittiRawDrive(FrameSequence):
     def camera(self) -> Camera:
         """The calibration of the view, the same for all frames."""
         return read_camera(self.date_folder, self.view)
-
-    def doubts(self) -> list[str]:
-        """List what is doubtful, as far as files' sizes, poses and a few frames show it.
-
-        Returns
-        -------
-        list of str
-            One line, which names the file, for each scan that is missing between others or was probably cut short, for
-            each run of scans or of images that repeat the one before them, and for each pose that no car can have
-            reached since the one before; then those of `frame_doubts`.
-        """
-        scans, packets, known = [self._file("velodyne_points", k, ".bin") for k in range(len(self))], {}, []
-        for k in range(len(self)):
-            with suppress(DataError):  # what can't be read is an error of the frame, and no doubt
-                packets[self._file("oxts", k, ".txt")] = read_packet(self._file("oxts", k, ".txt"))
-                known.append(k)
-        missing = [str(DataError(scans[k], "a scan", "none: the filter predicts over the gap")) for k in self.gaps]
-        far = jumps(packets, self._seconds("oxts")[np.array(known, int)])
-        images = [self._file(self.view, k, ".png") for k in range(len(self))]
-        again = [*repeats(scans, "scans"), *repeats(images, "images")]
-        return [*missing, *again, *short_scans(scans), *far, *super().doubts()]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
         """Yield a reader for each file, so that no damaged file hides another."""
@@ -177,15 +155,26 @@ class KittiRawDrive(FrameSequence):
         size = None if error_of(lambda: self.camera) else self.camera.size
         for k in range(len(self)):
             yield partial(self._points, k)
-            yield partial(read_packet, self._file("oxts", k, ".txt"))
+            yield partial(read_packet, self.file("oxts", k, ".txt"))
             yield partial(self._time, k)
             if self.view in self._sensors:
-                yield partial(read_png, self._file(self.view, k, ".png"), "RGB", size)
+                yield partial(read_png, self.file(self.view, k, ".png"), "RGB", size)
             labels, name = self.folder / "labels", f"{k:010d}.png"
             for kind in KINDS if is_labelled(labels, name) else ():
                 yield partial(read_label, labels, kind, name, size)
 
-    def _file(self, sensor: str, k: int, suffix: str) -> Path:
+    def file(self, sensor: str, k: int, suffix: str) -> Path:
+        """Return where a sensor's file of a frame is, whether it exists or not.
+
+        Parameters
+        ----------
+        sensor : str
+            Folder of the sensor: "velodyne_points", "oxts", "image_02" or "image_03".
+        k : int
+            Number of the frame.
+        suffix : str
+            ".bin", ".txt" or ".png".
+        """
         return self.folder / sensor / "data" / f"{k:010d}{suffix}"
 
     def _timestamp_files(self) -> list[Path]:
@@ -216,23 +205,16 @@ class KittiRawDrive(FrameSequence):
         lidar = self._times["velodyne_points"]
         return float((time - lidar[~np.isnat(lidar)][0]) / np.timedelta64(1, "s"))
 
-    def _seconds(self, sensor: str) -> NDArray[np.float64]:
-        """Return when a sensor took each frame, seconds; NaN where that isn't known."""
-        if error_of(lambda: self._times) or np.isnat(self._times[sensor]).all():
-            return np.full(len(self), np.nan)
-        times = self._times[sensor]
-        return (times - times[~np.isnat(times)][0]) / np.timedelta64(1, "s")
-
     def _points(self, k: int) -> NDArray[np.float32]:
         if k in self.gaps:
             return np.zeros((0, 4), np.float32)
-        return read_scan(self._file("velodyne_points", k, ".bin"))
+        return read_scan(self.file("velodyne_points", k, ".bin"))
 
     def _image(self, k: int) -> NDArray[np.uint8] | None:
         """Read the image, (h, w, 3); None when the drive has no folder of this camera."""
         if self.view not in self._sensors:
             return None
-        return read_png(self._file(self.view, k, ".png"), "RGB", self.camera.size)
+        return read_png(self.file(self.view, k, ".png"), "RGB", self.camera.size)
 
     @cached_property
     def _T_lidar_from_imu(self) -> NDArray[np.float64]:
@@ -240,11 +222,11 @@ class KittiRawDrive(FrameSequence):
 
     @cached_property
     def _first_packet(self) -> NDArray[np.float64]:
-        return read_packet(self._file("oxts", 0, ".txt"))
+        return read_packet(self.file("oxts", 0, ".txt"))
 
     def _pose(self, k: int) -> NDArray[np.float64]:
         """Return T_world_from_lidar; the world is the frame of the IMU at the drive's first packet."""
-        T_world_from_imu = imu_pose(self._first_packet, read_packet(self._file("oxts", k, ".txt")))
+        T_world_from_imu = imu_pose(self._first_packet, read_packet(self.file("oxts", k, ".txt")))
         return T_world_from_imu @ invert_rigid(self._T_lidar_from_imu)
 
     def _labels(self, k: int) -> FrameLabels | None:

@@ -1,7 +1,7 @@
-"""Errors like those of real data: a calibration that is a little off, labels drawn by hand, scans that are skewed (4).
+"""Errors like those of real data: calibration slightly off, labels drawn by hand, scans that are skewed (section 4).
 
-The simulator's calibration and labels are exact. Truth made from them would be better than any that can be made of
-real data. Its scans are skewed already where its scanner turns while the vehicle drives, as in the simulated data sets.
+The simulator's calibration and labels are exact, so truth made from them would be better than any made of real data.
+Its scans are already skewed where its scanner turns while the vehicle drives, as in the simulated data sets.
 """
 
 from collections.abc import Sequence
@@ -38,9 +38,9 @@ class TruthFlaws:
         of six frames of minikitti change, and two annotators disagree on 2.2 %. Two annotators of Cityscapes disagree
         on 2 % of what both label (Cordts et al., 2016, section 2.2).
     small : int
-        Area below which a thing that stands out of its surroundings may be missed, pixels: an assumption.
+        Area below which an object may be missed, pixels: an assumption.
     missed : float
-        Probability that such a small thing is missed, 0..1: an assumption.
+        Probability that such a small object is missed, 0..1: an assumption.
     skewed : bool
         Whether scans of one instant are skewed as a turning scanner on a moving vehicle records them (`skew_scan`).
     """
@@ -53,18 +53,22 @@ class TruthFlaws:
     skewed: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse sizes that are negative or infinite, and a probability above 1."""
+        """Check that sizes are finite and not negative, and that the probability is at most 1."""
         expected = "a finite number from 0 up, a probability up to 1"
         check_fields(self, expected, not_negative, "rotation", "translation", "outline", "small", "missed")
-        check_fields(self, expected, lambda share: share <= 1, "missed")
+        check_fields(self, expected, lambda probability: probability <= 1, "missed")
+
+    def apply(self, frames: Sequence[Frame], seed: int, number: int) -> list[Frame]:
+        """Return the frames with these errors: `flawed_drive`, whose parameters these are."""
+        return flawed_drive(frames, self, seed, number)
 
 
 NO_FLAWS = TruthFlaws(rotation=0, translation=0, outline=0, small=0, missed=0, skewed=False)
-"""Exact calibration, exact labels, scans of one instant: the simulator's own."""
+"""The simulator's own frames: exact calibration, exact labels, scans of one instant."""
 
 
 def miscalibrated(camera: Camera, flaws: TruthFlaws, rng: np.random.Generator) -> Camera:
-    """Return a camera with an error in where it is said to stand and look.
+    """Return a camera whose calibration has an error in position and direction.
 
     Parameters
     ----------
@@ -73,7 +77,7 @@ def miscalibrated(camera: Camera, flaws: TruthFlaws, rng: np.random.Generator) -
     flaws : TruthFlaws
         How large the error is.
     rng : numpy.random.Generator
-        Source of the error: one generator always gives the same camera.
+        Source of the error: the same generator state gives the same camera.
     """
     angles, shift = rng.standard_normal((2, 3)) * [[flaws.rotation], [flaws.translation]]
     error = rigid_transform(Rotation.from_rotvec(angles, degrees=True).as_matrix(), shift)
@@ -83,14 +87,14 @@ def miscalibrated(camera: Camera, flaws: TruthFlaws, rng: np.random.Generator) -
 def flawed_labels(
     labels: NDArray[np.uint8], label_set: LabelSet, flaws: TruthFlaws, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
-    """Return image labels as a person might have drawn them: some small things missed, outlines a little off.
+    """Return image labels as a person might have drawn them: some small objects missed, outlines slightly off.
 
     Parameters
     ----------
     labels : (h, w) uint8
         The true class of each pixel; 255 where unlabelled.
     label_set : LabelSet
-        The classes; patches of flat ones, such as road between two cars, are never missed.
+        The classes; patches of flat classes, such as road between two cars, are never missed.
     flaws : TruthFlaws
         How large the errors are.
     rng : numpy.random.Generator
@@ -100,7 +104,7 @@ def flawed_labels(
     -------
     (h, w) uint8
     """
-    kept = _without_small_things(labels, label_set, flaws, rng)
+    kept = _without_small_objects(labels, label_set, flaws, rng)
     if not flaws.outline:
         return kept
     waves = gaussian_filter(rng.standard_normal((2, *labels.shape)), (0, WAVE, WAVE))
@@ -110,40 +114,40 @@ def flawed_labels(
     return kept[rows, cols]
 
 
-def _without_small_things(
+def _without_small_objects(
     labels: NDArray[np.uint8], label_set: LabelSet, flaws: TruthFlaws, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
-    """Paint some small things over with what surrounds them."""
+    """Paint over some small objects with what surrounds them."""
     flat = {label_set.index(name) for name in label_set.flat}
     missed = np.zeros(labels.shape, bool)
     for c in sorted(set(np.unique(labels).tolist()) - flat - {IGNORE}):
-        things, count = label(labels == c)
-        areas = np.bincount(things.ravel(), minlength=count + 1)
-        gone = (areas < flaws.small) & (rng.random(count + 1) < flaws.missed)
-        missed |= gone[things] & (things > 0)
+        objects, count = label(labels == c)
+        areas = np.bincount(objects.ravel(), minlength=count + 1)
+        overlooked = (areas < flaws.small) & (rng.random(count + 1) < flaws.missed)
+        missed |= overlooked[objects] & (objects > 0)
     if not missed.any() or missed.all():
         return labels
     return labels[tuple(distance_transform_edt(missed, return_distances=False, return_indices=True))]
 
 
 def flawed_drive(frames: Sequence[Frame], flaws: TruthFlaws, seed: int, number: int = 0) -> list[Frame]:
-    """Return the frames of a drive as real data would have them, each by `flawed_frame`.
+    """Return the frames of a drive as a real recording would have them, each by `flawed_frame`.
 
     Parameters
     ----------
     frames : sequence of Frame
-        The frames of a simulated drive, in the order of time.
+        The frames of a simulated drive in temporal order.
     flaws : TruthFlaws
         How large the errors are.
     seed : int
-        Seed for the errors. Drives with the same seed have the same error of calibration.
+        Seed for the errors. Drives with the same seed have the same calibration error.
     number : int
-        Number of the drive, so that drives with the same seed have other errors in their labels.
+        Number of the drive: drives with the same seed but another number have other errors in their labels.
 
     Returns
     -------
     list of Frame
-        The scan of a drive with one frame alone isn't skewed, because a single pose doesn't show how the vehicle moves.
+        In a drive of one frame the scan isn't skewed, because a single pose doesn't tell how the vehicle moves.
     """
     others = [frames[k - 1 if k else min(1, len(frames) - 1)] for k in range(len(frames))]
     velocities = [ego_velocity(a, b) if a is not b else None for a, b in zip(frames, others, strict=True)]
@@ -153,7 +157,7 @@ def flawed_drive(frames: Sequence[Frame], flaws: TruthFlaws, seed: int, number: 
 def flawed_frame(
     frame: Frame, flaws: TruthFlaws, seed: int, key: tuple[int, ...] = (), velocity: EgoVelocity | None = None
 ) -> Frame:
-    """Return a frame as real data would have it: its calibration off, its labels drawn by hand, its scan skewed.
+    """Return a frame as a real recording would have it: calibration off, labels drawn by hand, scan skewed.
 
     Parameters
     ----------
@@ -162,16 +166,16 @@ def flawed_frame(
     flaws : TruthFlaws
         How large the errors are.
     seed : int
-        Seed for the error of calibration: frames with the same seed have the same one, as all frames of one day have.
+        Seed for the calibration error, which frames with the same seed share, as all frames of one day do.
     key : tuple of int
-        Tells frames with the same seed apart, so that the errors in their labels differ.
+        Identifies the frame among those with the same seed, so that the errors in their labels differ.
     velocity : EgoVelocity, optional
         Velocity of the vehicle; without it the scan isn't skewed.
 
     Returns
     -------
     Frame
-        Another frame; bird's-eye labels, depth and image are the true ones.
+        A new frame; bird's-eye labels, depth and image stay the true ones.
     """
     camera = miscalibrated(frame.camera, flaws, np.random.default_rng([seed, 0]))
     points = skew_scan(frame.points, velocity) if flaws.skewed and velocity else frame.points

@@ -22,6 +22,7 @@ from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder
 from semgrid_edu.training.devices import first_process_first, process_group, rank, world_size
 from semgrid_edu.training.loop import train
 from semgrid_edu.training.params import TrainingParams
+from semgrid_edu.workshop.flaws import TruthFlaws
 
 PAPER_IMAGE = (375, 1242)
 """Height and width of KITTI's images, pixels; the paper's networks see them at this size."""
@@ -85,7 +86,7 @@ def chosen_truth(name: str) -> LidarTruth | None:
     ----------
     name : str
         "true" for what the data set says of its cells; a key of `POLICIES`, such as "lidar", for grids made from its
-        image labels and scans, with errors like those of real data.
+        image labels and scans after these got errors like those of real data (`TruthFlaws`).
 
     Returns
     -------
@@ -94,7 +95,7 @@ def chosen_truth(name: str) -> LidarTruth | None:
     """
     if name != "true" and name not in POLICIES:
         raise ArgumentError("--truth", f"one of true, {', '.join(POLICIES)}", repr(name))
-    return None if name == "true" else LidarTruth(POLICIES[name])
+    return None if name == "true" else LidarTruth(POLICIES[name], TruthFlaws())
 
 
 def train_network(
@@ -229,7 +230,7 @@ def _command(
     truth: LidarTruth | None,
 ) -> str:
     """Return the command that makes the same training run, or as near as a command can: not every policy has a name."""
-    named = (name for name, policy in POLICIES.items() if truth == LidarTruth(policy))
+    named = (name for name, policy in POLICIES.items() if truth == LidarTruth(policy, TruthFlaws()))
     options = [
         *(f"--data {_name(data)}" for data in folders),
         f"--out {_name(folder)} --segmenter {description.segmenter}",

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
-from semgrid_edu.datasets.readers import pandaset_files as files
-from semgrid_edu.datasets.readers.calibration import camera_from
-from semgrid_edu.datasets.readers.cuboids import LabelledScan, put_together
-from semgrid_edu.datasets.readers.drive_doubts import repeats
-from semgrid_edu.datasets.readers.frames import FrameSequence, frame_numbers, nothing_known
-from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, cells_in_view, closest_returns, unhidden
+from semgrid_edu.datasets import pandaset_files as files
+from semgrid_edu.datasets.calibration import camera_from
+from semgrid_edu.datasets.cuboids import LabelledScan, put_together
+from semgrid_edu.datasets.frames import FrameSequence, frame_numbers, nothing_known
+from semgrid_edu.datasets.project_lidar import birdseye_votes, cells_in_view, closest_returns, unhidden
 from semgrid_edu.errors import ArgumentError, DataError, check_whole
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
@@ -186,19 +185,12 @@ class PandasetScene(FrameSequence):
         """
         return cells_in_view(self._camera(k), spec)
 
-    def doubts(self) -> list[str]:
-        """List images missing between others, scans and images that repeat, and what is doubtful about a few frames."""
-        expected = f"an image, since there is one every {min(np.diff(self.numbers), default=1)} frames"
-        missing = [str(DataError(self.view / f"{number:02d}.jpg", expected, "none")) for number in self.gaps]
-        scans = [self.folder / "lidar" / f"{number:02d}.pkl.gz" for number in self.numbers]
-        images = [self.view / f"{number:02d}.jpg" for number in self.numbers]
-        return [*missing, *repeats(scans, "scans"), *repeats(images, "images"), *super().doubts()]
-
     def _frame(self, k: int) -> Frame:
-        frame = self._without_labels(k)
+        frame = self.without_labels(k)
         return replace(frame, labels=self._labels(k, frame.camera))
 
-    def _without_labels(self, k: int) -> Frame:
+    def without_labels(self, k: int) -> Frame:
+        """Read a frame without its labels. Parameters are those of `FrameSequence.without_labels`."""
         scan, camera, T_world_from_lidar = self._scan(self.numbers[k]), self._camera(k), self._T_world_from_lidar(k)
         turning = scan.lidars == files.TURNING
         points = transform_points(invert_rigid(T_world_from_lidar), scan.points[turning])

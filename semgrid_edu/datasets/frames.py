@@ -13,12 +13,14 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.readers.drive_doubts import LIDAR_RANGE, frame_doubts
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.storage.reading import read_bytes
+
+LIDAR_RANGE = 250.0
+"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so anything twice as far is no measurement."""
 
 
 class LabelledDrive(Protocol):
@@ -79,9 +81,6 @@ class LabelledDrive(Protocol):
     def files(self) -> list[Path]:
         """Return the files that the frames are read from: when one changes, what was made of the drive is stale."""
 
-    def doubts(self) -> list[str]:
-        """List what is doubtful about the drive, as far as a few of its frames show it."""
-
 
 class FrameSequence(Sequence[Frame]):
     """The frames of a drive. Each is read, and checked, when it is asked for.
@@ -109,17 +108,17 @@ class FrameSequence(Sequence[Frame]):
         return self._frame(k % len(self))
 
     def problems(self) -> list[str]:
-        """Read everything and list all that is wrong or doubtful.
+        """Read everything and list what is missing or damaged.
 
         Returns
         -------
         list of str
-            One line for each problem, which names file or folder; empty when all frames are sound.
+            One line for each problem, which names the file or folder; empty when every frame can be read.
         """
-        return [error for error in dict.fromkeys([*map(error_of, self._readers()), *self.doubts()]) if error]
+        return [error for error in dict.fromkeys(map(error_of, self._readers())) if error]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
-        """Return what reads the drive piece by piece, so that no damaged piece hides another: here frame by frame."""
+        """Return functions that read the drive piece by piece (here: by frame), so that no error hides another."""
         return (partial(self._frame, k) for k in range(len(self)))
 
     def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
@@ -152,16 +151,18 @@ class FrameSequence(Sequence[Frame]):
         """Return all files below the folder of the drive."""
         return [path for path in self.folder.rglob("*.*") if path.is_file()]
 
-    def doubts(self) -> list[str]:
-        """List what is doubtful about a few of the frames; a reader that knows more of its drives adds to it."""
-        return frame_doubts(self, self.folder, self._without_labels)
-
     @abstractmethod
     def _frame(self, k: int) -> Frame:
         """Read frame k, 0 <= k < len(self)."""
 
-    def _without_labels(self, k: int) -> Frame:
-        """Read frame k without its labels. A reader whose labels take long overrides this."""
+    def without_labels(self, k: int) -> Frame:
+        """Read a frame that may lack its labels; readers whose labels take long to make override this.
+
+        Parameters
+        ----------
+        k : int
+            Number of the frame, 0 <= k < len(self).
+        """
         return self._frame(k)
 
 

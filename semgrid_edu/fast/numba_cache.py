@@ -1,13 +1,9 @@
-"""Folders for what can be made anew: arrays that are made of a data set, and functions that numba compiles."""
+"""Where numba keeps the functions that it compiled, also when the installation is read-only."""
 
 import os
 import sys
 import tempfile
 from pathlib import Path
-
-CACHE_VARIABLE = "SEMGRID_EDU_CACHE"
-"""The environment variable that names a folder for what is made of data sets; `semgrid-edu --cache` sets it, and worker
-processes inherit it."""
 
 PACKAGE = Path(__file__).parents[1]
 """The folder of the package, in which numba keeps what it compiles if it can."""
@@ -16,45 +12,28 @@ NUMBA_VARIABLE = "NUMBA_CACHE_DIR"
 """The environment variable that names numba's cache folder."""
 
 
-def cache_folder(dataset_dir: Path) -> Path:
-    """Return the folder for what is made of a data set.
-
-    Parameters
-    ----------
-    dataset_dir : Path
-        The folder of the data set.
-
-    Returns
-    -------
-    Path
-        The folder that `CACHE_VARIABLE` names, which all data sets share; `cache` in that of the data set when the
-        variable isn't set.
-    """
-    chosen = os.environ.get(CACHE_VARIABLE)
-    return Path(chosen) if chosen else dataset_dir / "cache"
-
-
 def keep_compiled_functions() -> str:
-    """Give numba a folder in the system's temporary one, if it could keep compiled functions nowhere else.
+    """Give numba a temporary folder if it can write to none of its usual ones.
 
-    Without such a folder numba refuses to import the package. The environment variable has to be set before numba is
-    imported; worker processes inherit it.
+    Without a folder to write to, numba raises an error when a compiled function is defined. The environment variable
+    has to be set before numba is imported; worker processes inherit it.
 
     Returns
     -------
     str
-        One line for the user; empty when numba finds a place by itself.
+        One line for the user; empty when numba finds a folder by itself.
     """
     chosen = [Path(os.environ[NUMBA_VARIABLE])] if os.environ.get(NUMBA_VARIABLE) else []
     if any(map(takes_files, [*chosen, *_usual_folders()])):
         return ""
-    os.environ[NUMBA_VARIABLE] = folder = str(_own_folder())
+    folder = str(_private_folder())
+    os.environ[NUMBA_VARIABLE] = folder
     return f"neither the package nor your cache folder can be written to; compiled functions are kept in {folder}"
 
 
 def _usual_folders() -> list[Path]:
     """Return where numba looks: beside the module, and in the user's cache folder."""
-    return [PACKAGE / "occupancy" / "__pycache__", user_cache()]
+    return [PACKAGE / "fast" / "__pycache__", user_cache()]
 
 
 def user_cache() -> Path:
@@ -83,8 +62,8 @@ def takes_files(folder: Path) -> bool:
     return True
 
 
-def _own_folder() -> Path:
-    """Return a folder of this user alone: compiled functions are code, which nobody else may put there."""
+def _private_folder() -> Path:
+    """Return a folder that only this user can write to: compiled functions are code."""
     user = os.getuid() if hasattr(os, "getuid") else 0
     folder = Path(tempfile.gettempdir()) / f"semgrid_edu-{user}"
     folder.mkdir(mode=0o700, exist_ok=True)

@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_from_grid, transform_points
-from semgrid_edu.datasets.readers.calibration import (
+from semgrid_edu.datasets.calibration import (
     BenchmarkCalibration,
     camera_from,
     parse_pose,
     read_benchmark_calibration,
 )
-from semgrid_edu.datasets.readers.class_tables import ClassTable
-from semgrid_edu.datasets.readers.frames import FrameSequence, frame_numbers, nothing_known, read_scan
-from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, seen_returns
+from semgrid_edu.datasets.class_tables import ClassTable
+from semgrid_edu.datasets.frames import FrameSequence, frame_numbers, nothing_known, read_scan
+from semgrid_edu.datasets.project_lidar import birdseye_votes, seen_returns
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
@@ -194,10 +194,11 @@ class SemanticKittiSequence(FrameSequence):
         return transform_points(invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT)), points), classes
 
     def _frame(self, k: int) -> Frame:
-        frame = self._without_labels(k)
+        frame = self.without_labels(k)
         return replace(frame, labels=self._labels(k, frame))
 
-    def _without_labels(self, k: int) -> Frame:
+    def without_labels(self, k: int) -> Frame:
+        """Read a frame without its labels. Parameters are those of `FrameSequence.without_labels`."""
         image = read_png(self._image_file(k), "RGB", self.camera.size) if self._has_images else None
         return Frame(image, self.scan(k), self.camera, self._poses[k], self._times[k])
 

@@ -23,10 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
-from semgrid_edu.datasets.readers.calibration import camera_from, check_rotation
-from semgrid_edu.datasets.readers.class_tables import ClassTable
-from semgrid_edu.datasets.readers.frames import FrameSequence, error_of, frame_numbers
-from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, depth_scan, points_from_depth
+from semgrid_edu.datasets.calibration import camera_from, check_rotation
+from semgrid_edu.datasets.class_tables import ClassTable
+from semgrid_edu.datasets.frames import FrameSequence, error_of, frame_numbers
+from semgrid_edu.datasets.project_lidar import birdseye_votes, depth_scan, points_from_depth
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import IGNORE, SYNTHIA_10

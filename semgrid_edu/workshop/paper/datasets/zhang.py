@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.readers.class_tables import ClassTable
-from semgrid_edu.datasets.readers.frames import FrameSequence, nothing_known
+from semgrid_edu.datasets.class_tables import ClassTable
+from semgrid_edu.datasets.frames import FrameSequence, nothing_known
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels
 from semgrid_edu.labels import KITTI_14

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
-from semgrid_edu.datasets.readers.calibration import BenchmarkCalibration, camera_from, read_benchmark_calibration
-from semgrid_edu.datasets.readers.frames import FrameSequence, frame_numbers, read_scan
-from semgrid_edu.datasets.readers.oxts import imu_pose, parse_packet
+from semgrid_edu.datasets.calibration import BenchmarkCalibration, camera_from, read_benchmark_calibration
+from semgrid_edu.datasets.frames import FrameSequence, frame_numbers, read_scan
+from semgrid_edu.datasets.oxts import imu_pose, parse_packet
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
 from semgrid_edu.storage.reading import read_png, read_text
