@@ -31,7 +31,6 @@ from semgrid_edu.plotting.images import image_labels, image_values, plane_on_ima
 from semgrid_edu.plotting.lattice import draw_lattice_frame, draw_triangles, lattice_story, vertex_places
 from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
-from semgrid_edu.plotting.story import draw_cell_story
 
 FIGURE_DPI = 110
 """Dots per inch of every figure in a notebook: `plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI`."""
@@ -53,7 +52,6 @@ __all__ = [
     "confusion",
     "coupling_errors",
     "depth_colours",
-    "draw_cell_story",
     "draw_lattice_frame",
     "draw_triangles",
     "error_against_time",
