@@ -1,7 +1,6 @@
 """Which inputs of the fusion network made the score of a class: gradient times input (section 3.4)."""
 
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ from torch.func import jvp, vmap
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.occupancy import N_STATES
 
 AT_ONCE = 8
 """How many groups of inputs pass through the network together: more would take more memory and no less time."""
@@ -111,19 +111,24 @@ def contributions(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> 
     if net.training:
         raise ArgumentError("net", "a network in evaluation mode, see `net.eval()`", "one in training mode")
     planes, o = fusion_inputs(net, scores, occupancy)
+    reduce, joined, last_layers = net.fusion.reduce, net.fusion.joined, net.fusion.conv_deconv
 
-    def first_layers(planes: Tensor, o: Tensor) -> Tensor:
-        return net.fusion.joined(net.fusion.reduce(planes), o)
+    def change_of_reduced(group: Tensor) -> Tensor:
+        return jvp(reduce, (planes,), (planes * group[..., None, None],))[1]
 
     def change_of_logits(change: Tensor) -> Tensor:
-        return jvp(net.fusion.conv_deconv, (inputs,), (change,))[1][0]
+        return jvp(last_layers, (inputs,), (change,))[1][0]
 
     with torch.no_grad(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "There is a performance drop")  # vmap has no rule for max_unpool2d
-        inputs = first_layers(planes, o)
-        changes = [jvp(first_layers, (planes, o), group)[1] for group in _groups(planes, o)]
-        parts = vmap(change_of_logits, chunk_size=AT_ONCE)(torch.stack(changes)).numpy()
-        logits = net.fusion.conv_deconv(inputs)[0].numpy()
+        reduced = reduce(planes)
+        inputs = joined(reduced, o)
+        of_planes = vmap(change_of_reduced, chunk_size=AT_ONCE)(_plane_groups(*planes.shape[1:3]))
+        changes = [(change, torch.zeros_like(o)) for change in of_planes]
+        changes += [(torch.zeros_like(reduced), _only(o, state)) for state in range(N_STATES)]
+        changes = torch.stack([jvp(joined, (reduced, o), change)[1] for change in changes])
+        parts = vmap(change_of_logits, chunk_size=AT_ONCE)(changes).numpy()
+        logits = last_layers(inputs)[0].numpy()
     n_scores, n_planes = planes.shape[1:3]
     return Contributions(logits, *np.split(parts, [n_planes, n_planes + n_scores]))
 
@@ -143,18 +148,17 @@ def fusion_inputs(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> 
     return planes, torch.tensor(np.asarray(occupancy, np.float32))[None]
 
 
-def _groups(planes: Tensor, o: Tensor) -> Iterator[tuple[Tensor, Tensor]]:
-    """Yield the inputs with all but one group set to zero: one plane, then one class, then one state."""
-    for axis in (2, 1):
-        for index in range(planes.shape[axis]):
-            yield _only(planes, axis, index), torch.zeros_like(o)
-    for state in range(o.shape[1]):
-        yield torch.zeros_like(planes), _only(o, 1, state)
+def _plane_groups(n_scores: int, n_planes: int) -> Tensor:
+    """Return a 1 for each class and plane of a group, (D + C, C, D): each of the planes, then each of the classes."""
+    by_plane = torch.eye(n_planes)[:, None].expand(-1, n_scores, -1)
+    by_class = torch.eye(n_scores)[:, :, None].expand(-1, -1, n_planes)
+    return torch.cat([by_plane, by_class])
 
 
-def _only(inputs: Tensor, axis: int, index: int) -> Tensor:
-    part = torch.zeros_like(inputs)
-    part.select(axis, index).copy_(inputs.select(axis, index))
+def _only(o: Tensor, state: int) -> Tensor:
+    """Return the occupancy with all but one state set to zero."""
+    part = torch.zeros_like(o)
+    part[:, state] = o[:, state]
     return part
 
 

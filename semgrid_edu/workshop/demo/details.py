@@ -17,9 +17,9 @@ from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.plotting import STATE_COLOURS
+from semgrid_edu.workshop.demo.all_cells import frame_story
 from semgrid_edu.workshop.demo.contributions import Contributions
 from semgrid_edu.workshop.demo.evidence import VERDICTS, Sight
-from semgrid_edu.workshop.demo.frame_story import frame_story
 from semgrid_edu.workshop.demo.what_if import CHANGES, FAULTS
 from semgrid_edu.workshop.demo.words import SENTENCES
 

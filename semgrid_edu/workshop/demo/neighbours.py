@@ -19,18 +19,18 @@ class Neighbours(NamedTuple):
 
     Parameters
     ----------
-    messages : (C, H, W) float64
+    messages : (C, H, W) float
         sum_j k_ij Q_j(l): what all neighbours together add to the logarithm of each class's probability.
     steps : (2, number, H, W) int64
         Rows and columns from each cell to the neighbours that pull it most towards one class, the strongest first; 0
         where there are fewer.
-    pull : (number, H, W) float64
+    pull : (number, H, W) float
         k_ij Q_j(l) of each of these: its term of the message.
     """
 
-    messages: NDArray[np.float64]
+    messages: NDArray[np.floating]
     steps: NDArray[np.int64]
-    pull: NDArray[np.float64]
+    pull: NDArray[np.floating]
 
 
 def neighbour_pull(Q: NDArray, label: NDArray, o: NDArray, params: CrfParams, number: int = 5) -> Neighbours:
@@ -51,15 +51,16 @@ def neighbour_pull(Q: NDArray, label: NDArray, o: NDArray, params: CrfParams, nu
     """
     steps = _window(params.sigma_alpha, label.shape)
     scale = _scales(o, params, steps)
-    messages = np.zeros(Q.shape)
-    pull = np.zeros((number, *label.shape))
+    messages = np.zeros_like(Q)
+    pull = np.zeros((number, *label.shape), Q.dtype)
     which = np.zeros((number, *label.shape), np.int64)
     for k, step in enumerate(steps[1:], start=1):  # without step 0: a cell is no pair with itself
         here, there = _pairs(label.shape, step)
-        weights = (_kernels(o, params, step) * scale[:, *here] * scale[:, *there]).sum(axis=0)
+        bilateral, spatial = _kernels(o, params, step)
+        weights = bilateral * scale[0][here] * scale[0][there] + spatial * scale[1][here] * scale[1][there]
         Q_j = Q[:, *there]
         messages[:, *here] += weights * Q_j
-        terms = np.zeros(label.shape)
+        terms = np.zeros_like(pull[0])
         terms[here] = weights * np.take_along_axis(Q_j, label[here][None], axis=0)[0]
         _insert(pull, which, terms, k)
     return Neighbours(messages, np.moveaxis(np.array(steps)[which], -1, 0), pull)
@@ -78,26 +79,27 @@ def _pairs(shape: tuple[int, int], step: Step) -> tuple[tuple[slice, slice], tup
     return here, there
 
 
-def _kernels(o: NDArray, params: CrfParams, step: Step) -> NDArray[np.float64]:
-    """Return both Gaussians of eq. (4), without weights and normalisation, for all pairs of cells of a step."""
+def _kernels(o: NDArray, params: CrfParams, step: Step) -> tuple[NDArray, float]:
+    """Return both Gaussians of eq. (4) for the pairs of cells of a step; the second one is the same for all pairs."""
     here, there = _pairs(o.shape[1:], step)
     place = step[0] ** 2 + step[1] ** 2
-    state = np.square(o[:, *here] - o[:, *there], dtype=np.float64).sum(axis=0)
+    difference = o[:, *here] - o[:, *there]
+    state = np.einsum("shw,shw->hw", difference, difference)
     bilateral = np.exp(-place / (2 * params.sigma_alpha**2) - state / (2 * params.sigma_beta**2))
-    spatial = np.full_like(bilateral, np.exp(-place / (2 * params.sigma_gamma**2)))
-    return np.stack([bilateral, spatial])
+    spatial = float(np.exp(-place / (2 * params.sigma_gamma**2)))
+    return bilateral, spatial
 
 
-def _scales(o: NDArray, params: CrfParams, steps: list[Step]) -> NDArray[np.float64]:
+def _scales(o: NDArray, params: CrfParams, steps: list[Step]) -> NDArray:
     """Return for each kernel the factor of each cell: k_ij is the Gaussian times the factors of i and of j."""
-    weights = np.reshape([params.w_bilateral, params.w_spatial], (2, 1, 1))
-    if params.normalization == "none":
-        return np.broadcast_to(np.sqrt(weights), (2, *o.shape[1:]))
-    row_sums = np.zeros((2, *o.shape[1:]))
-    for step in steps:
+    row_sums = np.zeros((2, *o.shape[1:]), o.dtype)
+    for step in steps if params.normalization == "symmetric" else steps[:1]:  # without steps, K_ii = 1 remains
         here, _ = _pairs(o.shape[1:], step)
-        row_sums[:, *here] += _kernels(o, params, step)
-    return np.sqrt(weights / row_sums)
+        bilateral, spatial = _kernels(o, params, step)
+        row_sums[0][here] += bilateral
+        row_sums[1][here] += spatial
+    weights = np.array([params.w_bilateral, params.w_spatial], o.dtype)
+    return np.sqrt(weights[:, None, None] / row_sums)
 
 
 def _insert(pull: NDArray, which: NDArray, terms: NDArray, number: int) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 from semgrid_edu.occupancy import State
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.demo.cell_story import CellStory
+from semgrid_edu.workshop.demo.one_cell import CellStory
 from semgrid_edu.workshop.demo.what_if import NO_IMAGE, NO_OCCUPANCY, TRUE_BOTH
 
 SENTENCES = table_beside(__file__)

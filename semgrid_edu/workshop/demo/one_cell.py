@@ -13,9 +13,9 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LABEL_SETS
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.pipeline import FrameResult
+from semgrid_edu.workshop.demo.all_cells import frame_story
 from semgrid_edu.workshop.demo.contributions import Contributions
 from semgrid_edu.workshop.demo.evidence import VERDICTS, ScanMaps, Sight, place_history
-from semgrid_edu.workshop.demo.frame_story import frame_story
 from semgrid_edu.workshop.demo.what_if import FAULTS
 
 FRAMES = 10
