@@ -21,6 +21,7 @@ from semgrid_edu.occupancy import (
     SensorModel,
     State,
     VelocityLattice,
+    Walls,
     WorldModel,
     transition_matrix,
 )

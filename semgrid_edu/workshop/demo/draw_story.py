@@ -1,7 +1,6 @@
 """The story of one cell as a figure: its image column, states, parts of the score, and neighbours (paper, Fig. 2)."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -11,44 +10,40 @@ from numpy.typing import NDArray
 
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, colour_legend
 from semgrid_edu.plotting.images import draw_image
-
-if TYPE_CHECKING:  # the story loads torch
-    from semgrid_edu.story import CellStory
+from semgrid_edu.workshop.demo.one_cell import CellStory
 
 FOR, AGAINST = "#6a1b9a", "#d9902f"
-"""Colours of parts that speak for a class and of those that speak against it."""
+"""Colours of parts that raise the score of a class and of those that lower it."""
 
 
-def draw_cell_story(story: "CellStory", image: NDArray | None = None) -> Figure:
+def draw_cell_story(story: CellStory, image: NDArray) -> Figure:
     """Draw the story of one cell.
 
-    At the top the image with the points of the planes above the cell. Below, from left to right: the four states
-    through the steps of the filter and over the last frames, the parts of the score by kind, by class and by plane, and
+    At the top is the image with the points of the planes above the cell. Below, from left to right: the four states
+    after each step of the filter and over the last frames, the parts of the score by kind, by class and by plane, and
     the distribution before and after the CRF.
 
     Parameters
     ----------
     story : CellStory
         The story, from `cell_story`.
-    image : (h, w, 3) uint8, optional
-        The frame's image, RGB; without it, the top is left out.
+    image : (h, w, 3) uint8
+        The frame's image, RGB.
 
     Returns
     -------
     Figure
         A new figure.
     """
-    figure = plt.figure(figsize=(12, 5.2 if image is None else 8.4), layout="constrained")
-    heights = [5] if image is None else [3, 5]
-    parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)
-    if image is not None:
-        _draw_column(story, image, parts[0, 0].subplots())
-    panels = parts[-1, 0].subplot_mosaic([["steps", "parts", "planes", "crf"], ["past", "classes", "planes", "crf"]])
+    figure = plt.figure(figsize=(12, 8.4), layout="constrained")
+    top, below = figure.subfigures(2, 1, height_ratios=[3, 5])
+    _draw_column(story, image, top.subplots())
+    panels = below.subplot_mosaic([["steps", "parts", "planes", "crf"], ["past", "classes", "planes", "crf"]])
     _draw_states(story, panels["steps"], panels["past"])
     _draw_parts(story, panels["parts"], panels["classes"], panels["planes"])
     _draw_crf(story, panels["crf"])
     x, y = story.xy
-    truth = "unknown" if story.truth is None or story.truth >= len(story.names) else story.names[story.truth]
+    truth = "unknown" if story.truth is None else story.names[story.truth]
     figure.suptitle(
         f"Cell {story.cell}, {x:.2f} m ahead, {abs(y):.2f} m to the {'right' if y < 0 else 'left'}: "
         f"{story.names[story.refined]} (truth: {truth}). This scan: {story.scan.verdict}"
@@ -56,7 +51,7 @@ def draw_cell_story(story: "CellStory", image: NDArray | None = None) -> Figure:
     return figure
 
 
-def _draw_column(story: "CellStory", image: NDArray, ax: Axes) -> None:
+def _draw_column(story: CellStory, image: NDArray, ax: Axes) -> None:
     """Mark the points of eq. (1) on the image; the lowest one is filled."""
     draw_image(image, ax)
     seen = story.pixels[story.visible]
@@ -65,7 +60,7 @@ def _draw_column(story: "CellStory", image: NDArray, ax: Axes) -> None:
     ax.set_title("the planes' points above the cell, eq. (1)", loc="left", fontsize="medium")
 
 
-def _draw_states(story: "CellStory", steps: Axes, past: Axes) -> None:
+def _draw_states(story: CellStory, steps: Axes, past: Axes) -> None:
     """Draw the four states as stacked bars: one bar per step, and one per frame."""
     _stack(steps, list(story.steps), np.stack(list(story.steps.values()), axis=1))
     _stack(past, [f"{time:.1f} s" for time in story.times], story.history)
@@ -87,15 +82,14 @@ def _stack(ax: Axes, names: Sequence[str], states: NDArray) -> None:
     ax.set(xlim=(0, 1), ylim=(len(names) - 0.5, -0.5))
 
 
-def _draw_parts(story: "CellStory", kinds: Axes, classes: Axes, planes: Axes) -> None:
+def _draw_parts(story: CellStory, kinds: Axes, classes: Axes, planes: Axes) -> None:
     """Draw why the cell got its class and not the rival."""
-    why = story.for_label.minus(story.for_rival)
+    why = story.why
     sums = [why.planes.sum(), why.occupancy.sum(), why.rest, why.score]
     _bars(kinds, ["image", "occupancy", "constants", "sum"], sums)
-    by_class = why.planes.sum(axis=1)
-    largest = np.argsort(-np.abs(by_class), kind="stable")[:6]
-    _bars(classes, [story.names[c] for c in largest], by_class[largest])
-    _bars(planes, [f"{height:.1f} m" for height in story.heights[::-1]], why.planes.sum(axis=0)[::-1])
+    largest = np.argsort(-np.abs(why.classes), kind="stable")[:6]
+    _bars(classes, [story.names[c] for c in largest], why.classes[largest])
+    _bars(planes, [f"{height:.1f} m" for height in story.heights[::-1]], why.planes[::-1])
     kinds.set_title(
         f"why {story.names[story.label]}\nand not {story.names[story.rival]}", loc="left", fontsize="medium"
     )
@@ -112,14 +106,12 @@ def _bars(ax: Axes, names: Sequence[str], values: Sequence[float]) -> None:
     ax.set_ylim(len(names) - 0.5, -0.5)
 
 
-def _draw_crf(story: "CellStory", ax: Axes) -> None:
+def _draw_crf(story: CellStory, ax: Axes) -> None:
     """Draw the probabilities of the classes that matter before and after the CRF, and what the neighbours add."""
-    pull = story.pull
-    classes = np.argsort(-np.maximum(pull.before, pull.after), kind="stable")[:4]
-    messages = pull.messages
-    names = [f"{story.names[c]}\n(neighbours {messages[c]:+.1f})" for c in classes]
-    ax.barh(np.arange(len(classes)) - 0.2, pull.before[classes], 0.38, color="0.7", label="before")
-    ax.barh(np.arange(len(classes)) + 0.2, pull.after[classes], 0.38, color=FOR, label="after")
+    classes = np.argsort(-np.maximum(story.before, story.after), kind="stable")[:4]
+    names = [f"{story.names[c]}\n(neighbours {story.messages[c]:+.1f})" for c in classes]
+    ax.barh(np.arange(len(classes)) - 0.2, story.before[classes], 0.38, color="0.7", label="before")
+    ax.barh(np.arange(len(classes)) + 0.2, story.after[classes], 0.38, color=FOR, label="after")
     ax.set_yticks(range(len(classes)), names, fontsize="small")
     ax.set(xlim=(0, 1), ylim=(len(classes) - 0.5, -0.5), xlabel="probability")
     ax.set_title("the CRF", loc="left", fontsize="medium")
