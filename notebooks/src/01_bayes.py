@@ -30,11 +30,12 @@ from ipywidgets import FloatSlider, interact
 
 from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, in_rows
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, PlanarMotion, SensorModel, State
-from semgrid_edu.occupancy import scan_evidence, track_drive, transition_matrix
+from semgrid_edu.occupancy import scan_evidence, transition_matrix
 from semgrid_edu.occupancy import update as update_grid
 from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_01_line import bayes_on_a_line, filtered, most_likely_path, smoothed

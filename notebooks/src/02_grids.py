@@ -39,7 +39,7 @@ from semgrid_edu.labels import KITTI_14
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.occupancy import LogOddsGrid, LogOddsParams, PlanarMotion, SensorModel, State, log_odds, probability
-from semgrid_edu.occupancy import scan_evidence, scan_evidence_literal, smear_area, update_log_odds
+from semgrid_edu.occupancy import scan_evidence, smear_area, update_log_odds
 from semgrid_edu.plotting.colours import STATE_COLOURS, colour_legend
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
@@ -240,7 +240,7 @@ def one_beam(length, n_cells, cell):
 
 occupied, free = one_beam(length=3.5, n_cells=5, cell=1.0)
 column = GridSpec(x_min=0, x_max=5, y_min=-0.5, y_max=0.5, cell=1)
-package = scan_evidence_literal(np.array([[3.5, 0.0, 1.0]]), column, sensor)  # one return, 1 m above the ground
+package = scan_evidence(np.array([[3.5, 0.0, 1.0]]), column, sensor)  # one return, 1 m above the ground
 np.testing.assert_allclose(occupied, package.occupied[::-1, 0])  # row 0 is the farthest ahead
 np.testing.assert_allclose(free, package.free[::-1, 0])
 print("P(occupied):", (0.5 * occupied / (0.5 * occupied + 0.5 * free)).round(2))

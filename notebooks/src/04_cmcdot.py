@@ -42,9 +42,10 @@ from semgrid_edu.plotting.moving import wheel_colours
 from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 
 # %% jupyter={"source_hidden": true}
+from semgrid_edu.fast import Cmcdot, track_drive
 from semgrid_edu.occupancy import (
-    Bof, Cmcdot, CmcdotParams, Evidence, FilterState, LogOddsGrid, Particles, PlanarMotion, State, VelocityLattice,
-    move, predict, resample, scan_evidence, track_drive, transition_matrix, update,
+    Bof, CmcdotParams, Evidence, FilterState, LogOddsGrid, Particles, PlanarMotion, State, VelocityLattice,
+    move, predict, resample, scan_evidence, transition_matrix, update,
 )  # fmt: skip
 from semgrid_edu.occupancy.planar_motion import scroll
 from semgrid_edu.occupancy.resampling import systematic_resample
@@ -358,7 +359,7 @@ for step in range(1, 6):
 line = GridSpec(x_min=0, x_max=6, y_min=0, y_max=1, cell=1)  # six cells straight ahead
 one = GridSpec(x_min=0, x_max=1, y_min=0, y_max=1, cell=1)
 NO_RATES = ((0.0,) * 4,) * 4
-calm = CmcdotParams(rates=NO_RATES, stop_rate=0.0, max_acceleration=0.0, clearing_time=0.0, n_particles=4)
+calm = CmcdotParams(rates=NO_RATES, stop_rate=0.0, max_acceleration=0.0, walls=None, n_particles=4)
 
 
 def as_line(values):
@@ -1029,9 +1030,9 @@ plt.show()
 even = (0.952, 0.024, 0.024)  # at first sight, STATIC and DYNAMIC equally probable
 suspects = {
     "the filter as it is": params,
-    "without the look-back rules": replace(params, clearing_time=0.0),
+    "without the look-back rules": replace(params, walls=None),
     "with even odds at first sight": replace(params, first_sight=even),
-    "with both changes": replace(params, clearing_time=0.0, first_sight=even),
+    "with both changes": replace(params, walls=None, first_sight=even),
 }
 of_f = {name: dynamic_shares("the car F", track_drive(real, wide, settings)) for name, settings in suspects.items()}
 

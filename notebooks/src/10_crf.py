@@ -34,10 +34,11 @@ from scipy.special import rel_entr, softmax, xlogy
 
 from semgrid_edu import plotting
 from semgrid_edu.crf import CrfParams, crf_model, damping, energy, exact_marginals, free_energy, gram_matrix
-from semgrid_edu.crf import log_partition, mean_field, mean_field_naive, mean_field_sequential, mean_field_updates
+from semgrid_edu.crf import log_partition, mean_field_naive, mean_field_sequential, mean_field_updates
 from semgrid_edu.crf import most_likely, pair_weights, unary_from_probability
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.datasets.grid_truth import grid_truth
+from semgrid_edu.fast import mean_field
 from semgrid_edu.graphical import GraphicalModel, d_separated, draw
 from semgrid_edu.graphical.places import CUT_COLOUR
 from semgrid_edu.grid import GridSpec

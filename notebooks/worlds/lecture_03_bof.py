@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.occupancy import BofState, bof_predict_literal, bof_update
+from semgrid_edu.occupancy import BofState, bof_predict, bof_update
 from worlds.lecture_00_stage_graph import CutEdge, Price, StageGraph
 from worlds.lecture_03_row import DT, SPEED, Cell, CellsInARow, exact_beliefs, row_evidence, row_model
 
@@ -49,7 +49,7 @@ def bof_beliefs(world: CellsInARow) -> NDArray[np.float64]:
     state = _first_state(world)
     beliefs = []
     for step in range(1, len(world.scans) + 1):
-        predicted = bof_predict_literal(state, world.spec, params, DT)
+        predicted = bof_predict(state, world.spec, params, DT)
         state = bof_update(predicted, world.spec, world.evidence(step), params)
         planes = [state.free, *state.occupied[_used(state.velocity)], state.unknown]
         beliefs.append(np.concatenate(planes).T)

@@ -21,6 +21,7 @@ from semgrid_edu.occupancy import (
     SensorModel,
     State,
     VelocityLattice,
+    Walls,
     WorldModel,
     transition_matrix,
 )
@@ -75,7 +76,7 @@ class CellsInARow:
     first_sight : (float, float, float)
         What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC and DYNAMIC, the last 0.
     clearing_time : float
-        How far back and ahead the filters look, seconds, as in `WorldModel`; exact inference doesn't need it. The
+        How far back and ahead the filters look, seconds, as in `Walls`; exact inference doesn't need it. The
         default reaches five cells far, so it makes no difference in a row of at most five. `DT` reaches the next cell.
         (`clearing_cells` is 0 here, because everything that moves is equally fast.)
     """
@@ -84,7 +85,7 @@ class CellsInARow:
     scans: tuple[str, ...]
     rates: tuple[tuple[float, ...], ...] = NO_CHANGE
     first_sight: tuple[float, float, float] = (0.85, 0.15, 0.0)
-    clearing_time: float = WorldModel.clearing_time
+    clearing_time: float = Walls.clearing_time
 
     def __post_init__(self) -> None:
         """Reject what the joint model doesn't describe."""
@@ -105,8 +106,7 @@ class CellsInARow:
         world = WorldModel(
             rates=self.rates,
             first_sight=self.first_sight,
-            clearing_time=self.clearing_time,
-            clearing_cells=0.0,
+            walls=Walls(clearing_time=self.clearing_time, clearing_cells=0.0),
             max_acceleration=0.0,
             stop_rate=0.0,
         )

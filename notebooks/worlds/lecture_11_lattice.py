@@ -1,6 +1,6 @@
 """The permutohedral lattice of points with two features, drawn: splat, blur, slice (Adams, Baek, Davis 2010)."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import matplotlib.pyplot as plt
@@ -9,9 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.crf import enclosing_simplex_literal
-from semgrid_edu.crf.lattice.literal import Vertex, blur_literal, splat_literal, step
-from semgrid_edu.crf.lattice.simplices import elevation
+from semgrid_edu.crf import PermutohedralLattice, enclosing_simplices
+from semgrid_edu.crf.lattice import elevated, elevation
 
 MARK = 50.0
 """Area of the mark of a point, or of a vertex that holds one point, in points squared."""
@@ -41,12 +40,12 @@ class LatticeFrame(NamedTuple):
     weights: NDArray
 
 
-def vertex_places(vertices: Iterable[Vertex]) -> NDArray[np.float64]:
+def vertex_places(vertices: ArrayLike) -> NDArray[np.float64]:
     """Return where vertices lie in the plane of the two features, (M, 2).
 
     Parameters
     ----------
-    vertices : iterable of Vertex
+    vertices : (M, 3) float
         Three coordinates each, with a sum of zero.
 
     Examples
@@ -56,7 +55,7 @@ def vertex_places(vertices: Iterable[Vertex]) -> NDArray[np.float64]:
            [1.732, 0.   ]])
     """
     basis = elevation(SIZE - 1)
-    return np.array(list(vertices)) @ basis / (basis[:, 0] @ basis[:, 0])
+    return np.asarray(vertices) @ basis / (basis[:, 0] @ basis[:, 0])
 
 
 def draw_triangles(low: ArrayLike, high: ArrayLike, ax: Axes) -> Axes:
@@ -69,7 +68,7 @@ def draw_triangles(low: ArrayLike, high: ArrayLike, ax: Axes) -> Axes:
     ax : Axes
         Axes to draw into.
     """
-    steps = vertex_places([tuple(step(SIZE, j)) for j in range(SIZE)])
+    steps = vertex_places(1 - SIZE * np.eye(SIZE))
     far = int(np.abs([low, high]).sum()) + 2
     places = np.stack(np.meshgrid(*[np.arange(-far, far + 1)] * 2), axis=-1).reshape(-1, 2) @ steps[:2]
     near = places[((places > np.subtract(low, 2)) & (places < np.add(high, 2))).all(axis=1)]
@@ -118,9 +117,11 @@ def lattice_story(features: NDArray, values: NDArray, between: int = 0) -> Itera
     LatticeFrame
         In the last one, each point has the weighted mean of the values around it.
     """
-    corners, shares = zip(*map(enclosing_simplex_literal, features @ elevation(SIZE - 1).T), strict=True)
-    at_points, all_corners = np.repeat(features, SIZE, axis=0), [c for corner in corners for c in corner]
-    at_corners, shares = vertex_places(all_corners), np.array(shares)
+    lattice = PermutohedralLattice.build(features)
+    corners, shares = enclosing_simplices(elevated(features))
+    at_points = np.repeat(features, SIZE, axis=0)
+    at_corners = vertex_places(corners.reshape(-1, SIZE))
+    at_vertices = vertex_places(lattice.vertices)
 
     def journey(title: str, starts: NDArray, ends: NDArray, colours: NDArray) -> Iterator[LatticeFrame]:
         for t in _parts(between):
@@ -128,19 +129,21 @@ def lattice_story(features: NDArray, values: NDArray, between: int = 0) -> Itera
 
     yield LatticeFrame("points, each with its value", features, values, np.ones(len(values)))
     title = "splat: each point gives to its 3 corners"
-    vertices = splat_literal(features, np.column_stack([values, np.ones(len(values))]))
+    held = lattice.shares.T @ np.column_stack([values, np.ones(len(values))])
     yield from journey(title, at_points, at_corners, np.repeat(values, SIZE))
-    yield _at_vertices(title, vertices)
-    for direction in range(SIZE):
-        before, vertices = vertices, blur_literal(vertices, direction)
-        title = f"blur along direction {direction + 1} of 3"
+    yield _of_sums(title, at_vertices, held)
+    for direction, blur in enumerate(lattice.blurs, start=1):
+        before = held
+        held = blur @ before
+        title = f"blur along direction {direction} of 3"
         for t in _parts(between):
-            yield _at_vertices(title, {v: (1 - t) * before[v] + t * vertices[v] for v in vertices})
-        yield _at_vertices(title, vertices)
+            yield _of_sums(title, at_vertices, (1 - t) * before + t * held)
+        yield _of_sums(title, at_vertices, held)
     title = "slice: each point takes from its 3 corners"
-    found = np.array([vertices[c] for c in all_corners])
+    of_vertex = {tuple(vertex): sums for vertex, sums in zip(lattice.vertices.tolist(), held, strict=True)}
+    found = np.array([of_vertex[tuple(corner)] for corner in corners.reshape(-1, SIZE).tolist()])
     yield from journey(title, at_corners, at_points, found[:, 0] / found[:, 1])
-    sums = np.array([share @ at_its for share, at_its in zip(shares, found.reshape(-1, SIZE, 2), strict=True)])
+    sums = lattice.shares @ held
     yield LatticeFrame(title, features, sums[:, 0] / sums[:, 1], np.ones(len(values)))
 
 
@@ -148,7 +151,6 @@ def _parts(between: int) -> NDArray[np.float64]:
     return np.arange(1, between + 1) / (between + 1)
 
 
-def _at_vertices(title: str, vertices: dict[Vertex, NDArray]) -> LatticeFrame:
+def _of_sums(title: str, places: NDArray, sums: NDArray) -> LatticeFrame:
     """Return the picture of vertices that hold a weighted sum of values, and the sum of the weights."""
-    sums = np.array(list(vertices.values()))
-    return LatticeFrame(title, vertex_places(vertices), sums[:, 0] / sums[:, 1], sums[:, 1])
+    return LatticeFrame(title, places, sums[:, 0] / sums[:, 1], sums[:, 1])

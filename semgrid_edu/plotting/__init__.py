@@ -25,7 +25,6 @@ from semgrid_edu.plotting.colours import (
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
-from semgrid_edu.plotting.story import draw_cell_story
 
 FIGURE_DPI = 110
 """Dots per inch of every figure in a notebook: `plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI`."""
@@ -45,7 +44,6 @@ __all__ = [
     "class_legend",
     "confusion",
     "depth_colours",
-    "draw_cell_story",
     "grid_labels",
     "grid_values",
     "image_labels",

@@ -4,8 +4,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from worlds.lecture_11_lattice import draw_lattice_frame, draw_triangles, lattice_story, vertex_places
 
-from semgrid_edu.crf import enclosing_simplex_literal, lattice_literal
-from semgrid_edu.crf.lattice.simplices import elevation
+from semgrid_edu.crf import PermutohedralLattice, enclosing_simplices
+from semgrid_edu.crf.lattice import elevated, elevation
 
 
 def street():
@@ -15,8 +15,7 @@ def street():
 
 def test_vertices_lie_where_their_points_are():
     features, _ = street()
-    for place, y in zip(features, features @ elevation(2).T, strict=True):
-        corners, weights = enclosing_simplex_literal(y)
+    for place, corners, weights in zip(features, *enclosing_simplices(elevated(features)), strict=True):
         np.testing.assert_allclose(weights @ vertex_places(corners), place)
 
 
@@ -24,7 +23,7 @@ def test_the_story_begins_with_the_points_and_ends_with_their_weighted_means():
     features, values = street()
     first, *_, last = lattice_story(features, values, between=2)
     np.testing.assert_array_equal(first.values, values)
-    sums, weights = lattice_literal(features, np.column_stack([values, np.ones(12)])).T
+    sums, weights = PermutohedralLattice.build(features)(np.column_stack([values, np.ones(12)])).T
     np.testing.assert_allclose(last.values, sums / weights)
     np.testing.assert_array_equal(last.places, features)
 

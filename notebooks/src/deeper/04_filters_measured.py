@@ -26,9 +26,10 @@ import numpy as np
 from IPython.display import Markdown
 
 from semgrid_edu import plotting
+from semgrid_edu.fast import Cmcdot
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
-from semgrid_edu.occupancy import Cmcdot, CmcdotParams, PlanarMotion, State, VelocityLattice
+from semgrid_edu.occupancy import CmcdotParams, PlanarMotion, State, VelocityLattice
 from semgrid_edu.workshop.studies.filter.occupancy import occupancy_table
 from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 

@@ -23,10 +23,11 @@ import warnings
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array, answer_arrays
+from semgrid_edu.workshop.course.answers import answer_array, answer_arrays
 from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import CmcdotParams, track_drive
+from semgrid_edu.occupancy import CmcdotParams
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 # Names that begin with _ belong to the tests.
