@@ -7,7 +7,7 @@ from semgrid_edu.workshop.course.registers import STAGES, StageModel, find_code,
 EXAMPLE = StageModel(
     "bof",
     "BOF: four cells",
-    model="semgrid_edu.occupancy.bof_predict_literal",
+    model="semgrid_edu.occupancy.bof_predict",
     check="tests/occupancy/test_bof.py::test_exact",
     lecture="03_bof#bof-predict",
 )
@@ -39,7 +39,7 @@ def test_a_row_links_model_check_and_lecture(monkeypatch):
     monkeypatch.setattr(registers, "STAGES", (EXAMPLE, in_a_cell))
     _, _, bof, tour = stage_table().splitlines()
     assert bof == (
-        "| BOF: four cells | [`bof_predict_literal`](../semgrid_edu/occupancy/literal/bof.py) "
+        "| BOF: four cells | [`bof_predict`](../semgrid_edu/occupancy/bof.py) "
         "| [`test_exact`](../tests/occupancy/test_bof.py) | [03](03_bof.ipynb), `bof-predict` |"
     )
     assert "| [graphical models](deeper/graphical_models.ipynb), `all` | to come |" in tour

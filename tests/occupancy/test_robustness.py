@@ -137,7 +137,7 @@ def test_contradictory_scans_leave_distributions(cmcdot):
 
 @pytest.mark.parametrize(
     "jump",
-    [PlanarMotion(100, 0, 0), PlanarMotion(-3, 100, 1.0), PlanarMotion(1e6, 1e6, 3.0), PlanarMotion(1e308, 0, 0.01)],
+    [PlanarMotion(100, 0, 0), PlanarMotion(-3, 100, 1.0), PlanarMotion(1e6, 1e6, 3.0), PlanarMotion(1e300, 0, 0.01)],
 )
 def test_a_jump_beyond_the_map_forgets_everything_and_the_filter_goes_on(cmcdot, jump):
     tracker = seasoned(cmcdot)

@@ -7,7 +7,7 @@ from pyagrum_oracle import assert_oracle_agrees
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, why_dependent
-from semgrid_edu.occupancy import State, WorldModel
+from semgrid_edu.occupancy import State, Walls
 from semgrid_edu.stage_models import cmcdot_stage
 from semgrid_edu.stage_models.bof import AT_THE_EDGE, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, bof_errors
 from semgrid_edu.stage_models.cells_in_a_row import DT, HIT, NO_CHANGE, NOT_SEEN, Cell, CellsInARow
@@ -64,7 +64,7 @@ BESIDE_A_WALL = ({"static": 0.6, "right": 0.4}, UNSEEN, {"static": 0.7, "left": 
 
 
 @pytest.mark.parametrize("scan", [".x.", "...", ".?."])
-@pytest.mark.parametrize("clearing_time", [0.0, DT, WorldModel.clearing_time])
+@pytest.mark.parametrize("clearing_time", [0.0, DT, Walls.clearing_time])
 @pytest.mark.parametrize(
     "cells", [FROM_BOTH_SIDES.cells, BESIDE_A_WALL, ({}, {"static": 0.5}, {"left": 0.9}), ({}, {}, {})]
 )
