@@ -11,10 +11,11 @@ from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import real_weights, sample_weights
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, build_net, load_net
-from semgrid_edu.occupancy import CmcdotParams, track_drive
+from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.pipeline import STAGES, Stages, network_image, run_pipeline, run_side_by_side
 
 FEW = CmcdotParams(n_particles=2000)
