@@ -14,10 +14,11 @@ from typer.testing import CliRunner
 
 from semgrid_edu.datasets import index, training_cache
 from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import SEGMENTERS
-from semgrid_edu.occupancy import CmcdotParams, Evidence, State, track_drive
+from semgrid_edu.occupancy import CmcdotParams, Evidence, State
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.paper.reports import ablations, reproduce
 from semgrid_edu.workshop.paper.runs.variants import Variant

@@ -24,10 +24,10 @@ from semgrid_edu.crf import (
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, build_net
-from semgrid_edu.occupancy import CmcdotParams, SensorModel, scan_evidence, track_drive
-from semgrid_edu.occupancy.literal.cmcdot import update_literal
+from semgrid_edu.occupancy import CmcdotParams, SensorModel, scan_evidence, update
 from semgrid_edu.occupancy.state import FilterState, Particles
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.planes import plane_pixels
@@ -117,7 +117,7 @@ class TestFilter:
         for frame, belief in zip(drive, both[1], strict=True):
             evidence = scan_evidence(frame.points_grid, SPEC, SensorModel())
             predicted = FilterState(belief.steps["predict"], Particles.none(), np.zeros(SPEC.shape))
-            updated = update_literal(predicted, SPEC, evidence, PARAMS)
+            updated = update(predicted, SPEC, evidence, PARAMS)
             np.testing.assert_allclose(belief.probability, updated.probability, atol=1e-5)
 
     def test_nothing_is_known_when_the_first_frame_begins(self, both):
