@@ -35,8 +35,8 @@ from semgrid_edu.graphical import d_separated
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
-from semgrid_edu.networks.backbones.deeplab import interpolate
-from semgrid_edu.networks.backbones.fcn import enlarge
+from semgrid_edu.networks.deeplab import interpolate
+from semgrid_edu.networks.fcn import enlarge
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.plotting.images import draw_image
 from semgrid_edu.stage_models import ledger, ledger_table, post_pixels

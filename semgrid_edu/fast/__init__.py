@@ -14,6 +14,13 @@ from importlib import import_module
 _WHERE: dict[str, str] = {
     # occupancy
     # planes and memory
+    "ClassMemory": "memory",
+    "PlaneSampler": "planes",
+    "carry_classes": "memory",
+    "learn_classes": "memory",
+    "look_at": "memory",
+    "recall_classes": "memory",
+    "remember_drive": "memory",
     # crf
 }
 """The module that each name comes from: it is loaded when the name is first used."""

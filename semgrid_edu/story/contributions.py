@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SemanticGridNet
-from semgrid_edu.networks.backbones.conv_deconv import ConvDeconv
+from semgrid_edu.networks.conv_deconv import ConvDeconv
 from semgrid_edu.occupancy import N_STATES
 
 AT_ONCE = 8
