@@ -36,7 +36,6 @@ def test_one_doubt_too_many_is_told_as_such(capsys):
         (["reproduce", "occupancy", "--out", "FOLDER"], r"FOLDER: expected a file to write, found a folder"),
         (["reproduce", "occupancy", "--out", "FILE/scores.json"], r"FILE: File exists"),
         (["evaluate", "--data", ".", "--weights", ".", "--out", "FOLDER"], r"FOLDER: expected a file to write"),
-        (["search-crf", "--data", ".", "--test", ".", "--weights", ".", "--out", "FOLDER"], r"FOLDER: expected a file"),
     ],
 )
 def test_a_mistake_ends_in_one_line(tmp_path, monkeypatch, arguments, message):

@@ -37,8 +37,8 @@ from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
-from semgrid_edu.stage_models import ledger, ledger_table, shared_pixel
-from semgrid_edu.stage_models.pixel_ray import believed_by_readers
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_06_shared_pixel import believed_by_readers, shared_pixel
 
 # %% jupyter={"source_hidden": true}
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI

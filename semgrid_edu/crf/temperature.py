@@ -59,15 +59,6 @@ def at_temperature(log_probability: ArrayLike, temperature: float) -> NDArray:
     return log_softmax(np.asarray(log_probability) / float(temperature), axis=0)
 
 
-def negative_log_likelihood(log_probability: ArrayLike, truth: ArrayLike, ignore: int = IGNORE) -> float:
-    """Return the mean of -log p(truth) over all labelled cells, in nats: the smaller, the better the probabilities.
-
-    Parameters are those of `fit_temperature`.
-    """
-    columns, classes = _labelled("log_probability", log_probability, truth, ignore)
-    return -float(columns[classes, np.arange(len(classes))].mean(dtype=np.float64))
-
-
 def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = IGNORE) -> float:
     """Return the temperature that makes the truth most likely (Guo et al. 2017, "temperature scaling").
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from worlds.lecture_02_boxes import Box, scan_boxes
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
 from semgrid_edu.errors import ArgumentError
@@ -13,7 +14,6 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Evidence, PlanarMotion, Scan, SensorModel, scan_evidence, scan_evidence_literal
 from semgrid_edu.occupancy.literal.evidence import walk_ray
 from semgrid_edu.occupancy.polar import fill_gaps
-from semgrid_edu.workshop.illustrations.boxes import Box, scan_boxes
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E_ELEVATIONS
 
 RAY = GridSpec(x_min=0, x_max=5, y_min=-0.5, y_max=0.5, cell=1)

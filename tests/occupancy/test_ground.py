@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from worlds.lecture_02_boxes import Box, scan_boxes
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -13,7 +14,6 @@ from semgrid_edu.occupancy import PlanarMotion, SensorModel, scan_evidence
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.literal.evidence import height_above_ground_literal, walk_sector
 from semgrid_edu.occupancy.sensor import prepare_scan
-from semgrid_edu.workshop.illustrations.boxes import Box, scan_boxes
 
 PARAMS = GroundParams()
 COARSE = GroundParams(sectors=40, bin=1.0, farthest=40.0, neighbours=2)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from worlds.lecture_02_boxes import Box, scan_boxes
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, PlanarMotion, State
-from semgrid_edu.workshop.illustrations.boxes import Box, scan_boxes
 
 SPEC = GridSpec(0, 40, -10, 10, 0.5)
 PARAMS = CmcdotParams(n_particles=10_000)

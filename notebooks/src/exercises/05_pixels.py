@@ -567,7 +567,7 @@ def sampler_of(frame):
 # %%
 def track(frames, spec):
     """Yield the package's beliefs, and note the camera."""
-    from semgrid_edu.occupancy import track_drive
+    from semgrid_edu.fast import track_drive
 
     def looked_at():
         for frame in frames:

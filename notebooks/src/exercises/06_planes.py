@@ -631,7 +631,7 @@ def matrix_of(frame):
 # %%
 def track(frames, spec):
     """Yield the package's beliefs, and note the camera."""
-    from semgrid_edu.occupancy import track_drive
+    from semgrid_edu.fast import track_drive
 
     def looked_at():
         for frame in frames:

@@ -137,31 +137,6 @@ def train(
 
 
 @app.command()
-def train_crf(
-    data: Annotated[Path, typer.Option(help="A data set; best one that the network has never seen.")],
-    weights: Annotated[Path, typer.Option(help="A trained network, which stays as it is.")],
-    out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
-    split: Annotated[str, typer.Option(help="The frames of the data set to learn from.")] = "validation",
-    label_costs: Annotated[bool, typer.Option("--label-costs", help="Learn a cost for every two labels.")] = False,
-    weight_limit: Annotated[float, typer.Option(help="Limit of the class weights; 1: all cells count the same.")] = 4.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the order of the frames.")] = 0,
-    iterations: Annotated[int, typer.Option(min=1, help="Steps of two frames each.")] = 150,
-    resume: Resume = False,
-) -> None:
-    """Train a CRF on the grids of a trained network: its weights, widths, and costs of labels."""
-    from dataclasses import replace
-
-    from semgrid_edu.networks.weights import weights_doubts
-    from semgrid_edu.training.crf import CRF_TRAINING
-    from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
-    from semgrid_edu.workshop.studies.crf.learned_crf import CrfVariant, train_crf_on
-
-    tell(dataset_doubts(data, split) + weights_doubts(weights))
-    params, variant = replace(CRF_TRAINING, grid_iterations=iterations), CrfVariant(split, label_costs, weight_limit)
-    train_crf_on(data, weights, out, variant, params, seed, resume)
-
-
-@app.command()
 def curves(
     runs: Annotated[list[Path], typer.Argument(help="Folders that `semgrid-edu train` writes, finished or not.")],
     out: Annotated[Path, typer.Option(help="Where to write the picture: a .png, .pdf or .svg.")] = Path("curves.png"),
@@ -209,29 +184,6 @@ def evaluate(
         return evaluate(data, weights, confusions_file=confusions)
 
     keep_result(out, scored, lambda result: scores_table(result["scores"], result["intervals"]), force=force)
-
-
-@app.command()
-def search_crf(
-    data: Annotated[Path, typer.Option(help="A data set with validation frames, such as data/validation.")],
-    test: Annotated[Path, typer.Option(help="The data set that the network was trained on, with test frames.")],
-    weights: Annotated[Path, typer.Option(help="A network trained on its train frames.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the parameters that are tried.")] = 0,
-    trials: Annotated[
-        int, typer.Option(min=1, max=100_000, help="Number of trials in all; a search that ended can go on.")
-    ] = 200,
-    out: Annotated[Path, typer.Option(help="Takes each trial; the same command goes on.")] = Path("crf_search.json"),
-) -> None:
-    """Calibrate a network, search the CRF's parameters on validation frames, and score the best on test frames."""
-    from semgrid_edu.networks.weights import weights_doubts
-    from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
-    from semgrid_edu.workshop.studies.crf.crf_search import search_crf, search_table
-
-    def searched() -> dict:
-        tell(dataset_doubts(data, "validation") + dataset_doubts(test, "test") + weights_doubts(weights))
-        return search_crf(data, test, weights, out, seed=seed, n_trials=trials)
-
-    keep_result(out, searched, search_table, goes_on=True)
 
 
 def run() -> None:

@@ -192,7 +192,7 @@ class Record:
         self._moving.append(_moving(package))
         if self.liveliest is None or self._moving[-1] > _moving(self.liveliest[0]):
             self.liveliest = package, runs.get(YOURS)
-        view = self._view(package, self._details(package, maps.get("truth")))
+        view = self._view(package, self._details(package))
         for prefix, result in runs.items():
             self._draw(view, result, prefix)
         for name, labels in maps.items():
@@ -212,11 +212,11 @@ class Record:
         pose = astuple(PlanarMotion.from_poses(self._first_pose, frame.T_world_from_lidar))
         return FrameView(clock, images, {"points": returns}, {}, frame.time, pose, details, scanned)
 
-    def _details(self, package: FrameResult, truth: NDArray | None) -> str:
+    def _details(self, package: FrameResult) -> str:
         """Return what the stories of the frame's cells are told from, if the page tells them."""
         if self.net is None or len(self.views) % self.stories:
             return ""
-        maps = frame_details(package, self.net, truth, self._past)
+        maps = frame_details(package, self.net, self._past)
         self.layout = maps.layout()
         return maps.packed()
 

@@ -17,9 +17,9 @@ from tqdm.auto import tqdm
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.ground_truth import Moment, TruthPolicy, drive_truth
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.storage.files import table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
