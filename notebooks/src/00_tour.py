@@ -35,7 +35,7 @@ from scipy import ndimage
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, project
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.graphical import d_separated, why_dependent
@@ -49,9 +49,10 @@ from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.planes import sample_planes_naive
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, class_legend, colour_patches
-from semgrid_edu.stage_models import ledger, ledger_table, whole_system
-from semgrid_edu.workshop.course.registers import equation_table, stage_table
 from semgrid_edu.workshop.demo import cell_story, draw_cell_story
+from worlds.lecture_00_equations import equation_table
+from worlds.lecture_00_ledger import ledger, ledger_table, stage_table
+from worlds.lecture_00_system import whole_system
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 spec = GridSpec.compact()

@@ -1,7 +1,8 @@
 """The stage `remember`, g -> g over frames: what earlier images said of a cell, kept where it still holds (section 3).
 
 The paper's semantic grid knows only the last image. Here class beliefs are kept in a map that scrolls under the vehicle
-by whole cells, as the occupancy filter's does. `stage_models.class_memory` is the exact model that this approximates.
+by whole cells, as the occupancy filter's does. `notebooks/worlds/lecture_14_class_memory.py` is the exact model that
+this approximates.
 """
 
 from semgrid_edu.memory.class_map import ClassMap, View, remember_drive, smooth_drive

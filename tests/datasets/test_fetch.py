@@ -9,12 +9,11 @@ import pytest
 from archive_server import serve
 from tiny_drive import DATE, write_tiny_drive
 
-from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.readers import fetch
-from semgrid_edu.datasets.readers.fetch import fetch_kitti
+from semgrid_edu.datasets import KittiRawDrive, fetch
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.download import unpack_zip
 from semgrid_edu.workshop.commands import main as cli
+from semgrid_edu.workshop.commands.fetch import fetch_kitti
 
 DRIVE = f"{DATE}_0001"
 CALIB = f"/{DATE}_calib.zip"

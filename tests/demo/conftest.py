@@ -48,7 +48,7 @@ def net(last_labelled, make_net):
 @pytest.fixture(scope="session")
 def told(last_labelled, net):
     """The results of all frames, with the filter's steps and with memory."""
-    return list(run_pipeline(last_labelled, Stages.of(net, keep_steps=True, memory=True)))
+    return list(run_pipeline(last_labelled, Stages.fast(net, keep_steps=True, memory=True)))
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.frame import Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE

@@ -1,20 +1,22 @@
 """The demo: run every stage over every frame of a drive, then write the page and its picture."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import tee
 from pathlib import Path
 from typing import NamedTuple
 
 from numba.core.event import Listener, install_listener
 from tqdm.auto import tqdm
 
-from semgrid_edu.datasets.readers.frames import FrameSequence
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import load_net
-from semgrid_edu.pipeline import FrameResult, Stages, load_stages, run_side_by_side
+from semgrid_edu.pipeline import FrameResult, Stages, run_pipeline
 from semgrid_edu.storage.files import check_ours, write_text
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.demo.comparison import Comparison
@@ -22,6 +24,7 @@ from semgrid_edu.workshop.demo.details import story_data
 from semgrid_edu.workshop.demo.overview import save_overview
 from semgrid_edu.workshop.demo.page import page_html
 from semgrid_edu.workshop.demo.record import Record
+from semgrid_edu.workshop.demo.stages_file import load_stages
 
 SHOWN = 40
 """How many frames the page shows at most by default, evenly spaced, so that its size stays near 10 MB."""
@@ -182,7 +185,7 @@ def write_demo(
         raise DataError(drive.folder, f"images of {getattr(drive, 'view', 'its camera')}", "none")
     mine = load_stages(stages) if stages is not None else Stages()
     memory = memory or mine.remember is not None
-    own, yours, comparison = Stages.of(net, keep_steps=True, memory=memory), (), None
+    own, yours, comparison = Stages.fast(net, keep_steps=True, memory=memory), (), None
     if stages is not None:
         yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given, memory)
     label_set = LABEL_SETS[net.architecture.label_set]
@@ -229,6 +232,25 @@ def write_both_streets(out: str | Path, weights: str | Path | None = None, **opt
     page = write_demo(real_drive(), weights or real_weights(), out, switch=REAL, **options)
     write_demo(sample_drive(), weights or sample_weights(), second, switch=SIMULATED, **options)
     return page
+
+
+def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tuple[FrameResult, ...]]:
+    """Send each frame through several sets of stages, to compare them.
+
+    Parameters
+    ----------
+    frames : iterable of Frame
+        The frames in the order of time; each is read once.
+    *several : Stages
+        Complete sets of stages, such as `Stages.fast(net)` and `mine.over(Stages.fast(net))`.
+
+    Yields
+    ------
+    tuple of FrameResult
+        One result for each set of stages, in their order.
+    """
+    streams = tee(frames, len(several))
+    yield from zip(*(run_pipeline(*one) for one in zip(streams, several, strict=True)), strict=True)
 
 
 def _check_page(out: str | Path, force: bool | None) -> tuple[Path, Path]:

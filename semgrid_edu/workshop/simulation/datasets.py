@@ -10,7 +10,7 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.index import INDEX_FILE
-from semgrid_edu.datasets.readers.kitti_raw import drive_folder
+from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError, check_whole
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.storage.files import LOCK, sole_writer, table_beside, write_json

@@ -18,7 +18,7 @@ from traitlets import Bool, Integer, Unicode
 from traitlets import List as ListTrait
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage.compiled import PACKAGE, takes_files, user_cache
+from semgrid_edu.fast.numba_cache import PACKAGE, takes_files, user_cache
 from semgrid_edu.workshop.course.nbgrader.autograde import UnfitError, student_variant
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import INSTRUCTOR, cell_name, run_submission
