@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from semgrid_edu import fast
-from semgrid_edu.crf import CrfParams, unary_from_probability
+from semgrid_edu.crf import CrfParams, mean_field, unary_from_probability
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import IGNORE, LABEL_SETS
 from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.workshop.demo.contributions import Contributions, contributions
@@ -114,7 +114,7 @@ def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[
     pixels, visible = plane_pixels(spec, architecture.heights, result.frame.camera)
     called, shown = classes_at(result, pixels, visible)
     params = CrfParams.for_cells(spec.cell)
-    before_last_update = fast.mean_field(unary_from_probability(result.grid), o, params, UPDATES - 1)
+    before_last_update = mean_field(unary_from_probability(result.grid), o, params, UPDATES - 1)
     otherwise = what_if(result, net)
     sight = None
     if result.remembered is not None:
@@ -122,7 +122,7 @@ def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[
         sight = last_sight([*past, (result.frame, label)], spec, n_semantic)
     return FrameStory(
         states={**result.belief.steps, "shown": o},
-        scan=scan_maps(result.frame.points_grid, spec, fast.SensorModel()),
+        scan=scan_maps(result.frame.points_grid, spec, SensorModel()),
         pixels=pixels,
         visible=visible,
         called=called,
