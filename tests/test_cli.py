@@ -166,7 +166,7 @@ def test_workers_end_without_a_word_when_their_command_is_stopped(tmp_path, sent
 def test_a_script_without_a_main_guard_is_told_so(tmp_path):
     script = tmp_path / "mine.py"
     script.write_text(
-        "from semgrid_edu.storage.workplace import worker_pool\n"
+        "from semgrid_edu.workshop.workplace import worker_pool\n"
         "with worker_pool(1) as pool: pool.submit(abs, 1).result()"
     )
     ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)

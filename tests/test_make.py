@@ -61,7 +61,7 @@ def test_an_environment_that_could_not_be_made_is_made_again(clone, monkeypatch)
 
 
 SLOW_TO_COMPILE = {
-    "semgrid_edu.occupancy.particles": "_fly",
+    "semgrid_edu.fast.occupancy.particles": "_fly",
     "semgrid_edu.fast.crf.mean_field": "_update",
     "semgrid_edu.fast.crf.windowed": "_window_sums",
     "semgrid_edu.workshop.simulation.sensors.shading": "_shade",

@@ -28,6 +28,13 @@ _WHERE: dict[str, str] = {
     "transition_matrix": "occupancy.transition",
     "update": "occupancy.steps",
     # planes and memory
+    "ClassMemory": "memory",
+    "PlaneSampler": "planes",
+    "carry_classes": "memory",
+    "learn_classes": "memory",
+    "look_at": "memory",
+    "recall_classes": "memory",
+    "remember_drive": "memory",
     # crf
     "PermutohedralLattice": "crf.lattice",
     "SeparableGaussian": "crf.spatial",

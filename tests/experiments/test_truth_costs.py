@@ -10,7 +10,6 @@ from semgrid_edu.datasets import training_cache
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.labels import KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.metrics import confusion_matrix
-from semgrid_edu.storage.workplace import Workplace
 from semgrid_edu.workshop.flaws import TruthFlaws
 from semgrid_edu.workshop.paper.reports import truth_costs as costs
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS
@@ -28,6 +27,7 @@ from semgrid_edu.workshop.scheduler.plan import with_needs
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 from semgrid_edu.workshop.studies.ground_truth.laboratory import TRIALS
 from semgrid_edu.workshop.training_run import chosen_truth
+from semgrid_edu.workshop.workplace import Workplace
 
 REDUCED = SCALES["reduced"]
 LABORATORY = {

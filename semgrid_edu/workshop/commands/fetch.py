@@ -1,15 +1,19 @@
-"""KITTI raw drives from their official archives: fetched, checked, unpacked where `KittiRawDrive` reads them."""
+"""`semgrid-edu data fetch`: KITTI raw drives from their official archives, in the layout that `KittiRawDrive` reads."""
 
 import re
+import shutil
+import zipfile
+import zlib
+from functools import partial
 from pathlib import Path
 
 import pooch
 import requests
+from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive, drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.download import ResumingDownloader, unpack_zip
-from semgrid_edu.storage.files import sha256, write_text
+from semgrid_edu.storage.files import named_errors, sha256, write_text
 
 KITTI_SOURCE = "https://s3.eu-central-1.amazonaws.com/avg-kitti/raw_data"
 """Where KITTI's archives are; https://www.cvlibs.net/datasets/kitti/raw_data.php links there."""
@@ -32,14 +36,20 @@ PANDASET_LICENCE = (
 REGISTRY = "registry.txt"
 """The file beside the archives that holds their SHA-256, in pooch's form: a line `name sha256` for each."""
 
+ATTEMPTS = 5
+"""How often a connection is made before giving up; what has arrived is kept, also for the next call."""
+
+CHUNK = 2**16
+"""Bytes that are read at once. When a connection breaks off, at most one such piece is lost."""
+
 _CALIBRATION = ("calib_cam_to_cam.txt", "calib_velo_to_cam.txt", "calib_imu_to_velo.txt")
 
 
 def fetch_kitti(folder: str | Path, drive: str, source: str = KITTI_SOURCE) -> KittiRawDrive:
     """Fetch a drive and the calibration of its day, unless they are on disk already.
 
-    Archives go to the folder archives and may be deleted afterwards. An archive that lies there already is unpacked
-    without any network. A download that breaks off goes on when the function is called again.
+    Archives go to the folder archives and may be deleted afterwards. An archive that is already there is unpacked
+    without any network. A download that broke off is resumed when the function is called again.
 
     KITTI publishes no checksums. So the first archive of a name is trusted, once every file in it has passed the
     archive's own checksums, and its SHA-256 is written to archives/registry.txt. From then on an archive of this name
@@ -59,14 +69,16 @@ def fetch_kitti(folder: str | Path, drive: str, source: str = KITTI_SOURCE) -> K
     ArgumentError
         When `drive` isn't a date and a number.
     DataError
-        When an archive can't be got (the error says which file to put where), has another checksum than recorded, or
-        is damaged.
+        When an archive can't be downloaded (the error says which file to put where), has another checksum than
+        recorded, or is damaged.
     """
-    folder, named = Path(folder), re.fullmatch(r"(\d{4}_\d\d_\d\d)_(?:drive_)?(\d{4})", drive)
+    folder = Path(folder)
+    named = re.fullmatch(r"(\d{4}_\d\d_\d\d)_(?:drive_)?(\d{4})", drive)
     if not named:
         raise ArgumentError("drive", "date and number such as 2011_09_26_0013", repr(drive))
     date, number = named.groups()
-    target, urls = drive_folder(folder, date, number), []
+    target = drive_folder(folder, date, number)
+    urls = []
     if not all((folder / date / name).exists() for name in _CALIBRATION):
         urls.append(f"{source}/{date}_calib.zip")
     if not target.exists():
@@ -80,9 +92,9 @@ def fetch_kitti(folder: str | Path, drive: str, source: str = KITTI_SOURCE) -> K
 
 
 def _known_files(archives: Path, urls: list[str]) -> pooch.Pooch:
-    """Return where archives are, by name, and their checksums, None where the registry has none."""
+    """Return the archives by name, with their URLs and their checksums (None where the registry has none)."""
     names = {url.rpartition("/")[2]: url for url in urls}
-    files = pooch.create(archives, base_url="", registry=dict.fromkeys(names), urls=names)
+    files = pooch.create(archives, base_url="", registry=dict.fromkeys(names), urls=names, retry_if_failed=ATTEMPTS - 1)
     if (archives / REGISTRY).exists():
         try:
             files.load_registry(archives / REGISTRY)
@@ -92,7 +104,7 @@ def _known_files(archives: Path, urls: list[str]) -> pooch.Pooch:
 
 
 def _record(files: pooch.Pooch, name: str, archive: Path) -> None:
-    """Write an archive's checksum to the registry when it wasn't known."""
+    """Add an archive's checksum to the registry if it is new."""
     if files.registry[name] is None:
         files.registry[name] = sha256(archive)
         known = {key: value for key, value in sorted(files.registry.items()) if value}
@@ -100,10 +112,11 @@ def _record(files: pooch.Pooch, name: str, archive: Path) -> None:
 
 
 def _download(files: pooch.Pooch, name: str) -> Path:
-    """Return where an archive is, after a download if it isn't there."""
-    archives, known = Path(files.path), files.registry[name]
+    """Return the path of an archive, after downloading it if necessary."""
+    archives = Path(files.path)
+    known = files.registry[name]
     try:
-        return Path(files.fetch(name, downloader=ResumingDownloader(archives / f".{name}.part")))
+        return Path(files.fetch(name, downloader=partial(_resume, archives / f".{name}.part")))
     except requests.HTTPError as error:
         refusal = f"{error.response.status_code} {error.response.reason}"
         raise DataError(files.urls[name], "an archive", f"{refusal}: is there such a drive?") from error
@@ -114,3 +127,73 @@ def _download(files: pooch.Pooch, name: str) -> Path:
     except ValueError as error:
         expected = f"the SHA-256 {known} that {archives / REGISTRY} has"
         raise DataError(archives / name, expected, f"another one in the download from {files.urls[name]}") from error
+
+
+def _resume(partial_file: Path, url: str, output_file: str, pooch: object) -> None:
+    """Download a file for `pooch`, which retries when this raises an error: append to what has already arrived.
+
+    If the file has changed on the server meanwhile, the archive's own checksums don't match when it is unpacked.
+    """
+    start = partial_file.stat().st_size if partial_file.exists() else 0
+    headers = {"Accept-Encoding": "identity", "Range": f"bytes={start}-"} if start else {}
+    with requests.get(url, headers=headers, stream=True, timeout=30) as response:
+        if response.status_code == requests.codes.requested_range_not_satisfiable:
+            partial_file.unlink()  # it is longer than the file on the server
+        response.raise_for_status()
+        if response.status_code != requests.codes.partial_content:
+            start = 0
+        size = start + int(response.headers.get("Content-Length", 0))
+        name = url.rpartition("/")[2]
+        bar = tqdm(desc=name, total=size or None, initial=start, unit="B", unit_scale=True)
+        with bar, named_errors(partial_file), partial_file.open("ab" if start else "wb") as file:
+            for chunk in response.iter_content(CHUNK):
+                file.write(chunk)
+                bar.update(len(chunk))
+    if partial_file.stat().st_size < size:
+        raise requests.ConnectionError(f"{partial_file.stat().st_size} of {size} bytes arrived")
+    partial_file.replace(output_file)
+
+
+def unpack_zip(archive: Path, folder: Path, top: str) -> None:
+    """Unpack the top folder of an archive, whole or not at all.
+
+    The archive is unpacked into a hidden folder first, which verifies the checksum of every file. Then its top folder
+    is moved into place. Names that lead elsewhere can't leave the hidden folder, and links become plain files.
+
+    Parameters
+    ----------
+    archive : Path
+        The zip archive.
+    folder : Path
+        Where to put the top folder.
+    top : str
+        Name of the top folder; anything outside of it is dropped.
+
+    Raises
+    ------
+    DataError
+        When the archive is damaged or has no such folder; then nothing is unpacked.
+    """
+    hidden = folder / f".{archive.stem}.partial"
+    shutil.rmtree(hidden, ignore_errors=True)
+    try:
+        with named_errors(folder), zipfile.ZipFile(archive) as opened:
+            for info in tqdm(opened.infolist(), desc=f"unpacking {archive.name}", unit="file"):
+                opened.extract(info, hidden)
+        if not (hidden / top).is_dir():
+            raise DataError(archive, f"a folder {top} in the archive", "none")
+        _move(hidden / top, folder / top)
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+        raise DataError(archive, "a sound zip archive", f"{error}; delete it to download it again") from error
+    finally:
+        shutil.rmtree(hidden, ignore_errors=True)
+
+
+def _move(source: Path, target: Path) -> None:
+    """Move a file or folder into place; if the folder is already there, move its contents."""
+    if source.is_dir() and target.is_dir():
+        for path in sorted(source.iterdir()):
+            _move(path, target / path.name)
+    else:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        source.replace(target)

@@ -7,10 +7,10 @@ import torch
 from torch import Tensor, nn
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks.backbones.conv_deconv import fresh_weights
+from semgrid_edu.networks.conv_deconv import fresh_weights
 
 IMAGENET_MEAN, IMAGENET_STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
-"""Mean and standard deviation of red, green and blue over ImageNet's images, 0..1: weights learnt on ImageNet expect
+"""Mean and standard deviation of red, green and blue over ImageNet's images, 0..1. Weights learnt on ImageNet expect
 inputs that are normalised by them."""
 
 
@@ -25,12 +25,12 @@ def unit_image(image: Tensor) -> Tensor:
     Returns
     -------
     (..., 3, h, w) float32
-        RGB, 0..1. Of PyTorch's default type, which is float32 unless a program sets another.
+        RGB, 0..1, in PyTorch's default type, which is float32 unless a program changes it.
 
     Raises
     ------
     ArgumentError
-        When the image isn't of bytes: it may have been scaled before.
+        When the image isn't bytes: it may have been scaled already.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def unit_image(image: Tensor) -> Tensor:
 class Segmenter(nn.Module, ABC):
     """An image network, i -> s: normalises the image, then scores it.
 
-    A subclass lists its presets, makes its layers in `build` and scores an image in `scores`. CONTRIBUTING.md says how
+    A subclass lists its presets, makes its layers in `build` and scores an image in `scores`. CONTRIBUTING.md shows how
     to add one.
 
     Parameters
@@ -62,7 +62,7 @@ class Segmenter(nn.Module, ABC):
     """The keyword arguments of `build`, for each preset."""
 
     IMAGENET: ClassVar[str | None] = None
-    """The published network, by torchvision's name, whose ImageNet weights the encoder can start from; None if there is
+    """torchvision's name of the published network whose ImageNet weights the encoder can start from; None if there is
     none."""
 
     def __init__(self, n_classes: int, preset: str = "compact", seed: int = 0) -> None:
@@ -92,12 +92,13 @@ class Segmenter(nn.Module, ABC):
             raise ArgumentError("image", "shape (B, 3, h, w)", tuple(image.shape))
         if not image.is_floating_point():
             raise ArgumentError("image", "floats in 0..1", image.dtype)
+        normalised = (image - self.mean) / self.std
         # Channels last in memory: half the time on a CPU, the same numbers.
-        return self.scores(((image - self.mean) / self.std).contiguous(memory_format=torch.channels_last))
+        return self.scores(normalised.contiguous(memory_format=torch.channels_last))
 
     @abstractmethod
     def build(self, n_classes: int, **preset: Any) -> None:
-        """Make the layers of one preset; `fresh_weights` draws their first weights afterwards.
+        """Make the layers of one preset; their first weights are drawn afterwards by `fresh_weights`.
 
         Parameters
         ----------
@@ -123,5 +124,5 @@ class Segmenter(nn.Module, ABC):
         """
 
     def imagenet_tensors(self) -> dict[str, Tensor]:
-        """Return the tensors of the encoder that ImageNet weights fill, by their names in torchvision's `IMAGENET`."""
+        """Return the encoder's tensors that published weights fill, not copies, by their names in torchvision."""
         return {}

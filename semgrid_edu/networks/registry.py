@@ -1,15 +1,14 @@
-"""Every image network by its name: the one place where a new one is entered (paper, section 3.1)."""
+"""Every image network by its name: a new one is added here (paper, section 3.1)."""
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks.backbones.deeplab import DeepLab
-from semgrid_edu.networks.backbones.fcn import Fcn
-from semgrid_edu.networks.backbones.segmenter import Segmenter
-from semgrid_edu.networks.backbones.segnet import SegNet
-from semgrid_edu.networks.backbones.unet import UNet
+from semgrid_edu.networks.deeplab import DeepLab
+from semgrid_edu.networks.fcn import Fcn
+from semgrid_edu.networks.segmenter import Segmenter
+from semgrid_edu.networks.segnet import SegNet
+from semgrid_edu.networks.unet import UNet
 
 SEGMENTERS: dict[str, type[Segmenter]] = {"segnet": SegNet, "fcn": Fcn, "deeplab": DeepLab, "unet": UNet}
-"""Every image network by its name. `build_segmenter`, the command line, the ImageNet loader, the experiments, the
-benchmarks and the tests all look here, so that a new network needs one line here and its own module."""
+"""Commands, experiments, benchmarks and tests all look here, so a new network needs its module and one line here."""
 
 
 def build_segmenter(name: str, n_classes: int, preset: str = "compact", seed: int = 0) -> Segmenter:

@@ -1,4 +1,4 @@
-"""U-Net: whole feature maps carried across, where SegNet carries indices (Ronneberger et al., 2015)."""
+"""U-Net: whole feature maps go across, where SegNet carries only indices (Ronneberger et al., 2015)."""
 
 from itertools import pairwise
 from typing import ClassVar
@@ -8,12 +8,12 @@ import torch.nn.functional as F
 from torch import Tensor, nn
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks.backbones.conv_deconv import conv_bn_relu
-from semgrid_edu.networks.backbones.segmenter import Segmenter
+from semgrid_edu.networks.conv_deconv import conv_bn_relu
+from semgrid_edu.networks.segmenter import Segmenter
 
 
 class UNet(Segmenter):
-    """Segment an image by an encoder, and a decoder that sees each of the encoder's maps beside its own.
+    """Segment an image by an encoder, and a decoder that also sees each of the encoder's maps.
 
     Every stage has two 3x3 convolutions. The encoder halves the map between stages by max-pooling; the decoder doubles
     it by a learnt up-convolution and appends the encoder's map of that size as further channels (the skip connection).
@@ -33,7 +33,7 @@ class UNet(Segmenter):
     have the size of the image, whereas the publication loses 92 pixels on each side. Each 3x3 convolution is followed
     by batch normalisation, as in SegNet; the publication has none. The publication's dropout is left out, because it
     would draw from a global generator. Where a map has an odd side, the last row or column of the up-convolution is
-    its bias alone.
+    only its bias.
 
     References
     ----------
@@ -43,7 +43,7 @@ class UNet(Segmenter):
     PRESETS: ClassVar = {"compact": {"widths": (8, 16, 32, 64, 128)}, "paper": {"widths": (64, 128, 256, 512, 1024)}}
 
     def build(self, n_classes: int, widths: tuple[int, ...]) -> None:
-        """Make encoder, up-convolutions, decoder (its finest stage first) and the final 1x1 convolution.
+        """Make encoder, up-convolutions, decoder (finest stage first) and the final 1x1 convolution.
 
         The other Parameters are those of `Segmenter.build`.
 
@@ -62,13 +62,14 @@ class UNet(Segmenter):
         smallest = 2 ** len(self.up)
         if min(x.shape[2:]) < smallest:
             raise ArgumentError("image", f"{smallest} x {smallest} pixels or more", tuple(x.shape))
-        seen = [self.encoder[0](x)]
+        skips = [self.encoder[0](x)]
         for encode in self.encoder[1:]:
-            seen.append(encode(F.max_pool2d(seen[-1], 2)))
-        x = seen.pop()
-        for up, decode, beside in zip(reversed(self.up), reversed(self.decoder), reversed(seen), strict=True):
-            # The size is given, since 35 rows and 34 both pool to 17.
-            x = decode(torch.cat([beside, up(x, output_size=beside.shape[2:])], dim=1))
+            skips.append(encode(F.max_pool2d(skips[-1], 2)))
+        x = skips.pop()
+        for up, decode, skip in zip(reversed(self.up), reversed(self.decoder), reversed(skips), strict=True):
+            # The size is given because 35 rows and 34 both pool to 17.
+            larger = up(x, output_size=skip.shape[2:])
+            x = decode(torch.cat([skip, larger], dim=1))
         return self.score(x)
 
 

@@ -1,16 +1,16 @@
-"""FCN-8s: scores of three depths of VGG16, summed on the way up (paper, section 3.1; Long et al., 2015)."""
+"""FCN-8s: scores from three depths of VGG16, summed on the way up (paper, section 3.1; Long et al., 2015)."""
 
 from typing import ClassVar
 
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from semgrid_edu.networks.backbones.segmenter import Segmenter
-from semgrid_edu.networks.backbones.vgg import Vgg, conv_relu, vgg16_tensors
+from semgrid_edu.networks.segmenter import Segmenter
+from semgrid_edu.networks.vgg import Vgg, conv_relu, vgg16_tensors
 
 
 class Fcn(Segmenter):
-    """Segment an image by VGG16 made convolutional, and skip connections that add the scores of finer stages.
+    """Segment an image by a fully convolutional VGG16, and skip connections that add the scores of finer stages.
 
     The two hidden layers of VGG16's classifier become a 7x7 convolution, conv6, and a 1x1 convolution, conv7. A 1x1
     convolution then scores the classes at 1/32 of the resolution. These scores are upsampled twofold and added to the
@@ -29,8 +29,8 @@ class Fcn(Segmenter):
     -----
     Three things differ from the publication. Convolutions are padded to keep the size, whereas the publication pads
     the image by 100 pixels and crops by offsets. (Pooling rounds up in both, so every size of image works; here maps
-    are cropped only at their lower and right ends.) Score layers start random, not at zero, so that the first step
-    already teaches the encoder. There is no dropout, because it would draw from a global generator.
+    are cropped only at their lower and right edges.) Score layers start with random weights, not with zeros, so that
+    the encoder learns from the first step on. There is no dropout, because it would draw from a global generator.
 
     References
     ----------
@@ -73,7 +73,7 @@ class Fcn(Segmenter):
         return enlarge(at_8, 8, x.shape[2:])
 
     def imagenet_tensors(self) -> dict[str, Tensor]:
-        """Return weights and biases of VGG16's convolutions, and of its two hidden layers as conv6 and conv7."""
+        """Return weights and biases of VGG16's convolutions and, as conv6 and conv7, of its two hidden layers."""
         convolutions = [layer for layer in self.backbone.features if isinstance(layer, nn.Conv2d)]
         return vgg16_tensors([*convolutions, self.conv6[0], self.conv7[0]])
 
@@ -81,7 +81,7 @@ class Fcn(Segmenter):
 def enlarge(scores: Tensor, factor: int, size: tuple[int, int]) -> Tensor:
     """Upsample a map whose cell i covers pixels factor i .. factor (i + 1) - 1, bilinearly, and crop it to `size`.
 
-    The value of a cell belongs to the middle of its pixels; beyond the outermost middles it stays constant.
+    The value of a cell is that of the middle of its pixels. Beyond the outermost middles the result is constant.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """The conv-deconv network: down by max-pooling, up by the indices it kept (paper, sections 3.1 and 3.4, Fig. 5).
 
-The image network SegNet and the fusion network are both built from it. Below it stands how every network of the
-package draws its first weights from a seed.
+The image network SegNet and the fusion network are both built from it. `fresh_weights` draws the first weights of
+every network of the package from a seed.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from semgrid_edu.errors import ArgumentError
 
 
 def conv_bn_relu(n_in: int, n_out: int) -> nn.Sequential:
-    """Return one layer of Fig. 5: 3x3 convolution, batch normalisation, ReLU; the size of the map stays.
+    """Return one layer of Fig. 5: 3x3 convolution, batch normalisation, ReLU; the map keeps its size.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class ConvDeconv(nn.Module):
 
     Each of the S stages halves the map on the way down and restores it on the way up. The decoder has as many
     layers as the encoder, in reverse order, and its last layer gives the result, without normalisation or ReLU.
-    A pooled map doesn't say where in its 2x2 window each maximum was. The indices, kept from the way down, put the
+    A pooled map no longer shows where in its 2x2 window each maximum was. The indices, kept from the way down, put the
     values back there, so that borders stay sharp without any weights (Badrinarayanan, Kendall and Cipolla, SegNet,
     PAMI 2017).
 
@@ -49,7 +49,7 @@ class ConvDeconv(nn.Module):
     depths : (S,) int
         Number of convolutions in each stage, on the way down and again on the way up.
     skips : bool
-        Whether each decoder stage also sees the map that its encoder stage had before pooling (Ronneberger, Fischer
+        Whether each decoder stage also sees its encoder stage's map before pooling (Ronneberger, Fischer
         and Brox, U-Net, 2015).
     """
 
@@ -87,13 +87,13 @@ class ConvDeconv(nn.Module):
             raise ArgumentError("x", f"maps of {smallest} x {smallest} or larger", tuple(x.shape))
         # Channels last in memory: half the time on a CPU, the same numbers.
         x = x.contiguous(memory_format=torch.channels_last)
-        seen = []
+        levels = []
         for encode in self.encoder:
             before = encode(x)
             x, indices = F.max_pool2d(before, 2, return_indices=True)
-            seen.append((before, indices))
-        for decode, (before, indices) in zip(reversed(self.decoder), reversed(seen), strict=True):
-            # The size is given, since 35 rows and 34 both pool to 17.
+            levels.append((before, indices))
+        for decode, (before, indices) in zip(reversed(self.decoder), reversed(levels), strict=True):
+            # The size is given because 35 rows and 34 both pool to 17.
             x = F.max_unpool2d(x, indices, 2, output_size=before.shape[2:])
             x = decode(torch.cat([x, before], dim=1) if self.skips else x)
         return x
@@ -107,16 +107,16 @@ def _layers(channels: list[int], plain_end: bool = False) -> list[nn.Module]:
 
 @contextmanager
 def fresh_weights(net: nn.Module, seed: int) -> Iterator[None]:
-    """Let the first weights of the layers that are made in the block depend on the seed alone.
+    """Make the first weights of the layers that are created in the block depend only on the seed.
 
-    PyTorch's layers draw their first weights from the global generator of the CPU when they are made. In the block
-    that generator starts from the seed; after it, it is as it was before. Then `initialise` draws the convolutions'
-    weights anew.
+    PyTorch's layers draw their first weights from the CPU's global generator when they are created. Inside the block
+    that generator starts from the seed; afterwards it is as it was before. Then `initialise` draws the convolutions'
+    weights again.
 
     Parameters
     ----------
     net : Module
-        The network whose layers are made in the block.
+        The network whose layers are created in the block.
     seed : int
         Seed for the initial weights.
     """
@@ -127,12 +127,12 @@ def fresh_weights(net: nn.Module, seed: int) -> Iterator[None]:
 
 
 def initialise(net: nn.Module, seed: int) -> None:
-    """Draw the weights of all convolutions anew, so that the signals keep their size from layer to layer.
+    """Draw new weights for all convolutions, such that signals keep their size from layer to layer.
 
-    The weights are normal and the biases zero. The variance of convolutions is 2 / fan-in, because a ReLU that follows
+    The weights are normal and the biases zero. The variance of convolutions is 2 / fan-in, because the ReLU after them
     halves the power of its input (He et al., 2015). The variance of up-convolutions is 1 / (number of input channels):
-    no ReLU follows them, and since their strides leave no overlap, a pixel of the result sums over the input's
-    channels at one place. Other layers are left as they are.
+    no ReLU follows them, and their strides leave no overlap, so each pixel of the result is a sum over the channels of
+    one input pixel. Other layers are left as they are.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""VGG16's thirteen convolutions: the encoder of FCN (paper, section 3.1; Simonyan and Zisserman, 2015)."""
+"""VGG16's thirteen convolutions, the encoder of FCN; SegNet's has the same shape (Simonyan and Zisserman, 2015)."""
 
 from collections.abc import Iterable
 from itertools import pairwise
@@ -6,14 +6,14 @@ from itertools import pairwise
 from torch import Tensor, nn
 
 DEPTHS = (2, 2, 3, 3, 3)
-"""The number of convolutions in each stage, thirteen together (Simonyan and Zisserman, table 1, column D)."""
+"""Number of convolutions in each stage, thirteen in all (Simonyan and Zisserman, table 1, column D)."""
 
 
 class Vgg(nn.Module):
-    """Compute feature maps by five stages of 3x3 convolutions with ReLU, each of which ends with 2x2 max-pooling.
+    """Compute feature maps by five stages of 3x3 convolutions with ReLU, each followed by 2x2 max-pooling.
 
-    Pooling rounds up, as in the framework that the network was published in: a last odd row or column is kept,
-    and cell i of a pooled map covers pixels 2 i and 2 i + 1, whatever the size. Parameters are named as in
+    Pooling rounds up, as in Caffe, in which the network was published: a last odd row or column is kept, and cell i of
+    a pooled map covers pixels 2 i and 2 i + 1, whatever the size. Parameters are named as in
     torchvision's `vgg16` (`vgg16_bn` with batch normalisation).
 
     Parameters
@@ -62,7 +62,7 @@ def conv_relu(n_in: int, n_out: int, kernel: int, batch_norm: bool) -> list[nn.M
     kernel : int
         Side of the kernel, odd, pixels.
     batch_norm : bool
-        Whether batch normalisation stands between convolution and ReLU.
+        Whether there is batch normalisation between convolution and ReLU.
 
     Returns
     -------
@@ -74,13 +74,13 @@ def conv_relu(n_in: int, n_out: int, kernel: int, batch_norm: bool) -> list[nn.M
 
 
 def vgg16_tensors(layers: Iterable[nn.Module]) -> dict[str, Tensor]:
-    """Return the weights and biases of layers by the names that they have in torchvision's `vgg16`.
+    """Return the weights and biases of layers under their names in torchvision's `vgg16`.
 
     Parameters
     ----------
     layers : iterable of Module
-        The convolutions from the first on, then the convolutions that stand for the two hidden layers of the
-        classifier. The last ones may be missing.
+        The thirteen convolutions in order, then those that replace the two hidden layers of the classifier, if the
+        network has them.
 
     Returns
     -------
@@ -88,18 +88,18 @@ def vgg16_tensors(layers: Iterable[nn.Module]) -> dict[str, Tensor]:
         The layers' own tensors under names such as "features.0.weight".
     """
     named = zip(_layer_names(), layers, strict=False)
-    return {f"{name}.{part}": own for name, layer in named for part, own in layer.named_parameters()}
+    return {f"{name}.{part}": tensor for name, layer in named for part, tensor in layer.named_parameters()}
 
 
 def _layer_names() -> list[str]:
-    """Return torchvision's names of VGG16's layers with weights; it numbers all layers, ReLU and pooling included."""
+    """Return torchvision's names of VGG16's layers with weights. It numbers all layers, ReLU and pooling included."""
     starts = [sum(2 * depth + 1 for depth in DEPTHS[:stage]) for stage in range(len(DEPTHS))]
     features = [f"features.{start + 2 * k}" for start, depth in zip(starts, DEPTHS, strict=True) for k in range(depth)]
     return [*features, "classifier.0", "classifier.3"]
 
 
 def _stage(start: int, width: int, depth: int, batch_norm: bool) -> list[nn.Module]:
-    """Return the layers of one stage, from `start` channels to `width`, pooling included."""
+    """Return the layers of one stage, from `start` channels to `width`, with pooling at the end."""
     channels = [start] + [width] * depth
     layers = [layer for n_in, n_out in pairwise(channels) for layer in conv_relu(n_in, n_out, 3, batch_norm)]
     return [*layers, nn.MaxPool2d(2, ceil_mode=True)]

@@ -4,7 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from semgrid_edu import fast
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
@@ -13,15 +16,13 @@ from semgrid_edu.occupancy import (
     FilterState,
     Particles,
     State,
+    Walls,
     WorldModel,
     predict,
-    predict_literal,
     update,
-    update_literal,
 )
 from semgrid_edu.occupancy.bof import origins
-from semgrid_edu.occupancy.literal.particles import cells_at_literal
-from semgrid_edu.occupancy.particles import cells_at, cells_of
+from semgrid_edu.occupancy.cellwise import CERTAIN
 from semgrid_edu.workshop.studies.filter.streets import measure_streets
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -29,8 +30,8 @@ ROW = GridSpec(0, 16, 0, 1, 1)
 """Sixteen cells ahead of the vehicle; row 0 is the farthest."""
 STILL = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0.0, max_acceleration=0.0)
 """Nothing changes its state or its velocity."""
-BLIND = replace(STILL, clearing_time=0.0)
-"""The same for filters that look neither back nor ahead."""
+BLIND = replace(STILL, walls=None)
+"""The same for the paper's filter, which looks neither back nor ahead."""
 ORIGIN, PASSED, BEFORE, TARGET, AHEAD = 13, 10, 9, 8, 3
 """Rows: where something at 10 m/s was 0.5 s, 0.2 s and 0.1 s before it gets into `TARGET`, and where it is 0.5 s on."""
 
@@ -58,7 +59,7 @@ def with_another(state: FilterState, rows: int, weight: float) -> FilterState:
     return replace(state, particles=both)
 
 
-TWINS = pytest.mark.parametrize("predicted", [predict, predict_literal])
+TWINS = pytest.mark.parametrize("predicted", [predict, fast.predict], ids=["book", "fast"])
 
 
 @TWINS
@@ -106,7 +107,7 @@ def test_what_comes_past_a_porous_hedge_is_doubted_if_it_keeps_pace_with_the_veh
 
     By hand, with a = 0.5, u = 1 and b = 0 or 0.5, P(DYNAMIC) = (a - b) / (1 - b).
     """
-    state, world = flying(0.0, UNKNOWN), replace(STILL, clearing_cells=2.0)
+    state, world = flying(0.0, UNKNOWN), replace(STILL, walls=Walls(clearing_cells=2.0))
     state.probability[:, PASSED, 0] = 0, 1, 0, 0
     given = predicted(state, ROW, world, 0.1, np.random.default_rng(0), driven)
     np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], 0.0 if driven > 0.5 else 0.5, atol=1e-6)
@@ -118,7 +119,9 @@ def test_a_place_beside_what_stands_is_no_open_space_to_what_keeps_pace_with_the
     """By hand: a = 0.5, u = 1, and b = 0.6 a because the cell beside it stands with this probability."""
     state = flying(1.0, UNKNOWN, FREE)
     state.probability[:, AHEAD - 1, 0] = 0.4, 0.6, 0, 0
-    given = predicted(state, ROW, replace(STILL, clearing_cells=1.0), 0.1, np.random.default_rng(0), driven)
+    given = predicted(
+        state, ROW, replace(STILL, walls=Walls(clearing_cells=1.0)), 0.1, np.random.default_rng(0), driven
+    )
     np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], dynamic, atol=1e-6)
 
 
@@ -143,12 +146,12 @@ def test_a_car_that_drives_along_a_parked_row_is_believed_although_the_vehicle_d
     probability[:, BEFORE, 0] = 0.5, 0, 0.5, 0
     state = replace(flying(0.0, FREE), probability=probability, newborn=np.zeros((16, 2), np.float32))
     state.particles.position[:, 1] = 1.5
-    street, world = GridSpec(0, 16, 0, 2, 1), replace(STILL, clearing_cells=1.0)
+    street, world = GridSpec(0, 16, 0, 2, 1), replace(STILL, walls=Walls(clearing_cells=1.0))
     given = predicted(state, street, world, 0.1, np.random.default_rng(0), 1.0)
     np.testing.assert_allclose(given.probability[:, TARGET, 0], [0.5, 0, 0.5, 0], atol=1e-6)
 
 
-@pytest.mark.parametrize("updated", [update, update_literal])
+@pytest.mark.parametrize("updated", [update, fast.update], ids=["book", "fast"])
 @pytest.mark.parametrize(("world", "seen", "static"), [(STILL, False, 2 / 3), (STILL, True, 0.8), (BLIND, False, 0.8)])
 def test_nothing_stands_where_something_has_come_from_unless_it_is_seen(updated, world, seen, static):
     """By hand: a = 0.5 and s = 0.8 leave (1 - a) s / (1 - a s). A scan that all but says nothing has still seen."""
@@ -163,31 +166,53 @@ def test_nothing_stands_where_something_has_come_from_unless_it_is_seen(updated,
 
 
 @pytest.mark.parametrize("velocity", [(1.0, 0.0), (-3.0, 4.0), (0.0, -6.0), (1e-3, 0.0), (0.0, 0.0)])
-def test_particles_look_back_half_a_second_and_slow_ones_three_cells(velocity):
-    """By hand, from the middle of a cell of 1 m: at 1 m/s three cells, at 5 m/s as well, at 6 m/s half a second."""
-    spec, v = GridSpec(0, 11, -5, 6, 1), np.array([velocity])
-    particles = Particles(np.full((1, 2), [5.5, 0.5], np.float32), v.astype(np.float32), np.ones(1, np.float32))
-    speed = np.linalg.norm(v)
-    for time in (-0.5, 0.5, 0.0):
-        there = [5.5, 0.5] + np.sign(time) * max(3.0, 0.5 * speed) * v / max(speed, 1e-30)
-        expected = np.array([-1]) if speed * time == 0 else cells_of(there.astype(np.float32), spec)
-        for look in (cells_at, cells_at_literal):
-            assert look(particles, cells_of(particles.position, spec), spec, time, 3.0) == expected
-        assert (origins(v, spec, STILL) == np.rint(there - [5.5, 0.5])).all() or time >= 0
+def test_the_filters_look_back_half_a_second_and_for_slow_things_three_cells(velocity):
+    """By hand, with cells of 1 m: at 1 m/s three cells, at 5 m/s as well, at 6 m/s half a second."""
+    v, speed = np.array([velocity]), np.linalg.norm(velocity)
+    expected = -max(3.0, 0.5 * speed) * v / max(speed, 1e-30) if speed else 0 * v
+    np.testing.assert_allclose(Walls().displacement(v, 1.0, -1), expected)
+    np.testing.assert_array_equal(origins(v, ROW, Walls()), np.rint(expected))
+    np.testing.assert_array_equal(Walls(clearing_time=0).displacement(v, 1.0, -1), 0)
 
 
-@pytest.mark.parametrize("name", ["clearing_time", "clearing_cells"])
+@given(st.integers(0, 1000))
+def test_without_walls_prediction_is_the_papers_formula(seed):
+    """P(DYNAMIC) = [a (1 - s) + (1 - a) d] / (1 - a s), others (1 - a) P / (1 - a s), by plain loops over cells."""
+    rng = np.random.default_rng(seed)
+    own = rng.dirichlet(np.ones(4), 16)
+    own[:, FREE] += own[:, DYNAMIC]
+    own[:, DYNAMIC] = 0
+    weight = rng.uniform(0, own[:, FREE])
+    own[:, FREE] -= weight
+    own[:, DYNAMIC] = weight
+    jump = rng.integers(-2, 3, 16)  # whole cells that the particle of each cell flies in a step
+    position = np.stack([15.5 - np.arange(16), np.full(16, 0.5)], axis=1)
+    velocity = np.stack([jump / 0.1, np.zeros(16)], axis=1)
+    state = FilterState(own.T[:, :, None], Particles(position, velocity, weight), np.zeros(ROW.shape))
+    found = predict(state, ROW, BLIND, 0.1, rng).probability[:, :, 0].T
+
+    for row in range(16):
+        came = [k for k in range(16) if k - jump[k] == row and jump[k]]
+        a = min(sum(weight[k] for k in came), CERTAIN)
+        free, static, _, unknown = own[row]
+        stays, left = (0, weight[row]) if jump[row] else (weight[row], 0)
+        moves = a * (1 - static) + (1 - a) * stays
+        expected = np.array([(1 - a) * (free + left), (1 - a) * static, moves, (1 - a) * unknown])
+        np.testing.assert_allclose(found[row], expected / (1 - a * static), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["clearing_time", "clearing_cells", "second_look"])
 @pytest.mark.parametrize("value", [-0.1, np.nan, np.inf])
 def test_what_is_no_time_and_no_number_of_cells_is_refused(name, value):
     with pytest.raises(ArgumentError, match=name):
-        WorldModel(**{name: value})
+        Walls(**{name: value})
 
 
 def test_walls_that_come_into_view_stay_static():
     """On a street of walls that come into view, half a second makes less than half as many phantoms as none."""
     arguments = {"drives": 1, "grids": ("compact",), "streets": ("walls",), "frames": 25}
     looks, blind = (
-        measure_streets(seed=9, params=CmcdotParams(clearing_time=time), **arguments)["scores"]["compact"]["walls"]
-        for time in (0.5, 0.0)
+        measure_streets(seed=9, params=CmcdotParams(walls=walls), **arguments)["scores"]["compact"]["walls"]
+        for walls in (Walls(), None)
     )
     assert looks["cells"]["scenery"]["called"] < blind["cells"]["scenery"]["called"] / 2

@@ -5,25 +5,25 @@ from typing import ClassVar
 
 from torch import Tensor
 
-from semgrid_edu.networks.backbones.conv_deconv import ConvDeconv
-from semgrid_edu.networks.backbones.segmenter import Segmenter
-from semgrid_edu.networks.backbones.vgg import vgg16_tensors
+from semgrid_edu.networks.conv_deconv import ConvDeconv
+from semgrid_edu.networks.segmenter import Segmenter
+from semgrid_edu.networks.vgg import vgg16_tensors
 
 
 class SegNet(Segmenter):
-    """Segment an image by an encoder in the shape of VGG16 and a decoder that unpools by the encoder's indices.
+    """Segment an image by an encoder shaped like VGG16 and a decoder that unpools by the encoder's indices.
 
     The encoder halves the maps by max-pooling and remembers where in each 2x2 window the maximum was. The decoder
-    mirrors the encoder: each of its stages puts the values back to these places, then convolves. The last convolution
-    gives the scores. `ConvDeconv` is this network; SegNet gives it three channels of an image.
+    mirrors the encoder: each of its stages puts the values back in these places, then convolves. The last convolution
+    gives the scores. `ConvDeconv` is this network; here it takes the three channels of an image.
 
     The other Parameters are those of `Segmenter`.
 
     Parameters
     ----------
     preset : str
-        "paper" has VGG16's thirteen convolutions on the way down and thirteen on the way up; "compact" is the same,
-        narrow and shallow enough for two cores. Both have two convolutions at full resolution: after unpooling
+        "paper" has VGG16's thirteen convolutions on the way down and thirteen on the way up; "compact" is narrower and
+        shallower, for two cores. Both have two convolutions at full resolution: after unpooling
         three pixels in four are empty, and a single convolution leaves them speckled.
 
     References
@@ -57,5 +57,5 @@ class SegNet(Segmenter):
         return self.conv_deconv(x)
 
     def imagenet_tensors(self) -> dict[str, Tensor]:
-        """Return weights and biases of the encoder's convolutions; VGG16 has no batch normalisation, so it stays."""
+        """Return weights and biases of the encoder's convolutions; VGG16 has no batch normalisation to load."""
         return vgg16_tensors(layer[0] for layer in chain.from_iterable(self.conv_deconv.encoder))
