@@ -163,14 +163,3 @@ def positive_count(number: float) -> bool:
         Any number.
     """
     return isinstance(number, Integral) and number >= 1
-
-
-def sum_to_one(totals: ArrayLike) -> bool:
-    """Tell whether these are sums of probabilities: at least 99 % of them are 1 within 0.02.
-
-    Parameters
-    ----------
-    totals : (...) float
-        Sums over classes or states, of many cells.
-    """
-    return bool(np.mean(np.abs(np.asarray(totals) - 1) <= 0.02) >= 0.99)

@@ -43,16 +43,17 @@ from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.fast import mean_field
 from semgrid_edu.graphical import d_separated, draw
-from semgrid_edu.stage_models import crf_stage
 
 # %% jupyter={"source_hidden": true}
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.pipeline import Stages, network_image
+from worlds.lecture_10_crf import crf_stage
 from worlds.lecture_11_accurate import mean_field_accurate
+from worlds.lecture_11_lattice import draw_lattice_frame, draw_triangles, lattice_story, vertex_places
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 drive, spec = sample_drive(), GridSpec.compact()
@@ -112,9 +113,9 @@ draw(graph.model, axes[0], positions=graph.positions)
 axes[0].set_title("the model: 36 pairs of 9 cells")
 rng = np.random.default_rng(3)
 places = np.column_stack([np.linspace(0.4, 4.6, 12), np.where(np.arange(12) < 6, 0.8, 3.4) + rng.normal(0, 0.25, 12)])
-plotting.draw_triangles((-1.1, -1.3), (6.3, 5.8), axes[1])
+draw_triangles((-1.1, -1.3), (6.3, 5.8), axes[1])
 for place, simplex in zip(places, enclosing_simplices(places @ elevation(2).T)[0], strict=True):
-    for corner in plotting.vertex_places(simplex):
+    for corner in vertex_places(simplex):
         axes[1].plot(*zip(place, corner, strict=True), color="0.35", linewidth=0.8)
         axes[1].plot(*corner, "s", color="0.35", markersize=4)
 axes[1].plot(*places.T, "o", color="#fc7200", markersize=8, markeredgecolor="k")
@@ -433,13 +434,13 @@ for d in (2, 3, 5, 8):
 
 # %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="a plane of triangles; two points in orange, the corners of their triangles marked with their coordinates and weights"
 fig, ax = plt.subplots(figsize=(7.5, 5), layout="constrained")
-plotting.draw_triangles((-1.2, 0.5), (2.9, 3.1), ax)
+draw_triangles((-1.2, 0.5), (2.9, 3.1), ax)
 for y, offset in (([4.2, -0.4, -3.8], (8, -16)), ([1.7, 1.6, -3.3], (-118, -4))):
     corners, weights = enclosing_simplex(np.array(y))
-    place = plotting.vertex_places([y])[0]
+    place = vertex_places([y])[0]
     ax.plot(*place, "o", color="#fc7200", markersize=9, markeredgecolor="k", zorder=3)
     ax.annotate(f"y = {tuple(y)}", place, offset, textcoords="offset points", fontsize=9, color="#a04000")
-    for corner, weight, at in zip(corners.tolist(), weights, plotting.vertex_places(corners), strict=True):
+    for corner, weight, at in zip(corners.tolist(), weights, vertex_places(corners), strict=True):
         ax.plot(*zip(place, at, strict=True), color="0.3", linewidth=1.2)
         ax.plot(*at, "s", color="0.2", markersize=6)
         ax.annotate(
@@ -570,15 +571,15 @@ def pictures(between, hold):
     """Yield the frames of the animation on one figure."""
     fig, ax = plt.subplots(figsize=(6.4, 4.5), dpi=plotting.FIGURE_DPI)
     fig.subplots_adjust(left=0.08, right=0.98, bottom=0.1, top=0.94)
-    story = list(plotting.lattice_story(street, p_road, between))
+    story = list(lattice_story(street, p_road, between))
     for frame, following in zip(story, [*story[1:], story[0]], strict=True):
         ax.clear()
-        plotting.draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
-        plotting.draw_lattice_frame(frame, ax)
+        draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
+        draw_lattice_frame(frame, ax)
         ax.set(xlabel="place in the row / 4 cells", ylabel="P(FREE) / 0.2")
         if frame.title.startswith("blur"):
             j = int(frame.title.split()[3]) - 1
-            way = 1.2 * plotting.vertex_places([tuple(1 - 3 * (k == j) for k in range(3))])[0]
+            way = 1.2 * vertex_places([tuple(1 - 3 * (k == j) for k in range(3))])[0]
             ax.annotate(
                 "",
                 np.add((7, 4), way),
@@ -592,13 +593,13 @@ def pictures(between, hold):
 plotting.animate(pictures(between=1, hold=4), period=0.25, alt="36 points splat onto triangles, blur, and slice back")
 
 # %% jupyter={"source_hidden": true} alt="four panels in two rows: points with their colours, vertices after the splat, vertices after three blurs, and points with smoothed colours in two groups"
-story = {frame.title: frame for frame in plotting.lattice_story(street, p_road)}
+story = {frame.title: frame for frame in lattice_story(street, p_road)}
 chosen = [frame for title, frame in story.items() if "direction 1" not in title and "direction 2" not in title]
 fig, axes = plt.subplots(2, 2, figsize=(11, 7), layout="constrained", sharex=True, sharey=True)
 names = ("points", "after the splat", "after three blurs", "after the slice")
 for letter, name, frame, ax in zip("abcd", names, chosen, axes.flat, strict=True):
-    plotting.draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
-    plotting.draw_lattice_frame(frame, ax).set_title(f"({letter}) {name}", loc="left", fontsize="medium")
+    draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
+    draw_lattice_frame(frame, ax).set_title(f"({letter}) {name}", loc="left", fontsize="medium")
     ax.set(xlabel="place / 4 cells", ylabel="P(FREE) / 0.2")
 marks = axes[-1, -1].collections[-1]
 fig.colorbar(marks, ax=axes, label="P(road)", shrink=0.8)
@@ -633,7 +634,7 @@ plt.show()
 
 # %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
 dense = np.stack(np.meshgrid(*[np.arange(-6, 6, 0.2)] * 2), axis=-1).reshape(-1, 2) + 0.07
-special = {"on a vertex": plotting.vertex_places([(0, 0, 0)]), "in the middle": plotting.vertex_places([(1, 0, -1)])}
+special = {"on a vertex": vertex_places([(0, 0, 0)]), "in the middle": vertex_places([(1, 0, -1)])}
 lattice_2d = PermutohedralLattice.build(np.concatenate([dense, *special.values()]))
 print("k_ii on a vertex {:.2f}, in the middle of a triangle {:.2f}".format(*lattice_2d.diagonal[-2:]))
 lattice = PermutohedralLattice.build(features)
@@ -687,7 +688,7 @@ for ax, colour, (index, (name, at)) in zip(axes, ("#0072b2", "#d55e00"), enumera
     image = kernel.reshape(60, 60)
     extent = (dense[0, 0], dense[-1, 0], dense[0, 1], dense[-1, 1])
     ax.imshow(image, origin="lower", extent=extent, cmap="gray", vmin=0, vmax=1.15)
-    plotting.draw_triangles(at[0] - 4, at[0] + 4, ax).collections[0].set(alpha=0.4)
+    draw_triangles(at[0] - 4, at[0] + 4, ax).collections[0].set(alpha=0.4)
     ax.contour(image, [0.1, 0.5, 0.9], colors=colour, extent=extent)
     ax.set(title=f"a point {name}", xlabel="first feature [widths]", ylabel="second feature [widths]")
     axes[2].plot(np.linalg.norm(dense - at, axis=1), kernel, ".", ms=3, color=colour, label=name, alpha=0.5)

@@ -17,8 +17,8 @@ from scipy.special import softmax
 from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_probability
-from semgrid_edu.stage_models.crf import coupled
 from semgrid_edu.storage.provenance import made_by
+from worlds.lecture_10_crf import coupled
 from worlds.lecture_11_other_ways import potts_messages, visit_labellings
 
 COUPLINGS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)

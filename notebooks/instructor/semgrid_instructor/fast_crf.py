@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from semgrid_edu.answers import answer_array, answer_number, peak_megabytes
 from semgrid_edu.crf import enclosing_simplices
+from semgrid_edu.workshop.course.answers import answer_array, answer_number, peak_megabytes
 from semgrid_instructor import close, generator, hidden, keeping
 
 

@@ -25,15 +25,14 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import Markdown
-
 from scipy.special import rel_entr, xlogy
 
 from semgrid_edu import plotting
 from semgrid_edu.crf import CrfParams, free_energy, gram_matrix, log_partition, mean_field_updates
-from semgrid_edu.stage_models.crf import all_free, coupled
-from semgrid_edu.plotting.charts import coupling_errors, error_against_time
 
 sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_10_crf import all_free, coupled
+from worlds.lecture_11_charts import coupling_errors, error_against_time
 from worlds.lecture_11_coupling import COUPLINGS, random_crf
 from worlds.lecture_11_error import crf_error_tables
 

@@ -11,7 +11,8 @@ from typer.core import TyperCommand
 
 from semgrid_edu import __version__
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.compiled import CACHE_VARIABLE, keep_compiled_functions
+from semgrid_edu.fast.numba_cache import keep_compiled_functions
+from semgrid_edu.storage.files import CACHE_VARIABLE
 from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
@@ -77,10 +78,11 @@ def demo(
     from semgrid_edu.datasets.samples import real_weights
     from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.workshop.demo import write_both_streets, write_demo
+    from semgrid_edu.workshop.doubts import drive_doubts
 
     kitti_named = {"--kitti": kitti, "--date": date, "--drive": drive}
     chosen = chosen_drive(kitti_named, {"--pandaset": pandaset, "--scene": scene}, camera)
-    tell([*(chosen.doubts() if chosen else ()), *(weights_doubts(weights) if weights else ())])
+    tell([*(drive_doubts(chosen) if chosen else ()), *(weights_doubts(weights) if weights else ())])
     if chosen is None:
         page = write_both_streets(out, weights, stages=stages, frames=frames, force=force, memory=memory)
     else:
@@ -125,8 +127,8 @@ def train(
     ImageNet weights (VGG16 or ResNet-101) are a safetensors file. --truth lidar makes labels from image labels and
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
-    from semgrid_edu.datasets.index import dataset_doubts
-    from semgrid_edu.training.run import chosen_truth, train_network, training_params
+    from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
+    from semgrid_edu.workshop.training_run import chosen_truth, train_network, training_params
 
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
@@ -166,9 +168,9 @@ def evaluate(
     force: Force = False,
 ) -> None:
     """Score a trained network and the baselines on the test frames."""
-    from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.storage.files import check_ours
+    from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
     from semgrid_edu.workshop.scoring.confusions import confusion_key, distance_band_names
     from semgrid_edu.workshop.scoring.evaluate import evaluate, scores_table
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from semgrid_edu.crf import CrfParams, at_temperature, unary_from_log_probability
 from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets.index import load_index
-from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
-from semgrid_edu.datasets.readers.project_lidar import depth_scan, seen_returns
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.project_lidar import depth_scan, seen_returns
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError
 from semgrid_edu.fast import mean_field
