@@ -15,16 +15,16 @@ import numpy as np
 def filters_and_simulator() -> None:
     """Track a wall and two frames of the shipped drive with every filter, remember one, and simulate two others."""
     from semgrid_edu.datasets.samples import sample_drive
+    from semgrid_edu.fast import ClassMemory
     from semgrid_edu.grid import GridSpec
     from semgrid_edu.labels import KITTI_14
-    from semgrid_edu.memory import ClassMap
     from semgrid_edu.occupancy import Bof, LogOddsGrid, PlanarMotion, track_drive
     from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
 
     spec, drive = GridSpec(0, 32, -8, 8, 1.0), sample_drive()
     *_, belief = track_drive([drive[0], drive[1]], spec)
     even = np.full((len(KITTI_14), *spec.shape), 1 / len(KITTI_14), np.float32)
-    ClassMap(spec, KITTI_14.n_semantic).step(even, belief, PlanarMotion(), 0.1)
+    ClassMemory(spec).advance(even, belief, PlanarMotion(), 0.1)
     wall = np.array([[20.25, y, 1.0] for y in np.arange(-3, 3, 0.1)])
     for tracker in (Bof(spec), LogOddsGrid(spec)):
         tracker.step(wall, PlanarMotion(), 0.1)

@@ -6,6 +6,8 @@ from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from torch import nn
+
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
@@ -16,6 +18,7 @@ from semgrid_edu.networks import Architecture, SemanticGridNet, build_net, build
 from semgrid_edu.networks.build import with_mean_scores
 from semgrid_edu.networks.semantic_grid import MOST_SEGMENTERS
 from semgrid_edu.networks.weights import read_architecture
+from semgrid_edu.planes import PlaneSampler
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import write_provenance
 from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder
@@ -110,6 +113,7 @@ def train_network(
     device: str = "cpu",
     truth: LidarTruth | None = None,
     start: str | Path | Sequence[str | Path] = (),
+    sampler: type[nn.Module] = PlaneSampler,
 ) -> None:
     """Train a network on the split "train" of data sets; under torchrun, in all of its processes.
 
@@ -139,6 +143,8 @@ def train_network(
         A trained network of the same architecture to start from, in place of `imagenet`. Of several the image networks'
         mean scores are fused, see `with_mean_scores`; they don't learn, so there is no first stage. Without any, the
         weights are fresh.
+    sampler : type
+        The class that samples the planes, as for `build_net`.
 
     Raises
     ------
@@ -173,7 +179,10 @@ def train_network(
             dataset = _open(folders, description, truth)
         description = replace(description, label_set=dataset.label_set.name)
         camera = dataset.camera
-        net = _starts_as(starts, description, camera) if starts else build_net(description, camera, seed)
+        if starts:
+            net = _starts_as(starts, description, camera, sampler)
+        else:
+            net = build_net(description, camera, seed, sampler)
         if imagenet:
             load_imagenet(net.segmenter, imagenet)
         train(net, dataset, folder, params, seed, resume, chosen)
@@ -204,9 +213,11 @@ def _open(folders: Sequence[str | Path], description: Architecture, truth: Lidar
     return mixture.parts[0] if len(mixture.parts) == 1 else mixture
 
 
-def _starts_as(paths: Sequence[str | Path], description: Architecture, camera: Camera) -> SemanticGridNet:
+def _starts_as(
+    paths: Sequence[str | Path], description: Architecture, camera: Camera, sampler: type[nn.Module]
+) -> SemanticGridNet:
     """Return the network of another training run, or the mean of several, and refuse those of another architecture."""
-    nets = [load_net(path, camera) for path in paths]
+    nets = [load_net(path, camera, sampler) for path in paths]
     for path, net in zip(paths, nets, strict=True):
         _check_alike(path, net.architecture, description)
     return with_mean_scores(nets)

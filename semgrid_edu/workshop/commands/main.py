@@ -126,12 +126,13 @@ def train(
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
     from semgrid_edu.datasets.index import dataset_doubts
+    from semgrid_edu.fast import PlaneSampler
     from semgrid_edu.training.run import chosen_truth, train_network, training_params
 
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
     choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
-    train_network(data, out, segmenter, params, seed, resume, start=start or (), **choices)
+    train_network(data, out, segmenter, params, seed, resume, start=start or (), sampler=PlaneSampler, **choices)
 
 
 @app.command()
