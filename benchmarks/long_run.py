@@ -7,6 +7,7 @@ import argparse
 import hashlib
 import math
 import os
+import sys
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -23,7 +24,10 @@ from semgrid_edu.memory import MemoryParams
 from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, PlanarMotion
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
-from semgrid_edu.workshop.illustrations.boxes import Box, scan_boxes
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "notebooks"))
+
+from worlds.lecture_02_boxes import Box, scan_boxes
 
 RADIUS, SPEED = 25.0, 5.0
 """Of the circle on which the vehicle drives, metres, and how fast, m/s: one lap takes half a minute."""

@@ -21,12 +21,12 @@ from semgrid_edu.training import Objective, TrainingParams, train
 from semgrid_edu.training.batches import Batch
 from semgrid_edu.training.devices import first_process_first, process_group
 from semgrid_edu.training.loop import learn
-from semgrid_edu.training.run import architecture, training_params
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
 from semgrid_edu.workshop.paper.runs.variants import USUAL, Variant
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scheduler.torchrun import few_threads
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.training_run import architecture, training_params
 
 TIMED_STEPS = 2
 """Number of steps that a trial times, after one that it doesn't."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 from tqdm.auto import tqdm
 
-from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
+from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import real_weights, sample_drive, sample_weights
 from semgrid_edu.errors import check_whole
 from semgrid_edu.fast import load_net, remember_drive
