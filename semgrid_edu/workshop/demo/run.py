@@ -13,10 +13,10 @@ from tqdm.auto import tqdm
 from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import load_net
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
-from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import FrameResult, Stages, run_pipeline
 from semgrid_edu.storage.files import check_ours, write_text
 from semgrid_edu.storage.reading import read_json

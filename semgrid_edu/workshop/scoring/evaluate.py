@@ -8,9 +8,10 @@ from torch import nn
 
 from semgrid_edu.datasets.training_arrays import SEED
 from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.fast import load_net
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net
+from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet
 from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import made_by
