@@ -16,9 +16,9 @@ from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
 from semgrid_edu.workshop.simulation.named_streets import TEST_STREETS
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "notebooks" / "deeper"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "notebooks"))
 
-from phantom_suspects import BARRED, MENDED, SUSPECTS, measure_suspects
+from worlds.lecture_04_suspects import BARRED, MENDED, SUSPECTS, measure_suspects
 
 CLOSELY = ("walls", "mesh and hedge")
 CURES = (next(iter(SUSPECTS)), BARRED, MENDED)

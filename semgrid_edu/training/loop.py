@@ -89,7 +89,9 @@ def train(
     run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.need_architecture())}
     run |= {f"{stage} class weights": weights.tolist() for stage, weights in alpha.items()}
 
-    samplers = {part: plane_sampler(net.architecture, part.camera).to(device) for part in _parts(dataset)}
+    samplers = {
+        part: plane_sampler(net.architecture, part.camera, type(net.sampler)).to(device) for part in _parts(dataset)
+    }
 
     def objective(stage: str) -> nn.Module:
         return _objective(net, stage, alpha[stage].to(device), params.end_to_end)

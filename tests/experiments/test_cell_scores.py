@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, PlanarMotion, State
-from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.studies.filter.cell_scores import CellScores, Estimate, hit_cell_groups
 from semgrid_edu.workshop.studies.filter.scenes import CellTruth, KnownScene, SceneHistory, pool_truth

@@ -5,6 +5,7 @@ import pytest
 from filterpy import discrete_bayes
 from hypothesis import given
 from hypothesis import strategies as st
+from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -22,7 +23,6 @@ from semgrid_edu.occupancy import (
     smear_area,
     update_log_odds,
 )
-from semgrid_edu.workshop.illustrations.boxes import Box, cells_in, scan_boxes
 
 SPEC = GridSpec(0, 40, -5, 5, 0.5)
 FREELY = LogOddsParams(lowest=1e-12, highest=1 - 1e-12)

@@ -12,20 +12,21 @@ from torch.utils.data import Subset
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
+from semgrid_edu.fast import build_net, load_net
 from semgrid_edu.labels import LABEL_SETS
-from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_net, load_net
+from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.tensors import read_tensors
 from semgrid_edu.training import Objective, TrainingParams, train
 from semgrid_edu.training.batches import Batch
 from semgrid_edu.training.devices import first_process_first, process_group
 from semgrid_edu.training.loop import learn
-from semgrid_edu.training.run import architecture, training_params
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
 from semgrid_edu.workshop.paper.runs.variants import USUAL, Variant
 from semgrid_edu.workshop.scheduler.runs import Run
 from semgrid_edu.workshop.scheduler.torchrun import few_threads
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.training_run import architecture, training_params
 
 TIMED_STEPS = 2
 """Number of steps that a trial times, after one that it doesn't."""

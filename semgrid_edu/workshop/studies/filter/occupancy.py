@@ -5,8 +5,9 @@ from time import perf_counter
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError, check_whole
+from semgrid_edu.fast import Cmcdot
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, State
+from semgrid_edu.occupancy import Bof, LogOddsGrid, State
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive

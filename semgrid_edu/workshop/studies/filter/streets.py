@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import Cmcdot
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, State
+from semgrid_edu.occupancy import Belief, CmcdotParams, State
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 from semgrid_edu.workshop.simulation.drive import PERIOD
 from semgrid_edu.workshop.simulation.named_streets import FRAMES, TEST_STREETS, named_street

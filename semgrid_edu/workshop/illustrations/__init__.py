@@ -1,1 +1,0 @@
-"""Small worlds, small networks and measurements that the lectures show."""
