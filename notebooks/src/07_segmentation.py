@@ -36,8 +36,8 @@ from semgrid_edu.graphical import d_separated
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
-from semgrid_edu.networks.backbones.deeplab import interpolate
-from semgrid_edu.networks.backbones.fcn import enlarge
+from semgrid_edu.networks.deeplab import interpolate
+from semgrid_edu.networks.fcn import enlarge
 from semgrid_edu.plotting.images import draw_image
 
 # %% jupyter={"source_hidden": true}

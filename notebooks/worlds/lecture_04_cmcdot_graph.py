@@ -136,7 +136,8 @@ def _along_a_wall(world: CellsInARow, cell: int, M: NDArray) -> NDArray[np.float
     steps = round(world.clearing_time / DT)
     doubt = np.zeros(len(HERE))
     for state, (place, velocity) in enumerate(PLACES, start=1):
-        origin, ahead = cell - 1 - velocity * steps, cell - 1 + velocity * steps
+        origin = cell - 1 - velocity * steps
+        ahead = cell - 1 + velocity * steps
         if place == 0 and steps > 0 and 0 <= origin <= last:
             wall = by_now[ahead, [STATIC, UNKNOWN]].sum() if 0 <= ahead <= last else 1.0
             doubt[state] = by_now[origin, STATIC] * wall

@@ -94,7 +94,8 @@ def _voted(world: LabelWorld) -> NDArray[np.float64]:
     shape = (*(3,) * world.returns, 4)
     cells = np.indices(shape).reshape(len(shape), -1)
     classes = np.array([*CONTENTS, IGNORE], np.uint8)[cells[:-1]]
-    pixels, reached = np.arange(classes.size), np.tile(np.arange(cells.shape[1]), world.returns)
+    pixels = np.arange(classes.size)
+    reached = np.tile(np.arange(cells.shape[1]), world.returns)
     label_set = KITTI_14 if world.vote == "standing" else replace(KITTI_14, flat=())
     made = carry_labels(classes, pixels, reached, np.eye(4)[:, cells[-1], None], label_set)[:, 0]
     return (made[:, None] == np.array(MADE)).astype(float).reshape(*shape, len(MADE))

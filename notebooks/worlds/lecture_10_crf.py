@@ -202,7 +202,8 @@ def critical_coupling(classes: int, values: NDArray) -> float:
 def _inferences(unary: NDArray, values: NDArray, params: CrfParams) -> tuple[dict[str, NDArray], list[int], bool]:
     """Return all marginals by method, the most likely labelling, and whether loopy sum-product converged."""
     model = crf_model(unary, values, params)
-    loopy, settled = sum_product(model), mean_field_graph(model, iterations=200)
+    loopy = sum_product(model)
+    settled = mean_field_graph(model, iterations=200)
     marginals = {
         "exact": exact_marginals(unary, values, params).reshape(len(unary), -1),
         "mean field": _by_cell(model, settled.marginals),

@@ -1,4 +1,4 @@
-"""The kernels of eq. (4): how strongly two cells are coupled by their distance in place and in occupancy."""
+"""The kernels of eq. (4): how strongly distance in place and in occupancy lets two cells influence each other."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,7 +64,7 @@ def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     """Compute the bracket of eq. (4) for every two cells, a cell and itself included.
 
     Gaussians of distances are inner products in some space, so this matrix has no negative eigenvalue, whatever the
-    weights, widths and normalisation. It is this property that keeps mean field from oscillating (`damping`).
+    weights, widths and normalisation. This is what lets `damping` keep mean field from oscillating.
 
     Parameters
     ----------
@@ -119,8 +119,8 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     Returns
     -------
     (H W, H W) float64
-        The cost of two cells having different labels; cells are counted row by row. Zero on the diagonal, since a cell
-        is no pair with itself.
+        The cost of different labels in two cells, counted row by row. Zero on the diagonal, since a cell is no pair
+        with itself.
     """
     weights = gram_matrix(values, params)
     np.fill_diagonal(weights, 0)

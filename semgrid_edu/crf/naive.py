@@ -24,9 +24,9 @@ def mean_field_naive(
         Q_i(l) = exp(-phi_u(l) - sum_{j != i} k_ij (1 - Q_j(l))) / Z_i
 
     All cells are updated at once, from Q_i(l) = exp(-phi_u(l)) / Z_i on, as in Kraehenbuehl and Koltun 2011, algorithm
-    1. They take the right-hand side as the new Q_i; here log Q_i moves only a part of the way to it, see `damping`.
-    Then no update raises the free energy. Without damping, two cells that strongly attract each other, each decided
-    for another label, swap their labels for ever.
+    1. They take the right-hand side as the new Q_i; here log Q_i moves only part of the way to it, see `damping`.
+    Then no update raises the free energy. Without damping, two cells that attract each other strongly but have
+    different labels swap them for ever.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def mean_field_naive(
         Weights, widths and normalisation.
     iterations : int
         The largest number of updates of all cells. With the default parameters nearly all labels have settled after
-        ten; probabilities of single cells still change later.
+        ten, though probabilities of single cells still change.
     tolerance : float
         Stop as soon as an update changes no probability by more than this.
 
@@ -57,7 +57,7 @@ def mean_field_naive(
 
 
 def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> Iterator[NDArray[np.float64]]:
-    """Yield what `mean_field_naive` holds at first and after each update, without end.
+    """Yield Q of `mean_field_naive` at first and after each update, without end.
 
     Parameters are those of `mean_field_naive`.
 
@@ -68,7 +68,7 @@ def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -
 
     Examples
     --------
-    The free energy after each update, of two cells that attract each other and disagree:
+    Two cells attract each other and disagree. The free energy, at first and after each update:
 
     >>> from semgrid_edu.crf import free_energy
     >>> unary, values = np.array([[[0.0, 2.0]], [[1.0, 0.0]]]), np.full((4, 1, 2), 0.25)
@@ -113,7 +113,7 @@ def updates(
 
 
 def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return how far each cost lies above that of the cell's best class: the unary term up to a constant.
+    """Return the cost of each class relative to the cell's best one: the unary term up to a constant.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def settled(states: Iterator[NDArray], iterations: int, tolerance: float) -> NDA
 
 
 def damping(self_coupling: NDArray) -> NDArray:
-    """Return how far an update of all cells at once may go, so that it can't raise the free energy.
+    """Return how far all cells may move at once without raising the free energy.
 
     With k_ii the weight of a cell with itself (the diagonal of `gram_matrix`), the free energy is::
 
@@ -178,8 +178,8 @@ def damping(self_coupling: NDArray) -> NDArray:
     Returns
     -------
     (N,) float
-        p_i, above 0 and at most 1. With the default parameters and many neighbours it is near 1, so that nothing is
-        lost; with `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
+        p_i, above 0 and at most 1. With the default parameters and many neighbours it is near 1, so damping costs
+        nothing; with `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
     """
     return 1 / (1 + self_coupling / 2)
 
@@ -189,8 +189,8 @@ def mean_field_sequential(
 ) -> NDArray[np.float64]:
     """Approximate the CRF's marginals by mean field, one cell after the other.
 
-    Each update minimises the free energy over the distribution of one cell, so none can raise it, and nothing has to be
-    damped. But cells have to wait for each other.
+    Each update minimises the free energy over the distribution of one cell, so it can't raise it, and needs no damping.
+    But cells have to wait for each other.
     Parameters are those of `mean_field_naive`, and so are errors.
 
     Returns

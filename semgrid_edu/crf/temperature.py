@@ -1,4 +1,4 @@
-"""Calibration: the temperature at which a network's probabilities mean what they say, before eq. (3) uses them."""
+"""Calibration: how often a network is right, by its confidence, and which temperature corrects it (eq. (3))."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import IGNORE
 
 COLDEST, HOTTEST = 0.01, 100.0
-"""The temperatures between which `fit_temperature` looks."""
+"""The temperatures between which `fit_temperature` searches."""
 
 
 class Reliability(NamedTuple):

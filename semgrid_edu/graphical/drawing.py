@@ -75,7 +75,7 @@ def draw(
     >>> beam = GraphicalModel([Factor("m", [0.8, 0.2]), Factor(("m", "z"), [[0.9, 0.1], [0.2, 0.8]])], {"z": ("m",)})
     >>> ax = draw(beam, positions=in_rows(["m"], ["z"]), observed="z", highlight="m")
     """
-    from semgrid_edu.graphical.rendering import Picture
+    from semgrid_edu.graphical.rendering import GraphPicture
 
     labels = labels or {}
     equations = equations or {}
@@ -85,7 +85,7 @@ def draw(
     highlight = as_names(highlight)
     named = [name for name in labels if name not in ghosts]
     _check(model, {"observed": observed, "highlight": highlight, "labels": named, **plates}, positions, equations)
-    picture = Picture(model, _places(model, positions), ghosts, labels)
+    picture = GraphPicture(model, _places(model, positions), ghosts, labels)
     picture.write(equations)
     picture.surround(plates)
     for edge in dashed:

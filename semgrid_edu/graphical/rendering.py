@@ -27,10 +27,10 @@ MARGIN = 0.45
 """How far a plate and the picture reach beyond the centres of nodes, at least."""
 
 LETTER = 0.12
-"""Approximate width of a letter, in a figure that `Picture` makes."""
+"""Approximate width of a letter, in a figure that `GraphPicture` makes."""
 
 INCHES = 0.8
-"""Distance of neighbouring nodes in a figure that `Picture` makes."""
+"""Distance of neighbouring nodes in a figure that `GraphPicture` makes."""
 
 FONT_SIZES = 8.0, 12.0
 """Smallest and largest font, points."""
@@ -42,7 +42,7 @@ GHOST = {"ec": "0.55", "ls": (0, (2, 2)), "fc": "0.97"}
 """Look of a node that the model doesn't have."""
 
 
-class Picture:
+class GraphPicture:
     """A model's nodes at their places. Texts, plates and dashed edges are added; `render` draws everything.
 
     Parameters

@@ -85,7 +85,8 @@ def train(
     run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.need_architecture())}
     run |= {f"{stage} class weights": weights.tolist() for stage, weights in alpha.items()}
     parts = dataset.parts if isinstance(dataset, Mixture) else ()
-    samplers = {part: plane_sampler(net.architecture, part.camera).to(fabric.device) for part in parts}
+    kind = type(net.sampler)
+    samplers = {part: plane_sampler(net.architecture, part.camera, kind).to(fabric.device) for part in parts}
 
     check_folder(folder, resume)
     with sole_writer(folder) if fabric.is_global_zero else nullcontext(), _freezing(net) as learnable:

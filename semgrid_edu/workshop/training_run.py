@@ -11,9 +11,10 @@ from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import build_net, load_net
 from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks import Architecture, SemanticGridNet, build_net, build_segmenter, load_imagenet, load_net
+from semgrid_edu.networks import Architecture, SemanticGridNet, build_segmenter, load_imagenet
 from semgrid_edu.networks.build import with_mean_scores
 from semgrid_edu.networks.semantic_grid import MOST_SEGMENTERS
 from semgrid_edu.networks.weights import read_architecture

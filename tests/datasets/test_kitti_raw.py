@@ -22,8 +22,9 @@ from tiny_drive import (
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import State, track_drive
+from semgrid_edu.occupancy import State
 from semgrid_edu.workshop.doubts import drive_doubts
 
 slow_disk = settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])

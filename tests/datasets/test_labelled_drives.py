@@ -9,10 +9,10 @@ from semgrid_edu.datasets.ground_truth import lidar_truth
 from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import WEIGHTS, Architecture, build_net
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.workshop.flaws import NO_FLAWS
 

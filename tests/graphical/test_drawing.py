@@ -9,7 +9,7 @@ from random_models import one_of_you
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, draw, in_rows
-from semgrid_edu.graphical.rendering import NODE, Picture
+from semgrid_edu.graphical.rendering import NODE, GraphPicture
 
 ROWS = in_rows(["m1", "m2"], ["z"])
 
@@ -120,7 +120,7 @@ def test_a_straight_dashed_edge_stands_for_the_arrow_and_a_bent_one_beside_it():
 
 
 def test_a_curve_begins_and_ends_at_the_outlines_of_its_nodes():
-    picture = Picture(one_of_you(), {"m1": (0.0, 0.0), "m2": (2.0, 0.0), "z": (1.0, -1.0)}, {}, {})
+    picture = GraphPicture(one_of_you(), {"m1": (0.0, 0.0), "m2": (2.0, 0.0), "z": (1.0, -1.0)}, {}, {})
     picture.connect(Dashed(("m1", "m2"), bend=0.25))
     start, middle, end = picture.curves[0][1]
     np.testing.assert_allclose([np.hypot(*start), np.hypot(*(end - (2, 0)))], NODE / 2 + 0.03)

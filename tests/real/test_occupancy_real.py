@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import SensorModel, State, track_drive
+from semgrid_edu.occupancy import SensorModel, State
 from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import State, track_drive
+from semgrid_edu.occupancy import State
 from semgrid_edu.plotting.grids import velocity_arrows
 from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 

@@ -13,7 +13,7 @@ from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import SEGMENTERS, Architecture, build_net, load_net, save_net
-from semgrid_edu.networks.backbones.fcn import Fcn
+from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log

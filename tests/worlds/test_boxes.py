@@ -5,7 +5,6 @@ import pytest
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 
 BOX = Box.around(20, 3, 4, 2, 1.8)
@@ -61,8 +60,3 @@ def test_cells_are_in_a_box_whose_centre_is():
     assert np.argwhere(inside).tolist() == [[r, c] for r in (6, 7) for c in (2, 3, 4)]
     np.testing.assert_array_equal(cells_in(Box(12, 14, 1, 4, 1), spec, x=10, y=1), inside)
     assert cells_in(Box(2, 4, 0, 3, 1), spec, margin=1).sum() == 4 * 5
-
-
-def test_noise_needs_a_generator():
-    with pytest.raises(ArgumentError, match="rng"):
-        scan_boxes([BOX], noise=0.1)

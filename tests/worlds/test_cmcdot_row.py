@@ -11,7 +11,7 @@ from worlds.lecture_04_cmcdot_graph import FROM_BOTH_SIDES, cmcdot_stage
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, why_dependent
 from semgrid_edu.metrics import total_variation
-from semgrid_edu.occupancy import State, WorldModel
+from semgrid_edu.occupancy import State, Walls
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 NUMBERS = [100, 400, 1600, 6400]
@@ -63,7 +63,7 @@ BESIDE_A_WALL = ({"static": 0.6, "right": 0.4}, UNSEEN, {"static": 0.7, "left": 
 
 
 @pytest.mark.parametrize("scan", [".x.", "...", ".?."])
-@pytest.mark.parametrize("clearing_time", [0.0, DT, WorldModel.clearing_time])
+@pytest.mark.parametrize("clearing_time", [0.0, DT, Walls.clearing_time])
 @pytest.mark.parametrize(
     "cells", [FROM_BOTH_SIDES.cells, BESIDE_A_WALL, ({}, {"static": 0.5}, {"left": 0.9}), ({}, {}, {})]
 )

@@ -18,9 +18,19 @@ LANES = 16
 def mean_field(
     unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10, tolerance: float = 0.0, pad: int = 0
 ) -> NDArray[np.float32]:
-    """Approximate the CRF's marginals by mean field in milliseconds (eq. (3), (4)).
+    """Approximate the CRF's marginals by mean field in milliseconds (eq. (3), (4)): the twin of the book's.
 
-    Parameters and result are those of `semgrid_edu.crf.mean_field`.
+    The other Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
+
+    Parameters
+    ----------
+    pad : int
+        Number of border cells to repeat outward before the CRF and to cut off afterwards.
+
+    Returns
+    -------
+    (C, H, W) float32
+        Q, the distribution over classes in each cell.
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations, tolerance)
@@ -71,9 +81,9 @@ def iterate(
 
 
 def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
-    """Build the first kernel of eq. (4), on place and occupancy, including its weight and normalisation.
+    """Build the first kernel of eq. (4), including its weight and normalisation: the twin of the book's.
 
-    Parameters and result are those of `semgrid_edu.crf.mean_field.bilateral_kernel`.
+    Parameters are those of `bilateral_features`.
     """
     lattice = PermutohedralLattice.build(bilateral_features(values, params))
     degree = np.ones(values[0].size)

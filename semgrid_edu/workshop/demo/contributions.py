@@ -120,14 +120,15 @@ def contributions(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> 
         return jvp(last_layers, (inputs,), (change,))[1][0]
 
     with torch.no_grad(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "There is a performance drop")  # vmap has no rule for max_unpool2d
+        warnings.simplefilter("ignore")  # torch warns about max_unpool2d under vmap, and about its own code
         reduced = reduce(planes)
-        inputs = joined(reduced, o)
+        inputs = joined(reduced, o).contiguous(memory_format=torch.channels_last)
         of_planes = vmap(change_of_reduced, chunk_size=AT_ONCE)(_plane_groups(*planes.shape[1:3]))
         changes = [(change, torch.zeros_like(o)) for change in of_planes]
         changes += [(torch.zeros_like(reduced), _only(o, state)) for state in range(N_STATES)]
-        changes = torch.stack([jvp(joined, (reduced, o), change)[1] for change in changes])
-        parts = vmap(change_of_logits, chunk_size=AT_ONCE)(changes).numpy()
+        changes = torch.cat([jvp(joined, (reduced, o), change)[1] for change in changes])
+        changes = changes.contiguous(memory_format=torch.channels_last)  # vmap can't change the layout itself
+        parts = vmap(change_of_logits, chunk_size=AT_ONCE)(changes[:, None]).numpy()
         logits = last_layers(inputs)[0].numpy()
     n_scores, n_planes = planes.shape[1:3]
     return Contributions(logits, *np.split(parts, [n_planes, n_planes + n_scores]))

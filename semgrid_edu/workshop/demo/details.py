@@ -1,4 +1,4 @@
-"""The numbers from which the page tells the story of any cell, rounded to bytes, one map of the grid for each."""
+"""The stories of all cells as bytes, which the page's script reads: rounded numbers, one map of the grid for each."""
 
 import base64
 import zlib
@@ -24,16 +24,16 @@ from semgrid_edu.workshop.demo.what_if import CHANGES, FAULTS
 from semgrid_edu.workshop.demo.words import SENTENCES
 
 STEPS = {"part": 0.1, "reach": 0.5, "distance": 0.1, "pixel": 1 / 32, "message": 0.1}
-"""To what the numbers are rounded: parts of a score, metres, pixels, and what neighbours add.
+"""The steps to which numbers are rounded: parts of a score, metres, pixels, and what neighbours add.
 
-A byte then holds parts up to 12.7, which nearly every plane stays below, and a reach up to 127 m.
+A byte then holds parts up to 12.7, which nearly no plane exceeds, and a reach up to 127 m.
 """
 
 NOT_SEEN = 2**16 - 1
 """Both coordinates of a point that the camera doesn't see."""
 
 FILTER_STEPS = ("move", "predict", "update", "resample", "shown")
-"""After which of the filter's steps the states are told, see `CellStory.steps`."""
+"""The steps of the filter after which the page shows the states, see `FrameStory.states`."""
 
 Maps = dict[str, NDArray[np.uint8]]
 """By name (K, H, W); what doesn't fit into a byte has K high bytes followed by K low ones."""
@@ -45,9 +45,9 @@ class StoryMaps(NamedTuple):
     Parameters
     ----------
     alike : dict of str to (K, H, W) uint8
-        Maps of which a cell has often what another cell has: all bytes of a cell stand together.
+        Maps in which many cells have the same numbers: the bytes of a cell are stored side by side.
     smooth : dict of str to (K, H, W) uint8
-        Maps that change little from row to row: one after the other, each row as the difference to the one before.
+        Maps that change little from row to row: one after the other, each row as the difference from the row before.
     """
 
     alike: Maps
@@ -167,7 +167,7 @@ def _parts(why: Contributions) -> Maps:
 
 
 def cell_places(spec: GridSpec, heights: ArrayLike, camera: Camera) -> StoryMaps:
-    """Return what holds of a cell in every frame: its distance, and the pixels of its points on the planes (eq. (1)).
+    """Return what is the same in every frame: a cell's distance, and the pixels of its points on the planes (eq. (1)).
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def cell_places(spec: GridSpec, heights: ArrayLike, camera: Camera) -> StoryMaps
 
 
 def story_data(net: SemanticGridNet, camera: Camera, frame_layout: dict[str, list[int]]) -> dict[str, object]:
-    """Gather what the page's script needs besides the maps of each frame, as plain numbers and text for JSON.
+    """Return what the page's script needs besides the maps of each frame, as plain numbers and text for JSON.
 
     Parameters
     ----------

@@ -12,9 +12,10 @@ from torch.utils.data import Subset
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
+from semgrid_edu.fast import build_net, load_net
 from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.labels import LABEL_SETS
-from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_net, load_net
+from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.tensors import read_tensors
 from semgrid_edu.training import Objective, TrainingParams, train

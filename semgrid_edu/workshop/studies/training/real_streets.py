@@ -18,9 +18,10 @@ from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
 from semgrid_edu.errors import check_whole
+from semgrid_edu.fast import build_net, load_net
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, build_net, load_net, with_mean_scores
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, with_mean_scores
 from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import check_writable, sha256, table_beside
 from semgrid_edu.storage.provenance import made_by
