@@ -1,13 +1,12 @@
 """Ways to train for real streets, scored on labelled returns of a PandaSet scene that were kept apart (section 4).
 
-A scene shows a few seconds of one street corner. Cameras that are left out of training see another side of it; a later
-time shows the same side again. Neither says how a network does in other streets.
+Cameras that are left out see another side of the same street corner. Neither split says how a network does elsewhere.
 """
 
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,7 @@ from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import check_writable, sha256, table_beside
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
-from semgrid_edu.training.devices import open_fabric
+from semgrid_edu.training.devices import choose_device, open_fabric
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, reliability_of_sums
 from semgrid_edu.workshop.scoring.grids import NETWORK, majority_by_state, network_grids
@@ -38,9 +37,6 @@ from semgrid_edu.workshop.scoring.score_with_interval import (
     score_with_interval,
     shown,
 )
-
-if TYPE_CHECKING:
-    from lightning_fabric import Fabric
 
 
 class WayToTrain(NamedTuple):
@@ -130,7 +126,7 @@ def compare_real(
         When there is no such scene, it lacks a camera or labels, or a file is damaged.
     """
     check_whole(seed=seed)
-    fabric = open_fabric(device)
+    choose_device(device)
     drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
     runs = Path(runs) / scene
     check_writable(runs / "run")
@@ -143,7 +139,7 @@ def compare_real(
         for name in TABLE["later"] if split == LATER else WAYS:
             counted = []
             for k in seeds if WAYS[name].params else seeds[:1]:
-                files = _networks(name, rounds, streets, runs / split, seeds, k, fabric)
+                files = _networks(name, rounds, streets, runs / split, seeds, k, device)
                 weights |= {run: sha256(file) for run, file in files.items()}
                 counted.append(_joined(_count(name, *one) for one in zip(files.values(), tests, strict=True)))
             found[split] |= {method: _scores_of([one[method] for one in counted], table) for method in counted[0]}
@@ -198,7 +194,7 @@ class _Subset(TrainingSet):
 
 
 def _networks(
-    name: str, rounds: list[Round], streets: list[TrainingSet], split: Path, seeds: range, k: int, fabric: "Fabric"
+    name: str, rounds: list[Round], streets: list[TrainingSet], split: Path, seeds: range, k: int, device: str
 ) -> dict[str, Path]:
     """Return the files of the weights that are learned in each round with seed k, by the names of their runs."""
     way, files = WAYS[name], {}
@@ -208,17 +204,17 @@ def _networks(
         folder = split.with_name(f"{split.name} {r}, {name}, {k}")
         if way.params and not (folder / WEIGHTS).exists():
             mixture = Mixture([[_Subset(*part) for part in training], *([streets] if way.with_simulated else [])])
-            _train(way, starts, mixture, folder, k, fabric)
+            _train(way, starts, mixture, folder, k, device)
         files[folder.name] = folder / WEIGHTS if way.params else starts[0]
     return files
 
 
-def _train(way: WayToTrain, starts: list[Path], mixture: Mixture, folder: Path, seed: int, fabric: "Fabric") -> None:
+def _train(way: WayToTrain, starts: list[Path], mixture: Mixture, folder: Path, seed: int, device: str) -> None:
     """Train a network, or go on where an interrupted run was."""
     nets = [load_net(start, mixture.camera) for start in starts]
     net = with_mean_scores(nets or [build_net(way.architecture, mixture.camera, seed)])
     params = replace(way.params, batch_size=min(way.params.batch_size, *map(len, mixture.parts)))
-    train(net, mixture, folder, params, seed, resume=True, fabric=fabric)
+    train(net, mixture, folder, params, seed, resume=True, fabric=open_fabric(device))
 
 
 def _count(name: str, weights: Path, test: list[Part]) -> Counted:
