@@ -31,16 +31,14 @@ def filters_and_simulator() -> None:
 
 
 def refinement() -> None:
-    """Refine a small map by both ways to filter messages."""
+    """Refine a small map."""
     from semgrid_edu.crf import CrfParams
     from semgrid_edu.fast import mean_field
-    from semgrid_edu.fast.crf.windowed import WindowedGaussian
 
     rng = np.random.default_rng(0)
     unary = rng.random((14, 8, 6), np.float32)
     occupancy = np.moveaxis(rng.dirichlet(np.ones(4), (8, 6)), 2, 0).astype(np.float32).copy()
     mean_field(unary, occupancy, CrfParams())
-    WindowedGaussian.build(occupancy, CrfParams())(np.zeros((48, 14), np.float32))
 
 
 PARTS = {part.__name__: part for part in (filters_and_simulator, refinement)}
