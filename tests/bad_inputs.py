@@ -35,9 +35,6 @@ DEEP, LONG_NUMBER = "[" * 10**5, '{"a": ' + "9" * 5000 + "}"
 DEMO = f"demo --kitti TINY --date {DATE} --drive 0001 --out OUT"
 TRAIN = "train --data TINY --out OUT"
 EVALUATE = "evaluate --data TINY --weights weights.safetensors --out scores.json"
-TRAIN_CRF = "train-crf --data TINY --weights weights.safetensors --out OUT --split train"
-SEARCH = "search-crf --data TINY --test TINY --weights weights.safetensors --out log.json"
-LEARNED = "reproduce learned-crf --data TINY --validation TINY --weights weights.safetensors --runs RUNS --out log.json"
 FETCH = "data fetch kitti --drive 2011_09_26_0013 --folder OUT"
 TABLE1 = "reproduce table1 --runs RUNS --out OUT --plan"
 CHECK = "reproduce check OUT"
@@ -437,12 +434,6 @@ WEIGHTS = (
         "weights.safetensors: .*header",
         lambda r: save_file({"a": torch.zeros(1)}, r / "weights.safetensors"),
     ),
-    Row(
-        "a CRF on the image stage",
-        TRAIN_CRF,
-        "weights.safetensors: expected a whole network",
-        lambda r: (r / "image_stage.safetensors").replace(r / "weights.safetensors"),
-    ),
 )
 
 RUNS = (
@@ -490,17 +481,8 @@ RUNS = (
         "found the provenance.json of something",
     ),
     Row(
-        "a CRF's training run in its data set", TRAIN_CRF.replace("OUT", "TINY"), "TINY: expected .*, found a data set"
-    ),
-    Row(
         "a folder that another process writes to",
         TRAIN,
-        "OUT: expected a folder that no other process writes to",
-        locked("OUT"),
-    ),
-    Row(
-        "a CRF's folder that another process writes to",
-        TRAIN_CRF,
         "OUT: expected a folder that no other process writes to",
         locked("OUT"),
     ),
@@ -550,8 +532,6 @@ RUNS = (
     Row("a picture of an unknown format", "curves RUN --out c.docx", "--out: expected a picture that ends in"),
     Row("a picture that can't say who made it", "curves RUN --out c.jpg", "--out: expected a picture that ends in"),
     Row("a picture without a format", "curves RUN --out c", "--out: expected a picture that ends in"),
-    Row("an unknown split for a CRF", TRAIN_CRF.replace("--split train", "--split none"), "split: expected one of"),
-    Row("a weight limit of NaN", f"{TRAIN_CRF} --weight-limit nan", "weight_limit: expected 1 or more"),
 )
 
 DATA = (
@@ -719,26 +699,7 @@ EXPERIMENTS = (
     ),
     Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "tint: expected a share of at least 0"),
     Row("no drives", "reproduce occupancy --drives 0", "Invalid value for '--drives'"),
-    Row("no draws", "reproduce crf-coupling --draws 0", "Invalid value for '--draws'"),
     Row("a result in a folder", "reproduce overfit --out TINY", "TINY: expected a file to write, found a folder"),
-    Row(
-        "another experiment's log, CRF error",
-        "reproduce crf-error --out log.json",
-        "log.json: expected a result of this",
-        text("log.json", '{"a": 1}'),
-    ),
-    Row(
-        "a log nested 100,000 deep",
-        "reproduce crf-error --out log.json",
-        "log.json: .*nested too deeply",
-        text("log.json", DEEP),
-    ),
-    Row(
-        "a log whose parts are numbers",
-        "reproduce crf-coupling --out log.json",
-        "log.json: expected a result of this",
-        text("log.json", json.dumps({"seed": 0, "draws": 20, "couplings": [], "cases": {"a": 5}})),
-    ),
     Row(
         "a log that is a list, policies",
         "reproduce truth-policies --out log.json",
@@ -767,26 +728,6 @@ EXPERIMENTS = (
         text("TINY/moving_cars_0013.json", '{"car": {"1": [2, 3]}}'),
     ),
     Row("a cache in place of a file", f"--cache architecture.json {TRAIN}", "architecture.json", frames()),
-    Row("no validation frames, search", SEARCH, "split: expected one of", frames()),
-    Row("no validation frames, learnt CRFs", LEARNED, "split: expected one of", frames()),
-    Row(
-        "provenance of weights that is a list",
-        SEARCH,
-        "provenance.json: expected a JSON object",
-        text("provenance.json", "[]"),
-    ),
-    Row(
-        "trials that are a number",
-        SEARCH,
-        "log.json: expected a result of this experiment",
-        text("log.json", '{"trials": 5}'),
-    ),
-    Row(
-        "another search's trials",
-        SEARCH,
-        "log.json: expected a result of this experiment",
-        text("log.json", '{"trials": [], "seed": 0}'),
-    ),
     Row(
         "a result over the weights",
         EVALUATE.replace("scores.json", "weights.safetensors"),
@@ -809,7 +750,6 @@ EXPERIMENTS = (
         locked("RUNS"),
     ),
     Row("a word for the number of seeds", f"{TABLE1} --seeds many", "Invalid value for '--seeds'"),
-    Row("no trials", f"{SEARCH} --trials 0", "Invalid value for '--trials'"),
     Row("an unknown scale", TABLE1 + " --scale galactic", "--scale: expected"),
     Row("a file in place of the runs", TABLE1.replace("RUNS", "architecture.json"), "--runs: expected a folder"),
     Row(
@@ -835,14 +775,13 @@ SINGLE = {
     "streets": "",
     "overfit": "",
     "point-labels": "",
-    "learned-crf": "--data TINY --validation TINY --weights weights.safetensors --runs RUNS",
     "real-streets": "--pandaset NONE --simulated TINY --runs RUNS",
     "real-drive": "--kitti NONE",
     "memory": "--pandaset NONE",
 }
 """The lectures' experiments that write their result at the end, with what they need."""
 
-RESUMED = ("crf-error", "crf-coupling", "truth-policies")
+RESUMED = ("truth-policies",)
 """Those that write while they run."""
 
 PAPERS = ("table1", "table2", "table3", "claims", "structure", "ablations", "truth-costs", "figures", "all")
@@ -911,8 +850,6 @@ REFUSED_FIRST = (
         Row(f"10^18 drives, {name}", f"reproduce {name} --drives {MANY} --out a.json", "Invalid value for '--drives'")
         for name in ("occupancy", "streets", "point-labels", "truth-policies", "memory")
     ),
-    Row("10^18 draws", f"reproduce crf-coupling --draws {MANY} --out a.json", "Invalid value for '--draws'"),
-    Row("10^18 trials", f"{SEARCH} --trials {MANY}", "Invalid value for '--trials'"),
     Row("a page of one's own", DEMO, f"index.html: {LOST} without --force", page("index.html")),
     Row("a picture of one's own", DEMO, "overview.png: expected a new file", page("overview.png")),
     Row("a folder called index.html", DEMO, "index.html: expected a file to write", in_out("index.html")),
@@ -939,7 +876,6 @@ REFUSED_FIRST = (
     Row("matrices in a folder", f"{EVALUATE} --confusions a.npz", "a.npz: .*found a folder", folder("a.npz")),
     Row("curves over one's own picture", "curves RUN --out c.png", f"{LOST} without --force", text("c.png", "x")),
     Row("curves over a pipe", "curves RUN --out c.png", "c.png: .*found a pipe", pipe("c.png")),
-    Row("trials over one's own JSON", SEARCH, "expected a result of this experiment", text("log.json", '{"mine": 1}')),
     Row("a log of one's own", TRAIN, f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
     Row(
         "an image stage of one's own",
@@ -948,8 +884,6 @@ REFUSED_FIRST = (
         text("OUT/image_stage.safetensors", "x"),
     ),
     Row("a log of one's own, resumed", f"{TRAIN} --resume", f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
-    Row("a log of one's own, CRF", TRAIN_CRF, f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
-    Row("a weight limit below 0", f"{TRAIN_CRF} --weight-limit -1", "weight_limit: expected 1 or more"),
     Row(
         "no ImageNet weights",
         f"{TRAIN} --preset paper --imagenet a.safetensors",

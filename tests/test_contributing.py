@@ -27,8 +27,8 @@ ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 FOLDERS = "semgrid_edu|tests|benchmarks|notebooks|data_samples|docs"
 ROOMS = "|".join(path.stem for path in (ROOT / "semgrid_edu").iterdir() if path.name[0].isalpha())
-BACKBONE = "semgrid_edu/networks/backbones/two_layers.py"  # the one that a contributor writes
-REGISTER = "semgrid_edu/workshop/course/registers.toml"
+BACKBONE = "semgrid_edu/networks/two_layers.py"  # the one that a contributor writes
+REGISTER = "notebooks/worlds/lecture_00_equations.toml"
 
 BLOCKS = [
     re.sub(rf"^{re.match(' *', block)[0]}", "", block, flags=re.MULTILINE)

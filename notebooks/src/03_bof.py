@@ -43,11 +43,10 @@ from semgrid_edu.occupancy import Bof, BofParams, BofState, Evidence, LogOddsGri
 from semgrid_edu.occupancy import VelocityLattice, WorldModel, bof_predict, bof_update
 from semgrid_edu.occupancy import bof_velocity, scan_evidence, smear_area
 from semgrid_edu.plotting.moving import wheel_colours
-from semgrid_edu.stage_models import bof_stage, ledger, ledger_table
-from semgrid_edu.stage_models.bof import HEAD_ON, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, expected_things
-from semgrid_edu.stage_models.cells_in_a_row import Cell, CellsInARow
-from semgrid_edu.stage_models.joint_row import exact_beliefs, row_evidence, row_model
+from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
+from worlds.lecture_03_bof import HEAD_ON, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, bof_stage, expected_things
+from worlds.lecture_03_row import Cell, CellsInARow, exact_beliefs, row_evidence, row_model
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State

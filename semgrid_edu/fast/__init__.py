@@ -28,7 +28,20 @@ _WHERE: dict[str, str] = {
     "transition_matrix": "occupancy.transition",
     "update": "occupancy.steps",
     # planes and memory
+    "ClassMemory": "memory",
+    "PlaneSampler": "planes",
+    "build_net": "networks",
+    "carry_classes": "memory",
+    "learn_classes": "memory",
+    "load_net": "networks",
+    "look_at": "memory",
+    "recall_classes": "memory",
+    "remember_drive": "memory",
     # crf
+    "PermutohedralLattice": "crf.lattice",
+    "SeparableGaussian": "crf.spatial",
+    "bilateral_kernel": "crf.mean_field",
+    "mean_field": "crf.mean_field",
 }
 """The module that each name comes from: it is loaded when the name is first used."""
 

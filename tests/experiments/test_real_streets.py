@@ -10,7 +10,7 @@ from tiny_pandaset import SCENE, write_tiny_pandaset
 
 import semgrid_edu
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
-from semgrid_edu.datasets.readers.pandaset import CAMERAS
+from semgrid_edu.datasets.pandaset import CAMERAS
 from semgrid_edu.datasets.samples import samples_dir
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, logit
 
-from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.graphical import Factor, product
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_instructor import close, generator, hidden, keeping
 
 CLIPPED = 0.05

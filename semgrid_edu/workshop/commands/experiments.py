@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from semgrid_edu.storage.files import check_ours, table_beside, write_json
-from semgrid_edu.workshop.commands.arguments import Commands, tell
+from semgrid_edu.workshop.commands.arguments import Commands
 from semgrid_edu.workshop.paper import reports
 
 reproduce = typer.Typer(cls=Commands, no_args_is_help=True, help="Run the experiments of the lectures.")
@@ -52,49 +52,6 @@ def overfit(
     from semgrid_edu.workshop.studies.training.overfit import overfit, overfit_table
 
     keep_result(out, lambda: overfit(seed), lambda result: overfit_table(result["networks"]))
-
-
-@reproduce.command()
-def crf_error(
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the filter's particles and for the landmarks.")] = 0,
-    out: Annotated[Path, typer.Option(help="Takes each scene; the same command goes on.")] = Path("crf_error.json"),
-) -> None:
-    """Measure error against time of every way to run the CRF, kernel and convergence apart (lecture 11)."""
-    from semgrid_edu.workshop.studies.crf.crf_error import crf_error, crf_error_tables
-
-    keep_result(out, lambda: crf_error(out, seed), crf_error_tables, goes_on=True)
-
-
-@reproduce.command()
-def crf_coupling(
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the random grids.")] = 0,
-    draws: Annotated[int, typer.Option(min=1, max=1000, help="Number of random grids of each size.")] = 20,
-    out: Annotated[Path, typer.Option(help="Takes each size; the same command goes on.")] = Path("crf_coupling.json"),
-) -> None:
-    """Compare approximate with exact inference in the CRF on tiny grids, as the coupling grows (lecture 10)."""
-    from semgrid_edu.workshop.studies.crf.crf_coupling import crf_coupling, crf_coupling_tables
-
-    keep_result(out, lambda: crf_coupling(out, seed, draws), crf_coupling_tables, goes_on=True)
-
-
-@reproduce.command()
-def learned_crf(
-    data: Annotated[Path, typer.Option(help="The data set that the network learned from, such as data/minikitti.")],
-    validation: Annotated[Path, typer.Option(help="A data set with validation frames, such as data/validation.")],
-    weights: Annotated[Path, typer.Option(help="A network trained on the train frames of --data.")],
-    runs: Runs,
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the order of the frames.")] = 0,
-    out: Annotated[Path, typer.Option(help="Where to write the scores.")] = Path("learned_crf.json"),
-) -> None:
-    """Learn a CRF's weights, widths and label costs in eight ways, and score them on test frames (lecture 11)."""
-    from semgrid_edu.datasets.index import dataset_doubts
-    from semgrid_edu.workshop.studies.crf.learned_crf import compare_learned_crfs, learned_crf_table
-
-    def scored() -> dict:
-        tell(dataset_doubts(data, "train", "test") + dataset_doubts(validation, "validation"))
-        return compare_learned_crfs(data, validation, weights, runs, seed=seed)
-
-    keep_result(out, scored, learned_crf_table)
 
 
 @reproduce.command()

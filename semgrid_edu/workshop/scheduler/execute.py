@@ -15,10 +15,10 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import commit, versions
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.storage.workplace import Workplace
 from semgrid_edu.workshop.scheduler.plan import left_to_do
 from semgrid_edu.workshop.scheduler.runs import CLAIM, ENDED, OUTPUT, Run
 from semgrid_edu.workshop.scheduler.torchrun import THREADS, few_threads, work_together
+from semgrid_edu.workshop.workplace import Workplace
 
 _ONE_AT_A_TIME = threading.Lock()
 """Threads and printed output belong to a process, so it takes one run at a time, however many a cluster gives it."""

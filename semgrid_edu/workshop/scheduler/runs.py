@@ -30,7 +30,7 @@ class Run(ABC):
     pace : str
         What the time of a step depends on: runs of the same pace take the same time per step.
     is_training : bool
-        Whether it is a training run, so that several processes can share its batches (`process_group`).
+        Whether it is a training run, so that several processes can share its batches (`open_fabric`).
     trial_seconds : float
         Seconds that a step probably takes, for the estimate of a plan: on one core when this was written.
     """

@@ -42,7 +42,7 @@ def work_together(run: Run, root: Path, device: str, processes: int) -> None:
     Parameters
     ----------
     run : Run
-        A training run: its work goes through `process_group`.
+        A training run: its work goes through `open_fabric`.
     root : Path
         The folder of all runs.
     device : str

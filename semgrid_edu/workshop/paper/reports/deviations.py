@@ -4,13 +4,13 @@ from collections.abc import Sequence
 
 from semgrid_edu.crf import CrfParams
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.training.run import PAPER_IMAGE, architecture
 from semgrid_edu.workshop.paper.runs.data_runs import RECIPE_OF
 from semgrid_edu.workshop.paper.runs.scales import Scale
 from semgrid_edu.workshop.paper.runs.score_runs import WEIGHTS_FOR_CLASSES
 from semgrid_edu.workshop.scoring.statistics import MIN_DRIVES
 from semgrid_edu.workshop.simulation.datasets import FORMAT
 from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD
+from semgrid_edu.workshop.training_run import PAPER_IMAGE, architecture
 
 _TEXTS = table_beside(__file__)
 CHOSEN_ON = 1

@@ -11,7 +11,6 @@ import matplotlib.pyplot as plt
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import atomic_path, check_ours, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import versions
-from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
 from semgrid_edu.training.devices import choose_device
 from semgrid_edu.workshop.paper.reports.deviations import deviations, frame_counts
 from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS, Experiment
@@ -20,6 +19,7 @@ from semgrid_edu.workshop.paper.runs.scales import Scale, scale_named
 from semgrid_edu.workshop.scheduler.execute import check_runs_folder, execute_plan
 from semgrid_edu.workshop.scheduler.plan import estimate, plan_hours, plan_table, with_needs
 from semgrid_edu.workshop.scheduler.runs import OUTPUT, Run
+from semgrid_edu.workshop.workplace import check_workers, usable_cores, workplace
 
 
 @dataclass(frozen=True, kw_only=True)

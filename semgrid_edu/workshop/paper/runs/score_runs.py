@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.crf import CrfParams, at_temperature, mean_field, unary_from_log_probability
+from semgrid_edu.crf import CrfParams, at_temperature, unary_from_log_probability
 from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets.index import load_index
-from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
-from semgrid_edu.datasets.readers.project_lidar import depth_scan, seen_returns
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.project_lidar import depth_scan, seen_returns
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError
+from semgrid_edu.fast import mean_field
 from semgrid_edu.storage.files import table_beside
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun
@@ -36,9 +37,9 @@ WITH_CRF, WITH_SEARCHED = f"{NETWORK} + CRF", f"{NETWORK} + searched CRF"
 
 _FOUND = table_beside(__file__)
 SEARCHED = {name: (row["temperature"], CrfParams(**row["crf"])) for name, row in _FOUND.items()}
-"""For each image network the temperature and the CRF's parameters that `semgrid-edu search-crf` chose for pixel
-accuracy on validation drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for
-which nothing was searched is scored without them."""
+"""For each image network the temperature and the CRF's parameters that a search chose for pixel accuracy on validation
+drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for which nothing was searched
+is scored without them."""
 
 WEIGHTS_FOR_CLASSES = {name: row["for_class_accuracy"] for name, row in _FOUND.items()}
 """The CRF's weights that the same search finds for class accuracy: near 0, the CRF is switched off."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from semgrid_edu.datasets.readers.oxts import EARTH_RADIUS
+from semgrid_edu.datasets.oxts import EARTH_RADIUS
 
 GRAVITY = 9.81
 """What an accelerometer at rest reads upwards, m/s^2."""

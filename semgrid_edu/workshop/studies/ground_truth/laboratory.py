@@ -15,7 +15,7 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.datasets.ground_truth import NO_FLAWS, Moment, TruthFlaws, TruthPolicy, drive_truth, flawed_drive
+from semgrid_edu.datasets.ground_truth import Moment, TruthPolicy, drive_truth
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import track_drive
 from semgrid_edu.frame import Frame
@@ -23,6 +23,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.storage.files import table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import resumable_json
+from semgrid_edu.workshop.flaws import NO_FLAWS, TruthFlaws, flawed_drive
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, LIDARS, check_request
