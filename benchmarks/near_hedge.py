@@ -8,6 +8,8 @@ are in the vehicle's frame. They are told by `SensorModel.edge`; with an edge of
 """
 
 import argparse
+import sys
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -17,8 +19,11 @@ from semgrid_edu.occupancy import Cmcdot, CmcdotParams, SensorModel, State
 from semgrid_edu.plotting.grids import velocity_arrows
 from semgrid_edu.workshop.simulation.named_streets import named_street
 from semgrid_edu.workshop.simulation.street import plan
-from semgrid_edu.workshop.studies.filter.scenes import known_scenes
-from semgrid_edu.workshop.studies.filter.streets import LEAST_DYNAMIC
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "notebooks"))
+
+from worlds.lecture_04_scenes import known_scenes
+from worlds.lecture_04_street_scores import LEAST_DYNAMIC
 
 SPLIT, FAST, PERIOD, FRAMES = 60, 6.0, 0.1, 30
 DRAWN = plan._side

@@ -44,7 +44,6 @@ from semgrid_edu.stage_models.bof import bof_beliefs
 from semgrid_edu.stage_models.cells_in_a_row import Cell
 from semgrid_edu.stage_models.cmcdot import LEFT_OR_RIGHT, particle_beliefs, sampling_error
 from semgrid_edu.stage_models.joint_row import exact_beliefs
-from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.occupancy import (
@@ -55,6 +54,7 @@ from semgrid_edu.occupancy.planar_motion import scroll
 from semgrid_edu.occupancy.resampling import systematic_resample
 from semgrid_edu.occupancy.steps import initialise_unknown
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
+from worlds.lecture_04_scenes import hit_cells
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State

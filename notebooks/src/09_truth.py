@@ -48,11 +48,11 @@ from semgrid_edu.stage_models.ground_truth_label import STATE_GIVEN_CONTENT
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.frame import Frame
-from semgrid_edu.workshop.studies.ground_truth.laboratory import simulated_drive
-from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, TruthCounts, counts_of
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.occupancy import State, track_drive
+from worlds.lecture_09_counts import BAND_EDGES, TruthCounts, counts_of
 from worlds.lecture_09_pictures import DIFFERENCES, difference_kinds, policy_errors, truth_difference, truth_errors
+from worlds.lecture_09_policies import simulated_drive
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 drive, spec = sample_drive(), GridSpec.compact()

@@ -44,7 +44,7 @@ from semgrid_edu.pipeline import run_pipeline
 from semgrid_edu.stage_models import MemoryWorld, class_over_time, ledger, ledger_table, memory_price
 from semgrid_edu.stage_models.class_memory import exact_classes, factored_classes, frames_worth
 from semgrid_edu.stage_models.system_world import CLASS_OF, CLASSES, STREET
-from semgrid_edu.workshop.studies.filter.memory_counts import frames_since_seen
+from semgrid_edu.workshop.course.street import frames_since_seen
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 spec, S = GridSpec.compact(), KITTI_14.n_semantic

@@ -5,6 +5,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from tiny_runs import HandMadeData
+from worlds.lecture_09_policies import TRIALS
 
 from semgrid_edu.datasets import training_cache
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
@@ -26,7 +27,6 @@ from semgrid_edu.workshop.paper.runs.score_runs import LABELS, LabelsRun
 from semgrid_edu.workshop.scheduler.execute import execute_plan
 from semgrid_edu.workshop.scheduler.plan import with_needs
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
-from semgrid_edu.workshop.studies.ground_truth.laboratory import TRIALS
 
 REDUCED = SCALES["reduced"]
 LABORATORY = {

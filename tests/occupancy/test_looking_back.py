@@ -4,6 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from worlds.lecture_04_scenes import known_scenes
+from worlds.lecture_04_street_scores import StreetScores
+from worlds.lecture_04_suspects import Suspect, run_filter
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -22,7 +25,7 @@ from semgrid_edu.occupancy import (
 from semgrid_edu.occupancy.bof import origins
 from semgrid_edu.occupancy.literal.particles import cells_at_literal
 from semgrid_edu.occupancy.particles import cells_at, cells_of
-from semgrid_edu.workshop.studies.filter.streets import measure_streets
+from semgrid_edu.workshop.simulation.named_streets import named_street
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(0, 16, 0, 1, 1)
@@ -185,9 +188,9 @@ def test_what_is_no_time_and_no_number_of_cells_is_refused(name, value):
 
 def test_walls_that_come_into_view_stay_static():
     """On a street of walls that come into view, half a second makes less than half as many phantoms as none."""
-    arguments = {"drives": 1, "grids": ("compact",), "streets": ("walls",), "frames": 25}
-    looks, blind = (
-        measure_streets(seed=9, params=CmcdotParams(clearing_time=time), **arguments)["scores"]["compact"]["walls"]
-        for time in (0.5, 0.0)
-    )
-    assert looks["cells"]["scenery"]["called"] < blind["cells"]["scenery"]["called"] / 2
+    spec, drive = GridSpec.compact(), named_street("walls", 9000, 25)
+    scenes, looks, blind = list(known_scenes(drive, spec)), StreetScores(spec), StreetScores(spec)
+    for scores, time in ((looks, 0.5), (blind, 0.0)):
+        run_filter(drive, scenes, Suspect(params=CmcdotParams(clearing_time=time)), scores, seed=9)
+    assert looks.cells["scenery"][0] == blind.cells["scenery"][0]
+    assert looks.cells["scenery"][1] < blind.cells["scenery"][1] / 2

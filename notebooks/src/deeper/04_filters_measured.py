@@ -29,13 +29,13 @@ from semgrid_edu import plotting
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.occupancy import Cmcdot, CmcdotParams, PlanarMotion, State, VelocityLattice
-from semgrid_edu.workshop.studies.filter.occupancy import occupancy_table
-from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 
 sys.path.append("..")  # for worlds/, in the folder above
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 from worlds.lecture_04_blur import SCHEMES, measure_blur, winding_road
 from worlds.lecture_04_convergence import measure_convergence
+from worlds.lecture_04_filters import occupancy_table
+from worlds.lecture_04_scenes import hit_cells
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State

@@ -29,8 +29,6 @@ from IPython.display import Markdown
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu import plotting
-from semgrid_edu.workshop.studies.filter.occupancy import markdown_table, per_cent
-from semgrid_edu.workshop.studies.filter.streets import LEAST_DYNAMIC, StreetScores
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
@@ -39,8 +37,10 @@ from semgrid_edu.occupancy import (
 from semgrid_edu.occupancy.cellwise import clear_wakes, collide
 from semgrid_edu.occupancy.particles import keeps_pace
 from semgrid_edu.occupancy.planar_motion import look_up
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 
 sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_04_street_scores import LEAST_DYNAMIC, StreetScores
 from worlds.lecture_04_suspects import (
     BARRED, BEFORE, MENDED, SUSPECTS, Suspect, counts, run_filter, scenes_of,
 )  # fmt: skip

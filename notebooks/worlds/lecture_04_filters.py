@@ -1,18 +1,23 @@
-"""Log-odds grid, BOF and CMCDOT compared on simulated drives, whose truth is known (paper, section 3.2)."""
+"""Log-odds grid, BOF and CMCDOT compared on simulated drives, whose truth is known (paper, section 3.2).
 
+In the folder notebooks, `python -m worlds.lecture_04_filters ../docs/results/occupancy.json --drives 20` measures them.
+"""
+
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+import typer
 
-from semgrid_edu.errors import ArgumentError, check_whole
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, State
+from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E, Lidar, Rig
-from semgrid_edu.workshop.studies.filter.cell_scores import BANKS, CellScores, Estimate, share
-from semgrid_edu.workshop.studies.filter.scenes import known_scenes
+from worlds.lecture_04_cell_scores import BANKS, CellScores, Estimate, share
+from worlds.lecture_04_scenes import known_scenes
 
 GRIDS = {"paper": GridSpec.paper(), "compact": GridSpec.compact()}
 LIDARS = {"HDL-64E": HDL64E, "coarse": Lidar()}
@@ -24,66 +29,14 @@ HELD_OUT = 100
 METHODS = ("log-odds", "BOF", "CMCDOT")
 
 
-def check_request(seed: int, drives: int, frames: int, grids: tuple[str, ...], lidar: str | None = None) -> None:
-    """Refuse what can't be run, before the work starts.
-
-    Parameters
-    ----------
-    seed : int
-        Seed for the drives and for the particles.
-    drives, frames : int
-        Number of drives, and number of frames of each.
-    grids : tuple of str
-        Keys of `GRIDS`.
-    lidar : str, optional
-        A key of `LIDARS`, where there is a choice.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such grid or LIDAR, the seed is negative, or there is nothing to do.
-    """
-    if not grids or not set(grids) <= set(GRIDS):
-        raise ArgumentError("grid", " or ".join(GRIDS), ", ".join(grids) or "none")
-    if lidar not in (None, *LIDARS):
-        raise ArgumentError("lidar", f"one of {', '.join(LIDARS)}", repr(lidar))
-    check_whole(seed=seed)
-    check_whole(1, drives=drives, frames=frames)
-
-
-def simulated_by(experiment: str, seed: int, drives: int, frames: int, grids: tuple[str, ...], began: float) -> dict:
-    """Return what made a result on simulated drives, see `made_by`.
-
-    Parameters
-    ----------
-    experiment : str
-        The command after `semgrid-edu reproduce`.
-    seed, drives, frames, grids
-        What was asked, as `check_request` takes it.
-    began : float
-        When the work started, by `perf_counter`.
-
-    Returns
-    -------
-    dict
-        Numbers of drives and frames, command, seed, date, minutes and versions; JSON can hold it.
-    """
-    one_grid = f" --grid {grids[0]}" if len(grids) == 1 else ""
-    command = f"semgrid-edu reproduce {experiment} --seed {seed} --drives {drives}{one_grid}"
-    minutes = round((perf_counter() - began) / 60, 1)
-    made = made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh")
-    return {"drives": drives, "frames": frames, "seed": seed, "minutes": minutes, **made}
-
-
 def compare_filters(
     seed: int = 0, drives: int = 20, grids: tuple[str, ...] = tuple(GRIDS), frames: int = FRAMES
 ) -> dict[str, object]:
     """Run the three filters with their default parameters over simulated drives, and score them.
 
-    Two sorts of cells count. Observed cells, about which the present scan says something, should be called what they
-    are: FREE, STATIC or DYNAMIC. Cells about which no scan of the drive has said anything should be called UNKNOWN.
-    All other cells a filter can only remember, so they don't count.
-    The log-odds grid calls STATIC whatever is occupied, and UNKNOWN what is still at its prior.
+    Two kinds of cells count. Cells that the present scan observes should be called what they are: FREE, STATIC or
+    DYNAMIC. Cells that no scan of the drive has observed should be called UNKNOWN. All other cells a filter can only
+    remember, so they don't count. The log-odds grid calls everything occupied STATIC, and a cell at its prior UNKNOWN.
 
     Parameters
     ----------
@@ -100,18 +53,18 @@ def compare_filters(
     -------
     dict
         "scores" by LIDAR, grid and filter (see `CellScores.summary`), and all that made them; JSON can hold it.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such grid, or nothing to do.
     """
     began = perf_counter()
-    check_request(seed, drives, frames, grids)
+    scores = {lidar: {grid: _score(seed, drives, frames, lidar, grid) for grid in grids} for lidar in LIDARS}
+    command = f"python -m worlds.lecture_04_filters OUT --seed {seed} --drives {drives}"
     return {
-        "scores": {lidar: {grid: _score(seed, drives, frames, lidar, grid) for grid in grids} for lidar in LIDARS},
+        "scores": scores,
         "states": [state.name for state in State],
-        **simulated_by("occupancy", seed, drives, frames, grids, began),
+        "drives": drives,
+        "frames": frames,
+        "seed": seed,
+        "minutes": round((perf_counter() - began) / 60, 1),
+        **made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh"),
     }
 
 
@@ -177,3 +130,22 @@ def occupancy_table(result: dict, lidar: str = "HDL-64E", grid: str = "paper") -
 
 def _error(error: dict[str, float | None]) -> str:
     return "-" if error["median"] is None else f"{error['median']:.2f} ({error['rms']:.2f})"
+
+
+def main(out: Path, seed: int = 0, drives: int = 20) -> None:
+    """Compare the filters, write the result and print its tables.
+
+    Parameters
+    ----------
+    out : Path
+        A JSON file.
+    seed, drives : int
+        As `compare_filters` takes them.
+    """
+    result = compare_filters(seed, drives)
+    write_json(out, result)
+    print(occupancy_tables(result))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -12,12 +12,12 @@ from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.readers.frames import FrameSequence
 from semgrid_edu.frame import Frame
 from semgrid_edu.metrics import METRICS
+from semgrid_edu.workshop.course.street import motion_between, piece_confusions
 from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
-from semgrid_edu.workshop.studies.new_drive import drive_checks as checks
-from semgrid_edu.workshop.studies.new_drive.domain import distances, training_images
-from semgrid_edu.workshop.studies.new_drive.faults import YAWS
-from semgrid_edu.workshop.studies.new_drive.own_street import piece_confusions
-from semgrid_edu.workshop.studies.new_drive.scan_borders import edge_contrast
+from worlds import lecture_13_checks as checks
+from worlds.lecture_13_domain import distances, training_images
+from worlds.lecture_13_faults import YAWS
+from worlds.lecture_13_scan_borders import edge_contrast
 
 TURNED, LEANS, SHIFTED, OVERSURE = 0.5, 1.0, 0.05, 0.05
 """Limits: a camera turned by more (degrees), ground that leans by more (degrees), a motion that fits worse than another
@@ -99,7 +99,7 @@ def check_lines(drive: FrameSequence, frames: Sequence[Frame]) -> list[Line]:
     ground = np.mean([checks.ground_plane(frame.points, frame.camera.lidar_height) for frame in frames], axis=0)
     problems, gaps, best = len(drive.problems()), len(checks.time_gaps(times)), YAWS[contrast.argmax()]
     passes = motion_verdict(errors)
-    far = float(np.linalg.norm(checks.motion_between(frames[0], frames[-1])[:3, 3]))
+    far = float(np.linalg.norm(motion_between(frames[0], frames[-1])[:3, 3]))
     return [
         Line("files", f"{problems} problems", problems == 0),
         Line("gaps in time", f"{gaps}; a step takes {1000 * np.median(np.diff(times)):.0f} ms", gaps == 0),

@@ -1,10 +1,15 @@
-"""Real drives through every check, beside the shipped drive: numbers only, never a picture (section 4)."""
+"""Real drives put through every check beside the shipped drive: numbers only, never a picture (section 4).
+
+In the folder notebooks, `python -m worlds.lecture_13_real_drive ../docs/results/real_drive.json FIRST SECOND` measures
+two stretches of a drive of KITTI.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from semgrid_edu.datasets import KittiRawDrive
@@ -16,13 +21,14 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import Belief, State
 from semgrid_edu.pipeline import run_pipeline
+from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
-from semgrid_edu.workshop.studies.filter.scenes import hit_cells
-from semgrid_edu.workshop.studies.new_drive import domain
-from semgrid_edu.workshop.studies.new_drive import drive_checks as checks
-from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, drive_readings
+from worlds import lecture_13_checks as checks
+from worlds import lecture_13_domain as domain
+from worlds.lecture_04_scenes import hit_cells
+from worlds.lecture_13_faults import FAULTS, drive_readings
 
 EVERY = 4
 """Images, ground and networks are measured in each frame of this number."""
@@ -54,7 +60,7 @@ def compare_drives(roots: Sequence[Path], date: str, drive: str) -> dict[str, ob
     for number, root in enumerate(roots, 1):
         boxes = read_boxes(root / f"moving_cars_{drive}.json")
         drives[f"stretch {number}"] = KittiRawDrive(root, date, drive), boxes
-    command = f"semgrid-edu reproduce real-drive --date {date} --drive {drive}"
+    command = f"python -m worlds.lecture_13_real_drive OUT{' FOLDER' * len(roots)} --date {date} --drive {drive}"
     return {
         "drives": {name: measure_drive(*one) for name, one in drives.items()},
         "faults": {
@@ -65,7 +71,7 @@ def compare_drives(roots: Sequence[Path], date: str, drive: str) -> dict[str, ob
         "drive": f"{date}_drive_{drive}",
         "seed": 0,
         "minutes": round((perf_counter() - began) / 60, 1),
-        **made_by(f"{command}{' --kitti FOLDER' * len(roots)}", "numpy", "scipy", "torch", "numba"),
+        **made_by(command, "numpy", "scipy", "torch", "numba"),
     }
 
 
@@ -225,3 +231,24 @@ def moving_hits(frame: Frame, belief: Belief, boxes: Iterable[Sequence[float]], 
     for x_min, x_max, y_min, y_max in boxes:
         inside |= (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max)
     return (belief.probability[State.DYNAMIC] > belief.probability[State.STATIC])[hit & inside]
+
+
+def main(out: Path, folders: list[Path], date: str = "2011_09_26", drive: str = "0013") -> None:
+    """Measure the drives, write the result and print its table.
+
+    Parameters
+    ----------
+    out : Path
+        A JSON file.
+    folders : list of Path
+        Folders of KITTI raw drives, one for each stretch.
+    date, drive : str
+        As `compare_drives` takes them.
+    """
+    result = compare_drives(folders, date, drive)
+    write_json(out, result)
+    print(real_drive_table(result))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import rigid_transform, transform_points
 from semgrid_edu.frame import Frame
-from semgrid_edu.workshop.studies.new_drive import drive_checks as checks
-from semgrid_edu.workshop.studies.new_drive.domain import colour_distance, mean_histograms
-from semgrid_edu.workshop.studies.new_drive.scan_borders import edge_contrast
+from worlds import lecture_13_checks as checks
+from worlds.lecture_13_domain import colour_distance, mean_histograms
+from worlds.lecture_13_scan_borders import edge_contrast
 
 TURN = 2.0
 """By how much a sensor is turned, degrees."""

@@ -8,20 +8,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
-from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
+from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.readers.oxts import read_timestamps
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
+from semgrid_edu.workshop.course.street import motion_between, standing_points
 
 LANE = (3.0, 20.0, 1.5)
 """Where the ground of the vehicle's own lane is looked for: from and to this far ahead, and to each side, metres."""
 GROUND_ERROR = 0.1
 """A return further than this from the fitted ground isn't part of it, metres."""
-TALL = (0.5, 3.0)
-"""Heights above the ground, metres, between which returns come from things that stand up, such as walls and poles."""
-NEAREST, FARTHEST = 3.0, 40.0
-"""Distances between which returns are compared, metres: beyond, neighbouring beams are too far apart."""
 
 
 def time_gaps(times: ArrayLike, factor: float = 1.5) -> NDArray[np.int64]:
@@ -184,30 +181,6 @@ def with_scan(frames: Sequence[Frame]) -> list[Frame]:
         Frames of a drive.
     """
     return [frame for frame in frames if len(frame.points)]
-
-
-def standing_points(frame: Frame) -> NDArray[np.float64]:
-    """Return the returns from things that stand up, (n, 3), metres in the LIDAR frame; moving cars are among them.
-
-    Parameters
-    ----------
-    frame : Frame
-        Its scan and the LIDAR's height are used.
-    """
-    height, distance = frame.points_grid[:, 2], np.hypot(*frame.points[:, :2].T)
-    chosen = (height > TALL[0]) & (height < TALL[1]) & (distance > NEAREST) & (distance < FARTHEST)
-    return frame.points[chosen, :3].astype(np.float64)
-
-
-def motion_between(before: Frame, now: Frame) -> NDArray[np.float64]:
-    """Return the motion of the LIDAR between two frames according to their poses: T_before_from_now, (4, 4), metres.
-
-    Parameters
-    ----------
-    before, now : Frame
-        Two frames of a drive.
-    """
-    return invert_rigid(before.T_world_from_lidar) @ now.T_world_from_lidar
 
 
 def overlay_error(before: Frame, now: Frame, T_before_from_now: NDArray) -> float:

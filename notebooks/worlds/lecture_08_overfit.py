@@ -1,4 +1,7 @@
-"""Overfitting on purpose: whether the whole network, with each image network, can learn four frames (section 4.1)."""
+"""Overfitting on purpose: whether the whole network, with each image network, can learn four frames (section 4.1).
+
+In the folder notebooks, `python -m worlds.lecture_08_overfit ../docs/results/overfit.json` trains and scores them.
+"""
 
 from collections.abc import Sequence
 from copy import deepcopy
@@ -9,20 +12,29 @@ from time import perf_counter
 
 import numpy as np
 import torch
+import typer
 
 from semgrid_edu.datasets.samples import sample_drive, sample_frames
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.metrics import confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net, unit_image
-from semgrid_edu.storage.files import table_beside
+from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.log import LOG, read_log
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
 
-PARAMS = TrainingParams(**table_beside(__file__))
-"""Every step sees the same four frames without augmentation, starting from random weights, and every class has the same
-weight. The learning rate is six times the usual one, because all steps follow the gradient of the same frames."""
+PARAMS = TrainingParams(
+    image_iterations=0,
+    grid_iterations=400,
+    batch_size=4,
+    learning_rate=0.3,
+    weight_limit=1.0,
+    jitter=0.0,
+    mirror=False,
+)
+"""Every step sees the same four frames without augmentation, and every class has the same weight. The learning rate is
+six times the usual one, because all steps follow the gradient of the same frames."""
 LOSS_EVERY = 50
 """Number of iterations between two losses that the result keeps."""
 
@@ -52,7 +64,7 @@ def overfit(seed: int = 0) -> OverfitResult:
         "frames": len(frames),
         "params": asdict(PARAMS),
         "seed": seed,
-        **made_by(f"semgrid-edu reproduce overfit --seed {seed}", "torch", "numpy"),
+        **made_by(f"python -m worlds.lecture_08_overfit OUT --seed {seed}", "torch", "numpy"),
     }
 
 
@@ -128,3 +140,22 @@ def overfit_table(networks: dict[str, OverfitResult]) -> str:
         shares = (f"{100 * result['pixel accuracy'][mode]:.2f}" for mode in ("evaluation", "training"))
         rows.append([name, *shares, f"{result['losses'][-1]:.4f}", f"{result['minutes']:.1f}"])
     return markdown_table(rows)
+
+
+def main(out: Path, seed: int = 0) -> None:
+    """Overfit each image network, write the result and print its table.
+
+    Parameters
+    ----------
+    out : Path
+        A JSON file.
+    seed : int
+        Seed for the initial weights.
+    """
+    result = overfit(seed)
+    write_json(out, result)
+    print(overfit_table(result["networks"]))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,6 +1,6 @@
 """Counts of semantic grids by when the camera last saw a cell: now, before, or never (section 3)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.occupancy.planar_motion import look_up
+from semgrid_edu.workshop.course.street import cells_seen, frames_since_seen
 from semgrid_edu.workshop.scoring.confusions import BANDS, band_names
 from semgrid_edu.workshop.scoring.counting import distance_bands, reliability_of_sums, reliability_sums
 from semgrid_edu.workshop.scoring.score_with_interval import (
@@ -35,22 +36,6 @@ PIXEL, CLASS, FORBIDDEN = "pixel accuracy", "class accuracy", "unknown forbidden
 """The metrics; the last one is pixel accuracy when only semantic classes may be answered."""
 
 
-def frames_since_seen(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int64]:
-    """Return how many frames ago the camera last saw each cell, (F, H, W): 0 for now, -1 for never.
-
-    Parameters
-    ----------
-    frames : sequence of F Frame
-        Labelled frames, in the order of time.
-    spec : GridSpec
-        The grid, (H, W) cells.
-    """
-    since = np.full((len(frames), *spec.shape), -1)
-    for now, ago, seen in _seen_then(frames, spec):
-        since[now, seen & (since[now] < 0)] = ago
-    return since
-
-
 def frames_in_view(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int64]:
     """Return in how many frames up to each one the camera saw each cell, (F, H, W).
 
@@ -60,18 +45,9 @@ def frames_in_view(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int64]
         As `frames_since_seen` takes them.
     """
     count = np.zeros((len(frames), *spec.shape), int)
-    for now, _, seen in _seen_then(frames, spec):
+    for now, _, seen in cells_seen(frames, spec):
         count[now] += seen
     return count
-
-
-def _seen_then(frames: Sequence[Frame], spec: GridSpec) -> Iterator[tuple[int, int, NDArray[np.bool_]]]:
-    """Yield for each frame and each one up to it: its number, how many frames ago, and the cells seen."""
-    visible = [frame.labels.visible_on(spec)[None].astype(np.float32) for frame in frames]
-    for now, frame in enumerate(frames):
-        for ago in range(now + 1):
-            motion = PlanarMotion.from_poses(frames[now - ago].T_world_from_lidar, frame.T_world_from_lidar)
-            yield now, ago, look_up(visible[now - ago], np.zeros(1, np.float32), spec, spec, motion)[0] > 0
 
 
 def last_looks(frames: Sequence[Frame], maps: Sequence[NDArray], since: NDArray, spec: GridSpec) -> list[NDArray]:

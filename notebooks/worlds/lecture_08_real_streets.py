@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
+import typer
 from numpy.typing import NDArray
 
 from semgrid_edu.crf import expected_calibration_error
@@ -18,12 +19,11 @@ from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
 from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
-from semgrid_edu.errors import check_whole
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, build_net, load_net, with_mean_scores
 from semgrid_edu.pipeline import Stages
-from semgrid_edu.storage.files import check_writable, sha256, table_beside
+from semgrid_edu.storage.files import check_writable, sha256, table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.devices import choose_device
@@ -65,14 +65,14 @@ class WayToTrain(NamedTuple):
 
 
 def _way(architecture: dict | None = None, training: dict | None = None, **fields) -> WayToTrain:
-    """Return the way that a row of `real_streets.toml` describes."""
+    """Return the way that a row of the table beside this file describes."""
     params = None if training is None else TrainingParams(**training)
     return WayToTrain(Architecture(**(architecture or {})), params=params, **fields)
 
 
 TABLE = table_beside(__file__)
 WAYS = {name: _way(**row) for name, row in TABLE["ways"].items()}
-"""The ways to train, by name, from `real_streets.toml`."""
+"""The ways to train, by name, from the table beside this file."""
 
 LEFT_OUT, LATER = "each pair of cameras left out", "later"
 """The splits: by camera, in as many rounds as there are pairs, and in time, in one round."""
@@ -126,7 +126,6 @@ def compare_real(
     DataError
         When there is no such scene, it lacks a camera or labels, or a file is damaged.
     """
-    check_whole(seed=seed)
     computer = choose_device(device)
     drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
     runs = Path(runs) / scene
@@ -144,8 +143,8 @@ def compare_real(
                 weights |= {run: sha256(file) for run, file in files.items()}
                 counted.append(_joined(_count(name, *one) for one in zip(files.values(), tests, strict=True)))
             found[split] |= {method: _scores_of([one[method] for one in counted], table) for method in counted[0]}
-    command = f"semgrid-edu reproduce real-streets --pandaset FOLDER --scene {scene} --simulated MINIKITTI --runs RUNS"
-    command += f" --seed {seed} --device {device}"
+    command = "python -m worlds.lecture_08_real_streets PANDASET MINIKITTI RUNS OUT"
+    command += f" --scene {scene} --seed {seed} --device {device}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
 
 
@@ -298,3 +297,28 @@ def _table(split: str, methods: dict[str, dict]) -> str:
         metrics = [shown(scores[metric]) for metric in ("pixel accuracy", "class accuracy")]
         rows.append([name, *metrics, *(per_cent(scores["recall"][c], 0) for c in classes), per_cent(scores["ECE"])])
     return markdown_table(rows)
+
+
+def main(
+    pandaset: Path, simulated: Path, runs: Path, out: Path, scene: str = "002", seed: int = 0, device: str = "cpu"
+) -> None:
+    """Train and score in every way, write the result and print its tables.
+
+    Parameters
+    ----------
+    pandaset : Path
+        The folder of PandaSet's scenes.
+    simulated, runs
+        As `compare_real` takes them.
+    out : Path
+        A JSON file.
+    scene, seed, device
+        As `compare_real` takes them.
+    """
+    result = compare_real(pandaset, scene, simulated, runs, seed, device)
+    write_json(out, result)
+    print(real_streets_table(result))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,17 +1,19 @@
-"""The policy laboratory: how wrong each way of making ground truth from LIDAR is, where the truth is known (section 4).
+"""How wrong each way of making ground truth from LIDAR is, measured where the truth is known (section 4).
 
 Simulated drives are filtered by CMCDOT, their calibration, labels and scans get errors like those of real data
 (`TruthFlaws`), each policy makes the truth of the frame in the middle, and its cells are counted (`TruthCounts`).
+In the folder notebooks, `python -m worlds.lecture_09_policies ../docs/results/truth_policies.json --lidar HDL-64E`
+measures them.
 """
 
-import hashlib
 from collections.abc import Iterable
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
 
-import numpy as np
+import typer
+from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.grid_truth import grid_truth
@@ -22,12 +24,11 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.storage.files import table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
-from semgrid_edu.storage.reading import resumable_json
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
-from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, LIDARS, check_request
-from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
-from semgrid_edu.workshop.studies.ground_truth.counts import ABOUT, TruthCounts
+from worlds.lecture_04_filters import GRIDS, LIDARS
+from worlds.lecture_04_scenes import labelled_frame
+from worlds.lecture_09_counts import ABOUT, TruthCounts, truth_tables
 
 HELD_OUT = 700
 """Seed of the first drive for seed 0; each further seed adds 1000."""
@@ -55,23 +56,21 @@ class Trial(NamedTuple):
 
 
 def _trial(row: dict) -> Trial:
-    """Return the trial that a row of `laboratory.toml` describes."""
+    """Return the trial that a row of the table beside this file describes."""
     policy = {name: value for name, value in row.items() if name != "errors"}
     errors = row.get("errors", [field.name for field in fields(TruthFlaws)])
     return Trial(TruthPolicy(**policy), replace(NO_FLAWS, **{name: getattr(ERRORS, name) for name in errors}))
 
 
 TRIALS = {name: _trial(row) for name, row in table_beside(__file__).items()}
-"""What is compared, by name, from `laboratory.toml`."""
+"""What is compared, by name."""
 
 
-def truth_policies(log: Path, seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "coarse") -> dict:
-    """Make the ground truth of simulated drives by every policy, and count how wrong it is.
+def truth_policies(seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "coarse") -> dict:
+    """Make the ground truth of simulated drives by every policy, and count its errors.
 
     Parameters
     ----------
-    log : Path
-        Takes every drive as soon as it is done. If the file exists, drives that it holds aren't simulated again.
     seed : int
         Seed for drives, errors and particles.
     drives : int
@@ -84,36 +83,27 @@ def truth_policies(log: Path, seed: int = 0, drives: int = 20, grid: str = "comp
     Returns
     -------
     dict
-        "drives": by number of the drive and name of the trial, each of `COUNTED` added up over classes and distances;
-        "sums": by name of the trial the cells of `TruthCounts`, of all drives; "policies": the trials; and all that
-        made them. JSON can hold it.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such grid or LIDAR, or nothing to do.
-    DataError
-        When the log is something else, or was begun with other choices.
+        "drives": by number of the drive and name of the trial, each of `COUNTED` summed over classes and distances;
+        "sums": by name of the trial the cells of `TruthCounts`, of all drives; "policies": the trials; and provenance.
+        JSON can hold it.
     """
-    check_request(seed, drives, 1, (grid,), lidar)
-    began, digest = perf_counter(), hashlib.sha256(repr(TRIALS).encode()).hexdigest()[:16]
-    identity = {"seed": seed, "grid": grid, "lidar": lidar, "trials": digest}
-    kinds = {"drives": dict, "sums": list, "minutes": float}
-    kept = {key: resumable_json(log, identity, key, kind) for key, kind in kinds.items()}
-    minutes, first = kept["minutes"].get("of all drives", 0.0), HELD_OUT + 1000 * seed
+    began, first = perf_counter(), HELD_OUT + 1000 * seed
+    by_drive: dict[str, dict] = {}
+    sums: dict[str, NDArray] = {}
     for number in tqdm(range(first, first + drives), desc="truth policies", unit="drive"):
-        if str(number) in kept["drives"]:
-            continue
-        counts, sums = score_trials(TRIALS, GRIDS[grid], number, lidar), kept["sums"]
-        kept["drives"][str(number)] = {name: one.cells.sum(axis=(1, 2)).tolist() for name, one in counts.items()}
-        kept["sums"] = {name: (one.cells + np.array(sums.get(name, 0))).tolist() for name, one in counts.items()}
-        kept["minutes"] = {"of all drives": round(minutes + (perf_counter() - began) / 60, 2)}
-        write_json(log, identity | kept)
-    command = f"semgrid-edu reproduce truth-policies --seed {seed} --drives {drives} --grid {grid} --lidar {lidar}"
-    return identity | {
+        counts = score_trials(TRIALS, GRIDS[grid], number, lidar)
+        by_drive[str(number)] = {name: one.cells.sum(axis=(1, 2)).tolist() for name, one in counts.items()}
+        sums = {name: one.cells + sums.get(name, 0) for name, one in counts.items()}
+    command = f"python -m worlds.lecture_09_policies OUT --seed {seed} --drives {drives} --grid {grid} --lidar {lidar}"
+    return {
+        "seed": seed,
+        "grid": grid,
+        "lidar": lidar,
         "policies": {name: asdict(trial.policy) | {"errors": asdict(trial.flaws)} for name, trial in TRIALS.items()},
         **ABOUT,
-        **kept,
+        "drives": by_drive,
+        "sums": {name: cells.tolist() for name, cells in sums.items()},
+        "minutes": round((perf_counter() - began) / 60, 1),
         **made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh"),
     }
 
@@ -188,3 +178,22 @@ def score_frame(
     }
     found = {name: drive_truth(moments[flaws], k, spec, policy) for name, (policy, flaws) in trials.items()}
     return {name: TruthCounts.of_frame(one, truth, standing, spec, labels.label_set) for name, one in found.items()}
+
+
+def main(out: Path, seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "coarse") -> None:
+    """Measure every policy, write the result and print its tables.
+
+    Parameters
+    ----------
+    out : Path
+        A JSON file.
+    seed, drives, grid, lidar
+        As `truth_policies` takes them.
+    """
+    result = truth_policies(seed, drives, grid, lidar)
+    write_json(out, result)
+    print(truth_tables(result))
+
+
+if __name__ == "__main__":
+    typer.run(main)

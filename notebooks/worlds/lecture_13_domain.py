@@ -17,7 +17,8 @@ from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import total_variation
-from semgrid_edu.workshop.studies.new_drive.drive_checks import LANE, TALL
+from semgrid_edu.workshop.course.street import STANDING
+from worlds.lecture_13_checks import LANE
 
 if TYPE_CHECKING:
     from semgrid_edu.networks import SemanticGridNet
@@ -191,7 +192,7 @@ def agrees_with_lidar(frame: Frame, labels: NDArray) -> Agreement:
     u, v = np.rint(pixels[visible]).astype(int).T
     called = labels[v, u]
     lane = (np.abs(y) < LANE[2]) & (x < LANE[1]) & (np.abs(height) < 0.3)
-    standing = (height > TALL[0]) & (height < TALL[1])
+    standing = (height > STANDING[0]) & (height < STANDING[1])
     upright = ~np.isin(called, [KITTI_14.index(name) for name in FLAT_CLASSES])
     agreeing = called[lane] == KITTI_14.index("road"), upright[standing]
     return Agreement(*(float(found.mean()) if len(found) else float("nan") for found in agreeing))

@@ -11,7 +11,7 @@ from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.occupancy import N_STATES, Belief, State
 from semgrid_edu.workshop.simulation.drive import PERIOD
 from semgrid_edu.workshop.simulation.things.materials import Kind
-from semgrid_edu.workshop.studies.filter.scenes import KnownScene
+from worlds.lecture_04_scenes import KnownScene
 
 UNDECIDED = 0.05
 """A log-odds grid calls a cell UNKNOWN while P(occupied) differs from the prior, one half, by no more than this."""

@@ -1,12 +1,16 @@
-"""A map of one's own street against its labels: cells counted by pieces of street, so that a score has an interval."""
+"""What lectures 13 and 14 share with their exercises and hidden tests: measurements on a labelled street.
 
-from collections.abc import Sequence
+A score on one street has an interval if its cells are counted by pieces of street. Students have no `worlds` folder,
+so what an exercise imports is here.
+"""
+
+from collections.abc import Iterator, Sequence
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.camera import transform_points
+from semgrid_edu.camera import invert_rigid, transform_points
 from semgrid_edu.datasets.grid_truth import truth_to_learn
 from semgrid_edu.datasets.readers.frames import FrameSequence
 from semgrid_edu.datasets.samples import real_drive, sample_weights
@@ -15,11 +19,18 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.networks import load_net
-from semgrid_edu.occupancy import N_STATES
+from semgrid_edu.occupancy import N_STATES, PlanarMotion
+from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.pipeline import FrameResult, run_pipeline
 
 PIECE = 8.0
 """Length and width of a piece of street, metres."""
+
+STANDING = (0.5, 3.0)
+"""Heights above the ground between which returns come from upright things, such as walls and poles, metres."""
+
+COMPARED = (3.0, 40.0)
+"""Distances between which two scans are compared, metres. Beyond, neighbouring beams are too far apart."""
 
 
 @cache
@@ -127,3 +138,65 @@ def best_table(truths: NDArray, beliefs: Sequence[NDArray]) -> NDArray[np.int64]
     counted = truths != IGNORE
     np.add.at(counts, (states[counted], truths[counted]), 1)
     return counts.argmax(axis=1)[states]
+
+
+def standing_points(frame: Frame) -> NDArray[np.float64]:
+    """Return the returns from things that stand up, (n, 3), metres in the LIDAR frame; moving cars are among them.
+
+    Parameters
+    ----------
+    frame : Frame
+        Its scan and the LIDAR's height are used.
+    """
+    height, distance = frame.points_grid[:, 2], np.hypot(*frame.points[:, :2].T)
+    chosen = (height > STANDING[0]) & (height < STANDING[1]) & (distance > COMPARED[0]) & (distance < COMPARED[1])
+    return frame.points[chosen, :3].astype(np.float64)
+
+
+def motion_between(before: Frame, now: Frame) -> NDArray[np.float64]:
+    """Return the motion of the LIDAR between two frames according to their poses: T_before_from_now, (4, 4), metres.
+
+    Parameters
+    ----------
+    before, now : Frame
+        Two frames of a drive.
+    """
+    return invert_rigid(before.T_world_from_lidar) @ now.T_world_from_lidar
+
+
+def frames_since_seen(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int64]:
+    """Return how many frames ago the camera last saw each cell, (F, H, W): 0 for now, -1 for never.
+
+    Parameters
+    ----------
+    frames : sequence of F Frame
+        Labelled frames, in the order of time.
+    spec : GridSpec
+        The grid, (H, W) cells.
+    """
+    since = np.full((len(frames), *spec.shape), -1)
+    for now, ago, seen in cells_seen(frames, spec):
+        since[now, seen & (since[now] < 0)] = ago
+    return since
+
+
+def cells_seen(frames: Sequence[Frame], spec: GridSpec) -> Iterator[tuple[int, int, NDArray[np.bool_]]]:
+    """Yield for each frame, and each frame up to it, which of its cells the camera saw then.
+
+    Parameters
+    ----------
+    frames, spec : sequence of Frame, GridSpec
+        As `frames_since_seen` takes them.
+
+    Yields
+    ------
+    now, ago : int
+        The number of the frame, and how many frames before it the camera looked.
+    seen : (H, W) bool
+        The cells of the frame's grid that it saw.
+    """
+    visible = [frame.labels.visible_on(spec)[None].astype(np.float32) for frame in frames]
+    for now, frame in enumerate(frames):
+        for ago in range(now + 1):
+            motion = PlanarMotion.from_poses(frames[now - ago].T_world_from_lidar, frame.T_world_from_lidar)
+            yield now, ago, look_up(visible[now - ago], np.zeros(1, np.float32), spec, spec, motion)[0] > 0

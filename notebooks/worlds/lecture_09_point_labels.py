@@ -1,12 +1,15 @@
 """How wrong the truth from labelled returns is, made as by `PandasetScene.truth`, on drives whose truth is known.
 
 Every return of a simulated scan gets its class, and every road user its cuboid, both without error. So the errors that
-are counted are those of the method alone: gaps, edges of cells, things that hang over the ground, things that move.
+are counted are those of the method alone: gaps, cell edges, overhanging objects, moving objects. In the folder
+notebooks, `python -m worlds.lecture_09_point_labels ../docs/results/point_labels.json` measures them.
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from tqdm.auto import tqdm
@@ -17,14 +20,15 @@ from semgrid_edu.datasets.readers.frames import visible_labels
 from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, unhidden
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, LabelSet
+from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import Kind, class_of_kind
-from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, LIDARS, check_request
-from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
-from semgrid_edu.workshop.studies.ground_truth.counts import ABOUT, TruthCounts
-from semgrid_edu.workshop.studies.ground_truth.laboratory import HELD_OUT, REACH
+from worlds.lecture_04_filters import GRIDS, LIDARS
+from worlds.lecture_04_scenes import labelled_frame
+from worlds.lecture_09_counts import ABOUT, TruthCounts, truth_tables
+from worlds.lecture_09_policies import HELD_OUT, REACH
 
 MOVABLE = (Kind.CAR, Kind.PEDESTRIAN, Kind.BICYCLE)
 FLAT = [KITTI_14.index(name) for name in ("road", "sidewalk")]
@@ -49,24 +53,20 @@ def point_labels(seed: int = 0, drives: int = 20, grid: str = "compact", lidar: 
     dict
         What `truth_tables` reads: "sums", by name of the way the cells of `TruthCounts`, of all drives, and all that
         made them. JSON can hold it.
-
-    Raises
-    ------
-    ArgumentError
-        When there is no such grid or LIDAR, or nothing to do.
     """
-    check_request(seed, drives, 1, (grid,), lidar)
     sums: dict[str, TruthCounts] = {}
     numbers = range(HELD_OUT + 1000 * seed, HELD_OUT + 1000 * seed + drives)
     for number in tqdm(numbers, desc="labelled returns", unit="drive"):
         for name, counts in score_drive(GRIDS[grid], number, lidar).items():
             sums[name] = sums[name] + counts if name in sums else counts
-    command = f"semgrid-edu reproduce point-labels --seed {seed} --drives {drives} --grid {grid} --lidar {lidar}"
+    options = f"--seed {seed} --drives {drives} --grid {grid} --lidar {lidar}"
     return {
         "sums": {name: counts.cells.tolist() for name, counts in sums.items()},
         "drives": list(numbers),
         **ABOUT,
-        **made_by(command, "numpy", "scipy", "numba", "embreex", "trimesh"),
+        **made_by(
+            f"python -m worlds.lecture_09_point_labels OUT {options}", "numpy", "scipy", "numba", "embreex", "trimesh"
+        ),
     }
 
 
@@ -131,3 +131,22 @@ def _cuboids(drive: SimulatedDrive, k: int) -> Cuboids:
         moving=np.arange(len(actors)) >= len(drive.parked),
         lidars=np.full(len(actors), ANY_LIDAR),
     )
+
+
+def main(out: Path, seed: int = 0, drives: int = 20, grid: str = "compact", lidar: str = "HDL-64E") -> None:
+    """Measure every way, write the result and print its tables.
+
+    Parameters
+    ----------
+    out : Path
+        A JSON file.
+    seed, drives, grid, lidar
+        As `point_labels` takes them.
+    """
+    result = point_labels(seed, drives, grid, lidar)
+    write_json(out, result)
+    print(truth_tables(result))
+
+
+if __name__ == "__main__":
+    typer.run(main)

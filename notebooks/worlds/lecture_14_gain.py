@@ -1,7 +1,8 @@
 """What the memory of classes gains, in cells that are in view, were seen before, or were never seen (section 3).
 
 Simulated streets have true labels in every cell; the labelled returns of a real scene are scored beside them. The
-second part measures what one more frame is worth at each distance from the vehicle (`worth_by_distance`).
+second part measures what one more frame is worth at each distance from the vehicle (`worth_by_distance`). In the folder
+notebooks, `python -m worlds.lecture_14_gain PANDASET ../docs/results/memory.json --drives 12` measures all.
 """
 
 from collections import deque
@@ -13,13 +14,13 @@ from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 from scipy.special import softmax
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import real_weights, sample_drive, sample_weights
-from semgrid_edu.errors import check_whole
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE
@@ -28,11 +29,12 @@ from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.pipeline import Stages, run_side_by_side
+from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD
-from semgrid_edu.workshop.studies.filter.memory_counts import MEMORY, ONE, SMOOTHED, GainCounts
-from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
+from worlds.lecture_04_scenes import labelled_frame
+from worlds.lecture_14_counts import MEMORY, ONE, SMOOTHED, GainCounts, memory_tables
 
 HELD_OUT = 1400
 """Seed of the first drive for seed 0; each further seed adds 1000. The memory's parameters are from other drives."""
@@ -129,8 +131,6 @@ def measure_memory(pandaset: str | Path, scene: str = "002", seed: int = 0, driv
         "scores": for fresh simulated streets, for the sample drive, and for the real scene with two networks, by group
         of cells; "worth": what one more frame is worth on the fresh streets; and all that made them. JSON can hold it.
     """
-    check_whole(seed=seed)
-    check_whole(1, drives=drives)
     began, spec = perf_counter(), GridSpec.compact()
     blocks = [block for camera in CAMERAS for block in real_blocks(PandasetScene(pandaset, scene, camera))]
     simulated = (_simulated(number) for number in range(HELD_OUT + 1000 * seed, HELD_OUT + 1000 * seed + drives))
@@ -142,7 +142,7 @@ def measure_memory(pandaset: str | Path, scene: str = "002", seed: int = 0, driv
         "real street, network that learned from its frames": _scored(blocks, real_weights(), spec)[0],
     }
     worth = _worth(views, spec)
-    command = f"semgrid-edu reproduce memory --scene {scene} --seed {seed} --drives {drives}"
+    command = f"python -m worlds.lecture_14_gain PANDASET OUT --scene {scene} --seed {seed} --drives {drives}"
     made = made_by(command, "numpy", "torch", "numba", "embreex", "trimesh")
     minutes = round((perf_counter() - began) / 60, 1)
     return {"scores": scores, "worth": worth, "drives": drives, "minutes": minutes, **made}
@@ -240,3 +240,24 @@ def worth_by_distance(
                 cells += np.histogram(distance[seen], edges)[0] if k == 0 else 0
     loss /= np.maximum(cells, 1)
     return WorthByDistance(loss, cells, np.array(worths)[loss.argmin(axis=0)])
+
+
+def main(pandaset: Path, out: Path, scene: str = "002", seed: int = 0, drives: int = 20) -> None:
+    """Measure what memory gains, write the result and print its tables.
+
+    Parameters
+    ----------
+    pandaset : Path
+        The folder of PandaSet's scenes.
+    out : Path
+        A JSON file.
+    scene, seed, drives
+        As `measure_memory` takes them.
+    """
+    result = measure_memory(pandaset, scene, seed, drives)
+    write_json(out, result)
+    print(memory_tables(result))
+
+
+if __name__ == "__main__":
+    typer.run(main)
