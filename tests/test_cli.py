@@ -13,7 +13,7 @@ import typer
 import semgrid_edu
 import semgrid_edu.datasets.index
 import semgrid_edu.training.run
-import semgrid_edu.workshop.paper.reports.reproduce
+import semgrid_edu.workshop.paper.reproduce
 from semgrid_edu.workshop import demo
 from semgrid_edu.workshop.commands.arguments import TOLD, tell
 from semgrid_edu.workshop.commands.main import run
@@ -123,7 +123,7 @@ def test_the_demo_opens_its_page(monkeypatch, capsys, tmp_path):
         ("data make sample OUT", datasets, "make_dataset", "goes on"),
         (
             "reproduce table1 --runs RUNS --out OUT",
-            semgrid_edu.workshop.paper.reports.reproduce,
+            semgrid_edu.workshop.paper.reproduce,
             "reproduce",
             "goes on",
         ),

@@ -13,16 +13,16 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.storage.tensors import write_arrays
-from semgrid_edu.workshop.paper.runs.other_runs import boxes_on
-from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
-from semgrid_edu.workshop.paper.runs.score_runs import (
+from semgrid_edu.workshop.paper.other_runs import boxes_on
+from semgrid_edu.workshop.paper.run_counts import RunCounts
+from semgrid_edu.workshop.paper.score_runs import (
     CONFUSIONS,
     RELIABILITY,
     SEARCHED,
     WEIGHTS_FOR_CLASSES,
     CountingRun,
 )
-from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
+from semgrid_edu.workshop.paper.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scoring.confusions import BANDS, distance_band_names, save_confusions
 from semgrid_edu.workshop.scoring.counting import count_grids, distance_bands
 from semgrid_edu.workshop.simulation.sensors.rig import Rig

@@ -266,7 +266,7 @@ def given_up(p_values, level=0.025):
             says="that is Holm's correction, or Bonferroni's",
             code="""
 def given_up(p_values, level=0.025):
-    from semgrid_edu.workshop.paper.reports.verdicts import holm
+    from semgrid_edu.workshop.paper.verdicts import holm
     return holm(p_values, level)""",
         ),
         mistake(

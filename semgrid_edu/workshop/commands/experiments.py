@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
+import semgrid_edu.workshop.paper
 from semgrid_edu.storage.files import check_ours, table_beside, write_json
 from semgrid_edu.workshop.commands.arguments import Commands
-from semgrid_edu.workshop.paper import reports
 
 reproduce = typer.Typer(cls=Commands, no_args_is_help=True, help="Run the experiments of the paper.")
 """What `semgrid-edu` adds to its commands."""
@@ -22,7 +22,7 @@ def check(
     folder: Annotated[Path, typer.Argument(help="Results of the paper's experiments, such as docs/results/reduced.")],
 ) -> None:
     """Compute the paper's tables, claims and ablations again from the counts beside them, and name what differs."""
-    from semgrid_edu.workshop.paper.reports.recompute import check_results
+    from semgrid_edu.workshop.paper.recompute import check_results
 
     if not check_results(folder, typer.echo):
         raise typer.Exit(1)
@@ -56,7 +56,7 @@ def keep_result(
     typer.echo(f"{table(result)}\n\nwritten to {out}")
 
 
-PAPER = {name: row["help"] for name, row in table_beside(reports.__file__, "experiments").items()}
+PAPER = {name: row["help"] for name, row in table_beside(semgrid_edu.workshop.paper.__file__, "experiments").items()}
 PAPER["all"] = "All of these."
 """The experiments of the paper, and their commands' help."""
 
@@ -66,7 +66,7 @@ def _command(experiment: str) -> Callable[..., None]:
 
     def command(
         runs: Runs,
-        out: Annotated[Path, typer.Option(help="Takes the results: JSON, Markdown and pictures.")],
+        out: Annotated[Path, typer.Option(help="Takes the results: JSON and Markdown.")],
         scale: Annotated[
             str,
             typer.Option(
@@ -77,13 +77,12 @@ def _command(experiment: str) -> Callable[..., None]:
         workers: Annotated[int | None, typer.Option(help="Runs at a time; one per core by default.")] = None,
         scheduler: Annotated[str | None, typer.Option(help="Instead, a dask cluster: tcp://HOST:PORT.")] = None,
         device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "cpu",
-        processes: Annotated[int, typer.Option(min=1, max=256, help="Processes (GPUs) of each training run.")] = 1,
         plan: Annotated[bool, typer.Option("--plan", help="Only show the runs and how long they will take.")] = False,
     ) -> None:
-        from semgrid_edu.workshop.paper.reports.reproduce import Request, reproduce
+        from semgrid_edu.workshop.paper.reproduce import Request, reproduce
 
         places = {"runs": runs, "out": out, "workers": workers, "scheduler": scheduler, "device": device}
-        request = Request(experiment=experiment, scale=scale, seeds=seeds, processes=processes, **places)
+        request = Request(experiment=experiment, scale=scale, seeds=seeds, **places)
         if problems := reproduce(request, typer.echo, plan):
             typer.echo(problems, err=True)
             raise typer.Exit(1)
