@@ -673,7 +673,7 @@ assert kinds[ROAD, CAR] in np.sort(kinds.ravel())[-4:]
 # things are overlooked; and the scan is **skewed**, because the vehicle moves on while the scanner turns. The sizes
 # are assumptions, whose reasons stand in its documentation. The following numbers, and those of the policy laboratory below,
 # were measured on 20 other drives of the same simulator, with an HDL-64E that measures a column every 0.18° (the scanner of
-# the sample drive: 0.45°). They are read from the file that `semgrid-edu reproduce truth-policies` wrote.
+# the sample drive: 0.45°). They are read from the file that `worlds/lecture_09_policies.py` wrote.
 
 # %% tags=["laboratory"] jupyter={"source_hidden": true}
 result = json.loads(Path("../docs/results/truth_policies.json").read_text(encoding="utf-8"))

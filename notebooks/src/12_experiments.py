@@ -325,7 +325,7 @@ for metric in METRICS.values():
 # The assertion says that this is the package's `drive_interval` for one seed. Notice the factor 3.18 from Student's
 # distribution with 3 degrees of freedom, in place of 1.96: four drives are few, and we don't know well how much drives
 # differ. The paper is such a case: the labels that it uses come from eight runs, so its Table 1 rests on about four. We
-# simulated as many frames in four long runs to learn from and four to test on (`semgrid-edu reproduce structure`):
+# simulated as many frames in four long runs to learn from and four to test on (`worlds/lecture_12_structure.py`):
 
 # %% jupyter={"source_hidden": true}
 for row in kept("structure")["rows"]:

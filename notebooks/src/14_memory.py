@@ -314,7 +314,7 @@ assert rates[10] > 5 * rates[1] ** 10  # far more than if it fell like r^k
 #
 # Therefore the package doesn't take its exponent from the formula. On fresh simulated streets, whose true labels are
 # known everywhere, we let a memory run with each of six exponents and look which one knows the classes in view best,
-# by distance ([memory.json](../docs/results/memory.json), made by `semgrid-edu reproduce memory`):
+# by distance ([memory.json](../docs/results/memory.json), made by `worlds/lecture_14_gain.py`):
 
 # %% jupyter={"source_hidden": true}
 worth = measured["worth"]

@@ -52,7 +52,7 @@ class MeanSegmenter(nn.Module):
     """Several image networks that score an image together: s is the mean of their scores.
 
     Where networks that learned from the same few frames err in different pixels, their mean errs less often;
-    `reproduce real-streets` compares it with one of them. The soft-max of mean scores is the networks' geometric mean
+    docs/results/real_streets.json compares it with one of them. The soft-max of mean scores is the networks' geometric mean
     of probabilities, normalised.
 
     Parameters

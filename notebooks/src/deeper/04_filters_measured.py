@@ -239,7 +239,7 @@ print(f"recall {both / np.sum(truth == DYNAMIC):.2f}, precision {both / np.sum(c
 # %% [markdown]
 # Now the filters of lectures 02, 03 and 04, on twenty simulated drives that none of them was tuned on, where the
 # truth of every cell is known. The scanner is KITTI's, the grid the paper's, and the roads have crowns and grades.
-# The result lies in the repository; `semgrid-edu reproduce occupancy`, which made it, took 45 minutes.
+# The result lies in the repository; `worlds/lecture_04_filters.py`, which made it, took 45 minutes.
 
 # %% jupyter={"source_hidden": true}
 result = json.loads(Path("../../docs/results/occupancy.json").read_text(encoding="utf-8"))

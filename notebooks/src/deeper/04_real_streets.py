@@ -765,9 +765,8 @@ plt.show()
 #   frames of phantoms remain at the far end of what we see.
 # - **Slow starters.** Whoever has just set off has an origin in which they stood a moment ago. So they are doubted when
 #   they go where nobody has looked. On six streets where people set off, at 0.2 m, CMCDOT called 96 % of the walkers'
-#   cells DYNAMIC before (to 25 m, 1.5 s after they set off), and about two thirds now: 70 % in the stored result of
-#   `semgrid-edu reproduce streets`, 66 % in an earlier run of it. Which particles survive matters that much: on
-#   two of the streets, four seeds differ by 12 and by 21 points. In the street that lost most we followed four who
+#   cells DYNAMIC before (to 25 m, 1.5 s after they set off), and about two thirds now: 70 % in one run,
+#   66 % in an earlier one. Which particles survive matters that much: on two of the streets, four seeds differ by 12 and by 21 points. In the street that lost most we followed four who
 #   weren't found: ahead of them were cells of which no scan had said anything.
 # - **A single return.** At first sight most cells are free, so one hit in a new cell isn't believed until a second
 #   scan confirms it.
