@@ -17,7 +17,7 @@ import numpy as np
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Cmcdot, CmcdotParams, SensorModel, State
 from semgrid_edu.plotting.grids import velocity_arrows
-from semgrid_edu.workshop.simulation.named_streets import named_street
+from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.street import plan
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "notebooks"))
@@ -38,7 +38,7 @@ def near_hedge(number: int):
         return side._replace(edge=wanted - 0.35 + arguments[2] / 2, strip=0.0, walk=0.0, bank_rise=0.0)
 
     with mock.patch.object(plan, "_side", narrow):
-        drive = named_street("hedge", number, FRAMES)
+        drive = simulate(number, FRAMES, "hedge")
         return drive, drive.plan.road.right.edge + 0.35 + drive.ego.trajectory.d
 
 

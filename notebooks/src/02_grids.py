@@ -46,7 +46,7 @@ from semgrid_edu.stage_models import ledger_table, one_log_odds_cell, package_lo
 from semgrid_edu.stage_models import scan_with_pose_error, thick_walls
 from semgrid_edu.stage_models.beam import range_state
 from semgrid_edu.stage_models.thick_walls import same_sensor
-from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
@@ -764,7 +764,7 @@ assert kept < 75
 # %% jupyter={"outputs_hidden": true, "source_hidden": true} tags=["nbval-ignore-output"]
 classes, others = class_of_kind(KITTI_14), []
 for seed in range(1, 6):
-    drive, found = SimulatedDrive(seed, n_frames=16), []
+    drive, found = simulate(seed, n_frames=16), []
     for k in range(0, 16, 3):
         evidence = scan_evidence(drive.scan(k).points_grid, spec, sensor)
         fine = blocks(classes[drive.birdseye(k / 10)[0]], spec)

@@ -14,7 +14,8 @@ from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, State
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
-from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
+from semgrid_edu.workshop.simulation import simulate
+from semgrid_edu.workshop.simulation.drive import PERIOD
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E, Lidar, Rig
 from worlds.lecture_04_cell_scores import BANKS, CellScores, Estimate, share
 from worlds.lecture_04_scenes import known_scenes
@@ -73,7 +74,7 @@ def _score(seed: int, drives: int, frames: int, lidar: str, grid: str) -> dict[s
     spec, scores = GRIDS[grid], {name: CellScores(GRIDS[grid]) for name in METHODS}
     read = Estimate.of_log_odds, Estimate.of_belief, Estimate.of_belief
     for number in HELD_OUT + 1000 * seed + np.arange(drives):
-        drive = SimulatedDrive(number, frames, rig=Rig(lidar=LIDARS[lidar]))
+        drive = simulate(number, frames, rig=Rig(lidar=LIDARS[lidar]))
         trackers = LogOddsGrid(spec), Bof(spec), Cmcdot(spec, seed=seed)
         for scene in known_scenes(drive, spec, f"{lidar}, {grid} grid, drive {number}"):
             for name, tracker, estimate in zip(METHODS, trackers, read, strict=True):

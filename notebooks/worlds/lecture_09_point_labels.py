@@ -22,6 +22,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, LabelSet
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
+from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import Kind, class_of_kind
@@ -82,7 +83,7 @@ def score_drive(spec: GridSpec, number: int, lidar: str) -> dict[str, TruthCount
     lidar : str
         A key of `LIDARS`.
     """
-    drive = SimulatedDrive(number, 2 * REACH + 1, rig=Rig(lidar=LIDARS[lidar]))
+    drive = simulate(number, 2 * REACH + 1, rig=Rig(lidar=LIDARS[lidar]))
     T, found = invert_rigid(drive.pose(REACH * PERIOD)), {}
     for name, ((points, classes), label_set) in _clouds(drive).items():
         points = transform_points(T, points)

@@ -24,7 +24,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import track_drive
 from semgrid_edu.storage.files import table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
-from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from worlds.lecture_04_filters import GRIDS, LIDARS
 from worlds.lecture_04_scenes import labelled_frame
@@ -140,7 +140,7 @@ def simulated_drive(number: int, lidar: str = "coarse", n_frames: int = 2 * REAC
     n_frames : int
         Number of frames, ten a second.
     """
-    drive = SimulatedDrive(number, n_frames, rig=Rig(lidar=LIDARS[lidar]))
+    drive = simulate(number, n_frames, rig=Rig(lidar=LIDARS[lidar]))
     return [replace(labelled_frame(drive, k, birdseye=k == n_frames // 2), image=None) for k in range(n_frames)]
 
 

@@ -31,7 +31,7 @@ from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.pipeline import Stages, run_side_by_side
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
-from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD
 from worlds.lecture_04_scenes import labelled_frame
 from worlds.lecture_14_counts import MEMORY, ONE, SMOOTHED, GainCounts, memory_tables
@@ -149,7 +149,7 @@ def measure_memory(pandaset: str | Path, scene: str = "002", seed: int = 0, driv
 
 
 def _simulated(number: int) -> list[Frame]:
-    drive = SimulatedDrive(number, FRAMES, rig=KITTI_AHEAD)
+    drive = simulate(number, FRAMES, rig=KITTI_AHEAD)
     return [labelled_frame(drive, k) for k in range(FRAMES)]
 
 

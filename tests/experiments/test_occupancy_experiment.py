@@ -16,7 +16,7 @@ from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
 from semgrid_edu.workshop.simulation.street.trajectories import STAND, ActorPace, Trajectory
-from semgrid_edu.workshop.simulation.things.cars import car_size
+from semgrid_edu.workshop.simulation.things.cars_and_people import car_size
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "occupancy.json"

@@ -25,7 +25,7 @@ from semgrid_edu.occupancy import (
 from semgrid_edu.occupancy.bof import origins
 from semgrid_edu.occupancy.literal.particles import cells_at_literal
 from semgrid_edu.occupancy.particles import cells_at, cells_of
-from semgrid_edu.workshop.simulation.named_streets import named_street
+from semgrid_edu.workshop.simulation import simulate
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(0, 16, 0, 1, 1)
@@ -188,7 +188,7 @@ def test_what_is_no_time_and_no_number_of_cells_is_refused(name, value):
 
 def test_walls_that_come_into_view_stay_static():
     """On a street of walls that come into view, half a second makes less than half as many phantoms as none."""
-    spec, drive = GridSpec.compact(), named_street("walls", 9000, 25)
+    spec, drive = GridSpec.compact(), simulate(9000, 25, "walls")
     scenes, looks, blind = list(known_scenes(drive, spec)), StreetScores(spec), StreetScores(spec)
     for scores, time in ((looks, 0.5), (blind, 0.0)):
         run_filter(drive, scenes, Suspect(params=CmcdotParams(clearing_time=time)), scores, seed=9)

@@ -12,9 +12,9 @@ from semgrid_edu.workshop.simulation import drive
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import TEST_STREETS, named_street
 from semgrid_edu.workshop.simulation.street.builder import Builder
+from semgrid_edu.workshop.simulation.street.ground import ground_mesh
 from semgrid_edu.workshop.simulation.street.plan import ANY, YARD, Wishes, draw_plan
 from semgrid_edu.workshop.simulation.street.road_users import overturned_car
-from semgrid_edu.workshop.simulation.street.terrain import ground_mesh
 from semgrid_edu.workshop.simulation.street.trajectories import Departure
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 

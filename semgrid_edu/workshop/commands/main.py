@@ -16,6 +16,7 @@ from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, c
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import keep_result, reproduce
+from semgrid_edu.workshop.simulation import MissingExtraError
 
 app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was interrupted, if there is one.")]
@@ -244,7 +245,7 @@ def run() -> None:
         if told := keep_compiled_functions():
             typer.echo(f"semgrid-edu: {told}", err=True)
         app(prog_name="semgrid-edu")
-    except (ArgumentError, DataError, OSError, RuntimeError) as error:
+    except (ArgumentError, DataError, MissingExtraError, OSError, RuntimeError) as error:
         if isinstance(error, RuntimeError) and "Symlink loop" not in str(error):
             raise
         where = f"{error.filename}: " if getattr(error, "filename", None) else ""

@@ -8,18 +8,16 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
-from semgrid_edu.workshop.simulation.sensors.gps import Geodesy
 from semgrid_edu.workshop.simulation.sensors.lidar import labelled_scan
 from semgrid_edu.workshop.simulation.sensors.raycast import Instant, PorousMesh, RayMesh
-from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.sensors.rig import Geodesy, Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
-from semgrid_edu.workshop.simulation.street.ego import Ego
 from semgrid_edu.workshop.simulation.street.footprints import footprint_table
 from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes, draw_plan
 from semgrid_edu.workshop.simulation.street.road_users import fill_street
 from semgrid_edu.workshop.simulation.street.scenery import build_scenery
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
-from semgrid_edu.workshop.simulation.street.trajectories import ActorPace
+from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Ego
 
 PERIOD = 0.1
 """Seconds between frames: KITTI's LIDAR turns ten times a second."""

@@ -23,7 +23,7 @@ from semgrid_edu.occupancy.ground import height_above_ground
 from semgrid_edu.occupancy.polar import beams_of
 from semgrid_edu.storage.files import LOCK, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import write_provenance
-from semgrid_edu.workshop.simulation.sensors.gps import Geodesy, oxts_packet
+from semgrid_edu.workshop.simulation.sensors.rig import Geodesy, oxts_packet
 from semgrid_edu.workshop.simulation.writer import WrittenFrame, write_calibration, write_frames
 
 IMAGE_SIZE = (145, 480)

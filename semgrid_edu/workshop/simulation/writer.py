@@ -20,8 +20,7 @@ from semgrid_edu.frame import FrameLabels
 from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.workshop.simulation.sensors.gps import DATAFORMAT, oxts_packet
-from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.sensors.rig import DATAFORMAT, Rig, oxts_packet
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
 
 DATE = "2026_01_01"
