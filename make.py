@@ -1,4 +1,4 @@
-"""What `make demo`, `make test`, `make test-browser` and `make site` do, for machines without make.
+"""What `make demo`, `make test` and the other targets do, for machines without make.
 
 `python make.py demo` in a clone needs nothing but Python's own library, since it makes the environment in
 which everything else is installed.
@@ -11,7 +11,7 @@ import venv
 from pathlib import Path
 
 CLONE = Path(__file__).resolve().parent
-"""The clone that this file lies in."""
+"""The folder of this file."""
 ENVIRONMENT = CLONE / ".venv"
 BIN = ENVIRONMENT / ("Scripts" if os.name == "nt" else "bin")
 MADE = ENVIRONMENT / "made"
@@ -20,6 +20,8 @@ NEEDS = ("pyproject.toml", "constraints.txt")
 """The files that decide what is installed; when one is newer, the environment is brought up to date."""
 OLDEST = (3, 11)
 """The oldest Python that will do."""
+REAL_DATA = ("KITTI", "SEMANTIC_KITTI", "PANDASET")
+"""Environment variables that name folders of real data."""
 
 
 def environment() -> None:
@@ -67,6 +69,36 @@ def test() -> None:
     _pytest(*pool, *nbval, "--doctest-modules", "--ignore=tests/browser", *files)
 
 
+def quick() -> None:
+    """Check the code and run the tests that need neither notebooks nor graders: two minutes, for each push."""
+    lint()
+    slow = ("graders", "browser", "notebooks", "experiments", "course", "real")
+    _pytest("-n", "3", "--dist", "loadfile", "tests", *(f"--ignore=tests/{folder}" for folder in slow))
+
+
+def test_real() -> None:
+    """Run the tests that need real sensor data; KITTI=..., SEMANTIC_KITTI=... and PANDASET=... name its folders."""
+    environment()
+    folders = {name: str(Path(os.environ[name]).resolve()) for name in REAL_DATA if os.environ.get(name)}
+    if not folders:
+        sys.exit(f"usage: make test-real KITTI=<folder that holds 2011_09_26>; also {' and '.join(REAL_DATA[1:])}")
+    _pytest("-m", "real", "tests", **folders)
+
+
+def notebooks() -> None:
+    """Execute the sources of all lectures, companions and exercises, and write the notebooks."""
+    environment()
+    _run("semgrid-edu", "course", "notebooks")
+
+
+def bench() -> None:
+    """Run every benchmark; each prints ratios between ways to do the same."""
+    environment()
+    _run("python", "-m", "pip", "install", "--quiet", "-c", "constraints.txt", "-e", ".[bench]")
+    for script in sorted((CLONE / "benchmarks").glob("bench_*.py")):
+        _run("python", str(script.relative_to(CLONE)))
+
+
 def test_browser() -> None:
     """Test the demo's page and a lecture's widget in a real browser; skipped where there is none."""
     environment()
@@ -74,11 +106,11 @@ def test_browser() -> None:
     _pytest("tests/browser")
 
 
-def _pytest(*arguments: str) -> None:
-    """Run pytest with one thread per process: two of them share two cores."""
-    # Hundreds of processes read what the first has compiled, also where the environment says to keep no bytecode.
-    few = {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
-    _run("python", "-m", "pytest", *arguments, PYTHONDONTWRITEBYTECODE="", **few)
+def _pytest(*arguments: str, **variables: str) -> None:
+    """Run pytest with one thread a process, because several processes share two cores."""
+    variables |= {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+    # Hundreds of processes read the bytecode of the first one, even where the environment forbids to write it.
+    _run("python", "-m", "pytest", *arguments, PYTHONDONTWRITEBYTECODE="", **variables)
 
 
 def _run(program: str, *arguments: str, **variables: str) -> None:
@@ -100,8 +132,9 @@ def site() -> None:
     _run("python", "docs/site/check.py", pages)
 
 
-TARGETS = {target.__name__.replace("_", "-"): target for target in (environment, demo, lint, test, test_browser, site)}
-"""What can be asked for, by name."""
+_ALL = (environment, demo, lint, quick, test, test_browser, test_real, notebooks, bench, site)
+TARGETS = {target.__name__.replace("_", "-"): target for target in _ALL}
+"""The targets by name."""
 
 
 def make_targets(asked: list[str]) -> None:

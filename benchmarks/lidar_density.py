@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
+from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.datasets.training_set import Mixture, sets_by_camera
 from semgrid_edu.labels import KITTI_14

@@ -35,9 +35,6 @@ DEEP, LONG_NUMBER = "[" * 10**5, '{"a": ' + "9" * 5000 + "}"
 DEMO = f"demo --kitti TINY --date {DATE} --drive 0001 --out OUT"
 TRAIN = "train --data TINY --out OUT"
 EVALUATE = "evaluate --data TINY --weights weights.safetensors --out scores.json"
-TRAIN_CRF = "train-crf --data TINY --weights weights.safetensors --out OUT --split train"
-SEARCH = "search-crf --data TINY --test TINY --weights weights.safetensors --out log.json"
-LEARNED = "reproduce learned-crf --data TINY --validation TINY --weights weights.safetensors --runs RUNS --out log.json"
 FETCH = "data fetch kitti --drive 2011_09_26_0013 --folder OUT"
 TABLE1 = "reproduce table1 --runs RUNS --out OUT --plan"
 CHECK = "reproduce check OUT"
@@ -437,12 +434,6 @@ WEIGHTS = (
         "weights.safetensors: .*header",
         lambda r: save_file({"a": torch.zeros(1)}, r / "weights.safetensors"),
     ),
-    Row(
-        "a CRF on the image stage",
-        TRAIN_CRF,
-        "weights.safetensors: expected a whole network",
-        lambda r: (r / "image_stage.safetensors").replace(r / "weights.safetensors"),
-    ),
 )
 
 RUNS = (
@@ -490,17 +481,8 @@ RUNS = (
         "found the provenance.json of something",
     ),
     Row(
-        "a CRF's training run in its data set", TRAIN_CRF.replace("OUT", "TINY"), "TINY: expected .*, found a data set"
-    ),
-    Row(
         "a folder that another process writes to",
         TRAIN,
-        "OUT: expected a folder that no other process writes to",
-        locked("OUT"),
-    ),
-    Row(
-        "a CRF's folder that another process writes to",
-        TRAIN_CRF,
         "OUT: expected a folder that no other process writes to",
         locked("OUT"),
     ),
@@ -550,8 +532,6 @@ RUNS = (
     Row("a picture of an unknown format", "curves RUN --out c.docx", "--out: expected a picture that ends in"),
     Row("a picture that can't say who made it", "curves RUN --out c.jpg", "--out: expected a picture that ends in"),
     Row("a picture without a format", "curves RUN --out c", "--out: expected a picture that ends in"),
-    Row("an unknown split for a CRF", TRAIN_CRF.replace("--split train", "--split none"), "split: expected one of"),
-    Row("a weight limit of NaN", f"{TRAIN_CRF} --weight-limit nan", "weight_limit: expected 1 or more"),
 )
 
 DATA = (
@@ -715,26 +695,6 @@ EXPERIMENTS = (
     Row("counts with damaged records", CHECK, "expected a JSON object", a_result({"records.json": np.array("{")})),
     Row("a result without a scale", CHECK, "table1.json: expected a result of", a_result({"records.json": "{}"}, "{}")),
     Row("a cache in place of a file", f"--cache architecture.json {TRAIN}", "architecture.json", frames()),
-    Row("no validation frames, search", SEARCH, "split: expected one of", frames()),
-    Row("no validation frames, learnt CRFs", LEARNED, "split: expected one of", frames()),
-    Row(
-        "provenance of weights that is a list",
-        SEARCH,
-        "provenance.json: expected a JSON object",
-        text("provenance.json", "[]"),
-    ),
-    Row(
-        "trials that are a number",
-        SEARCH,
-        "log.json: expected a result of this experiment",
-        text("log.json", '{"trials": 5}'),
-    ),
-    Row(
-        "another search's trials",
-        SEARCH,
-        "log.json: expected a result of this experiment",
-        text("log.json", '{"trials": [], "seed": 0}'),
-    ),
     Row(
         "a result over the weights",
         EVALUATE.replace("scores.json", "weights.safetensors"),
@@ -757,7 +717,6 @@ EXPERIMENTS = (
         locked("RUNS"),
     ),
     Row("a word for the number of seeds", f"{TABLE1} --seeds many", "Invalid value for '--seeds'"),
-    Row("no trials", f"{SEARCH} --trials 0", "Invalid value for '--trials'"),
     Row("an unknown scale", TABLE1 + " --scale galactic", "--scale: expected"),
     Row("a file in place of the runs", TABLE1.replace("RUNS", "architecture.json"), "--runs: expected a folder"),
     Row(
@@ -810,7 +769,6 @@ def page(name: str) -> Spoil:
 MANY = str(10**18)
 REFUSED_FIRST = (
     *(row for name in PAPERS for row in of_paper(name)),
-    Row("10^18 trials", f"{SEARCH} --trials {MANY}", "Invalid value for '--trials'"),
     Row("a page of one's own", DEMO, f"index.html: {LOST} without --force", page("index.html")),
     Row("a picture of one's own", DEMO, "overview.png: expected a new file", page("overview.png")),
     Row("a folder called index.html", DEMO, "index.html: expected a file to write", in_out("index.html")),
@@ -837,7 +795,6 @@ REFUSED_FIRST = (
     Row("matrices in a folder", f"{EVALUATE} --confusions a.npz", "a.npz: .*found a folder", folder("a.npz")),
     Row("curves over one's own picture", "curves RUN --out c.png", f"{LOST} without --force", text("c.png", "x")),
     Row("curves over a pipe", "curves RUN --out c.png", "c.png: .*found a pipe", pipe("c.png")),
-    Row("trials over one's own JSON", SEARCH, "expected a result of this experiment", text("log.json", '{"mine": 1}')),
     Row("a log of one's own", TRAIN, f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
     Row(
         "an image stage of one's own",
@@ -846,8 +803,6 @@ REFUSED_FIRST = (
         text("OUT/image_stage.safetensors", "x"),
     ),
     Row("a log of one's own, resumed", f"{TRAIN} --resume", f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
-    Row("a log of one's own, CRF", TRAIN_CRF, f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
-    Row("a weight limit below 0", f"{TRAIN_CRF} --weight-limit -1", "weight_limit: expected 1 or more"),
     Row(
         "no ImageNet weights",
         f"{TRAIN} --preset paper --imagenet a.safetensors",

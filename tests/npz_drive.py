@@ -7,8 +7,8 @@ import numpy as np
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets import DatasetIndex, LabelledFrame
-from semgrid_edu.datasets.readers.frames import FrameSequence, nothing_known
-from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, closest_returns
+from semgrid_edu.datasets.frames import FrameSequence, nothing_known
+from semgrid_edu.datasets.project_lidar import birdseye_votes, closest_returns
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import KITTI_14
 

@@ -15,12 +15,12 @@ import typer
 from bad_inputs import HELD, HUGE, TABLE, log, sample
 from tiny_drive import DATE, write_tiny_drive
 
-import semgrid_edu.training.run
 import semgrid_edu.workshop.scoring.evaluate
+import semgrid_edu.workshop.training_run
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.networks import Architecture, build_net, save_net
-from semgrid_edu.storage.compiled import CACHE_VARIABLE
+from semgrid_edu.storage.files import CACHE_VARIABLE
 from semgrid_edu.training.log import Step
 from semgrid_edu.workshop import demo
 from semgrid_edu.workshop.commands import main as cli
@@ -132,7 +132,7 @@ def no_work(monkeypatch):
         raise SystemExit("done")
 
     monkeypatch.setattr(demo, "write_demo", done)
-    monkeypatch.setattr(semgrid_edu.training.run, "train_network", done)
+    monkeypatch.setattr(semgrid_edu.workshop.training_run, "train_network", done)
     monkeypatch.setattr(semgrid_edu.workshop.scoring.evaluate, "evaluate", done)
 
 

@@ -12,8 +12,8 @@ import typer
 
 import semgrid_edu
 import semgrid_edu.datasets.index
-import semgrid_edu.training.run
 import semgrid_edu.workshop.paper.reproduce
+import semgrid_edu.workshop.training_run
 from semgrid_edu.workshop import demo
 from semgrid_edu.workshop.commands.arguments import TOLD, tell
 from semgrid_edu.workshop.commands.main import run
@@ -34,7 +34,6 @@ def test_one_doubt_too_many_is_told_as_such(capsys):
         (["data", "verify", "FILE"], r"FILE: expected folders of samples"),
         (["evaluate", "--data", ".", "--weights", ".", "--out", "FILE/scores.json"], r"FILE: File exists"),
         (["evaluate", "--data", ".", "--weights", ".", "--out", "FOLDER"], r"FOLDER: expected a file to write"),
-        (["search-crf", "--data", ".", "--test", ".", "--weights", ".", "--out", "FOLDER"], r"FOLDER: expected a file"),
     ],
 )
 def test_a_mistake_ends_in_one_line(tmp_path, monkeypatch, arguments, message):
@@ -127,7 +126,7 @@ def test_the_demo_opens_its_page(monkeypatch, capsys, tmp_path):
             "reproduce",
             "goes on",
         ),
-        ("train --data DATA --out OUT", semgrid_edu.training.run, "train_network", "goes on with --resume"),
+        ("train --data DATA --out OUT", semgrid_edu.workshop.training_run, "train_network", "goes on with --resume"),
     ],
 )
 def test_ctrl_c_says_whether_the_same_command_goes_on(arguments, module, name, told, monkeypatch, tmp_path):
@@ -137,7 +136,7 @@ def test_ctrl_c_says_whether_the_same_command_goes_on(arguments, module, name, t
     monkeypatch.chdir(tmp_path)
     (tmp_path / "DATA").mkdir()
     (tmp_path / "DATA" / "dataset.json").write_text('{"name": "a", "label_set": "KITTI-14", "splits": {}}')
-    monkeypatch.setattr(semgrid_edu.datasets.index, "dataset_doubts", lambda *_: [])
+    monkeypatch.setattr(semgrid_edu.workshop.commands.dataset_doubts, "dataset_doubts", lambda *_: [])
     monkeypatch.setattr(module, name, interrupted)
     monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments.split()])
     with pytest.raises(SystemExit, match=f"^semgrid-edu: interrupted; the same command {told}$"):
@@ -164,7 +163,7 @@ def test_workers_end_without_a_word_when_their_command_is_stopped(tmp_path, sent
 def test_a_script_without_a_main_guard_is_told_so(tmp_path):
     script = tmp_path / "mine.py"
     script.write_text(
-        "from semgrid_edu.storage.workplace import worker_pool\n"
+        "from semgrid_edu.workshop.workplace import worker_pool\n"
         "with worker_pool(1) as pool: pool.submit(abs, 1).result()"
     )
     ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)

@@ -14,10 +14,11 @@ from typer.testing import CliRunner
 
 from semgrid_edu.datasets import index, training_cache
 from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import SEGMENTERS
-from semgrid_edu.occupancy import CmcdotParams, Evidence, State, track_drive
+from semgrid_edu.occupancy import CmcdotParams, Evidence, State
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.paper import ablations, reproduce
 from semgrid_edu.workshop.paper.variants import Variant
@@ -26,8 +27,8 @@ ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 FOLDERS = "semgrid_edu|tests|benchmarks|notebooks|data_samples|docs"
 ROOMS = "|".join(path.stem for path in (ROOT / "semgrid_edu").iterdir() if path.name[0].isalpha())
-BACKBONE = "semgrid_edu/networks/backbones/two_layers.py"  # the one that a contributor writes
-REGISTER = "semgrid_edu/workshop/course/registers.toml"
+BACKBONE = "semgrid_edu/networks/two_layers.py"  # the one that a contributor writes
+REGISTER = "notebooks/worlds/lecture_00_equations.toml"
 
 BLOCKS = [
     re.sub(rf"^{re.match(' *', block)[0]}", "", block, flags=re.MULTILINE)

@@ -1,4 +1,4 @@
-"""Imports run one way: down the map of the house in docs/house.md, and never from the book to the workshop."""
+"""Imports run one way: down the map of docs/house.md, never from the book to `fast` or to the workshop."""
 
 import ast
 import re
@@ -12,7 +12,10 @@ PACKAGE = Path(semgrid_edu.__file__).parent
 MAP = PACKAGE.parent / "docs" / "house.md"
 FILES = sorted(PACKAGE.rglob("*.py"))
 MODULES = [path for path in FILES if path.name not in ("__init__.py", "__main__.py")]
-WORKSHOP = "workshop"
+ASSEMBLES_EITHER = "stages.stages"
+"""The one module of the book that may name `fast`: it assembles the stages from the book's parts or from twins."""
+LOADS_BY_NAME = {"__init__.py", "fast/__init__.py"}
+"""Modules that load others by name: the two tables of public names."""
 
 
 def dotted(path: Path) -> str:
@@ -34,7 +37,7 @@ def room_of(name: str) -> str:
 
 
 def imported(path: Path) -> set[str]:
-    """What a module imports of the package: modules and folders, by their names inside it."""
+    """What a module imports of the package, at the top or inside functions: modules and folders, by their names."""
     nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
     names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     for node in nodes:
@@ -54,33 +57,51 @@ def folder_of(name: str) -> str:
     return name if (PACKAGE.joinpath(*name.split(".")) / "__init__.py").is_file() else name.rpartition(".")[0]
 
 
-def in_workshop(name: str) -> bool:
-    return name.split(".")[0] in (WORKSHOP, "__main__")  # the door of `python -m` leads to the workshop
+def storey(name: str) -> str:
+    first = name.split(".")[0]
+    return {"fast": "fast", "workshop": "workshop", "__main__": "workshop"}.get(first, "book")
 
 
 def imports_between_folders() -> dict[str, set[str]]:
     """Which folders the modules of each folder import from, without what `__init__` collects from its own."""
     graph = defaultdict(set)
     for path in MODULES:
-        here = dotted(path.parent)
-        graph[here] |= {folder_of(name) for name in imported(path)} - {here}
+        if dotted(path) != ASSEMBLES_EITHER:
+            here = dotted(path.parent)
+            graph[here] |= {folder_of(name) for name in imported(path)} - {here}
     return graph
 
 
 def test_the_map_names_every_room_once():
     def rooms_in(folder: Path) -> set[str]:
         inside = [*folder.glob("*.py"), *(init.parent for init in folder.glob("*/__init__.py"))]
-        return {dotted(path) for path in inside} - {dotted(folder), WORKSHOP}
+        return {dotted(path) for path in inside} - {dotted(folder), "workshop"}
 
-    there = rooms_in(PACKAGE) | rooms_in(PACKAGE / WORKSHOP)
+    there = rooms_in(PACKAGE) | rooms_in(PACKAGE / "workshop")
     assert sorted(house()) == sorted(there - {""})
 
 
-def test_the_book_never_imports_the_workshop():
-    book = [path for path in FILES if not in_workshop(dotted(path))]
-    back = {dotted(path): found for path in book if (found := set(filter(in_workshop, imported(path))))}
-    assert len(book) > 100
-    assert back == {}
+def test_the_book_imports_neither_fast_nor_the_workshop():
+    book = [path for path in FILES if storey(dotted(path)) == "book"]
+    back = {dotted(path): found for path in book if (found := {n for n in imported(path) if storey(n) != "book"})}
+    assert len(book) > 50
+    assert {name: found for name, found in back.items() if found} == {ASSEMBLES_EITHER: {"fast"}}
+
+
+def test_fast_never_imports_the_workshop():
+    fast = [path for path in FILES if storey(dotted(path)) == "fast"]
+    assert len(fast) > 3
+    assert {n for path in fast for n in imported(path) if storey(n) == "workshop"} == set()
+
+
+def test_nothing_is_imported_by_name_at_run_time():
+    by_name = re.compile(r"\b(import_module|__import__|find_spec|exec|eval)\(")
+    found = {
+        path.relative_to(PACKAGE).as_posix()
+        for path in FILES
+        if storey(dotted(path)) != "workshop" and by_name.search(path.read_text(encoding="utf-8"))
+    }
+    assert found == LOADS_BY_NAME
 
 
 def test_a_room_imports_only_from_what_stands_above_it():

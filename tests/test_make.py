@@ -61,9 +61,9 @@ def test_an_environment_that_could_not_be_made_is_made_again(clone, monkeypatch)
 
 
 SLOW_TO_COMPILE = {
-    "semgrid_edu.occupancy.particles": "_fly",
-    "semgrid_edu.crf.mean_field": "_update",
-    "semgrid_edu.crf.accurate": "_window_sums",
+    "semgrid_edu.fast.occupancy.particles": "_fly",
+    "semgrid_edu.fast.crf.mean_field": "_update",
+    "semgrid_edu.fast.crf.windowed": "_window_sums",
     "semgrid_edu.workshop.simulation.sensors.shading": "_shade",
 }
 """A function each of the filter, the two ways of the CRF and the simulator, by its module."""
@@ -106,6 +106,25 @@ def test_tests_in_a_browser_are_apart(clone, ran):
     ran.clear()
     make.test()
     assert "--ignore=tests/browser" in ran[2]
+
+
+def test_real_data_is_named_by_variables(clone, ran, monkeypatch):
+    for name in make.REAL_DATA:
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(SystemExit, match="usage: make test-real KITTI="):
+        make.test_real()
+    monkeypatch.setenv("PANDASET", str(clone))
+    make.test_real()
+    assert ran[-1][-1]["PANDASET"] == str(clone)
+    assert ran[-1][2:-1] == ("pytest", "-m", "real", "tests")
+
+
+def test_the_quick_job_leaves_notebooks_and_graders_out(clone, ran):
+    make.quick()
+    words = ran[-1][:-1]
+    assert "tests" in words
+    assert "--ignore=tests/graders" in words
+    assert not any(word.endswith(".ipynb") for word in words)
 
 
 def test_an_old_python_is_refused(clone, monkeypatch):

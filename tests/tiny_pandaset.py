@@ -47,6 +47,7 @@ _CLASSES = {
     "pandas.core.frame": ["DataFrame"],
     "pandas.core.internals.managers": ["BlockManager"],
     "pandas.core.indexes.base": ["_new_Index", "Index"],
+    "pandas.core.indexes.range": ["RangeIndex"],
 }
 _FAKES = {name: _named(module, name) for module, names in _CLASSES.items() for name in names}
 
@@ -72,7 +73,9 @@ def pickled_table(columns, protocol=3):
         for places in kinds.values()
     ]
     names = _Called(_FAKES["_new_Index"], _FAKES["Index"], {"data": np.array(list(columns), object), "name": None})
-    manager = _FAKES["BlockManager"](([], [], [], {"0.14.1": {"axes": [names], "blocks": blocks}}))
+    rows = {"name": None, "start": 0, "stop": max(map(len, values)), "step": 1}
+    axes = [names, _Called(_FAKES["_new_Index"], _FAKES["RangeIndex"], rows)]
+    manager = _FAKES["BlockManager"](([], [], [], {"0.14.1": {"axes": axes, "blocks": blocks}}))
     modules = {module: ModuleType(module) for module in (*_CLASSES, "pandas", "pandas.core", "pandas.core.internals")}
     for module, classes in _CLASSES.items():
         vars(modules[module]).update({name: _FAKES[name] for name in classes})

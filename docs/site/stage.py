@@ -17,8 +17,11 @@ from matplotlib import pyplot as plt
 from nbformat import NotebookNode
 from widgets import RECORDED, stand_in, widget_cell
 
-from semgrid_edu.stage_models import ledger, ledger_table, read_scans
-from semgrid_edu.workshop.course.registers import STAGES, equation_table, find_code, notebook_link, stage_table
+sys.path.append(str(Path(__file__).resolve().parents[2] / "notebooks"))
+
+from worlds.lecture_00_equations import equation_table, notebook_link
+from worlds.lecture_00_ledger import STAGES, ledger, ledger_table, stage_table
+from worlds.lecture_02_cell import read_scans
 
 HERE = Path(__file__).resolve().parent
 CLONE = HERE.parents[1]
@@ -39,7 +42,7 @@ SECTIONS = ("lectures", "companions", "exercises", "graphs", "glossary", "result
 """The pages of the site's bar."""
 MODULES = (
     *("answers", "camera", "crf", "datasets", "errors", "frame", "graphical", "grid", "labels", "memory", "metrics"),
-    *("networks", "occupancy", "pipeline", "planes", "plotting", "stage_models", "storage", "story", "training"),
+    *("networks", "occupancy", "pipeline", "planes", "plotting", "storage", "story", "training"),
 )
 """The modules and rooms of the book, each a page of the reference."""
 LINK = re.compile(r"```.*?```|`[^`\n]*`|(!?\[(?:[^\[\]]|\[[^\]]*\])*\])\(([^()\s#:]+)(#[^()\s]*)?\)", re.DOTALL)
@@ -198,20 +201,20 @@ def write_graphs(folder: Path) -> None:
     (folder / "graphs").mkdir()
     parts = [
         "# Graphs, ledger, equations",
-        "Each stage is exact inference in some model. Dashed edges are those that the system cuts. On them stands what",
-        "that costs, on a toy world small enough for exact inference: the exact answer, an arrow, the system's answer.",
+        "Each stage is exact inference in some model. Dashed edges are those that the system cuts. The numbers on them",
+        "are the price on a toy world small enough for exact inference: exact answer, arrow, the system's answer.",
     ]
     for entry in STAGES:
-        build = find_code(entry.model)
-        graph = build(read_scans("#.")) if "scans" in signature(build).parameters else build()
+        one_cell = "scans" in signature(entry.build).parameters
+        graph = entry.build(read_scans("#.")) if one_cell else entry.build()
         ax = graph.draw()
         ax.figure.savefig(folder / "graphs" / f"{entry.id}.png", dpi=110, bbox_inches="tight")
         plt.close(ax.figure)
-        cuts = "; ".join(f"{edge.edge}: {edge.price}" for edge in graph.cut) or "no edge is cut"
+        cuts = "; ".join(f"{edge.edge}: {edge.cost}" for edge in graph.cut) or "no edge is cut"
         words = f"Graph of {graph.title}. Nodes {', '.join(graph.model.names)}. Cut: {cuts}"
         shown = f"![{words.replace('[', '(').replace(']', ')')}](graphs/{entry.id}.png)"
         parts += ["", f"## {entry.title}", "", f"Drawn in {in_notebooks(notebook_link(entry.lecture))}.", "", shown]
-        parts += ["", *(f"- `{edge.edge}`: {edge.price}" for edge in graph.cut)]
+        parts += ["", *(f"- `{edge.edge}`: {edge.cost}" for edge in graph.cut)]
     tables = {
         "The ledger of cut edges": ledger_table(ledger()),
         "Checked by": in_notebooks(stage_table()),
@@ -230,7 +233,7 @@ def in_notebooks(text: str) -> str:
     text : str
         Markdown.
     """
-    text = re.sub(r"\[([^\]]*)\]\(\.\./[^)]*\)", r"\1", text)
+    text = re.sub(r"\[([^\]]*)\]\((\.\./[^)]*|[^)]*\.py)\)", r"\1", text)
     return re.sub(r"\]\((?!http)", "](notebooks/", text)
 
 

@@ -35,7 +35,7 @@ from scipy import ndimage
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, project
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.graphical import d_separated, why_dependent
@@ -49,10 +49,10 @@ from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.planes import sample_planes_naive
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, class_legend, colour_patches
-from semgrid_edu.plotting.story import draw_cell_story
-from semgrid_edu.stage_models import ledger, ledger_table, whole_system
-from semgrid_edu.story import cell_story
-from semgrid_edu.workshop.course.registers import equation_table, stage_table
+from semgrid_edu.workshop.demo import cell_story, draw_cell_story
+from worlds.lecture_00_equations import equation_table
+from worlds.lecture_00_ledger import ledger, ledger_table, stage_table
+from worlds.lecture_00_system import whole_system
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 spec = GridSpec.compact()
@@ -81,8 +81,8 @@ assert story.label == story.refined == story.truth == CAR
 assert story.scan.verdict == "hit"
 assert story.steps["shown"][State.STATIC] > 0.9
 assert (story.history[State.STATIC, 1:] > 0.9).all()
-assert story.pull.messages.argmax() == CAR
-assert story.pull.before[CAR] > 0.99
+assert story.messages.argmax() == CAR
+assert story.before[CAR] > 0.99
 
 # %% [markdown]
 # Read it from A to G, one column after the other. You needn't understand any panel yet: the rest of this page explains
@@ -443,7 +443,7 @@ assert (trained.sampler(one_pixel) > 0).any(dim=2).sum() > 50
 # a probability for each class, by a soft-max. Its score for a class is a sum of parts, and panels D to F show them:
 
 # %% tags=["nbval-ignore-output"]
-why = story.for_label.minus(story.for_rival)
+why = story.why
 parts = {"image": why.planes.sum(), "occupancy": why.occupancy.sum(), "constants": why.rest}
 print(f"{KITTI_14.names[story.label]} against {KITTI_14.names[story.rival]}, in our cell:")
 for name, part in (parts | {"sum": why.score}).items():

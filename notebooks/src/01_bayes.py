@@ -30,14 +30,16 @@ from ipywidgets import FloatSlider, interact
 
 from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, in_rows
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles, PlanarMotion, SensorModel, State
-from semgrid_edu.occupancy import scan_evidence, track_drive, transition_matrix
+from semgrid_edu.occupancy import scan_evidence, transition_matrix
 from semgrid_edu.occupancy import update as update_grid
-from semgrid_edu.stage_models import ledger, ledger_table
-from semgrid_edu.stage_models.line import bayes_on_a_line, filtered, most_likely_path, smoothed
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_01_line import bayes_on_a_line, filtered, most_likely_path, smoothed
+from worlds.lecture_01_lines import belief_history, probability_lines, state_history
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 
@@ -181,7 +183,7 @@ np.testing.assert_allclose(one_reading, discrete_bayes.update(P_POLE, nothing_kn
 print("cell 3: {:.3f}   cell 5: {:.3f}".format(*one_reading[[3, 5]]))
 
 # %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="three rows of ten bars: the prior is 0.10 everywhere; the likelihood of pole is 0.80 in cells 2, 3 and 7 and 0.10 elsewhere; the posterior is 0.26 in those three cells and 0.03 elsewhere"
-plotting.probability_lines({"prior": nothing_known, "likelihood of 'pole'": P_POLE, "posterior": one_reading})
+probability_lines({"prior": nothing_known, "likelihood of 'pole'": P_POLE, "posterior": one_reading})
 plt.show()
 
 # %% [markdown]
@@ -236,7 +238,7 @@ print(f"cell 3: {moved_on[3]:.3f}   sum: {moved_on.sum():.3f}")
 
 # %% jupyter={"source_hidden": true} alt="three rows of ten bars: after one reading 0.26 in cells 2, 3 and 7; after the move the same one cell to the right and blunter; after the second reading 0.55 in cell 3 and less than 0.2 elsewhere"
 two_readings = update(P_POLE, moved_on)
-plotting.probability_lines(
+probability_lines(
     {"after one reading": one_reading, "after the move": moved_on, "after the second reading": two_readings}
 )
 plt.show()
@@ -299,7 +301,7 @@ for k, says in enumerate(says_pole):
 np.testing.assert_array_equal(places, TRIP)
 np.testing.assert_array_equal(np.flatnonzero(says_pole), SAYS_POLE)
 fig, axes = plt.subplots(2, 1, figsize=(7, 4.2), sharex=True, layout="constrained")
-plotting.belief_history(np.array(history), ax=axes[0], truth=places).set(xlabel="")
+belief_history(np.array(history), ax=axes[0], truth=places).set(xlabel="")
 fig.colorbar(axes[0].images[0], ax=axes, label="probability", shrink=0.46, anchor=(0, 1))
 axes[1].plot(np.repeat(np.arange(25), 2) + np.tile([-0.25, 0.0], 25), bits, "-", color="0.6")
 axes[1].plot(np.arange(25) - 0.25, bits[::2], "o", color="#0072b2", markersize=4, label="after predict")
@@ -562,7 +564,7 @@ seen = localise(heard)
 path = np.eye(N_CELLS)[best_path(heard)]
 for ax, name, table in zip(axes, names, (seen, smooth(seen, heard), path), strict=True):
     row = table.argmax(axis=1)
-    plotting.belief_history(table, ax, truth=np.array(TRIP)).set_title(
+    belief_history(table, ax, truth=np.array(TRIP)).set_title(
         f"{name}: right in {np.sum(row == TRIP)} of 25 steps", fontsize=10
     )
     ax.label_outer()
@@ -695,7 +697,7 @@ times = np.linspace(0, 10, 51)
 fig, axes = plt.subplots(1, 2, figsize=(9, 2.4), sharey=True, layout="constrained")
 for ax, state in zip(axes, (State.STATIC, State.DYNAMIC), strict=True):
     forgets = np.array([np.eye(4)[state] @ transition_matrix(params, t) for t in times])
-    plotting.state_history(times, forgets.T, ax=ax).set_title(f"{state.name}, then out of sight")
+    state_history(times, forgets.T, ax=ax).set_title(f"{state.name}, then out of sight")
 axes[0].get_legend().remove()
 axes[1].set_ylabel("")
 plt.show()
@@ -798,7 +800,7 @@ assert min(history[0, 0, State.FREE], history[0, 1, State.STATIC]) > 0.9  # road
 times = [frame.time - frames[0].time for frame in frames]
 fig, axes = plt.subplots(2, 2, figsize=(9, 4.6), sharex=True, sharey=True, layout="constrained")
 for ax, name, cell in zip(axes.ravel(), SPOTS, history.transpose(1, 2, 0), strict=True):
-    plotting.state_history(times, cell, ax=ax).set_title(name)
+    state_history(times, cell, ax=ax).set_title(name)
     ax.label_outer()
     if ax is not axes[0, 1]:
         ax.get_legend().remove()
@@ -894,7 +896,7 @@ def show(hit, slip, ax=None):
     """Draw a trip of 40 steps, and what a filter believes that knows sensor and odometry; return places, favourites."""
     places, history = one_trip(hit, slip, np.random.default_rng(6))
     right = 100 * np.mean(history.argmax(axis=1) == places)
-    ax = plotting.belief_history(history, ax, truth=places)
+    ax = belief_history(history, ax, truth=places)
     ax.set_title(f"hit {hit:.2f}, slip {slip:.2f}: right in {right:.0f} %", fontsize="medium")
     return places, history.argmax(axis=1)
 

@@ -39,16 +39,15 @@ from semgrid_edu.labels import KITTI_14
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.occupancy import LogOddsGrid, LogOddsParams, PlanarMotion, SensorModel, State, log_odds, probability
-from semgrid_edu.occupancy import scan_evidence, scan_evidence_literal, smear_area, update_log_odds
+from semgrid_edu.occupancy import scan_evidence, smear_area, update_log_odds
 from semgrid_edu.plotting.colours import STATE_COLOURS, colour_legend
-from semgrid_edu.stage_models import BeamWorld, beam_beliefs, beam_over_cells, count_rings, exact_cell, ledger
-from semgrid_edu.stage_models import ledger_table, one_log_odds_cell, package_log_odds_cell, read_scans
-from semgrid_edu.stage_models import scan_with_pose_error, thick_walls
-from semgrid_edu.stage_models.beam import range_state
-from semgrid_edu.stage_models.thick_walls import same_sensor
 from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_02_beam import BeamWorld, beam_beliefs, beam_over_cells, range_state
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
+from worlds.lecture_02_cell import exact_cell, one_log_odds_cell, package_log_odds_cell, read_scans
+from worlds.lecture_02_thick_walls import count_rings, same_sensor, scan_with_pose_error, thick_walls
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 GHOST = (225, 20, 30)  # occupied in the map, although the road there is empty
@@ -241,7 +240,7 @@ def one_beam(length, n_cells, cell):
 
 occupied, free = one_beam(length=3.5, n_cells=5, cell=1.0)
 column = GridSpec(x_min=0, x_max=5, y_min=-0.5, y_max=0.5, cell=1)
-package = scan_evidence_literal(np.array([[3.5, 0.0, 1.0]]), column, sensor)  # one return, 1 m above the ground
+package = scan_evidence(np.array([[3.5, 0.0, 1.0]]), column, sensor)  # one return, 1 m above the ground
 np.testing.assert_allclose(occupied, package.occupied[::-1, 0])  # row 0 is the farthest ahead
 np.testing.assert_allclose(free, package.free[::-1, 0])
 print("P(occupied):", (0.5 * occupied / (0.5 * occupied + 0.5 * free)).round(2))

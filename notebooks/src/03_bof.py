@@ -40,20 +40,19 @@ from semgrid_edu.graphical import d_separated, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import Bof, BofParams, BofState, Evidence, LogOddsGrid, PlanarMotion, State
-from semgrid_edu.occupancy import VelocityLattice, WorldModel, bof_predict, bof_predict_literal, bof_update
+from semgrid_edu.occupancy import VelocityLattice, WorldModel, bof_predict, bof_update
 from semgrid_edu.occupancy import bof_velocity, scan_evidence, smear_area
 from semgrid_edu.plotting.moving import wheel_colours
-from semgrid_edu.stage_models import bof_stage, ledger, ledger_table
-from semgrid_edu.stage_models.bof import HEAD_ON, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, expected_things
-from semgrid_edu.stage_models.cells_in_a_row import Cell, CellsInARow
-from semgrid_edu.stage_models.joint_row import exact_beliefs, row_evidence, row_model
+from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
+from worlds.lecture_03_bof import HEAD_ON, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, bof_stage, expected_things
+from worlds.lecture_03_row import Cell, CellsInARow, exact_beliefs, row_evidence, row_model
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 defaults = WorldModel()  # the numbers of the table of five things
 assert defaults.first_sight == (0.952, 0.045, 0.003)
-assert (defaults.stop_rate, defaults.stop_speed, defaults.clearing_time) == (5.0, 0.4, 0.5)
+assert (defaults.stop_rate, defaults.stop_speed, defaults.walls.clearing_time) == (5.0, 0.4, 0.5)
 
 # %% [markdown]
 # ## One column, sheared apart
@@ -64,7 +63,7 @@ assert (defaults.stop_rate, defaults.stop_speed, defaults.clearing_time) == (5.0
 # one place; dark blue is probable. Below is what remains when the velocities are summed: P(occupied).
 
 # %% jupyter={"source_hidden": true}
-steady = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=0, clearing_time=0)
+steady = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=0, walls=None)
 strip, fan = GridSpec(x_min=0, x_max=20, y_min=0, y_max=0.5, cell=0.5), VelocityLattice(max_speed=4, spacing=1)
 rows = [fan.velocities.tolist().index([v, 0]) for v in range(-4, 5)]
 occupied = np.zeros((len(fan), *strip.shape), np.float32)
@@ -432,9 +431,8 @@ def on_the_line(values):
 rng, toy = np.random.default_rng(0), BofParams(lattice, steady)  # `steady`: things move, and that is all
 for _ in range(20):
     random = 0.45 * rng.dirichlet(np.ones(3), size=6).T
-    for package in (bof_predict, bof_predict_literal):  # whole arrays at once, and cell by cell
-        predicted = package(as_state(random), line, toy, dt=1.0)
-        np.testing.assert_allclose(on_the_line(predicted.occupied[on_line]), predict(random), atol=1e-6)
+    predicted = bof_predict(as_state(random), line, toy, dt=1.0)
+    np.testing.assert_allclose(on_the_line(predicted.occupied[on_line]), predict(random), atol=1e-6)
     scan = Evidence(*(beam[::-1, None].astype(np.float32) for beam in beams(hit=3)))
     seen = on_the_line(bof_update(as_state(random), line, scan, toy).occupied[on_line])
     np.testing.assert_allclose(seen, look(random, *beams(hit=3)), atol=1e-6)
@@ -665,7 +663,7 @@ for frame in drive:
     grid = log_odds.step(frame.points_grid, motion, frame.time - before.time)
     before = frame
 empty = drive[19].labels.birdseye_on(street) == road
-no_look_back = follow(drive, WorldModel(clearing_time=0))[19]
+no_look_back = follow(drive, WorldModel(walls=None))[19]
 occupied_now = [grid, *(b.probability[[STATIC, DYNAMIC]].sum(axis=0) for b in (no_look_back, beliefs[19]))]
 ghosts = [smear_area(p, empty, street) for p in occupied_now]
 on_the_left = empty & (x > 16) & (x < 22) & (y > 0)

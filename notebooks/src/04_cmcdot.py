@@ -39,21 +39,24 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.plotting.colours import HEADING_COLOURS, colour_patches
 from semgrid_edu.plotting.grids import draw_map
 from semgrid_edu.plotting.moving import wheel_colours
-from semgrid_edu.stage_models import cmcdot_stage, ledger, ledger_table
-from semgrid_edu.stage_models.bof import bof_beliefs
-from semgrid_edu.stage_models.cells_in_a_row import Cell
-from semgrid_edu.stage_models.cmcdot import LEFT_OR_RIGHT, particle_beliefs, sampling_error
-from semgrid_edu.stage_models.joint_row import exact_beliefs
+from worlds.lecture_04_scenes import hit_cells
 
 # %% jupyter={"source_hidden": true}
+from semgrid_edu.fast import Cmcdot, track_drive
 from semgrid_edu.occupancy import (
-    Bof, Cmcdot, CmcdotParams, Evidence, FilterState, LogOddsGrid, Particles, PlanarMotion, State, VelocityLattice,
-    move, predict, resample, scan_evidence, track_drive, transition_matrix, update,
+    Bof, CmcdotParams, Evidence, FilterState, LogOddsGrid, Particles, PlanarMotion, State, VelocityLattice,
+    move, predict, resample, scan_evidence, transition_matrix, update,
 )  # fmt: skip
 from semgrid_edu.occupancy.planar_motion import scroll
 from semgrid_edu.occupancy.resampling import systematic_resample
 from semgrid_edu.occupancy.steps import initialise_unknown
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_01_lines import state_history
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
+from worlds.lecture_03_bof import bof_beliefs
+from worlds.lecture_03_row import Cell, exact_beliefs
+from worlds.lecture_04_cmcdot import LEFT_OR_RIGHT, particle_beliefs, sampling_error
+from worlds.lecture_04_cmcdot_graph import cmcdot_stage
 from worlds.lecture_04_scenes import hit_cells
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
@@ -357,7 +360,7 @@ for step in range(1, 6):
 line = GridSpec(x_min=0, x_max=6, y_min=0, y_max=1, cell=1)  # six cells straight ahead
 one = GridSpec(x_min=0, x_max=1, y_min=0, y_max=1, cell=1)
 NO_RATES = ((0.0,) * 4,) * 4
-calm = CmcdotParams(rates=NO_RATES, stop_rate=0.0, max_acceleration=0.0, clearing_time=0.0, n_particles=4)
+calm = CmcdotParams(rates=NO_RATES, stop_rate=0.0, max_acceleration=0.0, walls=None, n_particles=4)
 
 
 def as_line(values):
@@ -407,7 +410,7 @@ assert rates[[FREE, DYNAMIC, STATIC], UNKNOWN].tolist() == [0.3, 0.5, 0.1]
 assert rates[[FREE, STATIC], DYNAMIC].tolist() == [0.01, 0.01]
 fig, axes = plt.subplots(1, 3, figsize=(9.5, 2.2), layout="constrained", sharey=True)
 for ax, state in zip(axes, (FREE, STATIC, DYNAMIC), strict=True):
-    plotting.state_history(times, chain[:, state].T, ax=ax)
+    state_history(times, chain[:, state].T, ax=ax)
     ax.set_title(f"it was {state.name}", fontsize=10)
     if state != DYNAMIC:
         ax.get_legend().remove()
@@ -773,7 +776,7 @@ for ax, name, place in zip(
     for _, x, _, belief in run:
         row, col, _ = near.cells(np.array([[place[0] - x, place[1]]]))
         past.append(belief.probability[:, row[0], col[0]])
-    plotting.state_history(np.arange(25) / 10, np.array(past).T, ax=ax)
+    state_history(np.arange(25) / 10, np.array(past).T, ax=ax)
     ax.set_title(f"a cell {name}", fontsize=10)
 axes[0].get_legend().remove()
 plt.show()
@@ -997,7 +1000,7 @@ for ax, letter, ahead in zip(axes[1:], "GH", (3.2, 12.2), strict=True):
     axes[0].plot(3.2, ahead, "o", mfc="white", color="#6a1b9a", ms=8)
     axes[0].text(2.3, ahead, letter, weight="bold", va="center")
     past = np.array([belief.probability[:, row[0], col[0]] for *_, belief in seen])
-    plotting.state_history(np.arange(30) / 10, past.T, ax=ax)
+    state_history(np.arange(30) / 10, past.T, ax=ax)
     ax.set_title(f"cell {letter}, {ahead:.0f} m ahead", fontsize=10)
     if letter == "G":
         assert past[:21, STATIC].min() > 0.8
@@ -1028,9 +1031,9 @@ plt.show()
 even = (0.952, 0.024, 0.024)  # at first sight, STATIC and DYNAMIC equally probable
 suspects = {
     "the filter as it is": params,
-    "without the look-back rules": replace(params, clearing_time=0.0),
+    "without the look-back rules": replace(params, walls=None),
     "with even odds at first sight": replace(params, first_sight=even),
-    "with both changes": replace(params, clearing_time=0.0, first_sight=even),
+    "with both changes": replace(params, walls=None, first_sight=even),
 }
 of_f = {name: dynamic_shares("the car F", track_drive(real, wide, settings)) for name, settings in suspects.items()}
 

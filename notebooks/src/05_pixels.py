@@ -38,8 +38,8 @@ from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.planes import plane_pixels
-from semgrid_edu.stage_models import ledger, ledger_table, pixel_height, pixel_ray
-from semgrid_edu.stage_models.pixel_ray import CAR_HEIGHTS, cell_by_cell, exact_ray, occlusion_cost
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_05_pixel_ray import CAR_HEIGHTS, cell_by_cell, exact_ray, occlusion_cost, pixel_height, pixel_ray
 
 # %% jupyter={"source_hidden": true}
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI

@@ -30,15 +30,15 @@ from scipy import ndimage
 
 from semgrid_edu import plotting
 from semgrid_edu.camera import transform_points
-from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
-from semgrid_edu.stage_models import ledger, ledger_table, shared_pixel
-from semgrid_edu.stage_models.pixel_ray import believed_by_readers
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_06_shared_pixel import believed_by_readers, shared_pixel
 
 # %% jupyter={"source_hidden": true}
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI

@@ -28,21 +28,21 @@ from IPython.display import Markdown
 from ipywidgets import IntSlider, interact
 
 from semgrid_edu import plotting
-from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_image_stage, sample_weights
 from semgrid_edu.datasets.training_arrays import resize_image
+from semgrid_edu.fast import track_drive
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
-from semgrid_edu.networks.backbones.deeplab import interpolate
-from semgrid_edu.networks.backbones.fcn import enlarge
-from semgrid_edu.occupancy import track_drive
+from semgrid_edu.networks.deeplab import interpolate
+from semgrid_edu.networks.fcn import enlarge
 from semgrid_edu.plotting.images import draw_image
-from semgrid_edu.stage_models import ledger, ledger_table, post_pixels
-from semgrid_edu.stage_models.pixel_ray import believed_of_post
 
 # %% jupyter={"source_hidden": true}
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_07_post import believed_of_post, post_pixels
 from worlds.lecture_07_thin_pole import (
     MECHANISMS,
     apply_mechanism,

@@ -35,21 +35,23 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
-from semgrid_edu.datasets.ground_truth import NO_FLAWS, Moment, TruthFlaws, TruthPolicy, carry_labels, close_and_spread
-from semgrid_edu.datasets.ground_truth import drive_truth, flawed_drive, gather_returns, lidar_truth
-from semgrid_edu.datasets.readers.project_lidar import closest_returns
+from semgrid_edu.datasets.ground_truth import Moment, TruthPolicy, carry_labels, close_and_spread
+from semgrid_edu.workshop.flaws import NO_FLAWS, TruthFlaws
+from semgrid_edu.datasets.ground_truth import drive_truth, gather_returns, lidar_truth
+from semgrid_edu.workshop.flaws import flawed_drive
+from semgrid_edu.datasets.project_lidar import closest_returns
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.graphical.drawing import Dashed
-from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
-from semgrid_edu.stage_models import LabelWorld, ledger, ledger_table, lidar_label_stage, wrong_label
-from semgrid_edu.stage_models.ground_truth_label import STATE_GIVEN_CONTENT
+from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, d_separated, draw, eliminate
 
 # %% jupyter={"source_hidden": true}
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
-from semgrid_edu.occupancy import State, track_drive
+from semgrid_edu.occupancy import State
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_09_label import STATE_GIVEN_CONTENT, LabelWorld, lidar_label_stage, wrong_label
 from worlds.lecture_09_counts import BAND_EDGES, TruthCounts, counts_of
 from worlds.lecture_09_pictures import DIFFERENCES, difference_kinds, policy_errors, truth_difference, truth_errors
 from worlds.lecture_09_policies import simulated_drive

@@ -34,15 +34,13 @@ from scipy.special import rel_entr, softmax, xlogy
 
 from semgrid_edu import plotting
 from semgrid_edu.crf import CrfParams, crf_model, damping, energy, exact_marginals, free_energy, gram_matrix
-from semgrid_edu.crf import log_partition, mean_field, mean_field_naive, mean_field_sequential, mean_field_updates
+from semgrid_edu.crf import log_partition, mean_field_naive, mean_field_sequential, mean_field_updates
 from semgrid_edu.crf import most_likely, pair_weights, unary_from_probability
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.datasets.grid_truth import grid_truth
+from semgrid_edu.fast import mean_field
 from semgrid_edu.graphical import GraphicalModel, d_separated, draw
-from semgrid_edu.graphical.drawing import CUT_COLOUR
-from semgrid_edu.stage_models import crf_stage, ledger, ledger_table
-from semgrid_edu.stage_models.crf import UNDECIDED, all_free, coupled, two_classes
-from semgrid_edu.stage_models.crf import coupling_sweep, critical_coupling
+from semgrid_edu.graphical.places import CUT_COLOUR
 from semgrid_edu.grid import GridSpec
 
 # %% jupyter={"source_hidden": true}
@@ -51,6 +49,10 @@ from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import run_pipeline
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_10_crf import (
+    UNDECIDED, all_free, coupled, coupling_sweep, crf_stage, critical_coupling, two_classes,
+)  # fmt: skip
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 drive = sample_drive()

@@ -36,23 +36,24 @@ from scipy.spatial.distance import cdist
 from scipy.special import softmax
 
 from semgrid_edu import plotting
-from semgrid_edu.crf import CrfParams, PermutohedralLattice, SeparableGaussian, enclosing_simplex_literal, gram_matrix
-from semgrid_edu.crf import damping, lattice_literal, mean_field, mean_field_accurate, mean_field_naive
-from semgrid_edu.crf import mean_field_updates, unary_from_log_probability
-from semgrid_edu.crf.mean_field import bilateral_kernel
-from semgrid_edu.crf.lattice.simplices import elevation, peak
+from semgrid_edu.crf import CrfParams, PermutohedralLattice, SeparableGaussian, bilateral_kernel, damping, gram_matrix
+from semgrid_edu.crf import enclosing_simplices, mean_field_naive, mean_field_updates, unary_from_log_probability
+from semgrid_edu.crf.lattice import elevation, peak
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.datasets.grid_truth import grid_truth
+from semgrid_edu.fast import mean_field
 from semgrid_edu.graphical import d_separated, draw
-from semgrid_edu.stage_models import crf_stage
 
 # %% jupyter={"source_hidden": true}
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.pipeline import Stages, network_image
+from worlds.lecture_10_crf import crf_stage
+from worlds.lecture_11_accurate import mean_field_accurate
+from worlds.lecture_11_lattice import draw_lattice_frame, draw_triangles, lattice_story, vertex_places
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 drive, spec = sample_drive(), GridSpec.compact()
@@ -112,9 +113,9 @@ draw(graph.model, axes[0], positions=graph.positions)
 axes[0].set_title("the model: 36 pairs of 9 cells")
 rng = np.random.default_rng(3)
 places = np.column_stack([np.linspace(0.4, 4.6, 12), np.where(np.arange(12) < 6, 0.8, 3.4) + rng.normal(0, 0.25, 12)])
-plotting.draw_triangles((-1.1, -1.3), (6.3, 5.8), axes[1])
-for place, point in zip(places, places @ elevation(2).T, strict=True):
-    for corner in plotting.vertex_places(enclosing_simplex_literal(point)[0]):
+draw_triangles((-1.1, -1.3), (6.3, 5.8), axes[1])
+for place, simplex in zip(places, enclosing_simplices(places @ elevation(2).T)[0], strict=True):
+    for corner in vertex_places(simplex):
         axes[1].plot(*zip(place, corner, strict=True), color="0.35", linewidth=0.8)
         axes[1].plot(*corner, "s", color="0.35", markersize=4)
 axes[1].plot(*places.T, "o", color="#fc7200", markersize=8, markeredgecolor="k")
@@ -352,7 +353,7 @@ def cube_corners(features):
 table = ["sigma_beta   grid points   used   corners of simplices, see below"]
 for sigma_beta in (0.2, 0.1, 0.05):
     narrow = features_of(o, replace(params, sigma_beta=sigma_beta))
-    vertices = {corner for y in narrow @ elevation(5).T for corner in enclosing_simplex_literal(y)[0]}
+    vertices = PermutohedralLattice.build(narrow).vertices
     table.append("{:10.2f} {:13,d} {:6,d} {:12,d}".format(sigma_beta, *cube_corners(narrow), len(vertices)))
 print("\n".join(table))
 
@@ -429,17 +430,17 @@ for d in (2, 3, 5, 8):
         corners, weights = enclosing_simplex(y)
         np.testing.assert_allclose(weights @ corners, y, atol=1e-9)
         assert weights.min() >= 0
-        assert enclosing_simplex_literal(y)[0] == [tuple(corner) for corner in corners.tolist()]
+        np.testing.assert_array_equal(enclosing_simplices(y[None])[0][0], corners)
 
 # %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="a plane of triangles; two points in orange, the corners of their triangles marked with their coordinates and weights"
 fig, ax = plt.subplots(figsize=(7.5, 5), layout="constrained")
-plotting.draw_triangles((-1.2, 0.5), (2.9, 3.1), ax)
+draw_triangles((-1.2, 0.5), (2.9, 3.1), ax)
 for y, offset in (([4.2, -0.4, -3.8], (8, -16)), ([1.7, 1.6, -3.3], (-118, -4))):
     corners, weights = enclosing_simplex(np.array(y))
-    place = plotting.vertex_places([y])[0]
+    place = vertex_places([y])[0]
     ax.plot(*place, "o", color="#fc7200", markersize=9, markeredgecolor="k", zorder=3)
     ax.annotate(f"y = {tuple(y)}", place, offset, textcoords="offset points", fontsize=9, color="#a04000")
-    for corner, weight, at in zip(corners.tolist(), weights, plotting.vertex_places(corners), strict=True):
+    for corner, weight, at in zip(corners.tolist(), weights, vertex_places(corners), strict=True):
         ax.plot(*zip(place, at, strict=True), color="0.3", linewidth=1.2)
         ax.plot(*at, "s", color="0.2", markersize=6)
         ax.annotate(
@@ -536,7 +537,8 @@ print(f"middle {64 * hexagon[0, 0, 0]:.0f}/64, neighbour {64 * hexagon[1, 1, -2]
 # %% [markdown]
 # Two constants are missing. `elevation` sets how far apart the vertices are, so that splat, blur and slice together have
 # variance 1, like our Gaussian. The factor `peak` gives the filter the integral of the Gaussian. With both, our three
-# functions must agree with the package's filter, the literal one and the fast one:
+# functions must agree with the package's filter. That one is three sparse matrices: $S$ says which cell has which share
+# of which vertex, a matrix for each direction blurs, and $S$ transposed gives where $S$ takes:
 
 # %%
 cloud = rng.normal(0, 1.5, (80, 2))
@@ -546,8 +548,10 @@ vertices = splat(simplices, values)
 for direction in range(3):
     vertices = blur(vertices, direction)
 ours = peak(2) * slice_at(simplices, vertices)
-np.testing.assert_allclose(ours, lattice_literal(cloud, values))
-np.testing.assert_allclose(ours, PermutohedralLattice.build(cloud)(values.astype(np.float32)), rtol=1e-4)
+package = PermutohedralLattice.build(cloud)
+S, (blur_1, blur_2, blur_3) = package.shares, package.blurs
+np.testing.assert_allclose(ours, peak(2) * S @ (blur_3 @ (blur_2 @ (blur_1 @ (S.T @ values)))))
+np.testing.assert_allclose(ours, package(values))
 
 # %% [markdown]
 # Let us watch the filter do what the CRF needs. We make up a row of 36 cells. The left half is FREE and the right half
@@ -567,15 +571,15 @@ def pictures(between, hold):
     """Yield the frames of the animation on one figure."""
     fig, ax = plt.subplots(figsize=(6.4, 4.5), dpi=plotting.FIGURE_DPI)
     fig.subplots_adjust(left=0.08, right=0.98, bottom=0.1, top=0.94)
-    story = list(plotting.lattice_story(street, p_road, between))
+    story = list(lattice_story(street, p_road, between))
     for frame, following in zip(story, [*story[1:], story[0]], strict=True):
         ax.clear()
-        plotting.draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
-        plotting.draw_lattice_frame(frame, ax)
+        draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
+        draw_lattice_frame(frame, ax)
         ax.set(xlabel="place in the row / 4 cells", ylabel="P(FREE) / 0.2")
         if frame.title.startswith("blur"):
             j = int(frame.title.split()[3]) - 1
-            way = 1.2 * plotting.vertex_places([tuple(1 - 3 * (k == j) for k in range(3))])[0]
+            way = 1.2 * vertex_places([tuple(1 - 3 * (k == j) for k in range(3))])[0]
             ax.annotate(
                 "",
                 np.add((7, 4), way),
@@ -589,13 +593,13 @@ def pictures(between, hold):
 plotting.animate(pictures(between=1, hold=4), period=0.25, alt="36 points splat onto triangles, blur, and slice back")
 
 # %% jupyter={"source_hidden": true} alt="four panels in two rows: points with their colours, vertices after the splat, vertices after three blurs, and points with smoothed colours in two groups"
-story = {frame.title: frame for frame in plotting.lattice_story(street, p_road)}
+story = {frame.title: frame for frame in lattice_story(street, p_road)}
 chosen = [frame for title, frame in story.items() if "direction 1" not in title and "direction 2" not in title]
 fig, axes = plt.subplots(2, 2, figsize=(11, 7), layout="constrained", sharex=True, sharey=True)
 names = ("points", "after the splat", "after three blurs", "after the slice")
 for letter, name, frame, ax in zip("abcd", names, chosen, axes.flat, strict=True):
-    plotting.draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
-    plotting.draw_lattice_frame(frame, ax).set_title(f"({letter}) {name}", loc="left", fontsize="medium")
+    draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
+    draw_lattice_frame(frame, ax).set_title(f"({letter}) {name}", loc="left", fontsize="medium")
     ax.set(xlabel="place / 4 cells", ylabel="P(FREE) / 0.2")
 marks = axes[-1, -1].collections[-1]
 fig.colorbar(marks, ax=axes, label="P(road)", shrink=0.8)
@@ -609,9 +613,10 @@ plt.show()
 # is the last of the left one, cell 18 the first of the right one. But in the plane the groups are 4 widths apart, no
 # vertex links them, and so they have exchanged nothing. This blur stops at the edge of occupancy, as we wanted.
 #
-# In five dimensions only the number of coordinates changes. The package numbers the vertices once for each frame, with
-# a hash table (a dictionary) whose keys are the coordinates, packed into one 64-bit integer. Each of the ten iterations
-# then only adds, blurs and interpolates.
+# In five dimensions only the number of coordinates changes. The package numbers the vertices once for each frame: the
+# coordinates of a vertex are the digits of one integer, so a step along the lattice is an addition
+# (`semgrid_edu/crf/lattice.py`, thirty lines). Each of the ten iterations then only multiplies by sparse matrices.
+# `semgrid_edu.fast` does the same in compiled loops, five times as fast; it refines the maps of this lecture.
 #
 # ## A cell is no pair with itself
 #
@@ -629,7 +634,7 @@ plt.show()
 
 # %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
 dense = np.stack(np.meshgrid(*[np.arange(-6, 6, 0.2)] * 2), axis=-1).reshape(-1, 2) + 0.07
-special = {"on a vertex": plotting.vertex_places([(0, 0, 0)]), "in the middle": plotting.vertex_places([(1, 0, -1)])}
+special = {"on a vertex": vertex_places([(0, 0, 0)]), "in the middle": vertex_places([(1, 0, -1)])}
 lattice_2d = PermutohedralLattice.build(np.concatenate([dense, *special.values()]))
 print("k_ii on a vertex {:.2f}, in the middle of a triangle {:.2f}".format(*lattice_2d.diagonal[-2:]))
 lattice = PermutohedralLattice.build(features)
@@ -676,15 +681,14 @@ print(
 # %% jupyter={"source_hidden": true} alt="left and middle: two nearly round bright spots with contours over the triangles of the lattice, one slightly hexagonal and higher, one slightly triangular and lower; right: kernel values against distance scatter around a Gaussian"
 fig, axes = plt.subplots(1, 3, figsize=(12, 3.9), layout="constrained", width_ratios=(1, 1, 1.3))
 distance = np.linspace(0, 4.5, 100)
-everywhere = np.concatenate([dense, *special.values(), [[90.0, 0.0]]])
 for ax, colour, (index, (name, at)) in zip(axes, ("#0072b2", "#d55e00"), enumerate(special.items()), strict=False):
-    one = np.zeros((len(everywhere), 1), np.float32)
+    one = np.zeros((len(dense) + len(special), 1))
     one[len(dense) + index] = 1
     kernel = lattice_2d(one)[: len(dense), 0]
     image = kernel.reshape(60, 60)
     extent = (dense[0, 0], dense[-1, 0], dense[0, 1], dense[-1, 1])
     ax.imshow(image, origin="lower", extent=extent, cmap="gray", vmin=0, vmax=1.15)
-    plotting.draw_triangles(at[0] - 4, at[0] + 4, ax).collections[0].set(alpha=0.4)
+    draw_triangles(at[0] - 4, at[0] + 4, ax).collections[0].set(alpha=0.4)
     ax.contour(image, [0.1, 0.5, 0.9], colors=colour, extent=extent)
     ax.set(title=f"a point {name}", xlabel="first feature [widths]", ylabel="second feature [widths]")
     axes[2].plot(np.linalg.norm(dense - at, axis=1), kernel, ".", ms=3, color=colour, label=name, alpha=0.5)
@@ -833,7 +837,7 @@ for infer in (mean_field_naive, mean_field_accurate, mean_field):
 #
 # **Time** (middle and right). Both axes of the middle picture are logarithmic. Twice the cells cost the lattice about
 # twice the time, and all pairs about four times. With the classes, time grows slowly: 48 of them cost a few times as
-# much as 2, depending on the processor. One reason is that the package fills them up to a multiple of 16. On a quiet
+# much as 2, depending on the processor. One reason is that the compiled loops fill them up to a multiple of 16. On a quiet
 # machine you see steps after 16 and after 32; in a picture made on a busy one, chance hides them.
 #
 # **The tenth of a second.** The printed lines give the times on the machine that built this page: for the drive's map,
@@ -948,7 +952,7 @@ print("\n".join(table))
 # kernel is so narrow that cells hardly hear each other in either way.
 #
 # **Many dimensions.** A cell has only $d + 1$ corners, but the kernel gets worse with each dimension, as you have seen
-# in the cloud. Three colours as further features would make eight dimensions. The package refuses more than eight.
+# in the cloud. Three colours as further features would make eight dimensions. The compiled lattice refuses more than eight.
 #
 # **Some classes shrink.** Is the fast filter to blame when a pedestrian is smoothed away? We compare on ten frames of
 # the drive: the network alone, the CRF with the lattice, and the CRF with the window. The table shows how many of the
@@ -1011,8 +1015,7 @@ Markdown("\n".join(rows))
 # rule. Class accuracy falls for all three. Where networks learn from LIDAR labels, pixel accuracy rises for all three,
 # by LIDAR labels and by true ones (lecture [12](12_experiments.ipynb)). So whether a CRF "helps" depends on the metric,
 # on what the network learned from, and on the labels that judge it. Weights searched for pixel accuracy raise it for all
-# three, and still cost class accuracy. The companion [the CRF, measured](deeper/11_crf_measured.ipynb) shows the search,
-# and weights that are learned.
+# three, and still cost class accuracy. The companion [the CRF, measured](deeper/11_crf_measured.ipynb) shows the search.
 #
 # ## In five lines
 #

@@ -69,14 +69,12 @@ from semgrid_edu.crf import expected_calibration_error, reliability
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_image_stage, sample_weights
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
-from semgrid_edu.graphical.drawing import Dashed
+from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.pipeline import run_pipeline
-from semgrid_edu.stage_models import ledger
 from semgrid_edu.training import TrainingParams
 from semgrid_edu.training.loop import train
 from semgrid_edu.workshop.scoring.statistics import paired_interval
@@ -94,6 +92,7 @@ from worlds.lecture_13_report_card import (
     MARKS, border_verdict, check_lines, draw_report_card, map_lines, motion_verdict,
 )  # fmt: skip
 from worlds.lecture_13_scan_borders import depth_edges, edge_contrast
+from worlds.lecture_00_ledger import ledger
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 torch.set_num_threads(1)

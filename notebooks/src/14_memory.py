@@ -41,9 +41,12 @@ from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.pipeline import run_pipeline
 
 # %% jupyter={"source_hidden": true}
-from semgrid_edu.stage_models import MemoryWorld, class_over_time, ledger, ledger_table, memory_price
-from semgrid_edu.stage_models.class_memory import exact_classes, factored_classes, frames_worth
-from semgrid_edu.stage_models.system_world import CLASS_OF, CLASSES, STREET
+from worlds.lecture_14_counts import frames_since_seen
+from worlds.lecture_00_ledger import ledger, ledger_table
+from worlds.lecture_00_street import CLASSES, CLASS_OF, STREET
+from worlds.lecture_14_class_memory import (
+    MemoryWorld, class_over_time, exact_classes, factored_classes, frames_worth, memory_price,
+)  # fmt: skip
 from semgrid_edu.workshop.course.street import frames_since_seen
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 
 
@@ -51,9 +50,9 @@ def scan_boxes(
     Parameters
     ----------
     boxes : list of Box
-        What stands in the world.
+        The things in the world.
     x, y, yaw : float
-        Pose of the vehicle in the world, metres and rad; its LIDAR stands as high as KITTI's.
+        Pose of the vehicle in the world, metres and rad; its LIDAR is as high as KITTI's.
     columns, rings : int
         Numbers of directions: `columns` azimuths over `field` degrees, symmetric about forward, times `rings`
         elevations from -24.8 to 2 degrees.
@@ -71,31 +70,28 @@ def scan_boxes(
     (N, 3) float32
         Returns in the grid frame of the vehicle, metres.
 
-    Raises
-    ------
-    ArgumentError
-        When there is noise, but no generator to draw it from.
-
     Examples
     --------
     >>> points = scan_boxes([Box.around(10, 0, 2, 2, 1.5)], columns=1, rings=20)
     >>> points[points[:, 2] > 0.3][:, 0].round(2).tolist()
     [9.0, 9.0, 9.0, 9.0, 9.0]
     """
-    if noise and rng is None:
-        raise ArgumentError("rng", "a numpy.random.Generator to draw the noise from", rng)
     azimuth = np.radians((np.arange(columns) + 0.5) / columns * field - field / 2)
     elevation = np.radians(np.linspace(-24.8, 2.0, rings))
-    azimuth, elevation = (angle.ravel() for angle in np.meshgrid(azimuth, elevation))
+    azimuth, elevation = np.meshgrid(azimuth, elevation)
+    azimuth = azimuth.ravel()
+    elevation = elevation.ravel()
     flat = np.cos(elevation)
     ray = np.stack([flat * np.cos(azimuth + yaw), flat * np.sin(azimuth + yaw), np.sin(elevation)], axis=1)
     ray[ray == 0] = 1e-12
     start = np.array([x, y, KITTI_LIDAR_HEIGHT])
     length = np.where(ray[:, 2] < 0, -start[2] / ray[:, 2], np.inf)
     for box in boxes:
-        low, high = np.array([box.x_min, box.y_min, 0]), np.array([box.x_max, box.y_max, box.height])
-        first, second = (low - start) / ray, (high - start) / ray
-        enters, leaves = np.minimum(first, second).max(axis=1), np.maximum(first, second).min(axis=1)
+        # A ray is in the box between the last of the three pairs of faces that it enters and the first that it leaves.
+        first = (np.array([box.x_min, box.y_min, 0]) - start) / ray
+        second = (np.array([box.x_max, box.y_max, box.height]) - start) / ray
+        enters = np.minimum(first, second).max(axis=1)
+        leaves = np.maximum(first, second).min(axis=1)
         length = np.where((enters > 0) & (enters < leaves), np.minimum(length, enters), length)
     hit = length < farthest
     length = length[hit] + (rng.normal(0, noise, hit.sum()) if noise else 0)

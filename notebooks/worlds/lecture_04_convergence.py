@@ -12,8 +12,8 @@ from semgrid_edu.occupancy import State
 from semgrid_edu.occupancy.local_belief import velocity_moments
 from semgrid_edu.occupancy.particles import cells_of
 from semgrid_edu.occupancy.sensor import likelihoods
-from semgrid_edu.stage_models.cmcdot import NO_BIRTHS
 from worlds.lecture_02_boxes import Box, cells_in
+from worlds.lecture_04_cmcdot import NO_BIRTHS
 
 SPEC = GridSpec(0, 16, -4, 4, 0.5)
 DT = 0.125

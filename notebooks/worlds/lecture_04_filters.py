@@ -9,8 +9,9 @@ from time import perf_counter
 import numpy as np
 import typer
 
+from semgrid_edu.fast import Cmcdot
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Bof, Cmcdot, LogOddsGrid, State
+from semgrid_edu.occupancy import Bof, LogOddsGrid, State
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
+from semgrid_edu.fast import scan_evidence
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels, blocks
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.occupancy import PlanarMotion, SensorModel, State, scan_evidence
+from semgrid_edu.occupancy import PlanarMotion, SensorModel, State
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, look_up, map_around
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.street.traffic import MOVING_SPEED

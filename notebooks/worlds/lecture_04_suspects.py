@@ -7,8 +7,10 @@ from unittest.mock import patch
 
 import numpy as np
 
+from semgrid_edu.fast import Cmcdot
+from semgrid_edu.fast.occupancy import cellwise
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Cmcdot, CmcdotParams, cellwise
+from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import KITTI_RIG, named_street
 from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
@@ -17,7 +19,7 @@ from semgrid_edu.workshop.simulation.things.materials import Kind
 from worlds.lecture_04_scenes import KnownScene, SceneHistory, true_cells
 from worlds.lecture_04_street_scores import StreetScores
 
-BEFORE = CmcdotParams(clearing_time=0.0, first_sight=(0.93, 0.067, 0.003))
+BEFORE = CmcdotParams(walls=None, first_sight=(0.93, 0.067, 0.003))
 """The filter without the two rules against phantoms, with the probabilities of first sight that it had then."""
 BARRED = "no arrivals in UNKNOWN cells"
 MENDED = "the two rules"
@@ -60,7 +62,7 @@ def arrivals_barred() -> AbstractContextManager:
         everything = np.minimum(arrives, np.float32(cellwise.CERTAIN))
         return cellwise.collide(mixed, newborn, going, stays, arrives, everything)
 
-    return patch("semgrid_edu.occupancy.steps.collide", collide)
+    return patch("semgrid_edu.fast.occupancy.steps.collide", collide)
 
 
 @dataclass(frozen=True)

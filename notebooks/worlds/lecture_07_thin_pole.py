@@ -8,32 +8,29 @@ import torch.nn.functional as F
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor, nn
 
-from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks.backbones.conv_deconv import fresh_weights
-from semgrid_edu.networks.backbones.deeplab import interpolate
-from semgrid_edu.networks.backbones.fcn import enlarge
+from semgrid_edu.networks.conv_deconv import fresh_weights
+from semgrid_edu.networks.deeplab import interpolate
+from semgrid_edu.networks.fcn import enlarge
 
 MECHANISMS = ("nearest", "bilinear", "indices", "skips", "strided", "atrous")
-"""Ways to see far and to end at full resolution: max-pooling, then enlarging its result in one of two ways, unpooling
-it by its indices (SegNet), or adding finer maps to it (FCN); strides, then interpolation; holes instead of strides
-(DeepLab)."""
-SIDE, NOISE = 32, 0.1
-"""Side of the images, pixels, and standard deviation of each pixel's noise; poles are three to five times as bright."""
+"""Ways to see far and still score at full resolution: max-pooling, then enlarging its result in one of two ways,
+unpooling it by its indices (SegNet), or adding finer maps to it (FCN); strides, then interpolation; holes instead of
+strides (DeepLab)."""
+SIDE = 32
+"""Side of the images, pixels."""
+NOISE = 0.1
+"""Standard deviation of each pixel's noise; poles are three to five times as bright."""
 WIDTH = 8
 """Channels of every layer of a `PoleNet`."""
-STRIDES, RATES = (1, 2, 2, 1, 1, 1, 1), (1, 1, 2, 4, 4, 4, 4)
-"""Strides of the seven layers of "strided", rates of those of "atrous". The atrous algorithm makes the second of the
-first, see `ResNet`."""
-BATCH_SIZE, LEARNING_RATE = 8, 0.02
+STRIDES = (1, 2, 2, 1, 1, 1, 1)
+"""Strides of the seven layers of "strided"."""
+RATES = (1, 1, 2, 4, 4, 4, 4)
+"""Rates of the seven layers of "atrous": the atrous algorithm derives them from the strides, see `ResNet`."""
+BATCH_SIZE = 8
+LEARNING_RATE = 0.02
 """For Adam: gradient descent with momentum, as in `train`, takes more steps than fit into seconds."""
 POLE_WEIGHT = 4.0
 """Weight of a pole's pixel in the loss, the limit of `TrainingParams`: three pixels in a hundred belong to poles."""
-
-
-def _check_mechanism(mechanism: str) -> None:
-    """Refuse an unknown mechanism."""
-    if mechanism not in MECHANISMS:
-        raise ArgumentError("mechanism", f"one of {', '.join(MECHANISMS)}", repr(mechanism))
 
 
 def apply_mechanism(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
@@ -65,10 +62,7 @@ def apply_mechanism(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
     >>> apply_mechanism(pole, "indices")[0]
     array([0., 0., 1., 0.])
     """
-    _check_mechanism(mechanism)
     x = torch.as_tensor(np.asarray(image, np.float64))
-    if x.ndim != 2 or min(x.shape) < 4 or x.shape[0] % 4 or x.shape[1] % 4:
-        raise ArgumentError("image", "shape (H, W) of multiples of 4", tuple(x.shape))
     apply = _apply_kernels if mechanism in ("strided", "atrous") else _apply_pooling
     return apply(x[None, None], mechanism)[0, 0].numpy()
 
@@ -121,8 +115,6 @@ def place_and_width(profile: ArrayLike) -> tuple[float, int]:
     (2.5, 3)
     """
     profile = np.asarray(profile, np.float64)
-    if profile.ndim != 1 or not profile.max(initial=0) > 0:
-        raise ArgumentError("profile", "a row of pixels, at least one above 0", profile)
     brightest = np.flatnonzero(np.isclose(profile, profile.max()))
     return float(brightest.mean()), int((profile >= profile.max() / 2).sum())
 
@@ -151,7 +143,8 @@ def draw_poles(n: int, seed: int) -> tuple[Tensor, Tensor]:
     images = rng.normal(rng.uniform(0.3, 0.7, (n, 1, 1)), NOISE, (n, SIDE, SIDE))
     truth = np.zeros((n, SIDE, SIDE), np.int64)
     for image, labels in zip(images, truth, strict=True):
-        pole, wall = rng.integers(1, 3), rng.integers(6, 11)
+        pole = rng.integers(1, 3)
+        wall = rng.integers(6, 11)
         first, second = rng.permutation([pole, wall])
         left = rng.integers(0, SIDE - pole - wall - 1)
         right = left + first + rng.integers(2, SIDE - pole - wall - left + 1)
@@ -181,7 +174,6 @@ class PoleNet(nn.Module):
 
     def __init__(self, mechanism: str, seed: int = 0) -> None:
         super().__init__()
-        _check_mechanism(mechanism)
         self.mechanism = mechanism
         strides = STRIDES if mechanism == "strided" else (1,) * 7
         rates = RATES if mechanism == "atrous" else (1,) * 7
@@ -273,17 +265,17 @@ def score_poles(predicted: ArrayLike, truth: ArrayLike) -> PoleScores:
     predicted, truth : (n, H, W) bool or int
         What is called pole, and what is: 1 for a pixel of a pole, else 0.
     """
-    predicted, truth = np.asarray(predicted, bool), np.asarray(truth, bool)
-    if predicted.shape != truth.shape or truth.ndim != 3 or not truth.any():
-        raise ArgumentError("predicted, truth", "one shape (n, H, W), and poles", f"{predicted.shape}, {truth.shape}")
+    predicted = np.asarray(predicted, bool)
+    truth = np.asarray(truth, bool)
     iou = (predicted & truth).sum() / (predicted | truth).sum()
-    stands = truth.any(axis=-1)
-    found = stands & predicted.any(axis=-1)
+    with_pole = truth.any(axis=-1)
+    found = with_pole & predicted.any(axis=-1)
     if not found.any():
         return PoleScores(float(iou), 1.0, *[float("nan")] * 3)
-    called, poles = predicted[found], truth[found]
+    called = predicted[found]
+    poles = truth[found]
     offset = np.abs(_middle(called) - _middle(poles)).mean()
-    missed = 1 - found.sum() / stands.sum()
+    missed = 1 - found.sum() / with_pole.sum()
     return PoleScores(*map(float, (iou, missed, called.sum(1).mean(), poles.sum(1).mean(), offset)))
 
 

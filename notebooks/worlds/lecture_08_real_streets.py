@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
-from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
+from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
 from semgrid_edu.labels import IGNORE, KITTI_14

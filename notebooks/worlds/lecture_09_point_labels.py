@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 from tqdm.auto import tqdm
 
 from semgrid_edu.camera import invert_rigid, rigid_transform, transform_points
-from semgrid_edu.datasets.readers.cuboids import ANY_LIDAR, Cuboids, LabelledScan, put_together
-from semgrid_edu.datasets.readers.frames import visible_labels
-from semgrid_edu.datasets.readers.project_lidar import birdseye_votes, unhidden
+from semgrid_edu.datasets.cuboids import ANY_LIDAR, Cuboids, LabelledScan, put_together
+from semgrid_edu.datasets.frames import visible_labels
+from semgrid_edu.datasets.project_lidar import birdseye_votes, unhidden
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, LabelSet
 from semgrid_edu.storage.files import write_json

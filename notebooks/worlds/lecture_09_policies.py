@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.datasets.ground_truth import NO_FLAWS, Moment, TruthFlaws, TruthPolicy, drive_truth, flawed_drive
+from semgrid_edu.datasets.ground_truth import Moment, TruthPolicy, drive_truth
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.storage.files import table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
+from semgrid_edu.workshop.flaws import NO_FLAWS, TruthFlaws, flawed_drive
 from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from worlds.lecture_04_filters import GRIDS, LIDARS

@@ -13,7 +13,6 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
-from semgrid_edu.storage.workplace import workplace
 from semgrid_edu.workshop.paper.deviations import frame_counts
 from semgrid_edu.workshop.paper.loop import execute_plan
 from semgrid_edu.workshop.paper.run import with_needs
@@ -23,6 +22,7 @@ from semgrid_edu.workshop.paper.score_runs import ScoreRun, by_seed
 from semgrid_edu.workshop.scoring.grids import NETWORK
 from semgrid_edu.workshop.scoring.score_with_interval import every_metric, score_with_interval
 from semgrid_edu.workshop.scoring.statistics import drive_estimate
+from semgrid_edu.workshop.workplace import workplace
 
 DATA = ("minikitti", "kittiruns")
 """The same number of frames: of as many streets, and of four long runs."""

@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 
 from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.readers.oxts import read_timestamps
+from semgrid_edu.datasets.oxts import read_timestamps
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
 from semgrid_edu.workshop.course.street import motion_between, standing_points

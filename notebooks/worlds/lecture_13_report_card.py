@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.crf import expected_calibration_error, reliability
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.readers.frames import FrameSequence
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.frame import Frame
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.workshop.course.street import motion_between, piece_confusions

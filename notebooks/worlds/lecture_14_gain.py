@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import softmax
 from tqdm.auto import tqdm
 
-from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
+from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import real_weights, sample_drive, sample_weights
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
@@ -28,7 +28,7 @@ from semgrid_edu.memory import MemoryParams, View, remember_drive, smooth_drive
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.occupancy.planar_motion import look_up
-from semgrid_edu.pipeline import Stages, run_side_by_side
+from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.simulation import simulate
@@ -100,16 +100,18 @@ def grids_of(frames: Sequence[Frame], weights: Path) -> tuple[list[View], list[d
     weights : Path
         Those of the network.
     """
-    own = Stages.of(load_net(weights, frames[0].camera), memory=True)
-    results = [result for (result,) in run_side_by_side(frames, own)]
+    stages = Stages.fast(load_net(weights, frames[0].camera), memory=True)
+    results = list(run_pipeline(frames, stages))
     views = [View(result.frame, result.belief, result.grid) for result in results]
     methods = {MEMORY: [result.remembered for result in results]}
-    methods |= {name: list(of(views, own.architecture.grid)) for name, of in (FIRST | {SMOOTHED: smooth_drive}).items()}
+    methods |= {
+        name: list(of(views, stages.architecture.grid)) for name, of in (FIRST | {SMOOTHED: smooth_drive}).items()
+    }
     found = [{ONE: result.grid, f"{ONE}{CRF}": result.refined} for result in results]
     for name, maps in methods.items():
         for of_frame, view, one in zip(found, views, maps, strict=True):
             of_frame[name] = one
-            of_frame[f"{name}{CRF}"] = own.refine(np.log(np.maximum(one, 1e-6)), view.belief.probability)
+            of_frame[f"{name}{CRF}"] = stages.refine(np.log(np.maximum(one, 1e-6)), view.belief.probability)
     return views, found
 
 

@@ -55,16 +55,17 @@ def energy(labels: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
         raise ArgumentError("labels", f"integers of shape {unary.shape[1:]}", f"{labels.dtype} of {labels.shape}")
     if labels.min() < 0 or labels.max() >= len(unary):
         raise ArgumentError("labels", f"classes 0 to {len(unary) - 1}", f"{labels.min()} to {labels.max()}")
-    own = np.take_along_axis(unary, labels[None].astype(np.int64), axis=0).sum(dtype=np.float64)
+    unary_cost = np.take_along_axis(unary, labels[None].astype(np.int64), axis=0).sum(dtype=np.float64)
     x = labels.ravel()
     differ = x[:, None] != x  # mu(x_i, x_j)
-    return float(own + np.triu(pair_weights(values, params) * differ).sum())
+    pair_cost = np.triu(pair_weights(values, params) * differ).sum()  # each pair once
+    return float(unary_cost + pair_cost)
 
 
 def free_energy(Q: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfParams) -> float:
-    """Compute the free energy of independent cells, F(Q) = E_Q[E(x)] - H(Q), which mean field makes small.
+    """Compute the free energy of independent cells, F(Q) = E_Q[E(x)] - H(Q), which mean field minimises.
 
-    It is an upper bound of -log Z, and F(Q) + log Z = KL(Q || P) says how far Q is from P(x) = exp(-E(x)) / Z. Each
+    It is an upper bound of -log Z: F(Q) + log Z = KL(Q || P) is the distance of Q from P(x) = exp(-E(x)) / Z. Each
     pair of cells counts once.
 
     The other Parameters are those of `energy`.
@@ -99,12 +100,15 @@ def free_energy(Q: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
     if Q.shape != unary.shape or not (Q >= 0).all() or not np.allclose(Q.sum(axis=0), 1, atol=1e-3):
         raise ArgumentError("Q", f"distributions over axis 0, shape {unary.shape}", f"an array of shape {Q.shape}")
     q = Q.reshape(len(Q), -1)
-    own = (q * np.where(q > 0, unary.reshape(q.shape), 0)).sum()
-    return float(own + np.triu(pair_weights(values, params) * (1 - q.T @ q)).sum() + xlogy(q, q).sum())
+    unary_cost = (q * np.where(q > 0, unary.reshape(q.shape), 0)).sum()  # 0 times infinity counts as 0
+    differ = 1 - q.T @ q  # the probability that the labels of two cells differ
+    pair_cost = np.triu(pair_weights(values, params) * differ).sum()
+    entropy = -xlogy(q, q).sum()
+    return float(unary_cost + pair_cost - entropy)
 
 
 MAX_ENERGY = 700
-"""The largest energy of the best labelling: exp(-745) is 0, so beyond it every labelling would look impossible."""
+"""The largest energy of the best labelling: exp(-745) is 0, so beyond it all labellings would look impossible."""
 
 MAX_LABELLINGS = 10**7
 """The largest number of labellings: as every cell is coupled to every other, elimination needs a table of them all."""
@@ -122,11 +126,15 @@ def crf_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> Graphic
         and one per pair, which is exp(-k_ij) where the two labels differ and 1 where they agree.
     """
     unary, values = check_inputs(unary, values)
-    cells, weights = unary.reshape(len(unary), -1).T, pair_weights(values, params)
-    names, differ = [f"x{number}" for number in range(1, len(cells) + 1)], 1 - np.eye(len(unary))
-    own = [Factor(name, np.exp(-phi)) for name, phi in zip(names, cells, strict=True)]
-    pairs = combinations(range(len(cells)), 2)
-    return GraphicalModel([*own, *(Factor((names[i], names[j]), np.exp(-weights[i, j] * differ)) for i, j in pairs)])
+    cells = unary.reshape(len(unary), -1).T
+    weights = pair_weights(values, params)
+    differ = 1 - np.eye(len(unary))
+    names = [f"x{number}" for number in range(1, len(cells) + 1)]
+    of_cells = [Factor(name, np.exp(-phi)) for name, phi in zip(names, cells, strict=True)]
+    of_pairs = [
+        Factor((names[i], names[j]), np.exp(-weights[i, j] * differ)) for i, j in combinations(range(len(cells)), 2)
+    ]
+    return GraphicalModel([*of_cells, *of_pairs])
 
 
 def exact_marginals(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
@@ -197,19 +205,17 @@ def log_partition(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> flo
 
 
 def _tiny_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> tuple[GraphicalModel, tuple[int, ...]]:
-    """Return the model, the cheapest class of each cell taken as 0, and (C, H, W); refuse too many labellings."""
+    """Return the model, with costs relative to each cell's cheapest class, and (C, H, W); too many labellings raise."""
     unary, values = check_inputs(unary, values)
     classes, cells = len(unary), unary[0].size
     if cells * np.log10(classes) > np.log10(MAX_LABELLINGS):
         expected = f"at most {MAX_LABELLINGS:,} labellings; mean_field takes more"
         raise ArgumentError("unary", expected, f"{classes} classes in {cells} cells, {classes}^{cells}")
-    own = unary.astype(np.float64)
-    own -= own.min(axis=0)  # so exp(-phi) neither overflows nor vanishes
-    candidates = [np.full(own.shape[1:], label) for label in range(classes)] + [own.argmin(axis=0)]
-    least = min(energy(labels, own, values, params) for labels in candidates)
+    phi = unary.astype(np.float64)
+    phi -= phi.min(axis=0)  # so exp(-phi) neither overflows nor vanishes
+    candidates = [np.full(phi.shape[1:], label) for label in range(classes)] + [phi.argmin(axis=0)]
+    least = min(energy(labels, phi, values, params) for labels in candidates)
     if least > MAX_ENERGY:
-        expected = (
-            f"weights and costs for which a labelling costs at most {MAX_ENERGY} more than the cells' best classes"
-        )
+        expected = f"weights and costs for which a labelling costs at most {MAX_ENERGY} more than all best classes"
         raise ArgumentError("params", expected, f"{least:.4g}")
-    return crf_model(own, values, params), unary.shape
+    return crf_model(phi, values, params), unary.shape

@@ -1,7 +1,4 @@
-"""The kernels of eq. (4): how strongly two cells are coupled by their distance in place and in occupancy."""
-
-from collections.abc import Callable
-from typing import Any
+"""The kernels of eq. (4): how strongly distance in place and in occupancy lets two cells influence each other."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,22 +11,20 @@ MAX_CELLS = 10_000
 """The largest grid whose pairs are written out: two matrices of 10,000 x 10,000 numbers are 1.6 GB."""
 
 
-def gaussian(squared_distance: Any, exp: Callable = np.exp) -> Any:
+def gaussian(squared_distance: NDArray) -> NDArray:
     """Return exp(-d^2 / 2), the Gaussian of eq. (4), for squared distances d^2 in units of its width.
 
     Parameters
     ----------
-    squared_distance : array or Tensor
+    squared_distance : (...) float
         d^2 of each pair of cells.
-    exp : callable
-        The exponential for arrays of this kind: numpy's, or torch's, which has a gradient.
 
     Returns
     -------
-    array or Tensor
+    (...) float
         1 for two cells at the same place.
     """
-    return exp(-0.5 * squared_distance)
+    return np.exp(-0.5 * squared_distance)
 
 
 def kernels(
@@ -59,8 +54,9 @@ def kernels(
     values = np.asarray(values, dtype=np.float64)
     place = np.indices(values.shape[1:]).reshape(2, -1).T.astype(np.float64)
     occupancy = values.reshape(len(values), -1).T
-    both = np.hstack([place / params.sigma_alpha, occupancy / params.sigma_beta]), place / params.sigma_gamma
-    bilateral, spatial = (gaussian(cdist(features[cells], features, "sqeuclidean")) for features in both)
+    both = np.hstack([place / params.sigma_alpha, occupancy / params.sigma_beta])
+    alone = place / params.sigma_gamma
+    bilateral, spatial = (gaussian(cdist(features[cells], features, "sqeuclidean")) for features in (both, alone))
     return bilateral, spatial
 
 
@@ -68,7 +64,7 @@ def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     """Compute the bracket of eq. (4) for every two cells, a cell and itself included.
 
     Gaussians of distances are inner products in some space, so this matrix has no negative eigenvalue, whatever the
-    weights, widths and normalisation. It is this property that keeps mean field from oscillating (`damping`).
+    weights, widths and normalisation. This is what lets `damping` keep mean field from oscillating.
 
     Parameters
     ----------
@@ -96,16 +92,22 @@ def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
         raise ArgumentError("values", f"at most {MAX_CELLS} cells; mean_field takes more", values[0].size)
     bilateral, spatial = kernels(values, params)
     if params.normalization == "symmetric":
-        _normalise(bilateral)
-        _normalise(spatial)
+        normalise(bilateral)
+        normalise(spatial)
     bilateral *= params.w_bilateral  # in place, as these matrices may be large
     spatial *= params.w_spatial
     bilateral += spatial
     return bilateral
 
 
-def _normalise(kernel: NDArray[np.float64]) -> None:
-    """Make D^-1/2 K D^-1/2 of K, in place, with D its row sums."""
+def normalise(kernel: NDArray[np.float64]) -> None:
+    """Make D^-1/2 K D^-1/2 of K, in place, with D its row sums.
+
+    Parameters
+    ----------
+    kernel : (N, N) float64
+        K; overwritten.
+    """
     root = np.sqrt(kernel.sum(axis=1))
     kernel /= root[:, None]
     kernel /= root
@@ -117,8 +119,8 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     Returns
     -------
     (H W, H W) float64
-        The cost of two cells having different labels; cells are counted row by row. Zero on the diagonal, since a cell
-        is no pair with itself.
+        The cost of different labels in two cells, counted row by row. Zero on the diagonal, since a cell is no pair
+        with itself.
     """
     weights = gram_matrix(values, params)
     np.fill_diagonal(weights, 0)

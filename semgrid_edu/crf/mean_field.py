@@ -1,18 +1,13 @@
-"""Mean field on the whole grid in milliseconds: eq. (3), (4) with filters in place of the sum over all pairs."""
+"""Mean field on the whole grid: eq. (3), (4) with filters in place of the sum over all pairs."""
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.crf.lattice.arithmetic import FAST, exponential
-from semgrid_edu.crf.lattice.lattice import PermutohedralLattice
-from semgrid_edu.crf.naive import NEVER, damping
+from semgrid_edu.crf.lattice import PermutohedralLattice
+from semgrid_edu.crf.naive import settled, updates
 from semgrid_edu.crf.params import NARROWEST, CrfParams, check_inputs, check_stop
 from semgrid_edu.crf.spatial import SeparableGaussian
-from semgrid_edu.errors import ArgumentError
-
-LANES = 16
-"""Filters take a cell's classes side by side, padded to a multiple of this number: 16 floats fill a cache line."""
+from semgrid_edu.errors import check_whole
 
 _ZERO_SUM_STATES = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
 """An orthonormal basis of the space orthogonal to (1, 1, 1, 1). The four probabilities sum to one, so three numbers in
@@ -20,14 +15,20 @@ this basis keep every distance between the states of two cells."""
 
 
 def mean_field(
-    unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10, tolerance: float = 0.0
+    unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10, tolerance: float = 0.0, pad: int = 0
 ) -> NDArray[np.float32]:
-    """Approximate the CRF's marginals by mean field, fast (eq. (3), (4)); the twin of `mean_field_naive`.
+    """Approximate the CRF's marginals by mean field with filters (eq. (3), (4)): the updates of `mean_field_naive`.
 
-    The sum over all pairs becomes two filters: the spatial one is exact (`SeparableGaussian`), the bilateral one uses
+    The sum over all pairs becomes two filters. The spatial one is exact (`SeparableGaussian`). The bilateral one is
     the permutohedral lattice, whose kernel is only nearly Gaussian. Filters include the cell itself, which is no
     pair, so its own contribution is subtracted.
-    Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
+    The other Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
+
+    Parameters
+    ----------
+    pad : int
+        Number of border cells to repeat outward before the CRF and to cut off afterwards. At the edge of the grid a
+        cell has neighbours on one side only; with 8, sidewalks at the edge of real streets come back.
 
     Returns
     -------
@@ -36,51 +37,18 @@ def mean_field(
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations, tolerance)
+    unary, values = (with_border(maps, pad) for maps in (unary, values))
     spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
-    phi = _above_best(np.require(unary, requirements="CW"))
-    return iterate(phi, bilateral_kernel(values, params), spatial, iterations, tolerance)
+    bilateral = bilateral_kernel(values, params)
+    self_coupling = bilateral.diagonal + spatial.diagonal
 
+    # The cost of disagreeing, sum_j k_ij (1 - Q_j(l)), differs from this negative reward of agreeing by sum_j k_ij,
+    # which is the same for all classes and cancels in the soft-max.
+    def disagreement(Q: NDArray) -> NDArray:
+        return self_coupling * Q - (bilateral(Q.T) + spatial(Q.T)).T
 
-def iterate(
-    phi: NDArray[np.float32],
-    bilateral: PermutohedralLattice,
-    spatial: SeparableGaussian,
-    iterations: int,
-    tolerance: float = 0.0,
-) -> NDArray[np.float32]:
-    """Run the mean-field update of `mean_field_naive`, with filters for the sums over all cells.
-
-    The cost of disagreeing, sum_j k_ij (1 - Q_j(l)), differs from the negative reward of agreeing,
-    -sum_j k_ij Q_j(l), only by sum_j k_ij, which is the same for all classes and cancels in the soft-max.
-
-    Parameters
-    ----------
-    phi : (C, H, W) float32
-        The unary term, finite, at least 0, and 0 for the best class of each cell.
-    bilateral, spatial : PermutohedralLattice, SeparableGaussian
-        The two kernels of eq. (4), with their weights and normalisation.
-    iterations : int
-        The largest number of updates of all cells.
-    tolerance : float
-        Stop as soon as an update changes no probability by more than this.
-
-    Returns
-    -------
-    (C, H, W) float32
-        Q, the distribution over classes in each cell.
-    """
-    n_classes, height, width = phi.shape
-    cells = np.zeros((height * width, -(-n_classes // LANES) * LANES), np.float32)
-    rewards, own = np.zeros_like(cells), (bilateral.diagonal + spatial.diagonal).reshape(height, width)
-    part, logits, Q = damping(own).astype(np.float32), -phi, np.zeros_like(phi)
-    _update(rewards, phi, own, np.ones_like(part), logits, Q, cells)  # without rewards: the soft-max of the unary term
-    for _ in range(iterations):
-        spatial.filter(cells, rewards)
-        bilateral.add(cells, rewards)
-        change = _update(rewards, phi, own, part, logits, Q, cells)
-        if change <= tolerance:
-            break
-    return Q
+    Q = settled(updates(unary, disagreement, self_coupling), iterations, tolerance)
+    return without_border(Q, pad).astype(np.float32)
 
 
 def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
@@ -101,99 +69,69 @@ def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice
     Raises
     ------
     ArgumentError
-        When states differ by, or the grid measures, more widths than the lattice can count: some 3,000 together.
+        When states differ by, or the grid measures, more widths than the lattice can count.
     """
-    place = np.indices(values.shape[1:]) / max(params.sigma_alpha, NARROWEST)
-    state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta
-    features = np.concatenate([place, state]) * (params.w_bilateral > 0)  # a kernel without weight can have any
-    try:
-        lattice = PermutohedralLattice.build(features.reshape(5, -1).T)
-    except ArgumentError as error:
-        found = f"{params.sigma_beta:g} and {params.sigma_alpha:g}: the lattice can't count so many widths"
-        raise ArgumentError("params", "sigma_beta above 1e-3, or a larger sigma_alpha", found) from error
+    lattice = PermutohedralLattice.build(bilateral_features(values, params))
     degree = np.ones(values[0].size)
     if params.normalization == "symmetric":
-        degree = lattice(np.ones((values[0].size, 1), np.float32))[:, 0]
+        degree = lattice(np.ones((values[0].size, 1)))[:, 0]
     return lattice.scaled(np.sqrt(params.w_bilateral / degree))
 
 
-# The twin of `above_best` in one pass: at the paper's size 0.2 ms on one core, where numpy's passes take 0.8 ms.
-@njit(cache=True, parallel=True)
-def _above_best(unary):
-    """Return how far each cost lies above that of the cell's best class, as float32 and at most `NEVER`."""
-    n_classes, height, width = unary.shape
-    phi = np.empty(unary.shape, np.float32)
-    for r in prange(height):
-        best = unary[0, r].copy()
-        for k in range(1, n_classes):
-            for c in range(width):
-                best[c] = min(best[c], unary[k, r, c])
-        for k in range(n_classes):
-            for c in range(width):
-                phi[k, r, c] = min(unary[k, r, c] - best[c], NEVER)
-    return phi
+def bilateral_features(values: NDArray, params: CrfParams) -> NDArray[np.float64]:
+    """Return place and occupancy of each cell in units of the bilateral kernel's widths.
 
+    Parameters
+    ----------
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell: they sum to one.
+    params : CrfParams
+        The widths. When the kernel has no weight, any features do, and all are zero.
 
-# Classes, rows and columns lie in this order wherever cells don't add up: all loops then run along a row of the grid,
-# and the compiler takes many cells at once.
-@njit(cache=True, parallel=True, fastmath=FAST)
-def _update(rewards, phi, own, part, logits, Q, cells):
-    """Update all cells, and return the largest change of a probability; `cells` gets a copy of Q in the filters' order.
-
-    The reward of a cell contains the cell's own part, which is subtracted. Its log Q, up to a constant, goes a part
-    of the way to the reward minus the unary term, see `mean_field_update`.
+    Returns
+    -------
+    (H W, 5) float64
+        Row, column, and three numbers for the state: as far apart as the four probabilities are.
     """
-    n_classes, height, width = phi.shape
-    change = np.zeros(height, np.float32)
-    rewards, cells = rewards.reshape(height, width, -1), cells.reshape(height, width, -1)
-    for r in prange(height):
-        fresh, moved = np.empty((n_classes, width), np.float32), np.zeros(width, np.float32)
-        for c in range(width):  # here the filters' order is left, and below taken again: cell after cell is faster
-            for k in range(n_classes):
-                fresh[k, c] = rewards[r, c, k]
-        for k in range(n_classes):
-            _approach(logits[k, r], fresh[k], own[r], Q[k, r], phi[k, r], part[r])
-        _softmax(logits, r, fresh)
-        for k in range(n_classes):
-            _replace(Q[k, r], fresh[k], moved)
-        for c in range(width):
-            for k in range(n_classes):
-                cells[r, c, k] = fresh[k, c]
-        change[r] = moved.max()
-    return change.max()
+    place = np.indices(values.shape[1:]) / max(params.sigma_alpha, NARROWEST)
+    state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta
+    features = np.concatenate([place, state]) * (params.w_bilateral > 0)
+    return features.reshape(5, -1).T
 
 
-@njit(cache=True, fastmath=FAST, inline="always")
-def _approach(logits, reward, own, Q, phi, part):
-    for c in range(len(logits)):
-        logits[c] += part[c] * (reward[c] - own[c] * Q[c] - phi[c] - logits[c])
+def with_border(maps: NDArray, pad: int) -> NDArray:
+    """Repeat the cells at the border outward.
+
+    Parameters
+    ----------
+    maps : (K, H, W) float
+        K numbers for each cell.
+    pad : int
+        Number of cells to add on each side.
+
+    Returns
+    -------
+    (K, H + 2 pad, W + 2 pad) float
+        The same maps with a border.
+    """
+    check_whole(pad=pad)
+    return np.pad(maps, ((0, 0), (pad, pad), (pad, pad)), mode="edge") if pad else maps
 
 
-@njit(cache=True, fastmath=FAST, inline="always")
-def _softmax(logits, r, out):
-    """Write the soft-max of row r of the logits to `out`, (C, W), and make the largest logit of each cell 0."""
-    best, total = logits[0, r].copy(), np.zeros(out.shape[1], np.float32)
-    for k in range(1, len(out)):
-        row = logits[k, r]
-        for c in range(len(best)):
-            best[c] = max(best[c], row[c])
-    for k in range(len(out)):
-        row = logits[k, r]
-        for c in range(len(best)):
-            row[c] -= best[c]
-            out[k, c] = exponential(row[c])
-        for c in range(len(best)):
-            total[c] += out[k, c]
-    for c in range(len(best)):
-        total[c] = np.float32(1) / total[c]
-    for k in range(len(out)):
-        for c in range(len(best)):
-            out[k, c] *= total[c]
+def without_border(maps: NDArray, pad: int) -> NDArray:
+    """Cut off what `with_border` added.
 
+    Parameters
+    ----------
+    maps : (K, H + 2 pad, W + 2 pad) float
+        K numbers for each cell.
+    pad : int
+        Number of cells to cut off on each side.
 
-@njit(cache=True, fastmath=FAST, inline="always")
-def _replace(old, new, largest):
-    """Overwrite old numbers, and keep the largest change of each cell."""
-    for c in range(len(old)):
-        largest[c] = max(largest[c], abs(new[c] - old[c]))
-        old[c] = new[c]
+    Returns
+    -------
+    (K, H, W) float
+        The maps without their border.
+    """
+    _, height, width = maps.shape
+    return maps[:, pad : height - pad, pad : width - pad]

@@ -1,10 +1,6 @@
-"""Mean field with every pair of cells written out, all cells at once or one by one (eq. (3), (4)); for small grids.
-
-`mean_field_update` is the one rule of mean field: the accurate version and the trainable layer use it too.
-"""
+"""Mean field with every pair of cells written out, all cells at once or one by one (eq. (3), (4)); for small grids."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,9 +24,9 @@ def mean_field_naive(
         Q_i(l) = exp(-phi_u(l) - sum_{j != i} k_ij (1 - Q_j(l))) / Z_i
 
     All cells are updated at once, from Q_i(l) = exp(-phi_u(l)) / Z_i on, as in Kraehenbuehl and Koltun 2011, algorithm
-    1. They take the right-hand side as the new Q_i; here log Q_i moves only a part of the way to it, see `damping`.
-    Then no update raises the free energy. Without damping, two cells that strongly attract each other, each decided
-    for another label, swap their labels for ever.
+    1. They take the right-hand side as the new Q_i; here log Q_i moves only part of the way to it, see `damping`.
+    Then no update raises the free energy. Without damping, two cells that attract each other strongly but have
+    different labels swap them for ever.
 
     Parameters
     ----------
@@ -42,7 +38,7 @@ def mean_field_naive(
         Weights, widths and normalisation.
     iterations : int
         The largest number of updates of all cells. With the default parameters nearly all labels have settled after
-        ten; probabilities of single cells still change later.
+        ten, though probabilities of single cells still change.
     tolerance : float
         Stop as soon as an update changes no probability by more than this.
 
@@ -61,7 +57,7 @@ def mean_field_naive(
 
 
 def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> Iterator[NDArray[np.float64]]:
-    """Yield what `mean_field_naive` holds at first and after each update, without end.
+    """Yield Q of `mean_field_naive` at first and after each update, without end.
 
     Parameters are those of `mean_field_naive`.
 
@@ -72,7 +68,7 @@ def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -
 
     Examples
     --------
-    The free energy after each update, of two cells that attract each other and disagree:
+    Two cells attract each other and disagree. The free energy, at first and after each update:
 
     >>> from semgrid_edu.crf import free_energy
     >>> unary, values = np.array([[[0.0, 2.0]], [[1.0, 0.0]]]), np.full((4, 1, 2), 0.25)
@@ -82,62 +78,42 @@ def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -
     """
     unary, values = check_inputs(unary, values)
     weights = gram_matrix(values, params)
-    own = np.diag(weights).copy()
-    np.fill_diagonal(weights, 0)
-    for Q in all_updates(above_best(unary), lambda Q: (1 - Q) @ weights, damping(own)):
-        yield Q.reshape(unary.shape)
+    self_coupling = np.diag(weights).copy()
+    np.fill_diagonal(weights, 0)  # a cell is no pair with itself
+    return updates(unary, lambda Q: (1 - Q) @ weights, self_coupling)
 
 
-def mean_field_update(log_Q: Any, phi: Any, disagreement: Any, part: Any = 1.0) -> Any:
-    """Return log Q_i(l) after an update, up to a constant in each cell, which the soft-max cancels.
-
-        log Q_i(l) <- (1 - p_i) log Q_i(l) + p_i (-phi_i(l) - sum_{j != i} k_ij (1 - Q_j(l)))
-
-    Parameters
-    ----------
-    log_Q, phi : (C, ...) float array or Tensor
-        log Q and the unary term of one or many cells.
-    disagreement : (C, ...) float array or Tensor
-        The sum over all other cells, up to a constant that is the same for all classes.
-    part : (...) float array or Tensor
-        p_i, see `damping`; 1 when no other cell moves at the same time.
-
-    Returns
-    -------
-    (C, ...) float array or Tensor
-        Logarithms that aren't normalised.
-    """
-    return (1 - part) * log_Q + part * (-phi - disagreement)
-
-
-def all_updates(
-    phi: NDArray[np.floating], disagreement: Callable[[NDArray], NDArray], part: NDArray[np.floating]
+def updates(
+    unary: NDArray, disagreement: Callable[[NDArray], NDArray], self_coupling: NDArray
 ) -> Iterator[NDArray[np.floating]]:
-    """Yield Q at first and after each `mean_field_update` of all cells at once, without end.
+    """Yield Q at first and after each update of all cells at once, without end: the one rule of mean field.
 
     Parameters
     ----------
-    phi : (C, N) float
-        The unary term, finite, see `above_best`.
+    unary : (C, H, W) float
+        phi_u; inf where a class is impossible.
     disagreement : callable
-        Q (C, N) -> sum_{j != i} k_ij (1 - Q_j(l)), (C, N).
-    part : (N,) float
-        p_i, see `damping`.
+        Q (C, H W) -> sum_{j != i} k_ij (1 - Q_j(l)), (C, H W), up to a constant that is the same for all classes.
+    self_coupling : (H W,) float
+        k_ii, see `damping`.
 
     Yields
     ------
-    (C, N) float
-        Q, in the type of phi.
+    (C, H, W) float
+        Q, the distribution over classes in each cell.
     """
+    phi = above_best(unary).astype(np.float64)
+    part = damping(self_coupling)
     log_Q = log_softmax(-phi, axis=0)
     while True:
         Q = np.exp(log_Q)
-        yield Q
-        log_Q = log_softmax(mean_field_update(log_Q, phi, disagreement(Q), part), axis=0)
+        yield Q.reshape(unary.shape)
+        target = -phi - disagreement(Q)
+        log_Q = log_softmax((1 - part) * log_Q + part * target, axis=0)
 
 
 def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return how far each cost lies above that of the cell's best class: the unary term up to a constant.
+    """Return the cost of each class relative to the cell's best one: the unary term up to a constant.
 
     Parameters
     ----------
@@ -152,12 +128,12 @@ def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.minimum(unary - unary.min(axis=0), NEVER).reshape(len(unary), -1)
 
 
-def settled(updates: Iterator[NDArray], iterations: int, tolerance: float) -> NDArray:
-    """Take updates until their number is reached, or one changes no probability by more than the tolerance.
+def settled(states: Iterator[NDArray], iterations: int, tolerance: float) -> NDArray:
+    """Update until the number of updates is reached, or one changes no probability by more than the tolerance.
 
     Parameters
     ----------
-    updates : iterator of (C, H, W) float
+    states : iterator of (C, H, W) float
         Q at first and after each update, such as `mean_field_updates`.
     iterations : int
         The largest number of updates.
@@ -169,25 +145,26 @@ def settled(updates: Iterator[NDArray], iterations: int, tolerance: float) -> ND
     (C, H, W) float
         The last Q.
     """
-    Q = next(updates)
+    Q = next(states)
     for _ in range(iterations):
-        before, Q = Q, next(updates)
+        before = Q
+        Q = next(states)
         if np.abs(Q - before).max() <= tolerance:
             break
     return Q
 
 
-def damping(own: NDArray) -> NDArray:
-    """Return how far an update of all cells at once may go, so that it can't raise the free energy.
+def damping(self_coupling: NDArray) -> NDArray:
+    """Return how far all cells may move at once without raising the free energy.
 
     With k_ii the weight of a cell with itself (the diagonal of `gram_matrix`), the free energy is::
 
         F(Q) = sum_i Q_i . phi_i - 1/2 sum_ij k_ij Q_i . Q_j + 1/2 sum_i k_ii |Q_i|^2 - H(Q) + constant
 
-    The first sum over pairs has a positive semidefinite matrix, so with its minus sign it is concave, and lies below
-    its tangent at the present Q. The next sum lies above its tangent by ``k_ii / 2 |Q'_i - Q_i|^2``, which is at most
-    ``k_ii / 2 KL(Q'_i || Q_i)`` by Pinsker's inequality. Tangents and bound together lie above F and touch it at Q; so
-    the Q' that makes them smallest has no larger F than Q. Setting the derivative to zero gives::
+    The first sum over pairs has a positive semidefinite matrix, so with its minus sign it is concave, and nowhere above
+    its tangent at the present Q. The next sum is above its tangent by ``k_ii / 2 |Q'_i - Q_i|^2``, which is at most
+    ``k_ii / 2 KL(Q'_i || Q_i)`` by Pinsker's inequality. Tangents and bound together are nowhere below F and touch it
+    at Q; so the Q' that makes them smallest has no larger F than Q. Setting the derivative to zero gives::
 
         log Q'_i = (1 - p_i) log Q_i + p_i (-phi_i - sum_{j != i} k_ij (1 - Q_j)) + constant,   p_i = 1 / (1 + k_ii / 2)
 
@@ -195,25 +172,25 @@ def damping(own: NDArray) -> NDArray:
 
     Parameters
     ----------
-    own : (N,) float
+    self_coupling : (N,) float
         k_ii, for each cell the sum over the kernels.
 
     Returns
     -------
     (N,) float
-        p_i, above 0 and at most 1. With the default parameters and many neighbours it is near 1, so that nothing is
-        lost; with `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
+        p_i, above 0 and at most 1. With the default parameters and many neighbours it is near 1, so damping costs
+        nothing; with `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
     """
-    return 1 / (1 + own / 2)
+    return 1 / (1 + self_coupling / 2)
 
 
 def mean_field_sequential(
     unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10
 ) -> NDArray[np.float64]:
-    """Approximate the CRF's marginals by mean field, one cell after the other: the literal reference.
+    """Approximate the CRF's marginals by mean field, one cell after the other.
 
-    Each update minimises the free energy over the distribution of one cell, so none can raise it, and nothing has to be
-    damped. But cells have to wait for each other.
+    Each update minimises the free energy over the distribution of one cell, so it can't raise it, and needs no damping.
+    But cells have to wait for each other.
     Parameters are those of `mean_field_naive`, and so are errors.
 
     Returns
@@ -223,10 +200,11 @@ def mean_field_sequential(
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations)
-    phi, weights = above_best(unary.astype(np.float64)), pair_weights(values, params)
+    phi = above_best(unary.astype(np.float64))
+    weights = pair_weights(values, params)
     log_Q = log_softmax(-phi, axis=0)
     for _ in range(iterations):
         for i in range(phi.shape[1]):
             disagreement = (1 - np.exp(log_Q)) @ weights[i]
-            log_Q[:, i] = log_softmax(mean_field_update(log_Q[:, i], phi[:, i], disagreement))
+            log_Q[:, i] = log_softmax(-phi[:, i] - disagreement)
     return np.exp(log_Q).reshape(unary.shape)

@@ -10,11 +10,11 @@ from semgrid_edu.errors import ArgumentError, check_fields, check_shape, types_n
 from semgrid_edu.occupancy import N_STATES
 
 LARGEST_WEIGHT = 1e30
-"""The largest weight of a kernel, because the fast mean field computes in float32, whose largest number is 3e38."""
+"""The largest weight of a kernel. `fast.mean_field` computes in float32, whose largest number is 3e38."""
 
 NARROWEST = 0.15
-"""The narrowest kernel that the filters compute, cells. At this width neighbours lie 6.7 widths apart, beyond the reach
-of the lattice, where the Gaussian is 2e-10. A narrower kernel couples no cells either, so filters take this width."""
+"""The narrowest kernel that the filters compute, cells. At this width neighbours are 6.7 widths apart, out of reach of
+the lattice, and the Gaussian is 2e-10. A narrower kernel couples no cells either, so the filters use this width."""
 
 PAPER_CELL = 0.2
 """Side of a cell in the paper, metres (section 4.1)."""
@@ -28,22 +28,22 @@ class CrfParams:
     ----------
     w_bilateral, w_spatial : float
         w1 and w2, the weights of the two kernels. The defaults are 4 and 3. Kraehenbuehl and Koltun's published code
-        takes 10 and 3 for images; occupancy gets less weight here than colour does there, because many classes share
+        uses 10 and 3 for images; occupancy gets less weight here than colour does there, because many classes share
         a state.
     sigma_alpha : float
         Width of the bilateral kernel in space, cells: 8 cells are 1.6 m in the paper's grid, the width of a car.
     sigma_beta : float
-        Width of the bilateral kernel in state probability. Two certain, different states lie sqrt(2) apart, which is
-        seven times 0.2, so such cells hardly influence each other; a cell that is 90 % free is still influenced by a
-        cell that is certainly free.
+        Width of the bilateral kernel in state probability. Two different states, both certain, are sqrt(2) apart,
+        seven times 0.2, so such cells hardly influence each other. A cell that is 90 % free is still influenced by one
+        that is certainly free.
     sigma_gamma : float
         Width of the spatial kernel, cells: 3, as in Kraehenbuehl and Koltun's published code, removes single wrong
         cells.
     normalization : {"symmetric", "none"}
-        "symmetric" replaces each kernel K (its diagonal, 1, included) by D^-1/2 K D^-1/2 with D its row sums, as
-        Kraehenbuehl's code does by default: every cell receives about the same total weight, so the weights don't
-        depend on the sigmas or on how common a cell's state is. "none" is eq. (4) as printed: hundreds of neighbours
-        count with full weight, which over-smooths.
+        "symmetric" replaces each kernel K, its diagonal of ones included, by D^-1/2 K D^-1/2 with D its row sums, as
+        Kraehenbuehl's code does by default. Every cell then receives about the same total weight, whatever the sigmas
+        are and however common its state is. "none" is eq. (4) as printed: hundreds of neighbours count with full
+        weight, which over-smooths.
 
     Raises
     ------
@@ -65,7 +65,7 @@ class CrfParams:
         Parameters
         ----------
         cell : float
-            Side of a cell, metres; the defaults are for the paper's 0.2.
+            Side of a cell, metres; the plain defaults are for the paper's 0.2.
 
         Examples
         --------
@@ -77,7 +77,7 @@ class CrfParams:
 
     @types_named
     def __post_init__(self) -> None:
-        """Refuse numbers for which eq. (4) has no meaning."""
+        """Raise when a number is one for which eq. (4) has no meaning."""
         weights = f"a weight of at least 0 and at most {LARGEST_WEIGHT:g}"
         check_fields(self, weights, lambda weight: 0 <= weight <= LARGEST_WEIGHT, "w_bilateral", "w_spatial")
         widths = "sigma_alpha", "sigma_beta", "sigma_gamma"
@@ -146,7 +146,7 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
     ------
     ArgumentError
         When the shapes don't fit, a cost is NaN or -inf, a cell has no possible class, states don't sum to 1, or an
-        argument holds no real numbers or masked ones. `semgrid_edu.crf.check` says what the cause may be.
+        argument holds anything but real numbers, or masked ones.
     """
     unary, values = _floats("unary", unary), _floats("values", values)
     if unary.ndim != 3 or 0 in unary.shape:
@@ -163,7 +163,7 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float6
 
 
 def _floats(name: str, argument: ArrayLike) -> NDArray[np.floating]:
-    """Return an array of float32 or float64; what is neither becomes float64."""
+    """Return an array of float32 or float64; any other type becomes float64."""
     if np.ma.is_masked(argument):
         raise ArgumentError(name, "an array without masked numbers", f"{np.ma.count_masked(argument)} masked")
     try:
@@ -176,7 +176,7 @@ def _floats(name: str, argument: ArrayLike) -> NDArray[np.floating]:
 
 
 def check_stop(iterations: int, tolerance: float = 0.0) -> None:
-    """Refuse a number of iterations, or a change below which to stop, that is impossible.
+    """Check when mean field is to stop.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Calibration: the temperature at which a network's probabilities mean what they say, before eq. (3) uses them."""
+"""Calibration: how often a network is right, by its confidence, and which temperature corrects it (eq. (3))."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import IGNORE
 
 COLDEST, HOTTEST = 0.01, 100.0
-"""The temperatures between which `fit_temperature` looks."""
+"""The temperatures between which `fit_temperature` searches."""
 
 
 class Reliability(NamedTuple):
@@ -57,15 +57,6 @@ def at_temperature(log_probability: ArrayLike, temperature: float) -> NDArray:
     if not (np.isfinite(temperature) and temperature > 0):
         raise ArgumentError("temperature", "a positive number", temperature)
     return log_softmax(np.asarray(log_probability) / float(temperature), axis=0)
-
-
-def negative_log_likelihood(log_probability: ArrayLike, truth: ArrayLike, ignore: int = IGNORE) -> float:
-    """Return the mean of -log p(truth) over all labelled cells, in nats: the smaller, the better the probabilities.
-
-    Parameters are those of `fit_temperature`.
-    """
-    columns, classes = _labelled("log_probability", log_probability, truth, ignore)
-    return -float(columns[classes, np.arange(len(classes))].mean(dtype=np.float64))
 
 
 def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = IGNORE) -> float:

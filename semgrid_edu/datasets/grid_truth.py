@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets.readers.frames import LabelledDrive, visible_labels
+from semgrid_edu.datasets.frames import LabelledDrive, visible_labels
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import FrameLabels
 from semgrid_edu.grid import GridSpec

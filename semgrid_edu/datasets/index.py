@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from semgrid_edu.datasets.readers.frames import LabelledDrive
-from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
-from semgrid_edu.datasets.readers.pandaset import CAMERAS, PandasetScene
-from semgrid_edu.datasets.readers.pandaset_files import semseg_folder
-from semgrid_edu.datasets.readers.semantic_kitti import SemanticKittiSequence
-from semgrid_edu.datasets.readers.synthia import SynthiaSequence
+from semgrid_edu.datasets.frames import LabelledDrive
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
+from semgrid_edu.datasets.pandaset_files import semseg_folder
+from semgrid_edu.datasets.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14, LABEL_SETS, LabelSet
 from semgrid_edu.storage.files import write_json
@@ -43,9 +42,8 @@ READERS = {
     "kitti-raw": Reader(KittiRawDrive, ("date", "drive")),
     "pandaset": Reader(PandasetScene, ("scene", "camera")),
     "semantic-kitti": Reader(SemanticKittiSequence),
-    "synthia": Reader(SynthiaSequence),
 }
-"""The readers that dataset.json can name as its "reader"; without one it means "kitti-raw"."""
+"""The readers that dataset.json can name as its "reader". `READERS["mine"] = Reader(...)` adds one."""
 
 
 class LabelledFrame(NamedTuple):
@@ -139,26 +137,6 @@ class DatasetIndex:
             expected = f"the label set of {drive.name}, {drive.label_set.name}"
             raise DataError(self.root / INDEX_FILE, expected, self.label_set.name)
         return drive
-
-
-def dataset_doubts(dataset_dir: str | Path, *splits: str) -> list[str]:
-    """List what is doubtful about the drives of some splits, before hours of work are based on them.
-
-    Parameters
-    ----------
-    dataset_dir : path-like
-        The folder of the data set, such as data/minikitti.
-    *splits : str
-        Such as "train".
-
-    Returns
-    -------
-    list of str
-        One line for each doubtful thing, from the reader's `doubts`.
-    """
-    index = load_index(dataset_dir)
-    drives = [drive for split in splits for drive, _ in index.drives(split)]
-    return [line for drive in drives for line in drive.doubts()]
 
 
 def load_index(dataset_dir: str | Path) -> DatasetIndex:

@@ -1,24 +1,26 @@
-"""Labels of cells that are made from image labels and LIDAR: the policies that have names, and what makes them (4).
+"""Labels of cells made from image labels and LIDAR: named policies, and the loop over a drive (section 4).
 
-`cached_labels` keeps the labels until the code of this module, or of what it imports, changes. So only what makes
-labels stands here.
+`cached_labels` keeps the labels until the code of this module, or of what it imports, changes. So this module holds
+only what makes labels.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets.ground_truth import Moment, TruthFlaws, TruthPolicy, drive_truth, flawed_drive
-from semgrid_edu.datasets.readers.frames import LabelledDrive
+from semgrid_edu.datasets.frames import LabelledDrive
+from semgrid_edu.datasets.ground_truth import Moment, TruthPolicy, drive_truth
 from semgrid_edu.datasets.training_arrays import SEED, ArrayRecipe
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import Frame
 from semgrid_edu.occupancy import track_drive
 
 ACCUMULATED = TruthPolicy(past=9, vote="majority")
-"""The labelled scan and the nine before it, which began 0.9 s earlier, all labelled by the one labelled image, as in
-KITTI. Most cells then have many returns, so that a majority can decide."""
+"""The labelled scan and the nine before it (0.9 s), all labelled by the one labelled image, as in KITTI. Most cells
+then have many returns, so that a majority can decide."""
 
 POLICIES = {
     "lidar": TruthPolicy(),
@@ -29,8 +31,25 @@ POLICIES = {
     "camera-mask": TruthPolicy(visible_to="camera"),
     "de-skewed": TruthPolicy(deskew=True),
 }
-"""The policies that networks learn from, by name; "lidar" is the paper's, as far as it says. Each of the others changes
-one thing, except that the accumulated ones also take the majority's class."""
+"""The policies that networks learn from, by name; "lidar" is the paper's, as far as it is described. Each of the others
+changes one thing, except that the accumulated ones also take the majority's class."""
+
+
+class FrameErrors(Protocol):
+    """Errors that are added to frames, such as `semgrid_edu.workshop.flaws.TruthFlaws`; a frozen dataclass."""
+
+    def apply(self, frames: Sequence[Frame], seed: int, number: int) -> list[Frame]:
+        """Return the frames with errors.
+
+        Parameters
+        ----------
+        frames : sequence of Frame
+            The frames of a drive.
+        seed : int
+            Seed for the errors.
+        number : int
+            Number of the drive, so that the errors of two drives differ.
+        """
 
 
 @dataclass(frozen=True)
@@ -41,19 +60,18 @@ class LidarTruth:
     ----------
     policy : TruthPolicy
         What `lidar_truth` does.
-    flaws : TruthFlaws
-        The errors that image labels, calibration and scans get first, because simulated data have none: by default
-        errors like those of real data. `NO_FLAWS` for real data.
+    flaws : FrameErrors, optional
+        Errors that image labels, calibration and scans get first, because simulated data have none. None for real data.
     seed : int
-        Seed for these errors. The error of calibration is the same in the whole data set.
+        Seed for these errors. The calibration error is the same in the whole data set.
     """
 
     policy: TruthPolicy = field(default_factory=TruthPolicy)
-    flaws: TruthFlaws = field(default_factory=TruthFlaws)
+    flaws: FrameErrors | None = None
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse a seed that numpy would refuse later."""
+        """Check the seed, which numpy would do only later."""
         if self.seed < 0:
             raise ArgumentError("seed", "a whole number from 0 up", self.seed)
 
@@ -74,7 +92,7 @@ def drive_labels(
     truth : LidarTruth
         How to make them.
     number : int
-        Number of the drive in its split, so that each drive gets errors of its own.
+        Number of the drive in its split, so that the errors of two drives differ.
 
     Returns
     -------
@@ -83,6 +101,7 @@ def drive_labels(
     last = min(max(labelled) + truth.policy.future, len(drive) - 1)
     frames = [replace(drive[k], image=None) for k in range(last + 1)]
     beliefs = list(track_drive(frames, recipe.spec, recipe.params, SEED))
-    flawed = flawed_drive(frames, truth.flaws, truth.seed, number)
-    moments = [Moment(frame, belief) for frame, belief in zip(flawed, beliefs, strict=True)]
+    if truth.flaws:
+        frames = truth.flaws.apply(frames, truth.seed, number)  # after the filter: it sees the true scans
+    moments = [Moment(frame, belief) for frame, belief in zip(frames, beliefs, strict=True)]
     return [drive_truth(moments, k, recipe.spec, truth.policy) for k in labelled]

@@ -6,8 +6,8 @@ What needs torch is imported where it is used: torch takes seconds, and those wh
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
-from semgrid_edu.datasets.readers.pandaset_files import CREDIT
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.pandaset_files import CREDIT
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import shipped_folder
 from semgrid_edu.storage.provenance import PROVENANCE, provenance_problems

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from semgrid_edu.datasets.frames import LabelledDrive
 from semgrid_edu.datasets.grid_truth import truth_to_learn
-from semgrid_edu.datasets.readers.frames import LabelledDrive
-from semgrid_edu.datasets.readers.project_lidar import seen_returns
+from semgrid_edu.datasets.project_lidar import seen_returns
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec

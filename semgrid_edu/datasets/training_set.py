@@ -12,19 +12,19 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.index import INDEX_FILE, DatasetIndex, LabelledFrame, load_index
+from semgrid_edu.datasets.frames import LabelledDrive
+from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame, load_index
 from semgrid_edu.datasets.label_policies import LidarTruth
-from semgrid_edu.datasets.training_arrays import SEED, ArrayRecipe
-from semgrid_edu.datasets.training_cache import LabelledDrives, cached_arrays, cached_labels
+from semgrid_edu.datasets.training_arrays import ArrayRecipe
+from semgrid_edu.datasets.training_cache import cached_arrays
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture
 from semgrid_edu.occupancy import CmcdotParams
-from semgrid_edu.storage.provenance import PROVENANCE, write_provenance
-from semgrid_edu.storage.tensors import read_tensors, write_tensors
+from semgrid_edu.storage.tensors import read_tensors
 
 FRAMES = "frames.safetensors"
-"""Name of the file that holds an excerpt."""
+"""Name of the file that holds an excerpt: a few labelled frames, such as the shipped ones."""
 
 
 class Sample(NamedTuple):
@@ -52,7 +52,7 @@ class TrainingSet(Dataset[Sample]):
     """The labelled frames of a split.
 
     The first use runs the occupancy filter over every drive up to its labelled frames and keeps the result in `cache/`
-    of the data set, see `cached_arrays`. Later uses map it from disk, until data, recipe or code change.
+    of the data set, see `cached_arrays`. Later uses read it from there, until data, recipe or code change.
 
     Parameters
     ----------
@@ -82,9 +82,8 @@ class TrainingSet(Dataset[Sample]):
     drives : tuple of str
         The name of the drive of each frame, such as "2026_01_01 0143". Frames of one drive look alike, so they aren't
         independent.
-    arrays : dict of str to arrays mapped from disk
-        All frames at once, as `cached_arrays` returns them, and "true", (N, H, W) uint8: what the data set says.
-        "truth" is the same, or what `truth` makes. The labels of pixels are the true ones in both cases.
+    arrays : dict of str to array
+        All frames at once, as `cached_arrays` returns them. The labels of pixels are always the data set's own.
 
     Raises
     ------
@@ -115,11 +114,7 @@ class TrainingSet(Dataset[Sample]):
         drives = index.drives(split)
         self.camera = _shared_camera(drives).resized(recipe.image_size)
         self.drives = tuple(drive.name for drive, numbers in drives for _ in numbers)
-        arrays = cached_arrays(index, split, recipe)
-        self.arrays = arrays | {"true": arrays["truth"]}
-        if truth:
-            folder = Path(arrays["truth"].filename).parent
-            self.arrays["truth"] = cached_labels(drives, recipe, truth, folder)
+        self.arrays = cached_arrays(index, split, recipe, truth)
 
     def __len__(self) -> int:
         """Return the number of labelled frames."""
@@ -234,8 +229,8 @@ def sets_by_camera(
     return [TrainingSet(part, split, spec, image_size, truth=truth) for part in parts]
 
 
-def _shared_camera(drives: LabelledDrives) -> Camera:
-    """Return the camera of a split's drives, refusing two that differ, because one sampler serves them all."""
+def _shared_camera(drives: Sequence[tuple[LabelledDrive, list[int]]]) -> Camera:
+    """Return the camera of a split's drives; it must be the same for all, because one sampler serves them."""
     (first, _), *others = drives
     camera = first.camera
     for drive, _ in others:
@@ -245,52 +240,13 @@ def _shared_camera(drives: LabelledDrives) -> Camera:
     return camera
 
 
-def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) -> None:
-    """Keep a few labelled frames of a data set's split "train", evenly spread over it.
-
-    Parameters
-    ----------
-    dataset_dir : path-like
-        The data set, such as data/minikitti.
-    n_frames : int
-        How many frames.
-    folder : path-like
-        The folder that takes `frames.safetensors` and `provenance.json`.
-
-    Raises
-    ------
-    ArgumentError
-        When the split has fewer frames.
-    DataError
-        When the folder lies in the data set, holds it, or has the provenance of something else, which would be lost.
-    """
-    _check_place(Path(folder), Path(dataset_dir))
-    training, folder = TrainingSet(dataset_dir, "train"), Path(folder)
-    if not 1 <= n_frames <= len(training):
-        raise ArgumentError("n_frames", f"1 to {len(training)} frames", n_frames)
-    chosen = [training[k * len(training) // n_frames] for k in range(n_frames)]
-    tensors = dict(zip(Sample._fields, map(torch.stack, zip(*chosen, strict=True)), strict=True))
-    write_tensors(folder / FRAMES, tensors)
-    command = f"semgrid-edu data excerpt --data {Path(dataset_dir).name} --frames {n_frames} {folder.name}"
-    write_provenance(folder, command, SEED, ("numpy", "torch", "numba"))
-
-
-def _check_place(folder: Path, dataset_dir: Path) -> None:
-    """Refuse to write an excerpt where provenance of something else is or would be mixed with its own."""
-    here, there = folder.resolve(), dataset_dir.resolve()
-    if here.is_relative_to(there) or there.is_relative_to(here) or (folder / INDEX_FILE).exists():
-        raise DataError(folder, f"a folder apart from the data set {dataset_dir}", "one that holds it or is part of it")
-    if (folder / PROVENANCE).exists() and not (folder / FRAMES).exists():
-        raise DataError(folder, "an empty folder, or an earlier excerpt", f"the {PROVENANCE} of something else")
-
-
 def read_excerpt(folder: str | Path) -> list[Sample]:
-    """Read the frames that `write_excerpt` kept.
+    """Read the frames that `semgrid-edu data excerpt` kept.
 
     Parameters
     ----------
     folder : path-like
-        The folder that it wrote to.
+        The folder that it wrote.
     """
     path = Path(folder) / FRAMES
     _, tensors = read_tensors(path)

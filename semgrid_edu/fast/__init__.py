@@ -13,8 +13,33 @@ from importlib import import_module
 
 _WHERE: dict[str, str] = {
     # occupancy
+    "Cmcdot": "occupancy.cmcdot",
+    "DriveTracker": "occupancy.cmcdot",
+    "SensorModel": "occupancy.sensor",
+    "SystematicResampling": "occupancy.resampling",
+    "height_above_ground": "occupancy.ground",
+    "look_up": "occupancy.planar_motion",
+    "move": "occupancy.steps",
+    "predict": "occupancy.steps",
+    "resample": "occupancy.steps",
+    "scan_evidence": "occupancy.sensor",
+    "systematic_resample": "occupancy.resampling",
+    "track_drive": "occupancy.cmcdot",
+    "transition_matrix": "occupancy.transition",
+    "update": "occupancy.steps",
     # planes and memory
+    "ClassMemory": "memory",
+    "PlaneSampler": "planes",
+    "carry_classes": "memory",
+    "learn_classes": "memory",
+    "look_at": "memory",
+    "recall_classes": "memory",
+    "remember_drive": "memory",
     # crf
+    "PermutohedralLattice": "crf.lattice",
+    "SeparableGaussian": "crf.spatial",
+    "bilateral_kernel": "crf.mean_field",
+    "mean_field": "crf.mean_field",
 }
 """The module that each name comes from: it is loaded when the name is first used."""
 

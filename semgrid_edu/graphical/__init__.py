@@ -8,15 +8,16 @@ independences off the graph, and `draw` shows it.
 from semgrid_edu.graphical.drawing import draw
 from semgrid_edu.graphical.exact import eliminate, enumerate_marginals, log_total, max_product, min_fill_order
 from semgrid_edu.graphical.factor import Factor, product
-from semgrid_edu.graphical.layout import in_rows
 from semgrid_edu.graphical.mean_field import mean_field_graph
-from semgrid_edu.graphical.messages import Beliefs, loopy_max_product, sum_product
+from semgrid_edu.graphical.messages import Beliefs, sum_product
 from semgrid_edu.graphical.model import GraphicalModel
+from semgrid_edu.graphical.places import Dashed, in_rows
 from semgrid_edu.graphical.separation import d_separated, why_dependent
 from semgrid_edu.metrics import total_variation
 
 __all__ = [
     "Beliefs",
+    "Dashed",
     "Factor",
     "GraphicalModel",
     "d_separated",
@@ -25,7 +26,6 @@ __all__ = [
     "enumerate_marginals",
     "in_rows",
     "log_total",
-    "loopy_max_product",
     "max_product",
     "mean_field_graph",
     "min_fill_order",

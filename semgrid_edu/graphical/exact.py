@@ -13,7 +13,7 @@ from semgrid_edu.graphical.factor import Factor, as_names, check_name, rescaled_
 from semgrid_edu.graphical.model import GraphicalModel, possible
 
 MAX_ASSIGNMENTS = 10**6
-"""As many assignments as a loop in Python visits in about half a minute."""
+"""A loop in Python visits so many in about half a minute."""
 
 NOTHING: Mapping[str, int] = MappingProxyType({})
 """No variable is given."""
@@ -73,9 +73,9 @@ def eliminate(
 ) -> Factor:
     """Sum out one variable after the other, each from the product of only those factors that contain it.
 
-    The result isn't normalised, because its total is worth having: P(given) in a directed model, the partition
-    function Z in an undirected one. `.normalised()` gives P(names | given). A directed model without anything
-    given has the total 1, so its marginals come out normalised.
+    The result isn't normalised, because its total is useful: P(given) in a directed model, the partition function Z in
+    an undirected one. `.normalised()` gives P(names | given). With nothing given, a directed model has the total 1, so
+    its marginals come out normalised.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def eliminate(
     ArgumentError
         When a product would have more than 10^7 entries (the message names its variables), a variable or state is
         unknown, `order` isn't a permutation of the variables to sum out, or the total is beyond the range of floats,
-        as P(given) of a long chain is: then see `log_total`.
+        as P(given) of a long chain may be; see `log_total`.
 
     Examples
     --------
@@ -117,10 +117,10 @@ def eliminate(
 
 
 def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: Sequence[str] | None = None) -> float:
-    """Return the logarithm of what `eliminate(model, ())` returns: log P(given), or log Z of an undirected model.
+    """Return the logarithm of `eliminate(model, ())`: log P(given), or log Z of an undirected model.
 
-    P(given) of a chain of thousands of readings is less than the smallest float, but its logarithm is an ordinary
-    number. The logarithm of P(x | given) is a difference of two of them, with and without x among what is given.
+    P(given) of a chain of thousands of readings is below the smallest float, but its logarithm is an ordinary number.
+    log P(x | given) is the difference of two of them: with and without x among the given variables.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: 
     Returns
     -------
     float
-        In nats; -inf when what is given can't happen.
+        In nats; -inf when the given states are impossible.
 
     Raises
     ------
@@ -155,10 +155,10 @@ def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: 
 def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> dict[str, int]:
     """Find a most likely assignment of all variables that aren't given: elimination with max in place of sum.
 
-    A variable that is maximised out remembers its best state for each state of its neighbours. Going back
-    through the variables in reverse order reads the assignment off, so that it is consistent even when several are
-    equally likely; one of them is returned, the same each time. On a chain this is the Viterbi algorithm. It is
-    exact on every graph, with or without loops, as long as no table exceeds 10^7 entries.
+    The clique of each eliminated variable is kept. Going through the variables in reverse order, each takes its best
+    state given those already chosen, so the assignment is consistent even when several are equally likely. On a chain
+    this is the Viterbi algorithm. It is exact on every graph, with or without loops, as long as no table exceeds 10^7
+    entries.
 
     Parameters
     ----------
@@ -184,7 +184,8 @@ def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> di
     {'rain': 1}
     """
     model = possible(model, given)
-    factors, cliques = list(model.factors), []
+    factors = list(model.factors)
+    cliques = []
     for name in min_fill_order(model):
         clique = rescaled_product(factor for factor in factors if name in factor.names)[0].normalised()
         cliques.append((name, clique))
@@ -197,10 +198,11 @@ def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> di
 
 
 def min_fill_order(model: GraphicalModel, keep: Iterable[str] = ()) -> tuple[str, ...]:
-    """Order variables for elimination: next is always the one whose elimination links the fewest strangers.
+    """Order variables for elimination by the min-fill rule.
 
-    Eliminating a variable couples all its neighbours. Pairs that weren't neighbours before are the fill; few of them
-    keep the tables small. Among equals the first in the model's order is taken.
+    Eliminating a variable couples all its neighbours. The pairs that weren't neighbours before are its fill; the next
+    variable is always one with the least fill, because that keeps the tables small. Ties go to the first in the
+    model's order.
 
     Parameters
     ----------
@@ -215,7 +217,8 @@ def min_fill_order(model: GraphicalModel, keep: Iterable[str] = ()) -> tuple[str
     >>> min_fill_order(chain)
     ('a', 'b', 'c')
     """
-    neighbours, keep = model.neighbours, set(keep)
+    neighbours = model.neighbours
+    keep = set(keep)
     order: list[str] = []
     while left := [name for name in model.names if name in neighbours and name not in keep]:
         name = min(left, key=lambda name: len(_fill(neighbours, name)))
@@ -236,9 +239,10 @@ def _fill(neighbours: Mapping[str, set[str]], name: str) -> list[tuple[str, str]
 def _summed_out(
     model: GraphicalModel, names: str | Sequence[str], given: Mapping[str, int], order: Sequence[str] | None
 ) -> tuple[Factor, int]:
-    """Return what is left over `names` divided by 2^n, and n: a power of two is taken out of each product."""
+    """Return the marginal over `names` divided by 2^n, and n: a power of two is taken out of each product."""
     model = model.given(**given)
-    names, power = _wanted(model, names, given), 0
+    names = _wanted(model, names, given)
+    power = 0
     factors = list(model.factors)
     for name in _checked_order(model, names, order):
         clique, more = rescaled_product(factor for factor in factors if name in factor.names)

@@ -25,7 +25,7 @@ class Factor:
     Parameters
     ----------
     names : tuple of str
-        One name per axis of the table; a single name may stand alone. () makes a constant.
+        One name per axis of the table; a string is a single name. () makes a constant.
     table : (K_1, ..., K_n) float
         Non-negative and finite, kept as a read-only float64 copy. K_i is the number of states of variable i.
 
@@ -48,7 +48,8 @@ class Factor:
     table: NDArray[np.float64]
 
     def __post_init__(self) -> None:
-        names, table = as_names(self.names), np.array(self.table, dtype=np.float64, order="C")
+        names = as_names(self.names)
+        table = np.array(self.table, dtype=np.float64, order="C")
         table.setflags(write=False)
         object.__setattr__(self, "names", names)
         object.__setattr__(self, "table", table)
@@ -76,17 +77,17 @@ class Factor:
             return NotImplemented
         names = tuple(dict.fromkeys(self.names + other.names))
         shared_cardinalities([self.cardinalities, other.cardinalities])
-        with np.errstate(over="ignore"):  # a Factor refuses what is infinite
+        with np.errstate(over="ignore"):  # the constructor rejects infinity
             return Factor(names, self._spread(names) * other._spread(names))
 
     def _spread(self, names: tuple[str, ...]) -> NDArray[np.float64]:
-        """Return the table with its axes in the order of `names`, and an axis of length 1 for each foreign name."""
+        """Return the table with its axes in the order of `names`, and an axis of length 1 for each other name."""
         states = self.cardinalities
-        own = self.ordered(*(name for name in names if name in states))
-        return own.table.reshape([states.get(name, 1) for name in names])
+        ordered = self.ordered(*(name for name in names if name in states))
+        return ordered.table.reshape([states.get(name, 1) for name in names])
 
     def ordered(self, *names: str) -> "Factor":
-        """Return the same factor with its axes in the order of `names`, which must be all of its own.
+        """Return the same factor with its axes in another order.
 
         Parameters
         ----------
@@ -157,7 +158,7 @@ class Factor:
         Raises
         ------
         ArgumentError
-            When all entries are 0: what is given can't happen under the model.
+            When all entries are 0: the given states are impossible under the model.
         """
         table = self.rescaled()[0].table  # so that the sum of huge or tiny entries stays in range
         if not table.any():
@@ -202,7 +203,7 @@ def product(factors: Iterable[Factor]) -> Factor:
 
 
 def rescaled_product(factors: Iterable[Factor]) -> tuple[Factor, int]:
-    """Multiply factors of which there may be thousands: a power of two is taken out after each.
+    """Multiply any number of factors; a power of two is taken out after each, so thousands stay in range.
 
     Parameters
     ----------
@@ -234,7 +235,7 @@ def _checked(factors: Iterable[Factor]) -> tuple[Factor, ...]:
 
 
 def shared_cardinalities(tables: Iterable[Mapping[str, int]]) -> dict[str, int]:
-    """Collect {name: number of states} of several tables, in the order in which the variables first occur.
+    """Return {name: number of states} of several tables, in the order in which the variables first occur.
 
     Parameters
     ----------
@@ -262,28 +263,28 @@ def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
 
 
 def check_name(argument: str, name: str, known: Iterable[str]) -> None:
-    """Refuse the name of a variable that isn't there.
+    """Raise an error for the name of a variable that doesn't exist.
 
     Parameters
     ----------
     argument : str
-        What the message calls the argument.
+        Name of the argument, for the message.
     name : str
-        The variable asked for.
+        The variable.
     known : iterable of str
-        The variables there are.
+        The variables that exist.
     """
     if name not in (known := tuple(known)):
         raise ArgumentError(argument, f"variables among {known}", name)
 
 
 def check_states(states: Mapping[str, int], cardinalities: Mapping[str, int]) -> None:
-    """Refuse unknown variables, and states that a variable doesn't have.
+    """Raise an error for unknown variables, and for states that a variable doesn't have.
 
     Parameters
     ----------
     states : dict of str to int
-        What is given.
+        The given states.
     cardinalities : dict of str to int
         The number of states of each variable.
     """

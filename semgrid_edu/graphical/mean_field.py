@@ -23,17 +23,17 @@ Independent = dict[str, NDArray[np.float64]]
 def mean_field_graph(
     model: GraphicalModel, given: Mapping[str, int] = NOTHING, iterations: int = 50, seed: int | None = None
 ) -> Beliefs:
-    """Improve one variable's distribution after the other, with all others held.
+    """Optimise one variable's distribution after the other, with all others fixed.
 
-    The best q_i is proportional to exp(E[log factors]). An update takes it, so the free energy never rises. It has
-    several minima, and the start decides which is found. Without a seed each variable starts from the factors over it
-    alone (uniform without any), as the CRF of the paper does. When these don't prefer a state, a symmetric model may
-    stay at its symmetric start for ever, although breaking the symmetry would lower the free energy; a seed starts from
-    random distributions instead.
+    The best q_i is proportional to exp(E[log factors]), so no update raises the free energy. It has several minima, and
+    the start decides which is found. Without a seed each variable starts from the factors over it alone (uniform
+    without any), as the CRF of the paper does. When these don't prefer a state, a symmetric model may stay at its
+    symmetric start, although breaking the symmetry would lower the free energy; a seed starts from random distributions
+    instead.
 
     A zero in a factor forbids a combination. The logarithm of zero is taken as the limit of ever larger penalties: an
-    update first minimises the expected number of forbidden combinations, and prefers only among the states left. As
-    long as Q gives a forbidden combination any probability, its free energy is infinite.
+    update first minimises the expected number of forbidden combinations, and weighs only the states that do. While Q
+    gives a forbidden combination any probability, its free energy is infinite.
 
     Parameters
     ----------
@@ -55,8 +55,8 @@ def mean_field_graph(
     Raises
     ------
     ArgumentError
-        When a variable or state is unknown, `iterations` is less than 1, or what is given is plainly impossible:
-        a factor is 0 there, or the factors over one variable alone forbid all of its states.
+        When a variable or state is unknown, `iterations` is less than 1, or the given states are obviously
+        impossible: a factor is 0 there, or the factors over one variable alone forbid all of its states.
 
     Examples
     --------
@@ -94,9 +94,10 @@ def _start(model: GraphicalModel, seed: int | None) -> Independent:
 
 
 def _best(model: GraphicalModel, q: Independent, name: str) -> NDArray[np.float64]:
-    """Return the distribution of one variable that minimises the free energy when all others are held."""
+    """Return the distribution of one variable that minimises the free energy when all others are fixed."""
     states = model.cardinalities[name]
-    forbidden, log = np.zeros(states), np.zeros(states)
+    forbidden = np.zeros(states)
+    log = np.zeros(states)
     for factor in model.factors:
         if name in factor.names:
             forbidden += _expected(factor.table == 0, factor, q, keep=name)

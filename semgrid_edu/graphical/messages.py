@@ -1,4 +1,4 @@
-"""Messages on a factor graph, sum-product and max-product: exact on trees, "loopy" elsewhere (Kschischang 2001)."""
+"""Sum-product messages on a factor graph: exact on trees, "loopy" elsewhere (Kschischang 2001)."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -51,12 +51,13 @@ Messages = dict[tuple[str, str], NDArray[np.float64]]
 def sum_product(
     model: GraphicalModel, given: Mapping[str, int] = NOTHING, iterations: int = 50, damping: float = 0.0
 ) -> Beliefs:
-    """Pass messages between variables and factors until they stop changing; a belief is the product of what arrives.
+    """Pass messages between variables and factors until they converge; a belief is the product of incoming messages.
 
-    A variable tells a factor the product of what its other factors say. A factor tells a variable its own table
-    times what its other variables say, summed over them. Every iteration visits all nodes twice, from the leaves
-    inwards and back out. On a tree the first iteration therefore delivers every message, and the second finds nothing
-    left to change. With loops the same messages meet their own echo, and the result is an approximation.
+    A variable's message to a factor is the product of the messages from its other factors. A factor's message to a
+    variable is its table times the messages from its other variables, summed over them. Every iteration visits all
+    nodes twice, from the leaves inwards and back out. On a tree the first iteration therefore delivers every message,
+    and the second changes nothing. With loops a message comes back to its source as if it were news, and the result
+    is an approximation.
 
     Every message sums to 1, so long chains neither underflow nor overflow.
 
@@ -75,7 +76,7 @@ def sum_product(
     -------
     Beliefs
         `.messages[source, target]` between a variable's name and a factor's label of `model.labels`: on a chain,
-        `.messages["x1", "P(x2 | x1)"]` is the filtered belief P(x1 | evidence up to 1). `.exact` says whether the
+        `.messages["x1", "P(x2 | x1)"]` is the filtered belief P(x1 | evidence up to 1). `.exact` is whether the
         factor graph without the given variables is a tree (or several) and the messages converged.
 
     Raises
@@ -90,44 +91,6 @@ def sum_product(
     >>> beliefs.marginals["rain"].round(2), beliefs.exact, beliefs.messages["P(wet | rain)", "rain"].round(2)
     (array([0.33, 0.67]), True, array([0.11, 0.89]))
     """
-    return _passed(model, given, iterations, damping, best=False)
-
-
-def loopy_max_product(
-    model: GraphicalModel, given: Mapping[str, int] = NOTHING, iterations: int = 50, damping: float = 0.0
-) -> Beliefs:
-    """Pass the messages of `sum_product` with the maximum in place of the sum.
-
-    On a tree a belief is then a max-marginal: how probable the best assignment is in which a variable has this state.
-    The best states of all variables together are a most likely assignment, if no two of them tie. With loops that is
-    an approximation; `max_product` eliminates instead, and is exact on every graph.
-
-    Parameters
-    ----------
-    model, given, iterations, damping
-        Those of `sum_product`.
-
-    Returns
-    -------
-    Beliefs
-        `.marginals` holds max-marginals, each divided by its sum; `.exact` is that of `sum_product`.
-
-    Raises
-    ------
-    ArgumentError
-        When no assignment agrees with what is given, or an argument is out of range.
-
-    Examples
-    --------
-    >>> rain, wet = Factor("rain", [0.8, 0.2]), Factor(("rain", "wet"), [[0.9, 0.1], [0.2, 0.8]])
-    >>> loopy_max_product(GraphicalModel([rain, wet], {"wet": ("rain",)})).marginals["rain"].round(2)
-    array([0.82, 0.18])
-    """
-    return _passed(model, given, iterations, damping, best=True)
-
-
-def _passed(model: GraphicalModel, given: Mapping[str, int], iterations: int, damping: float, best: bool) -> Beliefs:
-    """Pass messages until they stop changing; `best` says whether factors take the maximum, or the sum."""
     if iterations < 1:
         raise ArgumentError("iterations", "at least 1", iterations)
     if not 0 <= damping < 1:
@@ -138,19 +101,20 @@ def _passed(model: GraphicalModel, given: Mapping[str, int], iterations: int, da
     links = _links(factors, sliced.names)
     parts = _parts(links)
     outwards = [node for part in parts for node in part]
-    messages = _first_messages(factors, sliced.cardinalities)
-    converged, iteration = False, 0
+    messages = _uniform(factors, sliced.cardinalities)
+    converged = False
+    iteration = 0
     while not converged and iteration < iterations:
         iteration += 1
         before = dict(messages)
         for source in (*reversed(outwards), *outwards):
             for target in links[source]:
-                message = _message(source, target, links, factors, messages, best)
+                message = _message(source, target, links, factors, messages)
                 messages[source, target] = (1 - damping) * message + damping * messages[source, target]
         converged = all(abs(messages[link] - before[link]).max() <= TOLERANCE for link in messages)
-    arrived = {name: [messages[label, name] for label in links[name]] for name in sliced.names}
+    incoming = {name: [messages[label, name] for label in links[name]] for name in sliced.names}
     return Beliefs(
-        marginals={name: _product(told, sliced.cardinalities[name]) for name, told in arrived.items()},
+        marginals={name: _product(arrived, sliced.cardinalities[name]) for name, arrived in incoming.items()},
         converged=converged,
         iterations=iteration,
         exact=converged and _is_forest(links, parts),
@@ -190,11 +154,11 @@ def _is_forest(links: Mapping[str, list[str]], parts: list[list[str]]) -> bool:
     return sum(map(len, links.values())) // 2 == len(links) - len(parts)
 
 
-def _first_messages(factors: Mapping[str, Factor], states: Mapping[str, int]) -> Messages:
-    """Before the first iteration every message says nothing: all states alike."""
-    nothing = {name: np.full(count, 1 / count) for name, count in states.items()}
+def _uniform(factors: Mapping[str, Factor], cardinalities: Mapping[str, int]) -> Messages:
+    """Return the messages before the first iteration: uniform."""
+    uniform = {name: np.full(count, 1 / count) for name, count in cardinalities.items()}
     pairs = [(label, name) for label, factor in factors.items() for name in factor.names]
-    return {link: nothing[name] for label, name in pairs for link in ((label, name), (name, label))}
+    return {link: uniform[name] for label, name in pairs for link in ((label, name), (name, label))}
 
 
 def _message(
@@ -203,32 +167,30 @@ def _message(
     links: Mapping[str, list[str]],
     factors: Mapping[str, Factor],
     messages: Messages,
-    best: bool,
 ) -> NDArray[np.float64]:
-    """Return what a node tells a neighbour, from what all its other neighbours told it."""
-    heard = {node: messages[node, source] for node in links[source] if node != target}
+    """Return the message of a node to a neighbour, from the messages of all its other neighbours."""
+    others = {node: messages[node, source] for node in links[source] if node != target}
     if source in factors:
-        return _from_factor(factors[source], heard, best)
-    return _product(heard.values(), states=messages[source, target].size)
+        return _from_factor(factors[source], others)
+    return _product(others.values(), states=messages[source, target].size)
 
 
-def _from_factor(factor: Factor, heard: Mapping[str, NDArray], best: bool) -> NDArray[np.float64]:
-    """Return the table times what all variables but one say, with these summed out, or maximised out."""
-    told = factor.table
+def _from_factor(factor: Factor, incoming: Mapping[str, NDArray]) -> NDArray[np.float64]:
+    """Return the table times the messages of all variables but one, with these variables summed out."""
+    table = factor.table
     for axis, name in reversed(list(enumerate(factor.names))):
-        if name in heard:
+        if name in incoming:
             # Of the later axes only the target's can be left. It moves here, and the axis to sum over becomes the last.
-            told = told.swapaxes(axis, -1)
-            told = _normalised((told * heard[name]).max(axis=-1) if best else told @ heard[name])
-    return _normalised(told)
+            table = _normalised(table.swapaxes(axis, -1) @ incoming[name])
+    return _normalised(table)
 
 
 def _product(messages: Iterable[NDArray], states: int) -> NDArray[np.float64]:
     """Return the normalised product of messages about one variable; each partial product is normalised too."""
-    told = np.full(states, 1 / states)
+    belief = np.full(states, 1 / states)
     for message in messages:
-        told = _normalised(told * message)
-    return told
+        belief = _normalised(belief * message)
+    return belief
 
 
 def _normalised(table: NDArray) -> NDArray[np.float64]:

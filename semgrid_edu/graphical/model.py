@@ -13,7 +13,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.factor import Factor, as_names, check_name, check_states, shared_cardinalities
 
 SUM_TOLERANCE = 1e-9
-"""How far the sum over a child may be from 1: rounding, no more."""
+"""How far rounding may take the sum over a child from 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +30,7 @@ class GraphicalModel:
     Attributes
     ----------
     cardinalities : dict of str to int
-        How many states each variable has, in the order in which the variables first occur.
+        Number of states of each variable, in the order in which the variables first occur.
     labels : tuple of str
         One label per factor: "P(r | m1, m2)" in a directed model, "f(x, y)" in an undirected one; the second factor
         over the same variables is "f(x, y) #2".
@@ -54,15 +54,15 @@ class GraphicalModel:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "factors", tuple(self.factors))
-        if strangers := [factor for factor in self.factors if not isinstance(factor, Factor)]:
-            raise ArgumentError("factors", "objects of the class Factor", type(strangers[0]).__name__)
+        if others := [factor for factor in self.factors if not isinstance(factor, Factor)]:
+            raise ArgumentError("factors", "objects of the class Factor", type(others[0]).__name__)
         names = self.names
         if self.parents is not None:
             object.__setattr__(self, "parents", check_directed(self.factors, self.parents, names))
 
     @cached_property
     def cardinalities(self) -> dict[str, int]:
-        """How many states each variable has: {name: K}, in the order in which the variables first occur."""
+        """Number of states of each variable, {name: K}, in the order in which the variables first occur."""
         return shared_cardinalities(factor.cardinalities for factor in self.factors)
 
     @property
@@ -138,7 +138,7 @@ class GraphicalModel:
 
 
 def possible(model: GraphicalModel, given: Mapping[str, int]) -> GraphicalModel:
-    """Return the model of the variables that aren't given; refuse what makes a factor zero everywhere, by its label.
+    """Return the model of the variables that aren't given; an error names a factor that is zero everywhere.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def families(parents: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...
 
 
 def topological_order(parents: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Sort variables so that parents stand before their children; an error shows the cycle that prevents it.
+    """Sort variables so that parents come before their children; an error shows the cycle that prevents it.
 
     Parameters
     ----------

@@ -24,16 +24,16 @@ def d_separated(model: GraphicalModel, a: Names, b: Names, given: Names = ()) ->
     a, b : str or iterable of str
         One variable or several.
     given : str or iterable of str
-        Variables whose states are known; a dictionary of evidence serves too.
+        Variables whose states are known; a dictionary of evidence works too.
 
     Raises
     ------
     ArgumentError
-        When a variable is unknown, or stands in two of the three groups.
+        When a variable is unknown, or in two of the three groups.
 
     Examples
     --------
-    Two cells and the beam that both may reflect: independent, until the beam has been seen.
+    Two cells and the beam that both may reflect: independent, until the beam is observed.
 
     >>> import numpy as np
     >>> from semgrid_edu.graphical.factor import Factor
@@ -69,7 +69,7 @@ def why_dependent(model: GraphicalModel, a: Names, b: Names, given: Names = ()) 
     Raises
     ------
     ArgumentError
-        When a variable is unknown, or stands in two of the three groups.
+        When a variable is unknown, or in two of the three groups.
 
     Examples
     --------
@@ -78,10 +78,12 @@ def why_dependent(model: GraphicalModel, a: Names, b: Names, given: Names = ()) 
     >>> why_dependent(chain, "x", "z"), why_dependent(chain, "x", "z", given="y")
     (('x', 'y', 'z'), None)
     """
-    start, goal, known = (set(as_names(group)) for group in (a, b, given))
+    start = set(as_names(a))
+    goal = set(as_names(b))
+    known = set(as_names(given))
     _check_groups(model, start, goal, known)
     steps = _directed_steps(model.parents, known) if model.parents is not None else _undirected_steps(model, known)
-    # A place is a variable and whether the path came to it from one of its parents.
+    # A place in the search: a variable, and whether the path reached it from one of its parents.
     came_from = {(name, False): None for name in sorted(start)}
     queue = deque(came_from)
     while queue:
@@ -120,7 +122,8 @@ def _undirected_steps(model: GraphicalModel, known: set[str]):
 
 def _with_ancestors(parents: Mapping[str, tuple[str, ...]], names: set[str]) -> set[str]:
     """Return the variables and everything above them: the colliders that they open."""
-    found, queue = set(names), list(names)
+    found = set(names)
+    queue = list(names)
     while queue:
         new = set(parents[queue.pop()]) - found
         found |= new

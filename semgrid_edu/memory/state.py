@@ -1,12 +1,10 @@
-"""What is remembered of the classes of each cell, what one frame says of them, and what the memory assumes."""
+"""What the memory holds of each cell, what a single frame shows of it, and what the memory assumes."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from semgrid_edu.errors import ArgumentError, check_fields, check_shape, not_negative, types_named
 from semgrid_edu.grid import GridSpec
@@ -14,14 +12,14 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import N_STATES, State, WorldModel
 
 STAYS, MOVES = 0, 1
-"""The two layers of the memory: what lies and stands in a cell, and what moves through it."""
+"""The two layers of the memory: what stays in a cell, such as road or house, and what moves through it."""
 
 FAINT = 1e-3
-"""Probability below which the camera doesn't see what a layer holds: nothing is learnt there."""
+"""The camera counts as not seeing what a layer holds below this probability: nothing is learnt there."""
 
 
-def _leaving(state: State) -> float:
-    """Return the rate at which a cell leaves a state for another one that is known, 1/s."""
+def _leaving_rate(state: State) -> float:
+    """Return the rate at which a cell leaves a state for another known state, 1/s."""
     return float(sum(np.delete(WorldModel().rates[state], [state, State.UNKNOWN])))
 
 
@@ -32,37 +30,37 @@ class MemoryParams:
     Parameters
     ----------
     worth : float
-        Exponent of the evidence of one more frame, seen from close by: 1 if frames were independent witnesses. Measured
-        on simulated drives other than the shipped one (`worth_by_distance`), when `movable` classes were still
+        Exponent of the evidence of one more frame, for a cell next to the vehicle: 1 if frames were independent.
+        Measured on simulated drives other than the shipped one (`worth_by_distance`), when `movable` classes were still
         remembered in view. Now that they aren't, a smaller exponent is better in view, by 0.02 nats at most.
     reach : float
-        Distance from the vehicle, metres, over which the exponent falls by a factor e, because a near view is a better
-        witness than a far one. Measured on the same drives.
+        Distance from the vehicle, metres, over which the exponent falls by a factor e, because far views are less
+        reliable. Measured on the same drives.
     most : float
-        What all frames together may be worth, in frames, at least 1. Beyond this an old frame counts for less with each
-        new one. Measured on the same drives.
+        The most that all frames together count, in frames, at least 1. Once this is reached, each new frame lowers the
+        weight of the old ones. Measured on the same drives.
     change_rate : (float, float)
-        Rates at which what stays and what moves becomes something else, 1/s: by default those at which, in the
-        occupancy filter's `WorldModel`, a STATIC and a DYNAMIC cell change into another known state.
+        Rates at which what stays and what moves becomes something else, 1/s: by default those at which a STATIC and a
+        DYNAMIC cell change into another known state in the occupancy filter's `WorldModel`.
     movable : tuple of int
-        Numbers of the classes that come and go: by default KITTI-14's car, pedestrian and bicycle. As far as the camera
-        sees a cell now, this frame alone says whether one of them is there, because an earlier frame is no witness of
-        what came or left since. Where it doesn't look, a remembered one counts with `standing`.
+        Numbers of the classes that come and go: by default KITTI-14's car, pedestrian and bicycle. Earlier frames tell
+        nothing about a car that has just come or left, so where the camera sees a cell, only this frame decides on
+        them. Elsewhere a remembered one counts as far as the LIDAR finds something (`something_there`).
     least_moving : float
-        Probability of DYNAMIC from which on a cell holds something that moves. The default lies above `first_sight`'s
-        0.003 and far below the 0.5 at which the cell is called DYNAMIC.
+        Smallest probability of DYNAMIC for a cell to hold something that moves. The default is above the 0.003 that the
+        filter gives anything at first sight, and far below the 0.5 from which the cell is called DYNAMIC.
     """
 
     worth: float = 0.7
     reach: float = 100.0
     most: float = 1.0
-    change_rate: tuple[float, float] = (_leaving(State.STATIC), _leaving(State.DYNAMIC))
+    change_rate: tuple[float, float] = (_leaving_rate(State.STATIC), _leaving_rate(State.DYNAMIC))
     movable: tuple[int, ...] = tuple(map(KITTI_14.index, ("car", "pedestrian", "bicycle")))
     least_moving: float = 0.02
 
     @types_named
     def __post_init__(self) -> None:
-        """Refuse what describes no memory."""
+        """Check that the numbers describe a memory."""
         check_fields(self, "an exponent from 0 to 1", lambda w: 0 <= w <= 1, "worth")
         check_fields(self, "a positive distance in metres", lambda r: r > 0, "reach")
         check_fields(self, "a number of frames, at least 1", lambda n: np.isfinite(n) and n >= 1, "most")
@@ -71,7 +69,7 @@ class MemoryParams:
             raise ArgumentError("change_rate", "two rates in 1/s, not negative", self.change_rate)
 
     def exponent(self, distance: ArrayLike) -> NDArray[np.float64]:
-        """Return what one more frame is worth for cells at a distance from the vehicle.
+        """Return the exponent of one more frame for cells at a distance from the vehicle.
 
         Parameters
         ----------
@@ -81,7 +79,7 @@ class MemoryParams:
         return self.worth * np.exp(-np.asarray(distance) / self.reach)
 
     def kept(self, dt: float) -> NDArray[np.float64]:
-        """Return which part of each layer's evidence still holds after a time, (2,).
+        """Return the part of each layer's evidence that still holds after a time, (2,).
 
         Parameters
         ----------
@@ -94,20 +92,20 @@ class MemoryParams:
 
 
 @dataclass(frozen=True, eq=False)
-class ClassMemory:
-    """What earlier frames said of the S semantic classes in each cell of the map.
+class MemoryState:
+    """What earlier frames showed of the S semantic classes in each cell of the map.
 
     Parameters
     ----------
-    planes : (2 S + 6, H, W) float32
-        All that is remembered, in one array, so that it can be moved at once: `evidence`, `weight`, `seen` and
-        `offset`, which are views of it. float64 in literal twins.
+    planes : (2 S + 6, H, W) float
+        `evidence`, `weight`, `seen` and `offset` in one array, so that the map can be moved at once; the four are views
+        of it.
     """
 
-    planes: NDArray[np.float32]
+    planes: NDArray
 
     @classmethod
-    def empty(cls, n_semantic: int, spec: GridSpec) -> "ClassMemory":
+    def empty(cls, n_semantic: int, spec: GridSpec, dtype: DTypeLike = np.float64) -> "MemoryState":
         """Return the memory before the first frame.
 
         Parameters
@@ -116,20 +114,36 @@ class ClassMemory:
             S, the number of semantic classes.
         spec : GridSpec
             The cells of the map, (H, W).
+        dtype : dtype
+            float64, or float32 for the functions of `semgrid_edu.fast`.
         """
-        return cls(np.zeros((2 * n_semantic + 6, *spec.shape), np.float32))
+        return cls(np.zeros((2 * n_semantic + 6, *spec.shape), dtype))
+
+    def copy(self) -> "MemoryState":
+        """Return a memory with arrays of its own."""
+        return MemoryState(self.planes.copy())
+
+    def at(self, places: NDArray) -> "MemoryState":
+        """Return the memory of the cells with these numbers, which are counted row by row from 0.
+
+        Parameters
+        ----------
+        places : (H', W') int
+            Numbers of cells.
+        """
+        return MemoryState(self.planes.reshape(len(self.planes), -1)[:, places])
 
     @property
     def evidence(self) -> NDArray:
-        """(2, S, H, W), for what stays and for what moves: the mean of log P(class | frame), by exponents."""
+        """(2, S, H, W), for what stays and for what moves: the weighted mean of log P(class | frame) over frames."""
         return self.planes[:-6].reshape(2, -1, *self.planes.shape[1:])
 
     @property
     def weight(self) -> NDArray:
-        """(2, H, W): the sum of these exponents, from 0 to `MemoryParams.most`.
+        """(2, H, W): the sum of the frames' exponents, from 0 to `MemoryParams.most`.
 
         `evidence` times `weight` is the log of the belief, up to a constant in each cell. A weight below 1 counts as 1,
-        because `seen` says already that little was seen.
+        because `seen` already accounts for how little was seen.
         """
         return self.planes[-6:-4]
 
@@ -142,31 +156,32 @@ class ClassMemory:
     def offset(self) -> NDArray:
         """(2, H, W): where in its cell the moving thing is, metres from the centre along the axes of the map.
 
-        It is at most half a cell. Without it, what moves by less than that in a frame would never leave its cell.
+        It is at most half a cell. Without it, a thing that moves by less than that in a frame would never leave its
+        cell.
         """
         return self.planes[-2:]
 
 
 class Look(NamedTuple):
-    """What one frame says of the classes of each cell.
+    """What one frame shows of the classes of each cell.
 
     Parameters
     ----------
-    classes, log_class : (S, H, W) float32
+    classes, log_class : (S, H, W) float
         P(class | image, the camera sees the cell), and its natural logarithm.
-    sees : (H, W) float32
-        Probability that the camera sees what is in the cell: that its class isn't one of the unknown ones.
-    exponent : (H, W) float32
-        What the frame is worth there beside others: e + (1 - e) P(movable), with e from `MemoryParams.exponent`.
-    moving : (H, W) float32
+    sees : (H, W) float
+        Probability that the camera sees what is in the cell, so that its class isn't one of the unknown ones.
+    exponent : (H, W) float
+        How much the frame counts beside others: e + (1 - e) P(movable), with e from `MemoryParams.exponent`.
+    moving : (H, W) float
         P(DYNAMIC).
     """
 
-    classes: NDArray[np.float32]
-    log_class: NDArray[np.float32]
-    sees: NDArray[np.float32]
-    exponent: NDArray[np.float32]
-    moving: NDArray[np.float32]
+    classes: NDArray
+    log_class: NDArray
+    sees: NDArray
+    exponent: NDArray
+    moving: NDArray
 
 
 def look_at(grid: NDArray, occupancy: NDArray, spec: GridSpec, params: MemoryParams) -> Look:
@@ -174,65 +189,46 @@ def look_at(grid: NDArray, occupancy: NDArray, spec: GridSpec, params: MemoryPar
 
     Parameters
     ----------
-    grid : (C, H, W) float32
+    grid : (C, H, W) float
         g: probabilities of the semantic classes, then of the four unknown ones. They sum to 1 in each cell.
-    occupancy : (4, H, W) float32
+    occupancy : (4, H, W) float
         o, the occupancy grid of the same frame.
     spec : GridSpec
         Their cells, around the vehicle.
     params : MemoryParams
-        How much the frame is worth at which distance.
-
-    Returns
-    -------
-    Look
-        What the frame says of each cell, in the vehicle's grid.
+        How much a frame counts at which distance.
 
     Raises
     ------
     ArgumentError
-        When the shapes don't belong to the cells, or `params.movable` names a class that the grid lacks.
+        When the shapes don't fit the cells, or `params.movable` names a class that the grid lacks.
     """
+    check_look(grid, occupancy, spec, params)
+    semantic = np.asarray(grid[:-N_STATES], np.float64)
+    total = semantic.sum(axis=0)
+    seen = total >= FAINT
+    classes = np.where(seen, semantic / np.maximum(total, FAINT), 0)
+    log_class = np.where(seen, np.log(np.maximum(classes, 1e-6)), 0)
+    sees = np.where(seen, np.minimum(total, 1), 0)
+
+    e = params.exponent(spec.distances())
+    movable = classes[list(params.movable)].sum(axis=0)
+    return Look(classes, log_class, sees, e + (1 - e) * movable, np.clip(occupancy[State.DYNAMIC], 0, 1))
+
+
+def check_look(grid: NDArray, occupancy: NDArray, spec: GridSpec, params: MemoryParams) -> None:
+    """Check what `look_at` takes. Parameters and errors are those of `look_at`."""
     check_shape("occupancy", occupancy, (N_STATES, *spec.shape))
     if np.ndim(grid) != 3 or grid.shape[1:] != spec.shape or len(grid) <= N_STATES:
         wanted = f"shape (C, {spec.shape[0]}, {spec.shape[1]}), the last {N_STATES} classes unknown"
         raise ArgumentError("grid", wanted, f"shape {np.shape(grid)}")
-    classes, log_class, sees = _seen_classes(np.ascontiguousarray(grid, np.float32), len(grid) - N_STATES)
-    e, movable = _exponents(spec, params), list(params.movable)
-    if movable and not 0 <= min(movable) <= max(movable) < len(classes):
-        raise ArgumentError("movable", f"numbers of semantic classes, 0 to {len(classes) - 1}", params.movable)
-    exponent = e + (1 - e) * classes[movable].sum(axis=0)
-    return Look(classes, log_class, sees, exponent, np.clip(occupancy[State.DYNAMIC], 0, 1))
+    last = len(grid) - N_STATES - 1
+    if params.movable and not 0 <= min(params.movable) <= max(params.movable) <= last:
+        raise ArgumentError("movable", f"numbers of semantic classes, 0 to {last}", params.movable)
 
 
-@lru_cache(maxsize=8)
-def _exponents(spec: GridSpec, params: MemoryParams) -> NDArray[np.float32]:
-    """Return what one more frame is worth in each cell, (H, W)."""
-    return params.exponent(spec.distances()).astype(np.float32)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _seen_classes(grid, n):
-    """Divide the semantic classes by their sum; numpy would need five passes over the grid."""
-    height, width = grid.shape[1:]
-    classes, sees = np.zeros((n, height, width), np.float32), np.zeros((height, width), np.float32)
-    log_class = np.zeros((n, height, width), np.float32)
-    for r in range(height):
-        for k in range(n):
-            for c in range(width):
-                sees[r, c] += grid[k, r, c]
-        for k in range(n):
-            for c in range(width):
-                if sees[r, c] >= np.float32(FAINT):
-                    classes[k, r, c] = grid[k, r, c] / sees[r, c]
-                    log_class[k, r, c] = np.log(max(classes[k, r, c], np.float32(1e-6)))
-        for c in range(width):
-            sees[r, c] = min(sees[r, c], np.float32(1)) if sees[r, c] >= np.float32(FAINT) else np.float32(0)
-    return classes, log_class, sees
-
-
-def standing(occupancy: NDArray) -> NDArray:
-    """Return the probability that something stands or moves in each cell: in an UNKNOWN one it is as likely as not.
+def something_there(occupancy: NDArray) -> NDArray:
+    """Return the probability that a cell isn't empty; an UNKNOWN cell is empty or not with equal odds.
 
     Parameters
     ----------
@@ -242,7 +238,7 @@ def standing(occupancy: NDArray) -> NDArray:
     Returns
     -------
     (...) float
-        The probability, at least 0.001, so that a mistaken FREE can be put right later.
+        The probability, at least 0.001, so that a mistaken FREE can be corrected later.
     """
     o = np.asarray(occupancy)
     return np.maximum(o[State.STATIC] + o[State.DYNAMIC] + o[State.UNKNOWN] / 2, 1e-3)

@@ -4,20 +4,20 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from semgrid_edu.networks.backbones.conv_deconv import ConvDeconv, fresh_weights
+from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights
 from semgrid_edu.occupancy import N_STATES, State
 
 N_REDUCED = 16
-"""Number of planes after the reduction. The paper gives no number; with 16 of 280 the reduction costs less than the
-network after it."""
+"""Number of planes after the reduction. The paper gives none; with 16 of 280 the reduction costs less than the network
+after it."""
 
 
 class FusionNet(nn.Module):
     """Fuse the image's scores on D planes with the occupancy grid: (p, o) -> g.
 
-    A 1x1 convolution reduces the D x C planes to a few; its weights, the same in each cell, say which heights and
-    classes count. The four planes of the occupancy grid are appended, and a small conv-deconv network with skip
-    connections scores the classes.
+    A 1x1 convolution reduces the D x C planes to a few. It weighs heights and classes in the same way in every cell.
+    Then the four planes of the occupancy grid are appended, and a small conv-deconv network with skip connections
+    scores the classes.
 
     Parameters
     ----------
@@ -28,11 +28,11 @@ class FusionNet(nn.Module):
     n_classes : int
         C, the number of classes of the semantic grid.
     n_reduced : int or None
-        Number of planes after the reduction; None to leave it out, so that the conv-deconv network takes all D x C.
+        Number of planes after the reduction; None for none, so that the conv-deconv network takes all D x C planes.
     seed : int
         Seed for the initial weights.
     uses_occupancy : bool
-        Whether the network sees the occupancy grid. Without, each cell is UNKNOWN to it, see `Architecture`.
+        Whether the network sees the occupancy grid. Otherwise each cell is UNKNOWN to it, see `Architecture`.
     """
 
     WIDTHS, DEPTHS = (32, 48, 64), (1, 1, 2)
@@ -49,9 +49,9 @@ class FusionNet(nn.Module):
     ) -> None:
         super().__init__()
         self.uses_occupancy = uses_occupancy
+        n_left = n_reduced or n_scores * n_planes
         with fresh_weights(self, seed):
             self.reduce = _reduction(n_scores, n_planes, n_reduced)
-            n_left = n_reduced or n_scores * n_planes
             self.conv_deconv = ConvDeconv(n_left + N_STATES, n_classes, self.WIDTHS, self.DEPTHS, skips=True)
 
     def forward(self, planes: Tensor, occupancy: Tensor) -> Tensor:
@@ -72,7 +72,7 @@ class FusionNet(nn.Module):
         return self.fuse(self.reduce(planes), occupancy)
 
     def fuse(self, reduced: Tensor, occupancy: Tensor) -> Tensor:
-        """Return the logits, as `forward` does, from planes that have been reduced already.
+        """Return the logits, as `forward` does, from planes that are already reduced.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class FusionNet(nn.Module):
         Returns
         -------
         (B, n_reduced + 4, H, W) float
-            What the conv-deconv network takes.
+            The input of the conv-deconv network.
         """
         if not self.uses_occupancy:
             occupancy = torch.zeros_like(occupancy)  # as after a scan without a single beam
@@ -106,8 +106,8 @@ class FusionNet(nn.Module):
 class PlaneConvolution(nn.Conv3d):
     """The 1x1 convolution of all D x C planes: on (B, C, D, H, W), a D x 1 x 1 kernel.
 
-    It is computed as a product of two matrices, with one row of D x C scores per cell. The planes already lie in memory
-    in this order, so nothing is copied.
+    It is computed as a product of two matrices, with one row of D x C scores per cell. This is the order in which
+    `fast.PlaneSampler` leaves the planes in memory, so nothing is copied.
     """
 
     def forward(self, planes: Tensor) -> Tensor:
@@ -129,7 +129,7 @@ class PlaneConvolution(nn.Conv3d):
 
 
 def _reduction(n_scores: int, n_planes: int, n_reduced: int | None) -> nn.Module:
-    """Return what takes (B, C, D, H, W) to (B, n_reduced, 1, H, W); without a number to (B, C x D, 1, H, W)."""
+    """Return the layers from (B, C, D, H, W) to (B, n_reduced, 1, H, W); unreduced to (B, C x D, 1, H, W)."""
     if n_reduced is None:
         return nn.Sequential(nn.Flatten(1, 2), nn.Unflatten(1, (n_scores * n_planes, 1)))
     convolution = PlaneConvolution(n_scores, n_reduced, (n_planes, 1, 1))

@@ -12,18 +12,18 @@ from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.planes import PlaneSampler, plane_heights
 
 MOST_PIXELS, MOST_POINTS = 2**22, 2**24
-"""Pixels of an image, and points of all planes together: nine and fifteen times as many as at the published size. What
-asks for more is a mistake, or a damaged file, and would take all memory."""
+"""Limits for the pixels of an image and for the points of all planes together: nine and fifteen times the published
+sizes. Anything larger is a mistake or a damaged file, and would use up all memory."""
 
 MOST_SEGMENTERS = 9
-"""Image networks of one network: nine of the published size take one gigabyte (SegNet) to five (FCN)."""
+"""Limit for the image networks of one network: nine of the published size take one gigabyte (SegNet) to five (FCN)."""
 
 
 @dataclass(frozen=True)
 class Architecture:
     """Everything that decides the shapes of a network's weights and where its planes lie.
 
-    The camera isn't part of it: one trained network serves every calibration, because only its planes move.
+    The camera isn't part of it: one trained network fits every calibration, because only its planes move.
 
     Parameters
     ----------
@@ -34,20 +34,19 @@ class Architecture:
     label_set : str
         Name of the label set, a key of `LABEL_SETS`, whose classes both the scores and the grid have.
     image_size : (int, int)
-        Height h and width w that every image is scaled to, pixels. (96, 320) keeps the aspect of KITTI's images at
-        a fifteenth of their pixels.
+        Height h and width w that every image is scaled to, pixels. (96, 320) is the aspect of KITTI's images at a
+        fifteenth of their pixels.
     grid : GridSpec
         The cells of the semantic grid, (H, W) of them.
     heights : (D,) float
         delta_i, the heights of the planes above the ground, metres.
     uses_occupancy : bool
-        Whether the fusion network sees the occupancy grid. Without, each cell is UNKNOWN to it, whatever grid it is
-        given: so all else, also the initial weights, is that of the network with occupancy, and the two can be
-        compared.
+        Whether the fusion network sees the occupancy grid. Otherwise each cell is UNKNOWN to it. Everything else, the
+        initial weights included, is the same as with occupancy, so that the two can be compared.
     reduces : bool
-        Whether the 1x1 convolution reduces the planes. Without, all D x C of them go into the conv-deconv network.
+        Whether the 1x1 convolution reduces the planes. Otherwise the conv-deconv network takes all D x C of them.
     n_segmenters : int
-        How many image networks score an image, 1 to 9; the scores are the mean of theirs, see `MeanSegmenter`.
+        How many image networks score an image, 1 to 9; their mean counts, see `MeanSegmenter`.
     """
 
     segmenter: str = "segnet"
@@ -62,7 +61,7 @@ class Architecture:
 
     @types_named
     def __post_init__(self) -> None:
-        """Refuse sizes that no computer has the memory for."""
+        """Raise an `ArgumentError` for sizes that no computer has the memory for."""
         height, width = self.image_size
         if not (height >= 1 and width >= 1 and height * width <= MOST_PIXELS):
             raise ArgumentError("image_size", f"two whole numbers, 1 to {MOST_PIXELS} pixels", self.image_size)
@@ -75,12 +74,12 @@ class Architecture:
 
     @property
     def layout(self) -> tuple[str, tuple[int, int], GridSpec, tuple[float, ...]]:
-        """Label set, image size, grid and heights: what two networks share whose stages can be mixed or compared."""
+        """Label set, image size, grid and heights. Networks in which these are equal can exchange their stages."""
         return self.label_set, self.image_size, self.grid, self.heights
 
 
 class NetOutputs(NamedTuple):
-    """What the network computes on its way from image to grid; each part is a symbol of Fig. 2.
+    """What the network computes on the way from image to grid, by the symbols of Fig. 2.
 
     Parameters
     ----------
@@ -100,7 +99,7 @@ class NetOutputs(NamedTuple):
 class SemanticGridNet(nn.Module):
     """Segment the image, sample its scores on the planes, fuse them with the occupancy grid.
 
-    Every step is differentiable, so the loss on the grid also teaches the image network.
+    Every step is differentiable, so the image network also learns from the loss on the grid.
 
     Parameters
     ----------
@@ -108,14 +107,14 @@ class SemanticGridNet(nn.Module):
         The image network, i -> s: (B, 3, h, w) RGB in 0..1 -> (B, C, h, w) scores. Its `n_classes`, if it has this
         attribute, is the C of the scores; otherwise they have the classes of the grid.
     sampler : PlaneSampler
-        s -> p, for one calibration.
+        s -> p, for one calibration: the book's, or `fast.PlaneSampler`.
     n_classes : int
         C, the number of classes of the semantic grid.
     seed : int
         Seed for the initial weights of the fusion network.
     architecture : Architecture, optional
-        The description that the parts were built from, as `build_net` gives it. A network without one can be used,
-        but neither saved nor trained, since nothing says how to build it again.
+        The description that the parts were built from; `build_net` passes it. A network without one can be used, but
+        neither saved nor trained, because nothing tells how to build it again.
     """
 
     def __init__(
@@ -133,18 +132,18 @@ class SemanticGridNet(nn.Module):
         self.n_classes = n_classes
         self.architecture = architecture
         n_scores = getattr(segmenter, "n_classes", n_classes)
-        usual = architecture or Architecture()
+        options = architecture or Architecture()
         self.fusion = FusionNet(
             n_scores,
             sampler.planes_shape[0],
             n_classes,
-            n_reduced=N_REDUCED if usual.reduces else None,
+            n_reduced=N_REDUCED if options.reduces else None,
             seed=seed,
-            uses_occupancy=usual.uses_occupancy,
+            uses_occupancy=options.uses_occupancy,
         )
 
     def need_architecture(self) -> Architecture:
-        """Return the architecture, for work that can't be done without it, such as saving or training."""
+        """Return the architecture, or raise an `ArgumentError`: without it a network can't be saved or trained."""
         if self.architecture is None:
             expected = "a network of build_net, which records its architecture"
             raise ArgumentError("net", expected, "one made by hand, without an architecture")
@@ -162,11 +161,11 @@ class SemanticGridNet(nn.Module):
         occupancy : (B, 4, H, W) float
             Probability of FREE, STATIC, DYNAMIC, UNKNOWN; they sum to 1 in each cell.
         mirrored : bool
-            Whether the learnt parts see image and grid with left and right exchanged, as they do for half of the
-            batches in training. Every result is mirrored back. The planes are always sampled unmirrored: the camera
-            isn't quite symmetric, so a mirrored image would no longer lie where equation (1) looks.
+            Whether the learnt parts see image and grid with left and right exchanged, as in half of the training
+            batches. Every result is mirrored back. The planes are always sampled unmirrored: the camera isn't quite
+            symmetric, so in a mirrored image equation (1) would look at wrong pixels.
         sampler : PlaneSampler, optional
-            s -> p for another camera, which took these images; the network's own when left out.
+            s -> p for the camera that took these images; the network's own sampler when left out.
 
         Returns
         -------
@@ -177,11 +176,13 @@ class SemanticGridNet(nn.Module):
         _check("occupancy", occupancy, (N_STATES, *self.sampler.planes_shape[1:]))
         if len(image) != len(occupancy):
             raise ArgumentError("occupancy", f"one for each of the {len(image)} images", len(occupancy))
+        sampler = sampler or self.sampler
         scores = self.image_scores(image, mirrored)
-        planes = (sampler or self.sampler)(scores)
-        # Mirrored after the 1x1 convolution, which looks at one cell at a time: there is less to move.
-        reduced, occupancy = (_flip(part, mirrored) for part in (self.fusion.reduce(planes), occupancy))
-        return NetOutputs(scores, planes, _flip(self.fusion.fuse(reduced, occupancy), mirrored))
+        planes = sampler(scores)
+        # The 1x1 convolution looks at one cell at a time, so mirroring can wait until there is less to move.
+        reduced = _flip(self.fusion.reduce(planes), mirrored)
+        logits = self.fusion.fuse(reduced, _flip(occupancy, mirrored))
+        return NetOutputs(scores, planes, _flip(logits, mirrored))
 
     def image_scores(self, image: Tensor, mirrored: bool = False) -> Tensor:
         """Return s, the image network's scores. Parameters are those of `SemanticGridNet.stages`.
@@ -205,12 +206,12 @@ class SemanticGridNet(nn.Module):
 
 
 def _flip(x: Tensor, mirrored: bool) -> Tensor:
-    """Exchange left and right of images or grids if `mirrored`; otherwise return them unchanged."""
+    """Exchange left and right of images or grids if `mirrored`."""
     return x.flip(-1) if mirrored else x
 
 
 def _check(name: str, batch: Tensor, shape: tuple[int, ...]) -> None:
-    """Refuse a batch that isn't of floats or of another shape than (B, *shape)."""
+    """Raise an `ArgumentError` unless a batch holds floats of shape (B, *shape)."""
     if batch.ndim != 4 or tuple(batch.shape[1:]) != shape:
         raise ArgumentError(name, f"shape (B, {', '.join(map(str, shape))})", tuple(batch.shape))
     if not batch.is_floating_point():

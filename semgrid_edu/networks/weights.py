@@ -1,4 +1,4 @@
-"""Weights on disk: safetensors files that name their network, and published encoders from ImageNet (section 4)."""
+"""Weights on disk: safetensors files with their architecture, and encoders published for ImageNet (section 4)."""
 
 import json
 from collections.abc import Iterator
@@ -7,20 +7,21 @@ from dataclasses import asdict
 from pathlib import Path
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks.backbones.registry import SEGMENTERS
-from semgrid_edu.networks.backbones.segmenter import Segmenter
 from semgrid_edu.networks.build import build_net
+from semgrid_edu.networks.registry import SEGMENTERS
+from semgrid_edu.networks.segmenter import Segmenter
 from semgrid_edu.networks.semantic_grid import Architecture, SemanticGridNet
+from semgrid_edu.planes import PlaneSampler
 from semgrid_edu.storage.reading import parse_json
 from semgrid_edu.storage.tensors import read_tensors, write_tensors
 
 IMAGE_STAGE, WEIGHTS = "image_stage.safetensors", "weights.safetensors"
-"""The files that a training run leaves in its folder: the network after each of the two stages."""
+"""The files that a training run writes to its folder: the network after each of the two stages."""
 
 
 def save_net(net: SemanticGridNet, path: str | Path) -> None:
@@ -29,25 +30,26 @@ def save_net(net: SemanticGridNet, path: str | Path) -> None:
     Parameters
     ----------
     net : SemanticGridNet
-        A network with an architecture, as `build_net` and `load_net` make it. The camera's calibration isn't
-        written: it belongs to the drive.
+        A network with an architecture, from `build_net` or `load_net`. The camera's calibration isn't written: it
+        belongs to the drive.
     path : path-like
         The safetensors file to write.
 
     Raises
     ------
     ArgumentError
-        When the network has no architecture, so that nothing says how to build it again.
+        When the network has no architecture, so that nothing tells how to build it again.
     """
     description = asdict(net.need_architecture())
     for name in ("uses_occupancy", "reduces", "n_segmenters"):
-        if description[name] == getattr(Architecture, name):  # left out: the checksums are those of before it existed
+        # Files from before these fields existed keep their checksums when they are written again.
+        if description[name] == getattr(Architecture, name):
             del description[name]
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in net.state_dict().items()}
     write_tensors(path, tensors, {"architecture": json.dumps(description)})
 
 
-def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
+def load_net(path: str | Path, camera: Camera, sampler: type[nn.Module] = PlaneSampler) -> SemanticGridNet:
     """Read a trained network and place its planes for a camera.
 
     Parameters
@@ -56,6 +58,8 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
         A file that `save_net` wrote.
     camera : Camera
         Calibration of the images that the network will see.
+    sampler : type
+        The class that samples the planes, as for `build_net`.
 
     Returns
     -------
@@ -65,12 +69,12 @@ def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
     Raises
     ------
     DataError
-        When the file is missing, damaged or of another program, its weights don't fit the architecture in its
-        header, or one isn't a finite number.
+        When the file is missing, damaged or from another program, its weights don't fit the architecture in its
+        header, or a weight isn't a finite number.
     """
     header, tensors = read_tensors(path)
     with _named(path, header):
-        net = build_net(_architecture(path, header), camera)
+        net = build_net(_architecture(path, header), camera, sampler=sampler)
     check_tensors(path, tensors, net.state_dict())
     net.load_state_dict(tensors)
     return net.eval()
@@ -91,7 +95,7 @@ def read_architecture(path: str | Path) -> Architecture:
 
 @contextmanager
 def _named(path: str | Path, header: dict) -> Iterator[None]:
-    """Turn what a wrong architecture raises into an error that names the file."""
+    """Turn any error about the architecture into one that names the file."""
     try:
         yield
     except (KeyError, TypeError, ValueError, OverflowError) as error:
@@ -100,14 +104,14 @@ def _named(path: str | Path, header: dict) -> Iterator[None]:
 
 
 def _architecture(path: str | Path, header: dict) -> Architecture:
-    """Return the architecture from the nested dictionary in the header that `asdict` made of it."""
+    """Return the architecture from the header, where `save_net` put it as a nested dictionary."""
     values = parse_json(path, header["architecture"])
     tuples = {name: tuple(values[name]) for name in ("image_size", "heights")}
     return Architecture(**(values | tuples | {"grid": GridSpec(**values["grid"])}))
 
 
 def weights_doubts(path: str | Path) -> list[str]:
-    """List what is doubtful about a file of weights that is to be scored as a whole network, i and o -> g.
+    """List what is doubtful about a file of weights that will be used as a whole network, i and o -> g.
 
     Parameters
     ----------
@@ -122,22 +126,23 @@ def weights_doubts(path: str | Path) -> list[str]:
     Raises
     ------
     DataError
-        When the file is missing or damaged, or holds a network of the image stage, whose fusion hasn't learnt yet.
+        When the file is missing or damaged, or is a network of the image stage, whose fusion hasn't learnt yet.
     """
     _, tensors = read_tensors(path)
-    learns = {name: bool((steps > 0).any()) for name, steps in tensors.items() if name.endswith("num_batches_tracked")}
-    fusion = [has_learnt for name, has_learnt in learns.items() if name.startswith("fusion.")]
-    if fusion and not any(fusion) and any(learns.values()):
+    # Batch normalisation counts the batches that it has learnt from.
+    learnt = {name: bool((count > 0).any()) for name, count in tensors.items() if name.endswith("num_batches_tracked")}
+    fusion = [has_learnt for name, has_learnt in learnt.items() if name.startswith("fusion.")]
+    if fusion and not any(fusion) and any(learnt.values()):
         raise DataError(path, f"a whole network, such as {WEIGHTS}", "one of the image stage: its fusion hasn't learnt")
     doubts = [] if any(fusion) else [DataError(path, "a network that has learnt", "one that hasn't made a step")]
-    learnt = [found for name, found in tensors.items() if found.is_floating_point() and found.ndim > 1]
-    if learnt and all(bool((found == found.round()).all()) for found in learnt):
-        doubts.append(DataError(path, "weights like 0.137", "whole numbers alone: were they rounded?"))
+    weights = [found for found in tensors.values() if found.is_floating_point() and found.ndim > 1]
+    if weights and all(bool((found == found.round()).all()) for found in weights):
+        doubts.append(DataError(path, "weights like 0.137", "only whole numbers: were they rounded?"))
     return [str(doubt) for doubt in doubts]
 
 
 def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str, Tensor]) -> None:
-    """Refuse tensors that aren't the network's; the error names the first one that differs.
+    """Raise a `DataError` about the first tensor that doesn't fit the network, if there is one.
 
     Parameters
     ----------
@@ -147,9 +152,8 @@ def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str
         The tensors of the file and those of the network; names and shapes are compared.
     """
     for name in sorted(found.keys() | expected.keys()):
-        have, want = (
-            "nothing" if part is None else tuple(part.shape) for part in (found.get(name), expected.get(name))
-        )
+        have = tuple(found[name].shape) if name in found else "nothing"
+        want = tuple(expected[name].shape) if name in expected else "nothing"
         if have != want:
             raise DataError(path, f"{want} for {name}", have)
         if not found[name].isfinite().all():
@@ -159,13 +163,13 @@ def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str
 
 
 def load_imagenet(segmenter: Segmenter, path: str | Path) -> None:
-    """Give an image network's encoder the weights that were learnt on ImageNet.
+    """Load weights that were learnt on ImageNet into an image network's encoder.
 
     Parameters
     ----------
     segmenter : Segmenter
-        An image network of preset "paper" whose class names a published network in `IMAGENET`. Changed in place, or
-        not at all if the file doesn't fit.
+        An image network of preset "paper" whose class names a published network in `IMAGENET`. It is changed in place,
+        or not at all if the file doesn't fit.
     path : path-like
         A safetensors file with the names and shapes of that network in torchvision: `vgg16` for SegNet and FCN,
         `resnet101` for DeepLab. Tensors of other layers, such as ImageNet's own classifier, are not used.
@@ -175,49 +179,33 @@ def load_imagenet(segmenter: Segmenter, path: str | Path) -> None:
     ArgumentError
         When the network has no published ImageNet weights.
     DataError
-        When the file is missing, damaged or no safetensors file, or a tensor is missing or has another shape.
+        When the file is missing, damaged or not a safetensors file, or a tensor is missing or has another shape.
 
     Notes
     -----
-    What is loaded: for SegNet the thirteen convolutions, but not its batch normalisation, which VGG16 lacks
-    and which stays as it is; for FCN the convolutions, and the two hidden layers of the classifier as conv6 and conv7;
-    for DeepLab all of ResNet-101 before the classifier, with scales, shifts and running statistics of its
-    batch normalisation. Decoders and score layers keep their weights.
+    What is loaded: for SegNet the thirteen convolutions, but no batch normalisation, which VGG16 lacks; for FCN the
+    convolutions, and the two hidden layers of the classifier as conv6 and conv7; for DeepLab all of ResNet-101 before
+    the classifier, with scales, shifts and running statistics of its batch normalisation. Decoders and score layers
+    keep their weights.
 
-    Pickled files (`.pth`) are refused, because reading one can run any code that is in it. Convert it once, on a
-    computer and from a source that you trust::
+    Pickled files (`.pth`) are rejected, because reading one can run any code in it. Convert a file from a trusted
+    source once::
 
         tensors = torch.load("vgg16.pth", map_location="cpu", weights_only=True)
         safetensors.torch.save_file({name: t.contiguous() for name, t in tensors.items()}, "vgg16.safetensors")
     """
-    wanted = imagenet_tensors(segmenter)
-    _, tensors = read_tensors(path)
-    found = {name: tensors[name] for name in wanted if name in tensors}
-    check_tensors(path, found, {name: _as_published(name, own) for name, own in wanted.items()})
-    with torch.no_grad():
-        for name, own in wanted.items():
-            own.copy_(found[name].reshape(own.shape))
-
-
-def imagenet_tensors(segmenter: Segmenter) -> dict[str, Tensor]:
-    """Return the network's own tensors that a file of ImageNet weights fills.
-
-    Parameters
-    ----------
-    segmenter : Segmenter
-        An image network.
-
-    Returns
-    -------
-    dict of str to Tensor
-        The tensors by their names in the file; they are the network's own, not copies.
-    """
-    if not (isinstance(segmenter, Segmenter) and segmenter.IMAGENET):
+    wanted = segmenter.imagenet_tensors() if isinstance(segmenter, Segmenter) else {}
+    if not wanted:
         published = ", ".join(name for name, network in SEGMENTERS.items() if network.IMAGENET)
         raise ArgumentError("segmenter", f"one with published ImageNet weights: {published}", type(segmenter).__name__)
-    return segmenter.imagenet_tensors()
+    _, tensors = read_tensors(path)
+    found = {name: tensors[name] for name in wanted if name in tensors}
+    check_tensors(path, found, {name: _as_published(name, tensor) for name, tensor in wanted.items()})
+    with torch.no_grad():
+        for name, tensor in wanted.items():
+            tensor.copy_(found[name].reshape(tensor.shape))
 
 
-def _as_published(name: str, own: Tensor) -> Tensor:
-    """Return a tensor with its shape in the file, where fully connected layers have no rows and columns."""
-    return own.flatten(1) if name.startswith("classifier") and own.ndim == 4 else own
+def _as_published(name: str, tensor: Tensor) -> Tensor:
+    """Return a tensor in the shape that it has in the file, where fully connected layers have no rows and columns."""
+    return tensor.flatten(1) if name.startswith("classifier") and tensor.ndim == 4 else tensor

@@ -1,21 +1,18 @@
 """From LIDAR scans to a grid of free, static, dynamic and unknown cells: l -> o (paper, section 3.2).
 
-A `Sensor` turns each scan into `Evidence`; the package's own is `SensorModel`. `steps` holds the four steps of the
-filter, each a pure function on a `FilterState`, and `literal.cmcdot` the same steps as a textbook would write them.
-`Cmcdot` runs the steps, and `track_drive` runs it over a drive. `LogOddsGrid` and `Bof` are the filters that came
-before it: the binary grid, and the exact filter on a lattice of velocities.
+A `Sensor` turns each scan into `Evidence`; the package's default is `SensorModel`. `steps` holds the four steps of the
+filter, each a pure function on a `FilterState`. `Cmcdot` runs the steps, and `track_drive` runs it over a drive.
+`LogOddsGrid` and `Bof` are the filters that came before it: the binary grid, and the exact filter on a lattice of
+velocities. `semgrid_edu.fast` has compiled twins of what takes long.
 
-In reading order: `state`, `planar_motion`; `evidence`, `polar`, `ground`, `sensor`; `log_odds`; `world`; `cellwise`,
-`particles`, `resampling`, `steps`; `local_belief`, `cmcdot`; `bof_state`, `bof`; and their twins in `literal`.
+In reading order: `state`, `planar_motion`; `evidence`, `polar`, `ground`, `sensor`; `log_odds`; `world`, `walls`;
+`cellwise`, `particles`, `resampling`, `steps`; `local_belief`, `cmcdot`; `bof_state`, `bof`.
 """
 
 from semgrid_edu.occupancy.bof import Bof, bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.bof_state import BofParams, BofState, VelocityLattice
-from semgrid_edu.occupancy.cmcdot import Cmcdot, track_drive
+from semgrid_edu.occupancy.cmcdot import Cmcdot, DriveTracker, track_drive
 from semgrid_edu.occupancy.evidence import Evidence, Measurement, Sensor, scan_evidence
-from semgrid_edu.occupancy.literal.bof import bof_predict_literal, bof_update_literal
-from semgrid_edu.occupancy.literal.cmcdot import move_literal, predict_literal, resample_literal, update_literal
-from semgrid_edu.occupancy.literal.evidence import scan_evidence_literal
 from semgrid_edu.occupancy.log_odds import (
     LogOddsGrid,
     LogOddsParams,
@@ -29,6 +26,7 @@ from semgrid_edu.occupancy.resampling import Resampling, SystematicResampling
 from semgrid_edu.occupancy.sensor import Scan, SensorModel
 from semgrid_edu.occupancy.state import N_STATES, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import move, predict, resample, update
+from semgrid_edu.occupancy.walls import Walls
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
 
 __all__ = [
@@ -39,6 +37,7 @@ __all__ = [
     "BofState",
     "Cmcdot",
     "CmcdotParams",
+    "DriveTracker",
     "Evidence",
     "FilterState",
     "LogOddsGrid",
@@ -53,27 +52,21 @@ __all__ = [
     "State",
     "SystematicResampling",
     "VelocityLattice",
+    "Walls",
     "WorldModel",
     "bof_move",
     "bof_predict",
-    "bof_predict_literal",
     "bof_update",
-    "bof_update_literal",
     "bof_velocity",
     "log_odds",
     "move",
-    "move_literal",
     "predict",
-    "predict_literal",
     "probability",
     "resample",
-    "resample_literal",
     "scan_evidence",
-    "scan_evidence_literal",
     "smear_area",
     "track_drive",
     "transition_matrix",
     "update",
-    "update_literal",
     "update_log_odds",
 ]

@@ -1,19 +1,22 @@
 """The BOF, the Bayesian Occupancy Filter, from which CMCDOT descends (Coue et al., IJRR 2006; paper, section 3.2)."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState
-from semgrid_edu.occupancy.cellwise import clear_wakes, collide, mix, open_space, ratio
+from semgrid_edu.occupancy.cellwise import mix, ratio, strike_out
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.local_belief import local_belief, observe
-from semgrid_edu.occupancy.particles import keeps_pace, slow_down
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
+from semgrid_edu.occupancy.particles import slow_down
+from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll, shift
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import update
-from semgrid_edu.occupancy.world import HALT, WorldModel, transition_matrix
+from semgrid_edu.occupancy.walls import Walls, free_beside_static, strike_out_wakes
+from semgrid_edu.occupancy.world import transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -43,8 +46,8 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float, d
 
     Some mass changes to neighbouring velocities, slow mass becomes STATIC, and the states mix by the transition matrix.
     Mass that leaves a cell leaves FREE behind. Where mass arrives, the combinations that can't be true are struck out:
-    something arrives where something stands, or comes out of a wall and goes on along it where nothing was seen to be
-    free. What becomes DYNAMIC takes the lattice's prior velocities. It moves from the next step on.
+    something arrives in a cell that is STATIC, or what arrives may be only a wall that comes into view (`world.walls`).
+    What becomes DYNAMIC takes the lattice's prior velocities. It moves from the next step on.
 
     Parameters
     ----------
@@ -62,52 +65,88 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float, d
     Raises
     ------
     ArgumentError
-        When the state is over cells other than `spec`, or of another lattice, or `dt` isn't a time.
+        When the state covers cells other than `spec`, or another lattice, or `dt` isn't a time.
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     M = transition_matrix(params.world, dt)
-    # Mass changes its velocity, some of it stops, and what goes on is shifted.
-    kept = (M[DYNAMIC, DYNAMIC] * _going_on(state, params, dt)).astype(np.float32)
-    change = np.float32(params.lattice.change_probability(params.world.max_acceleration, dt))
+    kept = M[DYNAMIC, DYNAMIC] * _going_on(state, params, dt)
     cells, remainder = whole_cells(state, spec, dt)
-    occupied = np.empty_like(state.occupied)
-    going, stays, arrives = np.zeros((3, *spec.shape), np.float32)
+    moves = cells.any(axis=1)
+    occupied = np.zeros_like(state.occupied)
+    going = np.zeros(spec.shape)
+    stays = np.zeros(spec.shape)
+    arrives = np.zeros(spec.shape)
     for k in range(1, len(occupied)):
-        mass = (1 - 4 * change) * state.occupied[k]
-        for other in params.lattice.neighbours[k]:
-            mass += change * state.occupied[other]
-        mass *= kept[k]
+        mass = float(kept[k]) * _accelerated(state, k, params, dt)
+        occupied[k] = shift(mass, cells[k])
         going += mass
-        _shift(mass, cells[k], out=occupied[k])
-        total = arrives if cells[k].any() else stays
+        total = arrives if moves[k] else stays
         total += occupied[k]
 
     # What arrives in a cell meets what the cell holds.
-    mixed, newborn = mix(state.probability, np.zeros(spec.shape, np.float32), going, M)
-    keeps = keeps_pace(*state.velocity.T, params.world.pace(driven, dt, spec.cell))
-    room = open_space(mixed)
-    ways = np.stack([origins(state.velocity, spec, params.world, part) for part in (1, HALT)], axis=1)
-    came = [k for k in range(1, len(occupied)) if cells[k].any()]
-    doubtful = np.zeros(spec.shape, np.float32)
-    for k in came:
-        doubtful += occupied[k] * _doubt(mixed, room, ways[k], keeps[k])
-    probability, newborn, (own, arrival), (_, less) = collide(mixed, newborn, going, stays, arrives, doubtful)
-    occupied[0] = probability[STATIC]
+    mixed, newborn = mix(state.probability, np.zeros(spec.shape), going, M)
+    vacated = going - stays
+    car_speed = driven / dt if dt > 0 else 0.0
+    blocked = _blocked(state.velocity, mixed, mixed[UNKNOWN] + vacated, spec, params.world.walls, car_speed)
+    possible = np.zeros(spec.shape)
+    for k in np.flatnonzero(moves):
+        possible += occupied[k] * (1 - blocked(k))
+    keep, take = strike_out(arrives, possible)
+    newborn = keep * newborn
     for k in range(1, len(occupied)):
-        occupied[k] *= arrival - less * _doubt(mixed, room, ways[k], keeps[k]) if k in came else own
-        occupied[k] += params.lattice.prior[k].astype(np.float32) * newborn
-    return BofState(probability[FREE], probability[UNKNOWN], occupied, state.velocity, remainder)
+        occupied[k] *= take * (1 - blocked(k)) if moves[k] else keep
+        occupied[k] += params.lattice.prior[k] * newborn
+    occupied[0] = keep * mixed[STATIC]
+    free = keep * (mixed[FREE] + vacated)
+    unknown = keep * mixed[UNKNOWN]
+    dtype = occupied.dtype
+    return BofState(free.astype(dtype), unknown.astype(dtype), occupied, state.velocity, remainder)
 
 
-def _going_on(state: BofState, params: BofParams, dt: float) -> NDArray[np.float32]:
-    """Return which share of each velocity's mass doesn't stop, (V,), by `slow_down` of one particle per velocity."""
-    velocity = state.velocity.astype(np.float32)
-    particles = Particles(np.zeros_like(velocity), velocity, np.ones(len(velocity), np.float32))
+def _going_on(state: BofState, params: BofParams, dt: float) -> NDArray[np.float64]:
+    """Return the share of each velocity's mass that doesn't stop, (V,), by `slow_down` of one particle per velocity."""
+    particles = Particles(np.zeros_like(state.velocity), state.velocity, np.ones(len(state.velocity)))
     return slow_down(particles, params.world.stop_rate, params.world.stop_speed, dt).weight
 
 
+def _accelerated(state: BofState, k: int, params: BofParams, dt: float) -> NDArray[np.floating]:
+    """Return the mass of one velocity, (H, W), after a part has changed to each neighbouring velocity and back."""
+    change = params.lattice.change_probability(params.world.max_acceleration, dt)
+    mass = (1 - 4 * change) * state.occupied[k]
+    for other in params.lattice.neighbours[k]:
+        mass += change * state.occupied[other]
+    return mass
+
+
+def _blocked(
+    velocity: NDArray, mixed: NDArray, unseen: NDArray, spec: GridSpec, walls: Walls | None, car_speed: float
+) -> Callable[[int], NDArray]:
+    """Return a function that tells with what probability mass of velocity k can't have arrived in a cell, (H, W).
+
+    It can't if the cell is STATIC. What `walls` doubts is that of `Walls.doubt`, for whole planes: a plane shifted the
+    other way shows in each cell the value at the place where its mass is at another time.
+    """
+    static = mixed[STATIC]
+    if walls is None:
+        return lambda k: static
+    keeps = walls.keeps_pace(velocity, car_speed, spec.cell)
+    before = origins(velocity, spec, walls)
+    shortly_before = origins(velocity, spec, walls, walls.second_look)
+    open_space = mixed[FREE] + mixed[DYNAMIC]
+    open_to_pace = open_space - free_beside_static(mixed)
+
+    def blocked(k: int) -> NDArray[np.floating]:
+        from_wall = _elsewhere(static, before[k])
+        if keeps[k]:
+            from_wall = np.maximum(from_wall, _elsewhere(static, shortly_before[k]))
+        open_ahead = _elsewhere(open_to_pace if keeps[k] else open_space, -before[k])
+        return static + from_wall * (1 - open_ahead) * unseen
+
+    return blocked
+
+
 def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return by how many whole cells each velocity shifts its mass, and what remains of its displacement.
+    """Return by how many whole cells each velocity shifts its mass, and the rest of its displacement.
 
     Parameters
     ----------
@@ -123,17 +162,17 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
     cells : (V, 2) int64
         Number of cells along the x and y axes of the map.
     remainder : (V, 2) float64
-        What remains along the same axes, metres, at most half a cell.
+        The rest along the same axes, metres, at most half a cell.
     """
     displacement = state.remainder + state.velocity * dt
     remainder = (displacement + spec.cell / 2) % spec.cell - spec.cell / 2
     cells = np.rint((displacement - remainder) / spec.cell)
-    farthest = max(spec.shape)  # all that leaves the grid is lost, however far it goes
+    farthest = max(spec.shape)  # mass that leaves the grid is lost, however far it goes
     return np.clip(cells, -farthest, farthest).astype(np.int64), remainder
 
 
-def origins(velocity: NDArray, spec: GridSpec, world: WorldModel, part: float = 1.0) -> NDArray[np.int64]:
-    """Return how many cells away mass of each velocity was some time ago, when it still took up another place.
+def origins(velocity: NDArray, spec: GridSpec, walls: Walls, fraction: float = 1.0) -> NDArray[np.int64]:
+    """Return how many cells away mass of each velocity was some time ago, when it was still in another place.
 
     Parameters
     ----------
@@ -141,27 +180,25 @@ def origins(velocity: NDArray, spec: GridSpec, world: WorldModel, part: float = 
         The velocities along the axes of the map, m/s.
     spec : GridSpec
         The cells.
-    world : WorldModel
+    walls : Walls
         How long ago: `clearing_time`, or for slow things the time that they need for `clearing_cells`.
-    part : float
-        Which part of `clearing_time` ago: `HALT` for the halt on the way.
+    fraction : float
+        Which fraction of `clearing_time` ago.
 
     Returns
     -------
     (V, 2) int64
         Number of whole cells along the x and y axes of the map, to the place where it was.
     """
-    back = -part * world.clearing_time * velocity / spec.cell
-    length = np.linalg.norm(back, axis=1, keepdims=True)
-    return np.rint(back * np.maximum(1, ratio(np.full_like(length, world.clearing_cells), length))).astype(np.int64)
+    return np.rint(walls.displacement(velocity, spec.cell, -fraction) / spec.cell).astype(np.int64)
 
 
 def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofParams) -> BofState:
-    """Update by Bayes' rule: that of CMCDOT's `update`, because a scan says nothing of velocities.
+    """Update by Bayes' rule: that of CMCDOT's `update`, because a scan tells nothing about velocities.
 
     All moving mass of a cell shares P(z | occupied), so it is scaled by one factor. The dynamic part of UNKNOWN cells
-    that are seen for the first time takes the lattice's prior velocities. In hidden cells, what moves says that nothing
-    stands where it was (`clear_wakes`).
+    that are seen for the first time takes the lattice's prior velocities. Hidden cells that moving mass has left become
+    free (`world.walls`).
 
     Parameters
     ----------
@@ -170,30 +207,32 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
     spec : GridSpec
         The cells, (H, W).
     evidence : Evidence
-        What the scan says of each cell.
+        What the scan tells about each cell.
     params : BofParams
         The lattice, and what UNKNOWN cells turn out to be at first sight.
 
     Raises
     ------
     ArgumentError
-        When state or evidence are over cells other than `spec`, or of another lattice.
+        When state or evidence cover cells other than `spec`, or another lattice.
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     before = state.probability
-    given = update(FilterState(before, Particles.none(), np.zeros_like(before[0])), spec, evidence, params.world)
+    given = update(FilterState(before, Particles.none(), np.zeros(spec.shape)), spec, evidence, params.world)
     factor = ratio(np.maximum(given.probability[DYNAMIC] - given.newborn, 0), before[DYNAMIC])
-    occupied = np.empty_like(state.occupied)
-    occupied[0] = given.probability[STATIC]
+    occupied = np.zeros_like(state.occupied)
     for k in range(1, len(occupied)):
-        np.multiply(state.occupied[k], factor, out=occupied[k])
-        occupied[k] += np.float32(params.lattice.prior[k]) * given.newborn
-    left = np.zeros(spec.shape, np.float32)
-    for mass, back in zip(occupied, origins(state.velocity, spec, params.world), strict=True):
-        left += _moved(mass, back)
-    cleared = clear_wakes(given.probability, left, evidence.occupied == evidence.free)
-    occupied[0] = cleared[STATIC]
-    return BofState(cleared[FREE], cleared[UNKNOWN], occupied, state.velocity, state.remainder)
+        occupied[k] = state.occupied[k] * factor + params.lattice.prior[k] * given.newborn
+    probability = given.probability
+    if params.world.walls is not None:
+        left = np.zeros(spec.shape)
+        for mass, back in zip(occupied[1:], origins(state.velocity[1:], spec, params.world.walls), strict=True):
+            left += _elsewhere(mass, -back)
+        probability = strike_out_wakes(probability, left, evidence.occupied == evidence.free)
+    occupied[0] = probability[STATIC]
+    dtype = occupied.dtype
+    free, unknown = probability[FREE].astype(dtype), probability[UNKNOWN].astype(dtype)
+    return BofState(free, unknown, occupied, state.velocity, state.remainder)
 
 
 def bof_velocity(state: BofState) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -233,7 +272,7 @@ class Bof:
     spec : GridSpec
         The grid in which the filter hands out its beliefs, (H, W) cells.
     params : BofParams, optional
-        The lattice of velocities, and what the filter assumes of the world and of its sensor.
+        The lattice of velocities, and what the filter assumes about the world and its sensor.
 
     Raises
     ------
@@ -257,7 +296,7 @@ class Bof:
         self._state = BofState.nothing_known(self.map_spec, self.params.lattice)
 
     def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> Belief:
-        """Take in one scan: move, predict, update.
+        """Process one scan: move, predict, update.
 
         Parameters, result and errors are those of `Cmcdot.step`.
         """
@@ -271,29 +310,9 @@ class Bof:
         return local_belief(predicted.probability, velocity, seen, self.map_spec, self.spec, world)
 
 
-def _doubt(mixed: NDArray, room: NDArray, way: NDArray[np.int64], keeps: bool) -> NDArray[np.float32]:
-    """Return which part of the mass of one velocity comes out of a wall and goes on along it, cell by cell.
+def _elsewhere(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
+    """Return for each cell the value so many cells away, along x and y, (H, W); 0 outside and for no distance at all.
 
-    `way` says where the mass was: its origin and its halt, in cells along x and y. A plane moved the other way shows in
-    each cell what is there; a plane moved by the origin itself, what is where the mass goes. The halt counts only
-    if the mass `keeps` pace; then the second plane of `room` is the open space, else the first.
+    At no distance nothing has moved, so there is no other place to look at.
     """
-    static = np.max([_moved(mixed[STATIC], -cells) for cells in (way if keeps else way[:1])], axis=0)
-    return static * (1 - _moved(room[int(keeps)], way[0]))
-
-
-def _moved(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
-    """Return a plane moved by whole cells along x and y; all zeros when they are 0, because then nothing has moved."""
-    out = np.zeros_like(plane)
-    if cells.any():
-        _shift(plane, cells, out)
-    return out
-
-
-def _shift(plane: NDArray, cells: NDArray[np.int64], out: NDArray) -> None:
-    """Move a plane by whole cells along x and y, which is up and left; nothing comes in from outside."""
-    up, left = np.clip(cells, np.negative(plane.shape), plane.shape)
-    height, width = plane.shape
-    out[...] = 0
-    source = plane[max(up, 0) : height + min(up, 0), max(left, 0) : width + min(left, 0)]
-    out[max(-up, 0) : height - max(up, 0), max(-left, 0) : width - max(left, 0)] = source
+    return shift(plane, -cells) if cells.any() else np.zeros_like(plane)

@@ -1,4 +1,4 @@
-"""What the BOF believes of each cell, and the velocities that it tells apart (Coue et al., IJRR 2006; section 3.2)."""
+"""What the BOF believes about each cell, and the velocities that it separates (Coue et al., IJRR 2006; section 3.2)."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -41,7 +41,7 @@ class VelocityLattice:
     spacing: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse a lattice of no velocity but zero, or of too many."""
+        """Check that there is a velocity besides zero, and that there aren't too many."""
         check_fields(self, "a positive speed in m/s", lambda v: np.isfinite(v) and v > 0, "spacing")
         if not self.spacing <= self.max_speed <= FINEST * self.spacing:
             expected = f"from 1 to {FINEST} times the spacing of {self.spacing} m/s"
@@ -71,8 +71,8 @@ class VelocityLattice:
     def neighbours(self) -> NDArray[np.int64]:
         """(V, 4): indices of the velocities one spacing ahead, behind, to the left and to the right of each.
 
-        Where there is none, the velocity's own index stands in its place. Zero has no neighbours and is no neighbour of
-        any other velocity, because what stands doesn't set off by accelerating a little.
+        Where there is none, the velocity's own index is there instead. Zero has no neighbours and is no neighbour of
+        any other velocity, because a standing thing doesn't set off by accelerating a little.
         """
         steps = np.rint(self.velocities / self.spacing).astype(int)
         index = {tuple(step): k for k, step in enumerate(steps) if k > 0}
@@ -118,7 +118,7 @@ class BofParams:
     lattice : VelocityLattice
         The velocities that the filter tells apart.
     world : WorldModel
-        What the filter assumes of the world and of its sensor.
+        What the filter assumes about the world and its sensor.
     """
 
     lattice: VelocityLattice = field(default_factory=VelocityLattice)

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import ArgumentError, not_negative
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy._runtime import keep_memory, on_another_core, undo_after_errors
 from semgrid_edu.occupancy.local_belief import local_belief, observe, velocity_moments
 from semgrid_edu.occupancy.particles import cells_of, transform
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
@@ -29,12 +29,11 @@ class Cmcdot:
     spec : GridSpec
         The grid in which the filter hands out its beliefs, (H, W) cells.
     params : CmcdotParams, optional
-        What the filter assumes of the world and of its sensor, and how it spends its particles.
+        What the filter assumes about the world and its sensor, and how it spends its particles.
     seed : int or numpy.random.Generator
         Seed or source of all random numbers that the filter draws: the same seed gives the same bits.
     keep_steps : bool
-        Whether each belief also holds what the map held after each step (`Belief.steps`). Apart from that, the
-            beliefs are the same.
+        Whether each belief also contains the state of the map after each step (`Belief.steps`).
 
     Examples
     --------
@@ -59,15 +58,14 @@ class Cmcdot:
         self._rng = np.random.default_rng(seed)
         self._pose = PlanarMotion()
         self._state = FilterState.unknown(self.map_spec)
-        keep_memory()
 
     @property
     def particles(self) -> Particles:
-        """The particles in the grid frame of the vehicle. Some lie outside the grid, in the margin of the map."""
+        """The particles in the grid frame of the vehicle. Some are outside the grid, in the margin of the map."""
         return transform(self._state.particles, self._pose)
 
     def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> Belief:
-        """Take in one scan: move, predict, update, resample.
+        """Process one scan: move, predict, update, resample.
 
         Parameters
         ----------
@@ -83,40 +81,89 @@ class Cmcdot:
         Returns
         -------
         Belief
-            What is believed of the cells of `spec`, in the grid frame of the vehicle now.
+            The belief about the cells of `spec`, in the grid frame of the vehicle now.
 
         Raises
         ------
         ArgumentError
             When the points aren't a table of finite coordinates, the time is negative or not finite, the sensor doesn't
-            turn the scan into evidence, or the resampling doesn't return indices. The tracker then stays as it was.
+            turn the scan into evidence, or the resampling doesn't return indices. The state then stays as it was.
         """
+        if not not_negative(dt):
+            raise ArgumentError("dt", "seconds, not negative", dt)
         shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
-        scan = observe, self.params.sensor, points_grid, pose, self.map_spec, self.spec  # called on another core below
-        steps: dict[str, NDArray[np.float32]] = {}
-        with undo_after_errors(self._rng), on_another_core(*scan) as seen:
-            # One name for what is between two steps: its memory, as large as what the filter keeps, is then used again.
-            state = self._noted(steps, "move", move(self._state, self.map_spec, shift), pose)
-            state = predict(state, self.map_spec, self.params, dt, self._rng, motion.dx)
-            state = self._noted(steps, "predict", state, pose)
-            predicted = state.probability
-            state = self._noted(steps, "update", update(state, self.map_spec, seen.result().on_map, self.params), pose)
-            state = self._noted(steps, "resample", resample(state, self.map_spec, self.params, self._rng), pose)
-        self._state, self._pose = state, pose
-        cells = cells_of(state.particles.position, self.map_spec)
-        velocity = velocity_moments(state.particles, cells, self.map_spec.shape)
-        belief = local_belief(predicted, velocity, seen.result(), self.map_spec, self.spec, self.params)
-        return replace(belief, steps=steps)
+        scan = observe(self.params.sensor, points_grid, pose, self.map_spec, self.spec)
 
-    def _noted(self, steps: dict[str, NDArray], name: str, state: FilterState, pose: PlanarMotion) -> FilterState:
-        """Return the state; when steps are kept, note what it holds at the centres of the vehicle's own cells."""
+        moved = move(self._state, self.map_spec, shift)
+        predicted = predict(moved, self.map_spec, self.params, dt, self._rng, motion.dx)
+        updated = update(predicted, self.map_spec, scan.on_map, self.params)
+        resampled = resample(updated, self.map_spec, self.params, self._rng)
+        self._state = resampled
+        self._pose = pose
+
+        cells = cells_of(resampled.particles.position, self.map_spec)
+        velocity = velocity_moments(resampled.particles, cells, self.map_spec.shape)
+        belief = local_belief(predicted.probability, velocity, scan, self.map_spec, self.spec, self.params)
         if self.keep_steps:
-            steps[name] = look_up(state.probability, NOTHING_KNOWN, self.map_spec, self.spec, pose)
-        return state
+            states = {"move": moved, "predict": predicted, "update": updated, "resample": resampled}
+            belief = replace(belief, steps={name: self._in_grid(state) for name, state in states.items()})
+        return belief
+
+    def _in_grid(self, state: FilterState) -> NDArray[np.float32]:
+        """Return the probabilities of a state of the map at the centres of the vehicle's own cells."""
+        probability = state.probability.astype(np.float32)
+        return look_up(probability, NOTHING_KNOWN, self.map_spec, self.spec, self._pose)
 
 
-LIDAR_PERIOD = 0.1
-"""Seconds between two scans of a scanner that turns at 10 Hz, as KITTI's does: the time step of the first frame."""
+class DriveTracker:
+    """A filter that takes frames: it finds the motion and the time since the previous frame by itself.
+
+    Parameters
+    ----------
+    spec : GridSpec
+        The grid in which the filter hands out its beliefs, (H, W) cells.
+    params : CmcdotParams, optional
+        What the filter assumes about the world and its sensor, and how it spends its particles.
+    seed : int or numpy.random.Generator
+        Seed or source of all random numbers that the filter draws.
+    keep_steps : bool
+        Whether each belief also contains the state of the filter's map after each step (`Belief.steps`).
+    """
+
+    filter_class = Cmcdot
+
+    def __init__(
+        self,
+        spec: GridSpec,
+        params: CmcdotParams | None = None,
+        seed: int | np.random.Generator = 0,
+        keep_steps: bool = False,
+    ) -> None:
+        self.filter = self.filter_class(spec, params, seed, keep_steps)
+        self._before: Frame | None = None
+
+    def step(self, frame: Frame) -> Belief:
+        """Process the next frame of a drive.
+
+        Parameters
+        ----------
+        frame : Frame
+            The frame, of which the scan, the pose and the time count.
+
+        Returns
+        -------
+        Belief
+            The belief after this frame, in the grid frame of that instant.
+
+        Raises
+        ------
+        ArgumentError
+            When time runs backwards, or a scan or pose isn't finite.
+        """
+        motion, dt = motion_since(self._before, frame)
+        belief = self.filter.step(frame.points_grid, motion, dt)
+        self._before = frame
+        return belief
 
 
 def track_drive(
@@ -132,14 +179,8 @@ def track_drive(
     ----------
     frames : iterable of Frame
         The frames of the drive in the order of time.
-    spec : GridSpec
-        The grid in which the filter hands out its beliefs, (H, W) cells.
-    params : CmcdotParams, optional
-        What the filter assumes of the world and of its sensor, and how it spends its particles.
-    seed : int or numpy.random.Generator
-        Seed or source of all random numbers that the filter draws.
-    keep_steps : bool
-        Whether each belief also holds what the filter's map held after each step (`Belief.steps`).
+    spec, params, seed, keep_steps
+        Parameters of the filter, as for `DriveTracker`.
 
     Yields
     ------
@@ -151,10 +192,13 @@ def track_drive(
     ArgumentError
         When frames run backwards in time, or a scan or pose isn't finite.
     """
-    tracker, before = Cmcdot(spec, params, seed, keep_steps), None
+    tracker = DriveTracker(spec, params, seed, keep_steps)
     for frame in frames:
-        yield tracker.step(frame.points_grid, *motion_since(before, frame))
-        before = frame
+        yield tracker.step(frame)
+
+
+LIDAR_PERIOD = 0.1
+"""Seconds between two scans of a scanner that turns at 10 Hz, as KITTI's does: the time step of the first frame."""
 
 
 def motion_since(before: Frame | None, now: Frame) -> tuple[PlanarMotion, float]:

@@ -1,14 +1,13 @@
-"""What one scan says of each cell, P(z | occupied) and P(z | free), and what a sensor must offer (paper, section 3.2).
+"""What one scan tells about each cell, P(z | occupied) and P(z | free), and what a sensor must offer (section 3.2).
 
-A filter needs two things: a sensor that takes in a scan (`Sensor.scan`), and a result that can say what the scan tells
-about the cells of any grid (`Measurement.evidence`). Any two classes with these methods will do.
+A filter needs two things: a sensor that processes a scan (`Sensor.scan`), and a result that can be asked about the
+cells of any grid (`Measurement.evidence`). Any two classes with these methods will do.
 """
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError, check_shape
@@ -19,7 +18,7 @@ from semgrid_edu.occupancy.state import check_part
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The two likelihoods of a scan in each cell. Where they are equal, the scan says nothing.
+    """The two likelihoods of a scan in each cell. Where they are equal, the scan tells nothing.
 
     Parameters
     ----------
@@ -36,7 +35,7 @@ class Evidence:
     free: NDArray[np.float32]
 
     def __post_init__(self) -> None:
-        """Refuse what would make nonsense of Bayes' rule without a warning."""
+        """Check that Bayes' rule makes sense with these numbers."""
         check_shape("free", self.free, np.shape(self.occupied))
         for name in ("occupied", "free"):
             if not (least := np.min(getattr(self, name), initial=0)) >= 0:  # NaN isn't either
@@ -45,13 +44,13 @@ class Evidence:
 
 @runtime_checkable
 class Measurement(Protocol):
-    """What a sensor has made of one scan. The package's own is `Scan`."""
+    """What a sensor has made of one scan. The package's default is `Scan`."""
 
     def evidence(self, spec: GridSpec, pose: PlanarMotion) -> Evidence:
-        """Say what the scan tells of each cell of a grid.
+        """Return what the scan tells about each cell of a grid.
 
-        A filter asks twice in each step: for the cells of its own map, in which the vehicle moves, and for the cells
-        of the grid in which it hands out its beliefs, whose frame is that of the vehicle.
+        A filter asks twice per step: for the cells of its map, in which the vehicle moves, and for the cells of the
+        grid in which it hands out its beliefs, whose frame is that of the vehicle.
 
         Parameters
         ----------
@@ -64,20 +63,20 @@ class Measurement(Protocol):
         Returns
         -------
         Evidence
-            P(z | occupied) and P(z | free), each (H, W); equal in cells of which the scan says nothing.
+            P(z | occupied) and P(z | free), each (H, W); equal in cells about which the scan tells nothing.
         """
         ...
 
 
 @runtime_checkable
 class Sensor(Protocol):
-    """A model of the sensor: it takes a scan in, and makes a measurement of it. The package's own is `SensorModel`.
+    """A model of the sensor: it turns a scan into a measurement. The package's default is `SensorModel`.
 
-    `Cmcdot` calls it in a thread of its own, while it predicts.
+    `fast.Cmcdot` calls it in a separate thread, while it predicts.
 
     Examples
     --------
-    A sensor that never says anything. With it, a filter believes UNKNOWN for ever:
+    A sensor that never sees anything. With it, a filter believes UNKNOWN for ever:
 
     >>> class Blind:
     ...     def scan(self, points):
@@ -89,14 +88,14 @@ class Sensor(Protocol):
     """
 
     def scan(self, points: NDArray) -> Measurement:
-        """Take one scan in.
+        """Process one scan.
 
         Parameters
         ----------
         points : (N, 3+) float32 or float64
             Returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid frame of the
-            vehicle now; a fourth column, where there is one, is reflectance, a fifth says which are the vehicle's own
-            (`Frame.own`). The filters have checked that x, y and z are finite. N may be 0.
+            vehicle now; a fourth column, where there is one, is reflectance, a fifth marks returns from the vehicle
+            itself (`Frame.own`). The filters have checked that x, y and z are finite. N may be 0.
 
         Returns
         -------
@@ -119,25 +118,23 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: Sensor, pose: PlanarM
     sensor : Sensor
         How the scanner errs: usually a `SensorModel`.
     pose : PlanarMotion, optional
-        Pose of the vehicle in the frame of `spec`; by default it stands at the origin of that frame.
+        Pose of the vehicle in the frame of `spec`; by default it is at the origin of that frame.
 
     Returns
     -------
     Evidence
-        P(z | occupied) and P(z | free), each (H, W). For a `SensorModel` that of `scan_evidence_literal`, except for
-        cells that several beams share and only some of them pass. These are thin lines where the seen area begins or
-        ends and, far away among foliage, whole patches.
+        P(z | occupied) and P(z | free), each (H, W).
 
     Raises
     ------
     ArgumentError
-        When `points` isn't a table of finite coordinates, or the sensor returns anything but evidence over `spec`.
+        When `points` isn't a table of finite coordinates, or the sensor returns anything but evidence on `spec`.
     """
     return evidence_of(take_scan(sensor, points), spec, pose or PlanarMotion())
 
 
 def take_scan(sensor: Sensor, points: NDArray) -> Measurement:
-    """Check a scan, hand it to a sensor, and check what the sensor makes of it.
+    """Check a scan, let a sensor process it, and check the result.
 
     Parameters
     ----------
@@ -159,7 +156,7 @@ def take_scan(sensor: Sensor, points: NDArray) -> Measurement:
 
 
 def evidence_of(measurement: Measurement, spec: GridSpec, pose: PlanarMotion) -> Evidence:
-    """Ask a measurement for its evidence over a grid, and check the answer.
+    """Ask a measurement for its evidence on a grid, and check the answer.
 
     Parameters
     ----------
@@ -182,18 +179,18 @@ def evidence_of(measurement: Measurement, spec: GridSpec, pose: PlanarMotion) ->
 
 
 def check_sensor(sensor: Sensor) -> None:
-    """Refuse what can't take a scan in.
+    """Check that an object is a sensor.
 
     Parameters
     ----------
     sensor : Sensor
-        The model of a sensor, an object with a method `scan`.
+        The object, which needs a method `scan`.
     """
     check_part("sensor", sensor, Sensor, ".scan(points), such as SensorModel()")
 
 
 def check_points(points: NDArray) -> NDArray:
-    """Return the points of a scan as an array of float32 or float64; refuse anything but finite coordinates.
+    """Return the points of a scan as an array of float32 or float64, after checking that coordinates are finite.
 
     Parameters
     ----------
@@ -206,16 +203,8 @@ def check_points(points: NDArray) -> NDArray:
     if points.dtype.kind not in "biuf":
         raise ArgumentError("points", "real numbers", f"type {points.dtype}")
     points = points.astype(np.float32 if np.can_cast(points.dtype, np.float32) else np.float64, copy=False)
-    if not _all_finite(points):
-        bad = int((~np.isfinite(points[:, :3]).all(axis=1)).sum())
+    finite = np.isfinite(points[:, :3]).all(axis=1)
+    if not finite.all():
+        bad = np.count_nonzero(~finite)
         raise ArgumentError("points", "finite coordinates", f"{bad} of {len(points)} points with NaN or infinity")
     return points
-
-
-@njit(cache=True, nogil=True)
-def _all_finite(points):
-    """Tell whether every x, y and z is finite; numpy, which writes arrays of truth values, takes five times as long."""
-    finite = True
-    for i in range(len(points)):
-        finite &= np.isfinite(points[i, 0]) & np.isfinite(points[i, 1]) & np.isfinite(points[i, 2])
-    return finite

@@ -1,10 +1,8 @@
-"""From the scrolling map to the vehicle's cells: what a scan says of both, and the belief handed out (section 3.2)."""
+"""From the scrolling map to the vehicle's cells: what a scan tells about both, and the final belief (section 3.2)."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
@@ -16,16 +14,16 @@ from semgrid_edu.occupancy.world import WorldModel
 
 
 class Observation(NamedTuple):
-    """A scan, as a step of a filter uses it.
+    """What a scan tells a filter in one step.
 
     Parameters
     ----------
     pose : PlanarMotion
         Pose of the vehicle in the frame of the map, metres and radians.
     on_map : Evidence
-        What the scan says of the cells of the map, (H, W).
+        What the scan tells about the cells of the map, (H, W).
     in_grid : Evidence
-        What the scan says of the cells of the grid around the vehicle, (H', W').
+        What the scan tells about the cells of the grid around the vehicle, (H', W').
     """
 
     pose: PlanarMotion
@@ -36,7 +34,7 @@ class Observation(NamedTuple):
 def observe(
     sensor: Sensor, points_grid: NDArray, pose: PlanarMotion, map_spec: GridSpec, spec: GridSpec
 ) -> Observation:
-    """Ask the sensor what a scan says of the cells of the map, and of those around the vehicle.
+    """Ask the sensor what a scan tells about the cells of the map, and about those around the vehicle.
 
     Parameters
     ----------
@@ -64,15 +62,15 @@ def local_belief(
 ) -> Belief:
     """Look the map up in the vehicle's cells, and update those with the scan; nothing of this goes back to the map.
 
-    The vehicle's cells don't coincide with the map's. Updating them with evidence of their own puts each return into
-    the very cell that it hit, however the vehicle is turned in the map.
+    The vehicle's cells don't coincide with the map's. Because they are updated with evidence on their own grid, each
+    return counts for the very cell that it hit, however the vehicle is turned in the map.
 
     Parameters
     ----------
-    predicted : (4, H, W) float32
-        The belief over the map before the scan.
-    velocity : (2, H, W) and (2, 2, H, W) float32
-        Mean and covariance of the velocity over the map, given the scan, along the axes of the map, m/s and m^2/s^2;
+    predicted : (4, H, W) float
+        The belief on the map before the scan.
+    velocity : (2, H, W) and (2, 2, H, W) float
+        Mean and covariance of the velocity on the map, given the scan, along the axes of the map, m/s and m^2/s^2;
         NaN where nothing moves.
     seen : Observation
         The scan in the vehicle's cells, and the pose of the vehicle in the map.
@@ -82,10 +80,10 @@ def local_belief(
         What `update` assumes.
     """
     here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, seen.pose)
-    prior = FilterState(here, Particles.none(), np.zeros(spec.shape, np.float32))
-    probability = update(prior, spec, seen.in_grid, world).probability
+    prior = FilterState(here, Particles.none(), np.zeros(spec.shape))
+    probability = update(prior, spec, seen.in_grid, world).probability.astype(np.float32)
     mean, covariance = velocity
-    moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)])
+    moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)]).astype(np.float32)
     moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, seen.pose)
     moments[:, probability[State.DYNAMIC] == 0] = np.nan
     return Belief(probability, *turn_moments(moments[:2], moments[2:].reshape(2, 2, *spec.shape), seen.pose))
@@ -93,7 +91,7 @@ def local_belief(
 
 def velocity_moments(
     particles: Particles, cells: NDArray, shape: tuple[int, int]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
     """Return mean and covariance of the velocities in each cell, weighted by the weights of the particles.
 
     Parameters
@@ -107,42 +105,26 @@ def velocity_moments(
 
     Returns
     -------
-    mean : (2, H, W) float32
+    mean : (2, H, W) float64
         sum(w v) / sum(w), along the axes of the map, m/s; NaN in cells without particles.
-    covariance : (2, 2, H, W) float32
+    covariance : (2, 2, H, W) float64
         sum(w (v - mean) (v - mean)^T) / sum(w), m^2/s^2; zero for a single particle, NaN in cells without particles.
     """
-    mean, covariance = _moments(particles.velocity, particles.weight, cells, math.prod(shape))
+    n_cells = shape[0] * shape[1]
+    inside = cells != OUTSIDE
+    cell = cells[inside]
+    weight = particles.weight[inside].astype(np.float64)
+    velocity = particles.velocity[inside].astype(np.float64)
+
+    def average(values: NDArray) -> NDArray[np.float64]:
+        return np.bincount(cell, weight * values, n_cells) / total
+
+    with np.errstate(invalid="ignore"):  # 0 / 0 is NaN, as it should be in cells without particles
+        total = np.bincount(cell, weight, n_cells)
+        mean = np.stack([average(velocity[:, 0]), average(velocity[:, 1])])
+        dx, dy = velocity.T - mean[:, cell]
+        covariance = np.stack([average(dx * dx), average(dx * dy), average(dx * dy), average(dy * dy)])
     return mean.reshape(2, *shape), covariance.reshape(2, 2, *shape)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _moments(velocity, weight, cells, n_cells):
-    """Add up in double precision, and twice: the covariance from differences to the mean, which keep their digits."""
-    first, second = np.zeros((n_cells, 3)), np.zeros((n_cells, 3))
-    for i in range(len(cells)):
-        c = cells[i]
-        if c != OUTSIDE:
-            w = np.float64(weight[i])
-            first[c, 0] += w
-            first[c, 1] += w * velocity[i, 0]
-            first[c, 2] += w * velocity[i, 1]
-    for c in range(n_cells):
-        first[c, 1] /= first[c, 0]
-        first[c, 2] /= first[c, 0]
-    for i in range(len(cells)):
-        c = cells[i]
-        if c != OUTSIDE:
-            x, y = velocity[i, 0] - first[c, 1], velocity[i, 1] - first[c, 2]
-            second[c, 0] += weight[i] * x * x
-            second[c, 1] += weight[i] * x * y
-            second[c, 2] += weight[i] * y * y
-    mean, covariance = np.empty((2, n_cells), np.float32), np.empty((2, 2, n_cells), np.float32)
-    for c in range(n_cells):
-        mean[0, c], mean[1, c] = first[c, 1], first[c, 2]
-        covariance[0, 0, c], covariance[1, 1, c] = second[c, 0] / first[c, 0], second[c, 2] / first[c, 0]
-        covariance[0, 1, c] = covariance[1, 0, c] = second[c, 1] / first[c, 0]
-    return mean, covariance
 
 
 def turn_moments(mean: NDArray, covariance: NDArray, motion: PlanarMotion) -> tuple[NDArray, NDArray]:

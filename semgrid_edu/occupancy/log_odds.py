@@ -13,7 +13,7 @@ from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, 
 from semgrid_edu.occupancy.sensor import SensorModel
 
 TINY = np.float32(1e-30)
-"""Stands for a likelihood of 0, whose logarithm is infinite. The bounds on P(occupied) make the difference vanish."""
+"""Replaces a likelihood of 0, whose logarithm is infinite. The bounds on P(occupied) make the difference vanish."""
 
 
 @dataclass(frozen=True)
@@ -23,10 +23,10 @@ class LogOddsParams:
     Parameters
     ----------
     prior : float
-        P(occupied) of a cell that no scan has said anything of. One half favours neither state (Moravec and Elfes).
+        P(occupied) of a cell that no scan has observed. One half favours neither state (Moravec and Elfes).
     lowest, highest : float
-        Bounds that P(occupied) never leaves, so that a cell can soon change its mind: without bounds, a cell that was
-        seen a hundred times would need about as many scans to the contrary. The defaults are OctoMap's (Hornung et
+        Bounds that P(occupied) never leaves, so that a cell can change quickly: without bounds, a cell that was seen a
+        hundred times would need about as many scans to the contrary. The defaults are OctoMap's (Hornung et
         al., Autonomous Robots 2013).
     sensor : Sensor
         Turns each scan into evidence; by default a `SensorModel`.
@@ -39,7 +39,7 @@ class LogOddsParams:
 
     @types_named
     def __post_init__(self) -> None:
-        """Refuse bounds that allow for certainty, and a prior outside the bounds."""
+        """Check that the bounds exclude certainty and contain the prior."""
         if not 0 < self.lowest < self.highest < 1:
             raise ArgumentError("lowest, highest", "0 < lowest < highest < 1", (self.lowest, self.highest))
         if not self.lowest <= self.prior <= self.highest:
@@ -83,13 +83,13 @@ def probability(L: ArrayLike) -> NDArray[np.floating]:
 
 
 def update_log_odds(L: NDArray, evidence: Evidence, params: LogOddsParams) -> NDArray[np.floating]:
-    """Take in one scan by Bayes' rule, which is a sum in log-odds.
+    """Update with one scan by Bayes' rule, which is a sum in log-odds.
 
         L(o | z) = L(o) + log( P(z | occupied) / P(z | free) )
 
     P(z) is the same for both states, so it has dropped out of the ratio. Nothing is subtracted, because the evidence is
-    a likelihood. The log-odds of an inverse sensor model, P(o | z), already hold the prior: with such a model, the log-
-    odds of the prior have to be subtracted at each scan, or else every scan would count the prior again.
+    a likelihood. The log-odds of an inverse sensor model, P(o | z), already contain the prior. With such a model, the
+    log-odds of the prior must be subtracted at each scan, or else every scan would count the prior again.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class LogOddsGrid:
     """The binary baseline: each cell is occupied or free, for ever.
 
     It knows nothing of motion, so moving things leave a smear: the cells that they have left stay occupied until enough
-    scans have said the contrary. Its map scrolls under the vehicle as that of `Cmcdot` does.
+    scans have shown them free. Its map scrolls under the vehicle as that of `Cmcdot` does.
 
     Parameters
     ----------
@@ -136,9 +136,9 @@ class LogOddsGrid:
         self._log_odds = np.full(self.map_spec.shape, self._prior, np.float32)
 
     def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> NDArray[np.float32]:
-        """Take in one scan, and return P(occupied) of each cell of `spec`, (H, W), in the vehicle's grid frame now.
+        """Process one scan, and return P(occupied) of each cell of `spec`, (H, W), in the vehicle's grid frame now.
 
-        `dt` is only checked, because this grid believes that nothing changes. Parameters and errors are those of
+        `dt` is only checked, because this grid assumes that nothing changes. Parameters and errors are those of
         `Cmcdot.step`.
         """
         if not not_negative(dt):
@@ -152,7 +152,7 @@ class LogOddsGrid:
 
 
 def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> float:
-    """Measure the smear of something that has moved: the area, m^2, that it has left but is believed to occupy still.
+    """Measure the smear of something that has moved: the area, m^2, that it has left but still seems to occupy.
 
     Parameters
     ----------

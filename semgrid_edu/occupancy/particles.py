@@ -1,27 +1,15 @@
-"""What many particles do at once: add up in cells, fly, slow down, turn with the map (section 3.2, steps 1 and 2).
-
-Loops that only compute take the pairs of coordinates (N, 2) end to end, as (2 N,): then the compiler knows how far
-apart the numbers lie, and does several particles at a time.
-"""
-
-import math
+"""What particles do: add up in cells, fly, slow down, turn with the map (section 3.2, steps 1 and 2)."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.cellwise import STATIC, open_space
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.state import OUTSIDE, Particles, cell_of
-from semgrid_edu.occupancy.world import Pace
-
-SLOW = np.float32(16)
-"""Beside 1, exp(-16) hardly counts in single precision, so exponentials beyond it needn't be computed."""
+from semgrid_edu.occupancy.state import OUTSIDE, Particles
 
 
-def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
-    """Return the cell that each particle is in, (N,) int32: row * W + column, or `OUTSIDE`.
+def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int64]:
+    """Return the cell that each particle is in, (N,): row * W + column, or `OUTSIDE`.
 
     Parameters
     ----------
@@ -30,175 +18,38 @@ def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
     spec : GridSpec
         The cells, (H, W).
     """
-    return _cells_of(position.ravel(), spec.shape, *spec.corner)
+    rows, cols, inside = spec.cells(position)
+    return np.where(inside, rows * spec.shape[1] + cols, OUTSIDE)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _cells_of(xy, shape, x_max, y_max, cell):
-    cells = np.empty(len(xy) // 2, np.int32)
-    for i in range(len(cells)):
-        cells[i] = cell_of(xy[2 * i], xy[2 * i + 1], shape, x_max, y_max, cell)
-    return cells
-
-
-@njit(cache=True, nogil=True)
-def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, ...]) -> NDArray:
-    """Add the weights up in each cell, in the order of the particles and in double precision.
+def weight_in_cells(weight: NDArray, cells: NDArray, shape: tuple[int, int]) -> NDArray[np.float64]:
+    """Add up the weights in each cell, (H, W).
 
     Parameters
     ----------
     weight : (N,) float
         The weight of each particle.
     cells : (N,) int
-        The cell of each particle, from `cells_of`; or from `by_origin`, for sums of shape (2, H, W).
-    shape : (int, int) or (int, int, int)
-        Shape of the result: H, W, or 2, H, W.
+        The cell of each particle, from `cells_of`.
+    shape : (int, int)
+        H, W.
     """
-    total = np.zeros(shape)
-    flat = total.ravel()
-    for i in range(len(cells)):
-        if cells[i] != OUTSIDE:
-            flat[cells[i]] += weight[i]
-    return total.astype(np.float32)
+    inside = cells != OUTSIDE
+    total = np.bincount(cells[inside], weights=weight[inside], minlength=shape[0] * shape[1])
+    return total.astype(np.float64).reshape(shape)  # of no particles, bincount makes integers
 
 
-@njit(cache=True, nogil=True)
-def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[np.float32]:
-    """Multiply each weight by the factor of its cell, and by zero outside.
+def at_cells(plane: NDArray, cells: NDArray) -> NDArray[np.float64]:
+    """Return for each particle the value of its cell, (N,), and 0 outside.
 
     Parameters
     ----------
-    weight : (N,) float
-        The weight of each particle.
+    plane : (H, W) float
+        One number per cell.
     cells : (N,) int
-        The cell of each particle, from `cells_of`; or from `by_origin`, for factors of shape (2, H, W).
-    factor : (H, W) or (2, H, W) float
-        The factor of each cell.
+        The cell of each particle, from `cells_of`.
     """
-    scaled, flat = np.zeros(len(weight), np.float32), factor.ravel()
-    for i in range(len(weight)):
-        if cells[i] != OUTSIDE:
-            scaled[i] = weight[i] * flat[cells[i]]
-    return scaled
-
-
-@njit(cache=True, nogil=True)
-def by_origin(before: NDArray, after: NDArray, n_cells: int) -> NDArray[np.int32]:
-    """Return the cell of each particle, plus `n_cells` if it has come in from another cell.
-
-    Parameters
-    ----------
-    before, after : (N,) int32
-        The cells in which each particle was and is, from `cells_of`.
-    n_cells : int
-        Number of cells, H W.
-
-    Returns
-    -------
-    (N,) int32
-        Indices into a flattened array (2, H, W), whose first plane is for particles that have stayed and whose second
-        is for those that have arrived; `OUTSIDE` for particles that have left the map.
-    """
-    origin = after.copy()
-    for i in range(len(after)):
-        if after[i] != before[i] and after[i] != OUTSIDE:
-            origin[i] += n_cells
-    return origin
-
-
-def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float, fewest: float) -> NDArray[np.int32]:
-    """Return the cell in which each particle was or will be at another time, if it is another cell than now.
-
-    Parameters
-    ----------
-    particles : Particles
-        N particles.
-    cells : (N,) int32
-        The cell that each is in now, from `cells_of`.
-    spec : GridSpec
-        The cells, (H, W).
-    time : float
-        Seconds from now, negative for the past: a particle at x with velocity v is taken to be at x + v time.
-    fewest : float
-        Number of cells by which a particle moves at least: a slow one is given more than `time`, unless that is 0.
-
-    Returns
-    -------
-    (N,) int32
-        row * W + column; `OUTSIDE` for a particle that is outside the grid then, or in the same cell as now.
-    """
-    now = particles.position.ravel(), particles.velocity.ravel()
-    return _cells_at(*now, cells, np.float32(time), np.float32(fewest * spec.cell), spec.shape, *spec.corner)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
-    there = np.empty(len(cells), np.int32)
-    for i in range(len(cells)):
-        vx, vy = velocity[2 * i], velocity[2 * i + 1]
-        speed = math.sqrt(vx * vx + vy * vy)
-        stretch = max(np.float32(1), least / (abs(time) * speed)) if time * speed != 0 else np.float32(0)
-        x, y = xy[2 * i] + stretch * time * vx, xy[2 * i + 1] + stretch * time * vy
-        then = cell_of(x, y, shape, x_max, y_max, cell)
-        there[i] = then if then != cells[i] else OUTSIDE
-    return there
-
-
-def keeps_pace(vx: NDArray, vy: NDArray, pace: Pace) -> NDArray[np.bool_]:
-    """Tell which velocities differ from the vehicle's by no more than that of a standing thing does, (N,).
-
-    So the difference may be as large as the vehicle's speed.
-
-    Parameters
-    ----------
-    vx, vy : (N,) float
-        Velocities along the axes of the map, m/s; in compiled loops those of one particle.
-    pace : Pace
-        How fast the vehicle drives, and from which speed on anything counts. Nothing keeps pace with one that stands.
-    """
-    slip, speed = (vx - pace.speed) ** 2 + vy**2, vx**2 + vy**2
-    return (slip <= pace.speed**2) & (speed >= pace.least**2) & (pace.speed != 0)
-
-
-_keeps_pace = njit(cache=True, nogil=True)(keeps_pace)
-
-
-def doubt_arrivals(
-    particles: Particles, cells: NDArray, doubt: NDArray, ahead: NDArray, mixed: NDArray, spec: GridSpec, pace: Pace
-) -> NDArray[np.float32]:
-    """Return which part of each weight comes out of a wall and goes on along it, beside a vehicle that drives, (N,).
-
-    Parameters
-    ----------
-    particles : Particles
-        N particles after their flight.
-    cells, ahead : (N,) int32
-        The cell that each is in now, from `cells_of`, and will be in, from `cells_at`.
-    doubt : (N,) float32
-        The part of each weight that comes out of a wall, by its origin alone.
-    mixed : (4, H, W) float32
-        The four states before particles flew.
-    spec : GridSpec
-        The cells, (H, W).
-    pace : Pace
-        How fast the vehicle drives.
-    """
-    now = particles.position.ravel(), particles.velocity.ravel(), particles.weight, cells
-    return _doubt_arrivals(*now, doubt, ahead, mixed[STATIC], open_space(mixed), pace, spec.shape, *spec.corner)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _doubt_arrivals(xy, velocity, weight, cells, doubt, ahead, static, room, pace, shape, x_max, y_max, cell):
-    doubted, standing, rooms = np.empty_like(doubt), static.ravel(), room.reshape(2, -1)
-    for i in range(len(cells)):
-        vx, vy, solid = velocity[2 * i], velocity[2 * i + 1], doubt[i]
-        keeps = _keeps_pace(vx, vy, pace)
-        if keeps:
-            halt = cell_of(xy[2 * i] - pace.halt * vx, xy[2 * i + 1] - pace.halt * vy, shape, x_max, y_max, cell)
-            if halt != OUTSIDE and halt != cells[i]:
-                solid = max(solid, weight[i] * standing[halt])
-        doubted[i] = solid - solid * rooms[int(keeps), ahead[i]] if ahead[i] != OUTSIDE else solid
-    return doubted
+    return np.where(cells == OUTSIDE, 0.0, plane.ravel()[cells])
 
 
 def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random.Generator) -> Particles:
@@ -209,33 +60,25 @@ def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random
     particles : Particles
         N particles at the start of their flight.
     max_acceleration : float
-        Largest acceleration along each axis, m/s^2. Each particle draws its own uniformly, up to this in either
-        direction, and keeps it during the flight.
+        Largest acceleration along each axis, m/s^2. Each particle draws its acceleration uniformly, up to this in
+        either direction, and keeps it during the flight.
     dt : float
         How long they fly, seconds.
     rng : numpy.random.Generator
         Source of the accelerations.
     """
-    noise = rng.random((len(particles), 2), np.float32)
-    change = np.float32(max_acceleration * dt)
-    start = particles.position.ravel(), particles.velocity.ravel()
-    position, velocity = _fly(*start, noise.ravel(), change, np.float32(dt))
-    return Particles(position.reshape(-1, 2), velocity.reshape(-1, 2), particles.weight)
-
-
-@njit(cache=True, nogil=True)
-def _fly(position, velocity, noise, max_change, dt):
-    flown, faster = np.empty_like(position), np.empty_like(velocity)
-    half, two = np.float32(0.5), np.float32(2)
-    for i in range(len(position)):
-        change = (two * noise[i] - np.float32(1)) * max_change
-        flown[i] = position[i] + (velocity[i] + half * change) * dt
-        faster[i] = velocity[i] + change
-    return flown, faster
+    noise = rng.random((len(particles), 2), np.float32).astype(np.float64)
+    a = max_acceleration * (2 * noise - 1)
+    v = particles.velocity.astype(np.float64)
+    x = particles.position + v * dt + a * dt**2 / 2
+    return Particles(x, v + a * dt, particles.weight)
 
 
 def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: float) -> Particles:
-    """Keep of each weight what goes on moving, exp(-stop_rate dt exp(-v^2 / (2 stop_speed^2))).
+    """Reduce each weight to the share that keeps moving.
+
+    A particle of speed v stops at the rate stop_rate exp(-v^2 / (2 stop_speed^2)), so after `dt` the share
+    exp(-rate dt) of its weight still moves.
 
     Parameters
     ----------
@@ -246,21 +89,9 @@ def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: flo
     dt : float
         The time step, seconds.
     """
-    stops, scale = np.float32(stop_rate * dt), np.float32(0.5 / stop_speed**2)
-    weight = _slow_down(particles.velocity, particles.weight, stops, scale)
-    return Particles(particles.position, particles.velocity, weight)
-
-
-@njit(cache=True, nogil=True)
-def _slow_down(velocity, weight, stops, scale):
-    kept = np.empty_like(weight)
-    for i in range(len(weight)):
-        speed2 = velocity[i, 0] * velocity[i, 0] + velocity[i, 1] * velocity[i, 1]
-        slowness = speed2 * scale
-        kept[i] = weight[i]
-        if slowness < SLOW:
-            kept[i] *= np.exp(-stops * np.exp(-slowness))
-    return kept
+    speed = np.linalg.norm(particles.velocity.astype(np.float64), axis=1)
+    rate = stop_rate * np.exp(-(speed**2) / (2 * stop_speed**2))
+    return Particles(particles.position, particles.velocity, particles.weight * np.exp(-rate * dt))
 
 
 def transform(particles: Particles, motion: PlanarMotion) -> Particles:
@@ -273,16 +104,6 @@ def transform(particles: Particles, motion: PlanarMotion) -> Particles:
     motion : PlanarMotion
         Pose of the new frame in the old one, metres and radians.
     """
-    T = (float(motion.dx), float(motion.dy), np.cos(motion.dyaw), np.sin(motion.dyaw))
-    position, velocity = _transform(particles.position.ravel(), particles.velocity.ravel(), *T)
-    return Particles(position.reshape(-1, 2), velocity.reshape(-1, 2), particles.weight)
-
-
-@njit(cache=True, nogil=True)
-def _transform(position, velocity, dx, dy, cos, sin):
-    moved, turned = np.empty_like(position), np.empty_like(velocity)
-    for i in range(0, len(position), 2):
-        x, y, vx, vy = position[i] - dx, position[i + 1] - dy, velocity[i], velocity[i + 1]
-        moved[i], moved[i + 1] = cos * x + sin * y, cos * y - sin * x
-        turned[i], turned[i + 1] = cos * vx + sin * vy, cos * vy - sin * vx
-    return moved, turned
+    position = motion.to_now(particles.position.astype(np.float64))
+    velocity = particles.velocity @ motion.rotation
+    return Particles(position, velocity, particles.weight)

@@ -4,13 +4,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import invert_rigid
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.state import cell_of
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,7 @@ class PlanarMotion:
     dyaw: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse a motion that isn't finite."""
+        """Check that the motion is finite."""
         if not np.isfinite([self.dx, self.dy, self.dyaw]).all():
             raise ArgumentError("motion", "finite metres and radians", self)
 
@@ -99,7 +97,7 @@ class PlanarMotion:
 
 
 MAX_YAW = np.radians(2)
-"""Angle between vehicle and map, radians, beyond which the map turns too. A larger one would need a wider margin."""
+"""Angle between vehicle and map, radians, beyond which the map turns too. A larger angle needs a wider margin."""
 
 
 def map_around(spec: GridSpec, max_yaw: float) -> GridSpec:
@@ -125,9 +123,9 @@ def map_around(spec: GridSpec, max_yaw: float) -> GridSpec:
 def scroll(pose: PlanarMotion, cell: float, max_yaw: float) -> tuple[PlanarMotion, PlanarMotion]:
     """Decide how the map follows the vehicle.
 
-    The map shifts by whole cells, which is exact, and the rest of the vehicle's displacement stays in the pose: nothing
-    is interpolated. Only when the vehicle has turned by more than `max_yaw` does the map turn with it. Then each new
-    cell is looked up once in the old map.
+    The map shifts by whole cells, which is exact, and the rest of the vehicle's displacement stays in the pose, so
+    nothing is interpolated. The map turns only when the vehicle has turned by more than `max_yaw`. Then each new cell
+    is looked up once in the old map.
 
     Parameters
     ----------
@@ -157,34 +155,37 @@ def scroll(pose: PlanarMotion, cell: float, max_yaw: float) -> tuple[PlanarMotio
 
 
 def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpec, pose: PlanarMotion) -> NDArray:
-    """Give each cell of one grid the values of the cell of another that its centre lies in.
+    """Give each cell of one grid the values of the cell of another grid that contains its centre.
 
     Parameters
     ----------
-    values : (K, H, W) float32
+    values : (K, H, W) float
         K values of each cell of `source`.
-    outside : (K,) float32
-        The values of a cell whose centre lies outside `source`.
+    outside : (K,) float
+        The values of a cell whose centre is outside `source`.
     source, target : GridSpec
         The two grids, (H, W) and (H', W') cells.
     pose : PlanarMotion
         Pose of the frame of `target` in that of `source`, metres and radians.
     """
-    grids = *source.corner, *target.corner, target.shape
-    return _look_up(np.ascontiguousarray(values), outside, *grids, float(pose.dx), float(pose.dy), float(pose.dyaw))
+    rows, cols, inside = source.cells(pose.to_previous(target.centers().reshape(-1, 2)))
+    found = np.where(inside, values[:, rows, cols], outside[:, None])
+    return found.reshape(len(values), *target.shape)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _look_up(values, outside, source_x, source_y, source_cell, x_max, y_max, cell, shape, dx, dy, dyaw):
-    """Find the places of a row of cells once, then copy all K values from them."""
-    found = np.empty((len(values), *shape), np.float32)
-    flat, place = values.reshape(len(values), -1), np.empty(shape[1], np.int32)
-    cos, sin, size = np.cos(dyaw), np.sin(dyaw), values.shape[1:]
-    for r in range(shape[0]):
-        for c in range(shape[1]):
-            x, y = x_max - (r + 0.5) * cell, y_max - (c + 0.5) * cell
-            place[c] = cell_of(cos * x - sin * y + dx, sin * x + cos * y + dy, size, source_x, source_y, source_cell)
-        for k in range(len(values)):
-            for c in range(shape[1]):
-                found[k, r, c] = flat[k, place[c]] if place[c] >= 0 else outside[k]  # faster than != OUTSIDE
-    return found
+def shift(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
+    """Move a plane by whole cells along x and y, which is up and to the left; zeros come in from outside.
+
+    Parameters
+    ----------
+    plane : (H, W) float
+        One number per cell.
+    cells : (2,) int
+        How far, in cells along x and y.
+    """
+    height, width = plane.shape
+    up, left = np.clip(cells, (-height, -width), (height, width))
+    shifted = np.zeros_like(plane)
+    source = plane[max(up, 0) : height + min(up, 0), max(left, 0) : width + min(left, 0)]
+    shifted[max(-up, 0) : height - max(up, 0), max(-left, 0) : width - max(left, 0)] = source
+    return shifted

@@ -1,130 +1,76 @@
-"""A scan in polar coordinates: how far each beam sees, and which cells it passes (paper, section 3.2, step 2).
-
-Loops over returns are compiled: they read each return once, and need no arrays for what is in between.
-"""
-
-import math
+"""A scan in polar coordinates: how far each beam sees, and which cells it passes (paper, section 3.2, step 2)."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.occupancy.state import OUTSIDE, cell_of
-
-ROUGH = 3e-5
-"""Radians that `rough_azimuth` may err by; it errs by less than half of that (Abramowitz and Stegun, 4.4.47)."""
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.planar_motion import PlanarMotion
 
 
-@njit(cache=True, inline="always")
-def beam_of(x, y, beams):
-    """Return the beam in whose sector a point lies, from 0 to B - 1; beam 0 begins straight behind the vehicle.
+def beams_of(x: NDArray, y: NDArray, beams: int) -> NDArray[np.int64]:
+    """Return the beam that contains each point, from 0 to B - 1.
 
     Parameters
     ----------
-    x, y : float
-        The point in the grid frame of the vehicle, metres.
-    beams : int
-        Number of beams in a turn, B.
-    """
-    return min(int((np.arctan2(y, x) + np.pi) * (beams / (2 * np.pi))), beams - 1)
-
-
-@njit(cache=True, inline="always", error_model="numpy")
-def rough_azimuth(x, y):
-    """Return arctan2(y, x) to within `ROUGH` radians, by a polynomial of the tangent; NaN for x = y = 0.
-
-    Parameters
-    ----------
-    x, y : float
-        The point, metres.
-    """
-    along, across = abs(x), abs(y)
-    t = min(along, across) / max(along, across)
-    t2 = t * t
-    angle = t * (0.9998660 + t2 * (-0.3302995 + t2 * (0.1801410 + t2 * (-0.0851330 + t2 * 0.0208351))))
-    angle = np.pi / 2 - angle if across > along else angle
-    angle = np.pi - angle if x < 0 else angle
-    return -angle if y < 0 else angle
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def beams_of(x, y, beams):
-    """Return the beam of each of many points: exactly that of `beam_of`, seven times as fast.
-
-    Each azimuth is first computed roughly, which the compiler does for several points at a time. The arctangent itself
-    is taken only of points that lie too close to the border between two beams for a rough azimuth to tell.
-
-    Parameters
-    ----------
-    x, y : (N,) float
+    x, y : (...) float
         The points in the grid frame of the vehicle, metres.
     beams : int
-        Number of beams in a turn, B.
+        Number of beams in a turn, B. Beam 0 begins straight behind the vehicle, and the beams go counter-clockwise.
     """
-    x, y = np.ascontiguousarray(x), np.ascontiguousarray(y)
-    per_radian, unsure = beams / (2 * np.pi), np.empty(len(x), np.bool_)
-    beam, margin = np.empty(len(x), np.int32), ROUGH * per_radian
-    for i in range(len(x)):
-        place = (rough_azimuth(x[i], y[i]) + np.pi) * per_radian
-        beam[i] = int(place)
-        unsure[i] = not ((place - beam[i] > margin) & (place - beam[i] < 1 - margin))  # so is the NaN of x = y = 0
-    for i in range(len(x)):
-        if unsure[i]:
-            beam[i] = beam_of(x[i], y[i], beams)
-    return beam
+    azimuth = np.arctan2(y, x).astype(np.float64)
+    beam = (azimuth + np.pi) * (beams / (2 * np.pi))
+    return np.minimum(beam.astype(np.int64), beams - 1)  # an azimuth of exactly pi closes the last beam
 
 
-@njit(cache=True, nogil=True)
-def polar_profile(points, low, high, beams):
+def polar_profile(
+    points: NDArray, low: float, high: float, beams: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Find the nearest obstacle and the farthest ground in each beam.
 
     Parameters
     ----------
     points : (N, 3+) float
-        Returns in the grid frame of the vehicle, metres.
+        Returns in the grid frame of the vehicle: x, y, and height above the ground, metres.
     low, high : float
-        Heights between which a return is an obstacle, metres. A lower return is ground, a higher one says nothing.
+        Heights between which a return is an obstacle, metres. Lower returns are ground, higher ones are ignored.
     beams : int
-        Number of beams in a turn, B. Beam 0 begins straight behind the vehicle, and the beams go counter-clockwise.
+        Number of beams in a turn, B.
 
     Returns
     -------
-    first_obstacle : (B,) float32
+    first_obstacle : (B,) float64
         Range of the nearest obstacle return, metres; infinite without one.
-    last_ground : (B,) float32
+    last_ground : (B,) float64
         Range of the farthest ground return, metres; zero without one.
     """
-    beam_of_point = beams_of(points[:, 0], points[:, 1], beams)
-    first_obstacle = np.full(beams, np.inf, np.float32)
-    last_ground = np.zeros(beams, np.float32)
-    for i in range(len(points)):
-        x, y, z, beam = points[i, 0], points[i, 1], points[i, 2], beam_of_point[i]
-        if z <= high:
-            distance = np.sqrt(x * x + y * y)
-            if z >= low:
-                first_obstacle[beam] = min(first_obstacle[beam], distance)
-            else:
-                last_ground[beam] = max(last_ground[beam], distance)
+    x, y, z = points[:, :3].T
+    beam = beams_of(x, y, beams)
+    distance = np.hypot(x, y)
+    obstacle = (z >= low) & (z <= high)
+    ground = z < low
+    first_obstacle = np.full(beams, np.inf)
+    last_ground = np.zeros(beams)
+    np.minimum.at(first_obstacle, beam[obstacle], distance[obstacle])
+    np.maximum.at(last_ground, beam[ground], distance[ground])
     return first_obstacle, last_ground
 
 
-def reach(first_obstacle: NDArray, last_ground: NDArray) -> NDArray[np.float32]:
+def reach(first_obstacle: NDArray, last_ground: NDArray) -> NDArray[np.floating]:
     """Return how far each beam sees, (B,) metres: to its first obstacle, else to its last ground return, else 0.
 
     Parameters
     ----------
-    first_obstacle, last_ground : (B,) float32
+    first_obstacle, last_ground : (B,) float
         Ranges from `polar_profile`, metres.
     """
     return np.where(np.isfinite(first_obstacle), first_obstacle, last_ground)
 
 
-@njit(cache=True, nogil=True)
-def fill_gaps(reach, gap):
-    """Give beams between two columns of returns the shorter reach of the two.
+def fill_gaps(reach: NDArray, gap: int) -> NDArray:
+    """Give empty beams between two columns of returns the shorter reach of the two.
 
-    A scanner whose columns are wider apart than a beam leaves some beams empty. These are no holes in what it sees, but
-    they don't see farther than their neighbours either. Wider gaps, in which nothing came back, stay blind.
+    A scanner whose columns are wider apart than a beam leaves some beams empty. These beams are no holes in what it
+    sees, but they don't see farther than their neighbours either. Wider gaps, in which nothing came back, stay blind.
 
     Parameters
     ----------
@@ -138,67 +84,35 @@ def fill_gaps(reach, gap):
     >>> fill_gaps(np.array([5.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0]), gap=2)
     array([5., 3., 3., 3., 0., 0., 0.])
     """
-    beams = len(reach)
     seen = np.flatnonzero(reach)
+    if len(seen) == 0:
+        return reach.copy()
+    empty = np.flatnonzero(reach == 0)
+    following = np.searchsorted(seen, empty)
+    left = seen[following - 1]
+    right = seen[following % len(seen)]
+    narrow = (right - left - 1) % len(reach) <= gap
     filled = reach.copy()
-    for k in range(len(seen)):
-        left, right = seen[k - 1], seen[k]
-        empty = (right - left - 1) % beams
-        if empty <= gap:
-            for step in range(1, empty + 1):
-                filled[(left + step) % beams] = min(reach[left], reach[right])
+    filled[empty] = np.where(narrow, np.minimum(reach[left], reach[right]), 0)
     return filled
 
 
-@njit(cache=True, nogil=True)
-def count_returns(points, low, high, shape, x_max, y_max, cell, dx, dy, dyaw):
-    """Count the returns in each cell.
+def beyond_reach(reach: NDArray, spec: GridSpec, pose: PlanarMotion) -> NDArray[np.float64]:
+    """Return how far each cell's centre is beyond the reach of its beam: look up its azimuth and range.
 
     Parameters
     ----------
-    points : (N, 3+) float
-        Returns in the grid frame of the vehicle, metres.
-    low, high : float
-        Heights between which a return is an obstacle, metres; a lower return is ground.
-    shape, x_max, y_max, cell : (int, int), float, float, float
-        The grid: H and W, its far and left border, and the side of a cell, metres.
-    dx, dy, dyaw : float
-        Pose of the vehicle in the frame of the grid, metres and radians.
-
-    Returns
-    -------
-    obstacles, ground : (H, W) int32
-        Number of obstacle and of ground returns in each cell.
-    """
-    obstacles, ground = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
-    cos, sin = np.cos(dyaw), np.sin(dyaw)
-    for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        place = cell_of(cos * x - sin * y + dx, sin * x + cos * y + dy, shape, x_max, y_max, cell)
-        if z <= high and place != OUTSIDE:
-            counted = obstacles if z >= low else ground
-            counted.flat[place] += 1
-    return obstacles, ground
-
-
-def beyond_reach(reach, shape, x_max, y_max, cell, dx, dy, dyaw):
-    """Return how far each cell's centre lies beyond the reach of its beam: look up its azimuth and range.
-
-    Parameters
-    ----------
-    reach : (B,) float32
+    reach : (B,) float
         How far each beam sees, metres.
-    shape, x_max, y_max, cell, dx, dy, dyaw
-        The grid and the vehicle's pose in it, as for `count_returns`.
+    spec : GridSpec
+        The cells, (H, W).
+    pose : PlanarMotion
+        Pose of the vehicle in the frame of `spec`, metres and radians.
 
     Returns
     -------
-    (H, W) float32
+    (H, W) float64
         Metres; negative for cells whose centre the beam passes.
     """
-    cos, sin = math.cos(dyaw), math.sin(dyaw)
-    from_x = x_max - (np.arange(shape[0])[:, None] + 0.5) * cell - dx
-    from_y = y_max - (np.arange(shape[1]) + 0.5) * cell - dy
-    x, y = cos * from_x + sin * from_y, cos * from_y - sin * from_x
-    beam = beams_of(x.ravel(), y.ravel(), len(reach)).reshape(shape)
-    return (np.sqrt(x * x + y * y) - reach[beam]).astype(np.float32)
+    x, y = np.moveaxis(pose.to_now(spec.centers()), -1, 0)
+    return np.hypot(x, y) - reach[beams_of(x, y, len(reach))]

@@ -1,11 +1,9 @@
-"""Particles drawn anew: where dynamic mass is, and where it has just come into being (section 3.2, step 4)."""
+"""Particles drawn again: where dynamic mass is, and where it has just appeared (section 3.2, step 4)."""
 
-import math
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError
@@ -15,11 +13,11 @@ from semgrid_edu.occupancy.state import Particles
 
 @runtime_checkable
 class Resampling(Protocol):
-    """How indices are drawn in proportion to weights. The package's own is `SystematicResampling`.
+    """How indices are drawn in proportion to weights. The package's default is `SystematicResampling`.
 
-    `resample` asks twice in each step: for the particles that go on, by their weights, and for the cells in which new
-    ones appear, by their newborn mass. All that are drawn get the same weight afterwards. So index i should be drawn
-    count w_i / sum(w) times on average; otherwise the filter's probabilities are biased.
+    `resample` calls it twice per step: for the particles that continue, by their weights, and for the cells in which
+    new ones appear, by their newborn mass. All that are drawn get the same weight afterwards. So index i should be
+    drawn count w_i / sum(w) times on average; otherwise the filter's probabilities are biased.
 
     Examples
     --------
@@ -61,14 +59,13 @@ class SystematicResampling:
         return systematic_resample(weight, count, rng.random())
 
 
-@njit(cache=True, nogil=True)
-def systematic_resample(weight, count, offset):
+def systematic_resample(weight: NDArray, count: int, offset: float) -> NDArray[np.int64]:
     """Draw `count` indices in proportion to the weights, by systematic resampling.
 
     The weights are laid end to end, and `count` equally spaced points are put on them, shifted by one random offset. So
-    index i is drawn as often as points lie on its weight: floor or ceil of count w_i / sum(w) times. For count = N this
-    is `filterpy.monte_carlo.systematic_resample`. That function takes its offset from numpy's global generator; here it
-    is an argument, so that a seed decides it.
+    index i is drawn as often as points fall on its weight: floor or ceil of count w_i / sum(w) times. For count = N
+    this is `filterpy.monte_carlo.systematic_resample`, which draws its offset from numpy's global generator. Here the
+    offset is an argument, so that a seed decides it.
 
     Parameters
     ----------
@@ -89,30 +86,10 @@ def systematic_resample(weight, count, offset):
     >>> systematic_resample(np.array([0.1, 0.6, 0.3]), 4, 0.5)
     array([1, 1, 1, 2])
     """
-    total = 0.0
-    for w in weight:  # in the same order as `below`, so that both end at the same number
-        total += w
-    points = (np.arange(count) + offset) / count * total
-    chosen = np.zeros(count + 1, np.int64)
-    first, below = 0, 0.0
-    for i in range(len(weight)):
-        chosen[first] = i  # a weight on which no point lies is overwritten by the next
-        below += weight[i]
-        first = _points_below(below, points, below / total * count - offset)
-    for m in range(1, count):
-        chosen[m] = max(chosen[m], chosen[m - 1])
-    return chosen[:count]
-
-
-@njit(cache=True, nogil=True)
-def _points_below(weight, points, expected):
-    """Return how many points lie below a weight: about `expected`, which rounding may have made wrong by one."""
-    n = min(max(math.ceil(expected), 0), len(points))
-    while n > 0 and points[n - 1] >= weight:
-        n -= 1
-    while n < len(points) and points[n] < weight:
-        n += 1
-    return n
+    ends = np.cumsum(weight, dtype=np.float64)
+    points = (np.arange(count) + offset) / count * ends[-1]
+    chosen = np.searchsorted(ends, points, side="right")
+    return np.minimum(chosen, len(weight) - 1)  # rounding can put the last point on the very end
 
 
 def draw_again(particles: Particles, count: int, resampling: Resampling, rng: np.random.Generator) -> Particles:
@@ -135,8 +112,8 @@ def draw_again(particles: Particles, count: int, resampling: Resampling, rng: np
         M particles with the same sum of weights; none when that sum is zero.
     """
     chosen = draw_indices(resampling, particles.weight, count, rng)
-    position, velocity = (np.take(values, chosen, axis=0) for values in (particles.position, particles.velocity))
-    return Particles(position, velocity, equal_weights(particles.weight, len(chosen)))
+    weight = equal_weights(particles.weight, len(chosen))
+    return Particles(particles.position[chosen], particles.velocity[chosen], weight)
 
 
 def draw_newborn(
@@ -146,7 +123,7 @@ def draw_newborn(
 
     Parameters
     ----------
-    newborn : (H, W) float32
+    newborn : (H, W) float
         Dynamic mass that no particle carries yet.
     spec : GridSpec
         The cells.
@@ -165,20 +142,11 @@ def draw_newborn(
         M particles anywhere in their cells, with velocities from the prior; none when there is no newborn mass.
     """
     chosen = draw_indices(resampling, newborn.ravel(), count, rng)
-    part = rng.random((len(chosen), 2), np.float32)
-    position = _positions(chosen, part, spec.shape[1], *spec.corner)
-    return Particles(position, draw_velocities(len(chosen), max_speed, rng), equal_weights(newborn, len(chosen)))
-
-
-@njit(cache=True, nogil=True)
-def _positions(cells, part, width, x_max, y_max, cell):
-    """Return the places, (M, 2), at given parts of cells, (M, 2) from 0 to 1, from their corner of largest x and y."""
-    position = np.empty_like(part)
-    for m in range(len(cells)):
-        row, col = divmod(cells[m], width)
-        position[m, 0] = x_max - (row + part[m, 0]) * cell
-        position[m, 1] = y_max - (col + part[m, 1]) * cell
-    return position
+    corner = np.stack(np.unravel_index(chosen, spec.shape), axis=1)
+    inside = rng.random(corner.shape, np.float32)
+    position = (spec.x_max, spec.y_max) - (corner + inside) * spec.cell
+    velocity = draw_velocities(len(chosen), max_speed, rng)
+    return Particles(position, velocity, equal_weights(newborn, len(chosen)))
 
 
 def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> NDArray[np.float32]:
@@ -207,8 +175,8 @@ def draw_velocities(count: int, max_speed: float, rng: np.random.Generator) -> N
     return np.stack([speed * np.cos(heading), speed * np.sin(heading)], axis=1)
 
 
-def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray:
-    """Ask a resampling for indices, and refuse an answer that isn't M indices from 0 to N - 1.
+def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Draw indices by a resampling, and check that they are M indices from 0 to N - 1.
 
     Parameters
     ----------
@@ -224,7 +192,7 @@ def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.ra
     Returns
     -------
     (M,) int64
-        What `resampling.draw` returned; none at all when the weights sum to 0.
+        What `resampling.draw` returned; empty when the weights sum to 0.
     """
     if count == 0 or not weight.any():
         return np.empty(0, np.int64)
@@ -238,7 +206,7 @@ def draw_indices(resampling: Resampling, weight: NDArray, count: int, rng: np.ra
     raise ArgumentError(type(resampling).__name__, expected, found)
 
 
-def equal_weights(weight: NDArray, count: int) -> NDArray[np.float32]:
+def equal_weights(weight: NDArray, count: int) -> NDArray[np.float64]:
     """Return equal weights, (M,), with the same sum as given ones.
 
     Parameters
@@ -248,4 +216,4 @@ def equal_weights(weight: NDArray, count: int) -> NDArray[np.float32]:
     count : int
         How many, M.
     """
-    return np.full(count, weight.sum(dtype=np.float64) / max(count, 1), np.float32)
+    return np.full(count, weight.sum(dtype=np.float64) / max(count, 1))

@@ -1,10 +1,9 @@
-"""The LIDAR as the filter knows it: which of its returns count, how far beams see, how it errs (paper, section 3.2)."""
+"""The LIDAR as the filter models it: which returns count, how far beams see, how it errs (paper, section 3.2)."""
 
 import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count, types_named
@@ -12,18 +11,18 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence, check_points
 from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.polar import beyond_reach, count_returns, fill_gaps, polar_profile, reach
+from semgrid_edu.occupancy.polar import beyond_reach, fill_gaps, polar_profile, reach
 
 
 @dataclass(frozen=True)
 class SensorModel:
-    """Which returns of a LIDAR count, and how it errs: the package's own `Sensor`.
+    """Which returns of a LIDAR count, and how it errs: the package's default `Sensor`.
 
     Parameters
     ----------
     obstacle_min, obstacle_max : float
         Returns between these heights above the ground (m) are obstacles: higher than a kerb, and lower than what a car
-        can drive under. Lower returns come from the ground, higher ones say nothing.
+        can drive under. Lower returns come from the ground, higher ones are ignored.
     azimuth_step : float
         Width of a beam, degrees. KITTI's scanner has a column of returns each 0.18 degrees, so that a beam of the
         default width holds one column or two.
@@ -39,11 +38,11 @@ class SensorModel:
         Probability that a beam passes a cell that is occupied (because foliage is porous and objects fill cells only in
         part), and one that is free.
     under : float
-        A ground return up to this far behind the first obstacle of its beam may come from below that obstacle, from
-        between a car's wheels, so it says nothing, metres. The default is the length of a car.
+        A ground return up to this far behind the first obstacle of its beam is ignored, metres, because it may come
+        from below that obstacle, from between a car's wheels. The default is the length of a car.
     vehicle : (float, float, float, float)
-        Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres. Unless the points say which
-        are the vehicle's own (`Frame.own`), an obstacle inside it is the vehicle's own bonnet or mirror. The default is
+        Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres. Unless the points are
+        marked (`Frame.own`), an obstacle inside it is the vehicle's own bonnet or mirror. The default is
         the outline of KITTI's estate car, whose LIDAR sees the end of its bonnet 2.5 m ahead.
     edge : float
         Up to how far outside the outline an obstacle whose reflectance is 0 counts as the vehicle's own, metres. A
@@ -70,7 +69,7 @@ class SensorModel:
 
     @types_named
     def __post_init__(self) -> None:
-        """Refuse a sensor that is impossible, or that never errs: no scan could ever correct a cell that is certain."""
+        """Check that the sensor is possible, and that it can err: else no scan could ever correct a certain cell."""
         check_fields(self, "metres, not negative", not_negative, "under", "edge")
         check_fields(self, "degrees, above 0 and up to 360", lambda angle: 0 < angle <= 360, "azimuth_step")
         check_fields(self, "degrees, from 0 to 360", lambda angle: 0 <= angle <= 360, "column_spacing")
@@ -93,7 +92,7 @@ class SensorModel:
         return math.ceil(self.column_spacing / self.azimuth_step - 1e-9)
 
     def scan(self, points: NDArray) -> "Scan":
-        """Take one scan in: find the ground, leave out the vehicle's own returns, and measure how far each beam sees.
+        """Process one scan: remove the vehicle's own returns, find the ground, and measure how far each beam sees.
 
         Parameters are those of `Sensor.scan`.
         """
@@ -104,12 +103,12 @@ class SensorModel:
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """A scan that is ready to be asked for evidence, made by `SensorModel.scan`.
+    """A scan from which evidence can be computed, made by `SensorModel.scan`.
 
-    A beam is a narrow sector of azimuth. Along it nothing stands before its first obstacle or, when it has none, before
-    its farthest ground return. So all that beams say about free space is one range per beam, its reach, in which each
-    cell is looked up. A cell with obstacle returns is occupied. A cell that its beam passes from end to end, or that
-    holds a ground return, is free. Of all other cells, behind obstacles or out of range, the scan says nothing.
+    A beam is a narrow sector of azimuth. It is free up to its first obstacle or, when it has none, up to its farthest
+    ground return. So all that beams tell about free space is one range per beam, its reach, in which each cell is
+    looked up. A cell with obstacle returns is occupied. A cell that its beam passes from end to end, or that holds a
+    ground return, is free. About all other cells, behind obstacles or out of range, the scan tells nothing.
 
     What this assumes:
 
@@ -120,19 +119,19 @@ class Scan:
       nearer ones may come through below the obstacle.
     - *Thin objects.* One return stops its whole beam, which is 16 cm wide at 30 m. A cell shared by several beams
       belongs to the beam through its centre. Something thinner than the distance between two columns of returns may
-      stand between them unseen, and its cell counts as passed.
-    - *Several rings.* The scan assumes that nothing stands between the ground returns of two rings. Where the rings
-      differ by an angle a, they miss things lower than a times the distance: for KITTI's scanner 0.3 m at 50 m. Nothing
-      checks the space below the lowest ring, nearer than 4 m, nor along rays that don't come back.
+      be between them unseen, and its cell counts as passed.
+    - *Several rings.* The scan assumes that nothing is between the ground returns of two rings. Where the rings differ
+      by an angle a, they miss things lower than a times the distance: for KITTI's scanner 0.3 m at 50 m. Nothing checks
+      the space below the lowest ring, nearer than 4 m, nor along rays that don't come back.
     - *Independence.* Returns are independent, up to `max_returns` in each cell. An obstacle return overrules everything
       else that a cell holds.
 
     Parameters
     ----------
-    points : (M, 3) float32 or float64
+    points : (M, 3) float
         Returns that don't come from the vehicle itself: x and y in the grid frame of the vehicle, and the height above
-        the ground at that place, metres.
-    reach : (B,) float32
+        the ground there, metres.
+    reach : (B,) float
         How far each beam sees, metres; zero for beams in which nothing came back. Beam 0 begins straight behind the
         vehicle, and the beams go counter-clockwise.
     sensor : SensorModel
@@ -140,20 +139,41 @@ class Scan:
     """
 
     points: NDArray[np.floating]
-    reach: NDArray[np.float32]
+    reach: NDArray[np.floating]
     sensor: SensorModel
 
     def evidence(self, spec: GridSpec, pose: PlanarMotion) -> Evidence:
         """Look each cell up in its beam. Parameters and result are those of `Measurement.evidence`."""
-        grid = (spec.shape, *spec.corner, float(pose.dx), float(pose.dy), float(pose.dyaw))
-        obstacles, ground = count_returns(self.points, self.sensor.obstacle_min, self.sensor.obstacle_max, *grid)
-        beyond = beyond_reach(self.reach, *grid)
-        passed, under = beyond <= -spec.cell / 2, (beyond > spec.cell / 2) & (beyond < self.sensor.under)
+        height = self.points[:, 2]
+        obstacle = (height >= self.sensor.obstacle_min) & (height <= self.sensor.obstacle_max)
+        xy = pose.to_previous(self.points[:, :2])
+        obstacles = count_in_cells(xy[obstacle], spec)
+        ground = count_in_cells(xy[height < self.sensor.obstacle_min], spec)
+        beyond = beyond_reach(self.reach, spec, pose)
+        passed = beyond <= -spec.cell / 2
+        # Just behind an obstacle, a beam may have come through below it.
+        under = (beyond > spec.cell / 2) & (beyond < self.sensor.under)
         return likelihoods(obstacles, passed | ((ground > 0) & ~under), self.sensor)
 
 
-def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
-    """Make a scan fit for evidence: check it, leave out the vehicle's own returns, and measure heights from the ground.
+def count_in_cells(xy: NDArray, spec: GridSpec) -> NDArray[np.int64]:
+    """Count the points in each cell, (H, W).
+
+    Parameters
+    ----------
+    xy : (N, 2) float
+        Points in the frame of `spec`, metres; those outside don't count.
+    spec : GridSpec
+        The cells, (H, W).
+    """
+    rows, cols, inside = spec.cells(xy)
+    height, width = spec.shape
+    cells = rows[inside] * width + cols[inside]
+    return np.bincount(cells, minlength=height * width).reshape(spec.shape)
+
+
+def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.floating]:
+    """Prepare a scan for evidence: check it, remove the vehicle's own returns, and measure heights from the ground.
 
     Parameters
     ----------
@@ -165,7 +185,7 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
 
     Returns
     -------
-    (M, 3) float
+    (M, 3) float32 or float64
         The other returns, in their order: x, y, and the height above the ground at that place (m).
     """
     points = without_own_returns(check_points(points), sensor.vehicle, sensor.edge, sensor.obstacle_min)
@@ -174,43 +194,41 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray:
     return points
 
 
-@njit(cache=True, nogil=True)
 def without_own_returns(
     points: NDArray, vehicle: tuple[float, float, float, float], edge: float, low: float
 ) -> NDArray:
-    """Leave out the returns that come from the vehicle itself, and from beams that its edge splits.
+    """Remove the returns that come from the vehicle itself, and from beams that its edge splits.
 
     They would travel along with the vehicle for ever, and hide what is behind them. Beside KITTI's car, some 30 returns
-    in each scan lie up to 0.65 m outside its outline, behind mirrors and roof. What tells them from a thing that is as
-    close is that hardly any light comes back: their reflectance is exactly 0.
+    per scan are up to 0.65 m outside its outline, behind mirrors and roof. Unlike returns from a thing that close, they
+    bring hardly any light back: their reflectance is exactly 0.
 
     Parameters
     ----------
     points : (N, 3+) float
-        Returns in the grid frame of the vehicle, metres; a fourth column is reflectance. A fifth column isn't 0 for the
-        vehicle's own returns; then they are left out, whatever their height, and outline and edge aren't asked.
+        Returns in the grid frame of the vehicle, metres; a fourth column is reflectance. A fifth column is not 0 for
+        the vehicle's own returns. With it, exactly those are removed, and outline and edge don't matter.
     vehicle : (float, float, float, float)
         Outline of the vehicle: x_min, x_max, y_min, y_max in its grid frame, metres.
     edge : float
-        How far outside the outline returns with a reflectance of 0 are left out as well, metres.
+        How far outside the outline returns with a reflectance of 0 are removed as well, metres.
     low : float
-        Returns are left out from this height on, metres; lower ones come from the ground.
+        Returns are removed from this height on, metres; lower ones come from the ground.
 
     Returns
     -------
     (M, 3) float
         x, y and z of the other returns, in their order.
     """
+    x, y, z = points[:, :3].T
+    columns = points.shape[1]
+    if columns > 4:
+        return points[points[:, 4] == 0, :3]
+    no_light = points[:, 3] == 0 if columns > 3 else np.zeros(len(points), bool)
+    around = np.where(no_light, edge, 0.0)
     x_min, x_max, y_min, y_max = vehicle
-    others, n, columns = np.empty((len(points), 3), points.dtype), 0, points.shape[1]
-    for i in range(len(points)):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        around = edge if columns > 3 and points[i, 3] == 0 else 0.0
-        beside = x_min - around < x < x_max + around and y_min - around < y < y_max + around
-        if not (points[i, 4] if columns > 4 else beside and z >= low):
-            others[n, 0], others[n, 1], others[n, 2] = x, y, z
-            n += 1
-    return others[:n]
+    beside = (x > x_min - around) & (x < x_max + around) & (y > y_min - around) & (y < y_max + around)
+    return points[~(beside & (z >= low)), :3]
 
 
 def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evidence:
@@ -221,8 +239,8 @@ def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evide
     obstacles : (H, W) int
         Number of obstacle returns in each cell, n: then P(z | .) = p_hit^min(n, max_returns).
     free : (H, W) bool
-        Whether the cell was seen to be free: then P(z | .) = p_pass. Obstacle returns overrule it, because an object
-        may fill a cell only in part.
+        Whether the scan has found the cell free: then P(z | .) = p_pass. Obstacle returns overrule it, because an
+        object may fill a cell only in part.
     sensor : SensorModel
         The sensor, with its probabilities of errors.
 

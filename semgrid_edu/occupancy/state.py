@@ -1,10 +1,9 @@
-"""What the filter believes of each cell: four states and a velocity (paper, section 3.2)."""
+"""What the filter believes about each cell: four states and a velocity (paper, section 3.2)."""
 
 from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError, check_shape, types_named
@@ -26,7 +25,7 @@ N_STATES = len(State)
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """What a filter believes of the cells in front of the vehicle, in the grid frame of the current instant.
+    """What a filter believes about the cells in front of the vehicle, in the grid frame of the current instant.
 
     Parameters
     ----------
@@ -39,8 +38,8 @@ class Belief:
         Covariance of that velocity along the same axes, m^2/s^2: how much it varies within the cell, and how uncertain
         it is. Symmetric and positive semi-definite; NaN where the velocity is NaN.
     steps : dict of str to (4, H, W) float32
-        How the filter came to this belief: the four probabilities after "move", "predict", "update" and "resample", in
-        this order, looked up at the centres of the same cells. Empty unless the filter was asked to keep them.
+        The four probabilities after "move", "predict", "update" and "resample", in this order, looked up at the centres
+        of the same cells. Empty unless the filter was asked to keep them.
     """
 
     probability: NDArray[np.float32]
@@ -55,21 +54,21 @@ class Particles:
 
     Parameters
     ----------
-    position : (N, 2) float32
-        x, y in the frame of the map, metres. All three arrays are float64 in literal twins.
-    velocity : (N, 2) float32
+    position : (N, 2) float
+        x, y in the frame of the map, metres. All three arrays are float64 in the book and float32 in `fast`.
+    velocity : (N, 2) float
         Velocity over ground along the axes of the map, m/s.
-    weight : (N,) float32
+    weight : (N,) float
         Probability that each particle carries. The dynamic probability of a cell is the sum of the weights in it.
     """
 
-    position: NDArray[np.float32]
-    velocity: NDArray[np.float32]
-    weight: NDArray[np.float32]
+    position: NDArray[np.floating]
+    velocity: NDArray[np.floating]
+    weight: NDArray[np.floating]
 
     @types_named
     def __post_init__(self) -> None:
-        """Refuse arrays of different lengths: compiled loops would read beyond the end of the shorter ones."""
+        """Check that there is one position and one velocity per weight; compiled loops would read past the end."""
         for name in ("position", "velocity"):
             check_shape(name, getattr(self, name), (*np.shape(self.weight), 2))
 
@@ -87,27 +86,27 @@ class Particles:
 class FilterState:
     """What the filter carries from one of its steps to the next.
 
-    Its dynamic probability is carried twice, and the two agree: `probability[DYNAMIC]` is, in each cell,
-    `newborn` plus the sum of the weights of the particles there.
+    The dynamic probability is stored twice, and the two agree: in each cell, `probability[DYNAMIC]` is `newborn` plus
+    the sum of the weights of the particles there.
 
     Parameters
     ----------
-    probability : (4, H, W) float32
+    probability : (4, H, W) float
         P(FREE), P(STATIC), P(DYNAMIC), P(UNKNOWN) of each cell of the map; they sum to 1. Both arrays are float64 in
-        literal twins.
+        the book and float32 in `fast`.
     particles : Particles
         The dynamic mass whose velocity is estimated.
-    newborn : (H, W) float32
-        Dynamic mass that has just come into being and isn't carried by particles yet. `resample` draws them.
+    newborn : (H, W) float
+        Dynamic mass that has just appeared and has no particles yet. `resample` draws particles for it.
     """
 
-    probability: NDArray[np.float32]
+    probability: NDArray[np.floating]
     particles: Particles
-    newborn: NDArray[np.float32]
+    newborn: NDArray[np.floating]
 
     @types_named
     def __post_init__(self) -> None:
-        """Refuse planes of different sizes: compiled loops would read beyond the end of the smaller ones."""
+        """Check that all planes have the same size; compiled loops would read past the end of the smaller ones."""
         check_shape("probability", self.probability, (N_STATES, *np.shape(self.newborn)))
 
     @classmethod
@@ -125,43 +124,20 @@ class FilterState:
 
 
 OUTSIDE = -1
-"""The index of what lies in no cell of a grid."""
-
-
-@njit(cache=True, inline="always", error_model="numpy")
-def cell_of(x, y, shape, x_max, y_max, cell):
-    """Return the cell that a place lies in, as an index into the flattened grid.
-
-    Parameters
-    ----------
-    x, y : float
-        The place, in the frame of the grid, metres.
-    shape : (int, int)
-        H, W of the grid.
-    x_max, y_max, cell : float
-        The grid's far and left border, and the side of a cell, metres.
-
-    Returns
-    -------
-    int32
-        row * W + column; `OUTSIDE` for a place outside the grid.
-    """
-    row, col = np.floor((x_max - x) / cell), np.floor((y_max - y) / cell)
-    inside = (row >= 0) & (row < shape[0]) & (col >= 0) & (col < shape[1])  # `and` would branch, and be slower
-    return np.int32(row * shape[1] + col if inside else OUTSIDE)
+"""The cell index of anything outside the grid."""
 
 
 def check_part(name: str, part: object, protocol: type, example: str) -> None:
-    """Refuse what can't take the place of an exchangeable part of a filter.
+    """Check that an object can serve as an exchangeable part of a filter, such as its sensor.
 
     Parameters
     ----------
     name : str
         Name of the argument, for the error.
     part : object
-        What was handed over.
+        The object.
     protocol : type
-        The protocol that it has to fulfil.
+        The protocol that it must follow.
     example : str
         The method that it needs, and a class that has it.
     """

@@ -9,7 +9,7 @@ from semgrid_edu.grid import GridSpec
 
 
 def plane_heights(n_planes: int = 20, spacing: float = 0.2) -> NDArray[np.float64]:
-    """Return the heights delta_i of the planes above the ground; the lowest plane lies on it.
+    """Return the heights delta_i of the planes; the lowest plane is the ground itself.
 
     Parameters
     ----------
@@ -17,7 +17,7 @@ def plane_heights(n_planes: int = 20, spacing: float = 0.2) -> NDArray[np.float6
         D, the number of planes; 20 in the paper (section 4.1).
     spacing : float
         d, the constant distance between planes, metres. The paper doesn't give it. 0.2 m is the side of the
-        paper's cells; 20 planes then reach 3.8 m, above cars, people, trucks and most signs.
+        paper's cells; the highest of 20 planes is then at 3.8 m, above cars, people, trucks and most signs.
 
     Returns
     -------
@@ -39,8 +39,8 @@ def plane_heights(n_planes: int = 20, spacing: float = 0.2) -> NDArray[np.float6
 def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Find the pixel that sees each point of each plane: equation (1).
 
-    The point of plane i above cell j lies at (x_j, y_j, delta_i) in the grid frame, and T_camera_from_grid
-    takes it to the camera.
+    The point of plane i above cell j is (x_j, y_j, delta_i) in the grid frame, and T_camera_from_grid takes it to the
+    camera.
 
     Parameters
     ----------
@@ -59,10 +59,11 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
         Whether the point is in front of the camera and inside the image.
     """
     heights = check_heights(heights)
-    centers, T_camera_from_grid = spec.centers(), camera.T_camera_from_grid
+    centers = spec.centers()
+    T_camera_from_grid = camera.T_camera_from_grid
     visible = np.empty((len(heights), *spec.shape), dtype=bool)
     pixels = np.empty((*visible.shape, 2))
-    # One plane at a time, as in `sparse.bilinear_matrix`: intermediate results fit into the processor's cache.
+    # One plane at a time, so that intermediate results fit into the processor's cache.
     for i, delta in enumerate(heights):
         points = np.dstack([centers, np.full(spec.shape, delta)])
         pixels[i], visible[i] = project(transform_points(T_camera_from_grid, points), camera)
@@ -70,7 +71,7 @@ def plane_pixels(spec: GridSpec, heights: ArrayLike, camera: Camera) -> tuple[ND
 
 
 def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
-    """Return the heights of planes as an array; refuse an empty one, and numbers that aren't finite.
+    """Return the heights of planes as an array, or raise an `ArgumentError` if they aren't one or more finite numbers.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ def check_heights(heights: ArrayLike) -> NDArray[np.float64]:
 
 
 def check_plane_points(pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> None:
-    """Refuse points of planes whose shapes don't agree, or visible ones outside the image.
+    """Raise an `ArgumentError` if the shapes don't agree, or a visible point is outside the image.
 
     Parameters
     ----------
@@ -100,13 +101,13 @@ def check_plane_points(pixels: NDArray, visible: NDArray, image_size: tuple[int,
     if pixels.shape != (*visible.shape, 2):
         raise ArgumentError("pixels", f"shape {(*visible.shape, 2)}", pixels.shape)
     last = np.array(image_size)[::-1] - 1
-    planes = zip(pixels, visible, strict=True)
-    if not all(((points >= 0) & (points <= last))[seen].all() for points, seen in planes):
+    inside = (pixels >= 0) & (pixels <= last)
+    if not inside[visible].all():
         raise ArgumentError("pixels", f"visible points in an image of {image_size} pixels", "points outside it")
 
 
 def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike) -> NDArray[np.float64]:
-    """Resample the scores on the planes: equation (2), literally, one point at a time.
+    """Resample the scores on the planes: equation (2) as printed, one point at a time.
 
     p[c, i, j] = sum_n sum_m s[c, n, m] k(u_j - m) k(v_j - n), with the bilinear kernel ``k(t) = max(0, 1 - |t|)``.
 
@@ -130,9 +131,12 @@ def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike
     >>> sample_planes_naive(scores, np.full((1, 1, 1, 2), 0.5), np.ones((1, 1, 1), bool))
     array([[[[1.5]]]])
     """
-    s, pixels, visible = np.asarray(scores, dtype=np.float64), np.asarray(pixels), np.asarray(visible)
+    s = np.asarray(scores, dtype=np.float64)
+    pixels = np.asarray(pixels)
+    visible = np.asarray(visible)
     check_plane_points(pixels, visible, s.shape[1:])
-    n, m = np.arange(s.shape[1]), np.arange(s.shape[2])
+    n = np.arange(s.shape[1])  # rows of the image
+    m = np.arange(s.shape[2])  # columns
     p = np.zeros((s.shape[0], *visible.shape))
     for j in np.ndindex(visible.shape):
         if visible[j]:
@@ -142,5 +146,5 @@ def sample_planes_naive(scores: ArrayLike, pixels: ArrayLike, visible: ArrayLike
 
 
 def _bilinear_kernel(t: NDArray) -> NDArray:
-    """Return k(t), the weight of a pixel at distance t along one axis."""
+    """Return k(t), the weight along one axis of a pixel at distance t from the point."""
     return np.maximum(0, 1 - np.abs(t))

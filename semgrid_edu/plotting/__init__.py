@@ -1,4 +1,4 @@
-"""The figures of lectures, demo and experiments, drawn with one vocabulary.
+"""The figures of lectures, demo and experiments, drawn with one vocabulary: maps, images, charts, animations.
 
 Every function that takes `ax` draws into these Axes, or into a new figure when they are left out, and returns the Axes.
 Grids are drawn as maps seen from above with forward up, in metres: the x axis points up, the y axis to the left, so its
@@ -8,11 +8,7 @@ numbers fall from left to right. Arrays are never flipped: row 0 is the farthest
 from semgrid_edu.plotting.animations import MAX_ANIMATION_BYTES, Animation, animate
 from semgrid_edu.plotting.charts import (
     confusion,
-    coupling_errors,
-    error_against_time,
     training_curves,
-    velocity_ellipse,
-    velocity_spread,
 )
 from semgrid_edu.plotting.colours import (
     DEPTH_RANGE,
@@ -28,10 +24,7 @@ from semgrid_edu.plotting.colours import (
 )
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
 from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
-from semgrid_edu.plotting.lattice import draw_lattice_frame, draw_triangles, lattice_story, vertex_places
-from semgrid_edu.plotting.lines import belief_history, probability_line, probability_lines, state_history
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
-from semgrid_edu.plotting.story import draw_cell_story
 
 FIGURE_DPI = 110
 """Dots per inch of every figure in a notebook: `plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI`."""
@@ -47,36 +40,23 @@ __all__ = [
     "Animation",
     "animate",
     "animate_occupancy",
-    "belief_history",
     "binary_states",
     "class_legend",
     "confusion",
-    "coupling_errors",
     "depth_colours",
-    "draw_cell_story",
-    "draw_lattice_frame",
-    "draw_triangles",
-    "error_against_time",
     "grid_labels",
     "grid_values",
     "image_labels",
     "image_values",
     "label_maps",
-    "lattice_story",
     "occupancy",
     "occupancy_colours",
     "particles",
     "plane_on_image",
     "points_on_image",
-    "probability_line",
-    "probability_lines",
-    "state_history",
     "training_curves",
     "velocity",
     "velocity_arrows",
     "velocity_colours",
-    "velocity_ellipse",
-    "velocity_spread",
     "velocity_wheel",
-    "vertex_places",
 ]

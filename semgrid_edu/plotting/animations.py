@@ -103,7 +103,7 @@ def _picture(frame: Figure | NDArray[np.uint8]) -> Image.Image:
 
 
 def _with_common_palette(pictures: list[Image.Image]) -> list[Image.Image]:
-    """Give all pictures the same 256 colours, so that what stands still keeps its colour and is stored once.
+    """Give all pictures the same 256 colours, so that still parts keep their colour and are stored once.
 
     Which colours these are is decided on a small picture, in which each colour is about as frequent as in all frames.
     """

@@ -86,7 +86,8 @@ def binary_states(p_occupied: NDArray) -> NDArray:
            [0. , 0. , 0. ],
            [0. , 1. , 0.2]])
     """
-    free, occupied = np.clip(2 - 4 * p_occupied, 0, 1), np.clip(4 * p_occupied - 2, 0, 1)
+    free = np.clip(2 - 4 * p_occupied, 0, 1)
+    occupied = np.clip(4 * p_occupied - 2, 0, 1)
     return np.stack([free, occupied, np.zeros_like(free), 1 - free - occupied])
 
 
@@ -120,8 +121,10 @@ def velocity_colours(velocity: NDArray) -> NDArray[np.uint8]:
         raise ArgumentError("velocity", "two components, shape (2, ...)", f"shape {np.shape(velocity)}")
     vx, vy = np.asarray(velocity, dtype=np.float64)
     known = np.isfinite(vx) & np.isfinite(vy)
-    vx, vy = np.where(known, vx, 0), np.where(known, vy, 0)
-    headings, static = np.array([*HEADING_COLOURS, HEADING_COLOURS[0]], float), np.array(STATE_COLOURS[State.STATIC])
+    vx = np.where(known, vx, 0)
+    vy = np.where(known, vy, 0)
+    headings = np.array([*HEADING_COLOURS, HEADING_COLOURS[0]], float)
+    static = np.array(STATE_COLOURS[State.STATIC])
     quarter = np.arctan2(vy, vx) % (2 * np.pi) / (np.pi / 2)
     full = np.stack([np.interp(quarter, range(5), channel) for channel in headings.T], axis=-1)
     share = np.sqrt(np.minimum(np.hypot(vx, vy) / WHEEL_SPEED, 1))[..., None]

@@ -47,7 +47,7 @@ def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, lege
 def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) -> Axes:
     """Add the arrows of `velocity_arrows` to an occupancy grid, as long as the distance covered in half a second.
 
-    A second line below the map says so.
+    A note below the map gives that time.
 
     Parameters
     ----------

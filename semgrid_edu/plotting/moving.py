@@ -71,7 +71,7 @@ def wheel_colours(spec: GridSpec, probability: NDArray, velocity: NDArray) -> ND
 def particles(spec: GridSpec, particles: Particles, ax: Axes | None = None) -> Axes:
     """Add particles to a map: points in the colour of their velocity, more opaque with more weight.
 
-    When there are more than `MAX_POINTS`, every k-th is drawn. A second line below the map says how many are drawn.
+    When there are more than `MAX_POINTS`, every k-th is drawn. A second line below the map gives the number drawn.
 
     Parameters
     ----------

@@ -19,6 +19,10 @@ PACKAGE = Path(__file__).resolve().parents[1]
 """The folder of the package, without symbolic links."""
 
 
+CACHE_VARIABLE = "SEMGRID_EDU_CACHE"
+"""The environment variable that names the cache folder; `semgrid-edu --cache` sets it for this and worker processes."""
+
+
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`, which is renamed to `path` when the block ends well.
@@ -277,3 +281,20 @@ def shipped_folder(name: str) -> Path:
     """
     inside = PACKAGE / name
     return inside if inside.is_dir() else PACKAGE.parent / name
+
+
+def cache_folder(dataset_dir: Path) -> Path:
+    """Return the folder that keeps what is computed from a data set.
+
+    Parameters
+    ----------
+    dataset_dir : Path
+        The folder of the data set.
+
+    Returns
+    -------
+    Path
+        The folder that `CACHE_VARIABLE` names, which all data sets share; by default `cache` in the data set's folder.
+    """
+    chosen = os.environ.get(CACHE_VARIABLE)
+    return Path(chosen) if chosen else dataset_dir / "cache"

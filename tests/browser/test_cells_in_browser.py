@@ -11,7 +11,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import Stages, run_pipeline
-from semgrid_edu.story import cell_story
+from semgrid_edu.workshop.demo import cell_story, story_text
 
 SPEC = GridSpec.compact()
 FRAME = 5
@@ -197,7 +197,7 @@ class TestChosenCells:
 
 @pytest.mark.parametrize("name", ["car", "mistake", "unseen"])
 class TestStory:
-    """What the panel tells, against `semgrid_edu.story.cell_story`."""
+    """What the panel tells, against `cell_story`."""
 
     def test_its_class_and_the_truth(self, shipped, cells, stories, name):
         page, story = shipped(f"#{FRAME}"), stories[name]
@@ -211,14 +211,14 @@ class TestStory:
         begins = "Why" if story.refined == story.label else "Before the CRF: why"
         assert why.inner_text() == f"{begins} {story.names[story.label]} and not {story.names[story.rival]}?"
         sentences = page.locator("#telling > p").all_inner_texts()
-        lines = str(story).splitlines()
+        lines = story_text(story).splitlines()
         assert set(sentences) >= {line for line in lines[2:-1] if not line.startswith("LIDAR")}
 
     def test_what_the_scan_says(self, shipped, cells, stories, name):
         page, scan = shipped(f"#{FRAME}"), stories[name].scan
         click(page, "refined", cells[name])
         text = page.locator("#telling").inner_text()
-        assert re.search(rf"\b{len(scan.obstacles)} obstacle returns? and {len(scan.ground)} ground returns? lie", text)
+        assert re.search(rf"\b{scan.obstacles} obstacle returns? and {scan.ground} ground returns? lie", text)
         assert f"the cell is {scan.distance:.1f} m away" in text or "Nothing came back" in text
         sentence = {
             "hit": "stands here",
@@ -251,7 +251,7 @@ class TestStory:
         np.testing.assert_allclose(past, 100 * story.history.T, atol=1.01)
 
     def test_the_parts_of_the_score_add_up(self, shipped, cells, stories, name):
-        page, why = shipped(f"#{FRAME}"), stories[name].for_label.minus(stories[name].for_rival)
+        page, why = shipped(f"#{FRAME}"), stories[name].why
         click(page, "refined", cells[name])
         image, occupancy, rest, total = (value for (value,) in rows(page, "#telling .parts >> nth=0").values())
         assert image + occupancy + rest == pytest.approx(total, abs=0.2)
@@ -259,7 +259,7 @@ class TestStory:
         assert occupancy == pytest.approx(why.occupancy.sum(), abs=0.26)
         assert image == pytest.approx(why.planes.sum(), abs=1.1)  # twenty planes, each rounded to 0.1
         by_height = [value for (value,) in rows(page, "#telling .two > div + div .parts").values()]
-        np.testing.assert_allclose(by_height[::-1], why.planes.sum(axis=0), atol=0.11)
+        np.testing.assert_allclose(by_height[::-1], why.planes, atol=0.11)
 
     def test_what_the_neighbours_add(self, shipped, cells, stories, name):
         page, story = shipped(f"#{FRAME}"), stories[name]
@@ -268,8 +268,8 @@ class TestStory:
         assert len(told_of) == len({story.label, story.rival, story.refined})
         for word, (before, pulled, after) in told_of.items():
             c = story.names.index(word)
-            assert (before, after) == pytest.approx((100 * story.pull.before[c], 100 * story.pull.after[c]), abs=1.01)
-            assert pulled == pytest.approx(story.pull.messages[c], abs=0.16)
+            assert (before, after) == pytest.approx((100 * story.before[c], 100 * story.after[c]), abs=1.01)
+            assert pulled == pytest.approx(story.messages[c], abs=0.16)
         assert page.locator("[data-marks=refined] .pull").count() == page.locator("#telling ol li").count() == 5
 
     def test_the_images_show_its_points_of_eq_1(self, shipped, cells, stories, name):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from semgrid_edu.answers import answer_array, answer_arrays, answer_number
+from semgrid_edu.workshop.course.answers import answer_array, answer_arrays, answer_number
 
 
 @pytest.mark.parametrize(

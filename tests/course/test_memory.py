@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from semgrid_edu.answers import peak_megabytes
+from semgrid_edu.workshop.course.answers import peak_megabytes
 
 
 def test_what_is_held_for_a_moment_counts():

@@ -10,7 +10,6 @@ from semgrid_edu.crf import (
     at_temperature,
     expected_calibration_error,
     fit_temperature,
-    negative_log_likelihood,
     reliability,
 )
 from semgrid_edu.errors import ArgumentError
@@ -45,11 +44,6 @@ def test_limits_are_the_uniform_distribution_and_the_arg_max(drawn):
 
 def test_float32_stays_float32(drawn):
     assert at_temperature(drawn[0].astype(np.float32), 2.0).dtype == np.float32
-
-
-def test_the_likelihood_is_torchs_cross_entropy(drawn):
-    log_p, truth = drawn
-    assert negative_log_likelihood(log_p, truth) == pytest.approx(cross_entropy(log_p, truth), abs=1e-12)
 
 
 @pytest.mark.parametrize("temperature", [0.3, 1.0, 4.0])

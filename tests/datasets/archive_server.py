@@ -6,7 +6,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 
 @contextmanager
-def serve(files, break_after=(), tags=True, ranges=True):
+def serve(files, break_after=(), ranges=True):
     """Serve files (path to content). The n-th answer breaks off after break_after[n] bytes; the others are whole.
 
     None in break_after is an error of the server, 503.
@@ -35,8 +35,6 @@ def serve(files, break_after=(), tags=True, ranges=True):
             self.send_response(206 if start else 200)
             if start:
                 self.send_header("Content-Range", f"bytes {start}-{len(content) - 1}/{len(content)}")
-            if tags:
-                self.send_header("ETag", f'"{hash(content)}"')
             self.send_header("Content-Length", str(len(content) - start))
             self.end_headers()
             self.wfile.write(content[start:][:end])

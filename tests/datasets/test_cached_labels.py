@@ -8,13 +8,13 @@ import torch
 from tiny_drive import DATE, write_tiny_dataset
 
 from semgrid_edu.datasets import KittiRawDrive, training_cache
-from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthFlaws, TruthPolicy, lidar_truth
+from semgrid_edu.datasets.ground_truth import TruthPolicy, lidar_truth
 from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import track_drive
-from semgrid_edu.storage.tensors import write_tensors
+from semgrid_edu.workshop.flaws import NO_FLAWS, TruthFlaws
 
 SMALL = (6, 20)
 EXACT = LidarTruth(flaws=NO_FLAWS)
@@ -65,16 +65,16 @@ def test_seed_policy_and_flaws_decide_it(root):
     flawed = LidarTruth(TruthPolicy(past=2, movers="carved"), TruthFlaws(rotation=2.0))
     one, other = (training(root, made).arrays["truth"] for made in (flawed, replace(flawed, seed=1)))
     assert (one != other).any()
-    for path in root.glob("cache/*/train/labels-*"):
+    for path in root.glob("cache/train-labels-*"):
         path.unlink()
     np.testing.assert_array_equal(training(root, flawed).arrays["truth"], one)
 
 
 def test_a_damaged_file_is_named(root):
     training(root, EXACT, "test")
-    (path,) = root.glob("cache/*/test/labels-*.safetensors")
-    write_tensors(path, {"other": torch.zeros(1)})
-    with pytest.raises(DataError, match=r"labels-.*: .*delete its folder to make it anew"):
+    (path,) = root.glob("cache/test-labels-*.npz")
+    path.write_bytes(path.read_bytes()[:-5])
+    with pytest.raises(DataError, match=r"labels-.*: .*delete the file to compute them again"):
         training(root, EXACT, "test")
 
 

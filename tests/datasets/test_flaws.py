@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthFlaws, flawed_drive
-from semgrid_edu.datasets.ground_truth.flaws import flawed_frame, flawed_labels, miscalibrated
 from semgrid_edu.datasets.ground_truth.window import EgoVelocity, skew_scan
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.workshop.flaws import NO_FLAWS, TruthFlaws, flawed_drive, flawed_frame, flawed_labels, miscalibrated
 
 ROAD, CAR, SKY = (KITTI_14.index(name) for name in ("road", "car", "sky"))
 CAMERA = Camera(

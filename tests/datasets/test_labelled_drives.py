@@ -5,15 +5,16 @@ import pytest
 from npz_drive import NpzDrive, write_npz_drives
 
 from semgrid_edu.datasets import training_cache
-from semgrid_edu.datasets.ground_truth import NO_FLAWS, lidar_truth
+from semgrid_edu.datasets.ground_truth import lidar_truth
 from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import WEIGHTS, Architecture, build_net
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.training import TrainingParams, train
+from semgrid_edu.workshop.flaws import NO_FLAWS
 
 SPEC, SIZE = GridSpec(0, 71, -15.5, 15.5, 1.0), (24, 80)
 WALL, ROAD, UNSEEN = (KITTI_14.index(name) for name in ("building", "road", "unknown-unobserved"))

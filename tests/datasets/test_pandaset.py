@@ -25,9 +25,9 @@ from tiny_pandaset import (
 
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets import DatasetIndex, LabelledFrame, PandasetScene, load_index
+from semgrid_edu.datasets.cuboids import put_together
 from semgrid_edu.datasets.index import write_pandaset_index
-from semgrid_edu.datasets.readers.cuboids import put_together
-from semgrid_edu.datasets.readers.pandaset_files import read_pandaset_scan
+from semgrid_edu.datasets.pandaset_files import read_pandaset_scan
 from semgrid_edu.datasets.training_set import TrainingSet, sets_by_camera
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
@@ -35,6 +35,7 @@ from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.occupancy import SensorModel, scan_evidence
 from semgrid_edu.occupancy.sensor import prepare_scan
 from semgrid_edu.storage.pickled_tables import read_pickled_table
+from semgrid_edu.workshop.doubts import drive_doubts
 
 SPEC = GridSpec(x_min=0, x_max=24, y_min=-8, y_max=8, cell=0.5)
 ROAD, CAR, BUILDING = (KITTI_14.index(name) for name in ("road", "car", "building"))
@@ -348,17 +349,17 @@ def test_a_missing_image_is_a_gap(copy):
     (copy / SCENE / "camera/front_camera/02.jpg").unlink()
     scene = PandasetScene(copy, SCENE)
     assert (scene.numbers, scene.gaps) == ((0, 4, 6), (2,))
-    (line,) = scene.doubts()
+    (line,) = drive_doubts(scene)
     assert "02.jpg: expected an image" in line
 
 
 def test_an_image_and_a_scan_that_come_again_are_doubtful(copy):
-    assert PandasetScene(copy, SCENE).doubts() == []
+    assert drive_doubts(PandasetScene(copy, SCENE)) == []
     for folder, name in (("camera/front_camera", "{}.jpg"), ("lidar", "{}.pkl.gz")):
         first = (copy / SCENE / folder / name.format("00")).read_bytes()
         for number in ("02", "04"):
             (copy / SCENE / folder / name.format(number)).write_bytes(first)
-    scan, image, in_frames = PandasetScene(copy, SCENE).doubts()
+    scan, image, in_frames = drive_doubts(PandasetScene(copy, SCENE))
     assert scan.endswith("02.pkl.gz: expected scans that differ, found 00.pkl.gz again, up to 04.pkl.gz")
     assert image.endswith("02.jpg: expected images that differ, found 00.jpg again, up to 04.jpg")
     assert "expected images that differ, found the same image again" in in_frames
@@ -368,7 +369,7 @@ def test_a_scan_that_was_packed_again_is_the_same_scan(copy):
     first, second = (copy / SCENE / "lidar" / f"{number}.pkl.gz" for number in ("02", "04"))
     second.write_bytes(gzip.compress(gzip.decompress(first.read_bytes()), 1, mtime=1))
     assert first.read_bytes() != second.read_bytes()
-    (line,) = PandasetScene(copy, SCENE).doubts()
+    (line,) = drive_doubts(PandasetScene(copy, SCENE))
     assert line.startswith(f"{second}: expected scans that differ, found {first.name} again")
 
 

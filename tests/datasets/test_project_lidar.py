@@ -3,7 +3,7 @@
 import numpy as np
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.readers.project_lidar import closest_returns, seen_returns
+from semgrid_edu.datasets.project_lidar import closest_returns, seen_returns
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 

@@ -8,7 +8,7 @@ import pytest
 from semgrid_edu.camera import invert_rigid, transform_points
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.index import load_index
-from semgrid_edu.datasets.readers.project_lidar import cells_in_view, closest_returns
+from semgrid_edu.datasets.project_lidar import cells_in_view, closest_returns
 from semgrid_edu.datasets.samples import real_drive, real_weights, samples_dir
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14

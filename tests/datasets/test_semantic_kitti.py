@@ -7,7 +7,7 @@ from PIL import Image
 from tiny_drive import BASELINE, CAMERA_FROM_LIDAR, SIZE, K
 
 from semgrid_edu.datasets import SemanticKittiSequence
-from semgrid_edu.datasets.readers.semantic_kitti import SEMANTIC_KITTI_CLASSES
+from semgrid_edu.datasets.semantic_kitti import SEMANTIC_KITTI_CLASSES
 from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from semgrid_edu.datasets import SynthiaSequence
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.labels import IGNORE, SYNTHIA_10
+from semgrid_edu.workshop.paper.datasets import SynthiaSequence
 
 NAME = "SYNTHIA-SEQS-04-SPRING"
 VIEW = "Stereo_Left/Omni_F"

@@ -6,10 +6,11 @@ from PIL import Image
 from scipy.io import savemat
 from tiny_drive import BASELINE, CAMERA_FROM_LIDAR, LIDAR_FROM_IMU, SIZE, K, write_packet, write_tiny_drive
 
-from semgrid_edu.datasets import KittiRawDrive, KittiTrackingRun, ZhangDrive, ZhangLabels
+from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.workshop.paper.datasets import KittiTrackingRun, ZhangDrive, ZhangLabels
 
 README = ["building", "sky", "road", "vegetation", "sidewalk", "car", "pedestrian", "bicycle", "signage", "fence"]
 """Names of the numbers 1 to 10 in the data set's readme, which says cyclist for bicycle; 0 is not ground-truthed."""

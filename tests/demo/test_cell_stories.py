@@ -10,22 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from read_page import Page
-from tiny_drive import DATE, write_tiny_drive
 
 import semgrid_edu.workshop.demo.page as page_module
-from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.networks import Architecture, build_net, load_net, save_net
+from semgrid_edu.networks import load_net, save_net
 from semgrid_edu.pipeline import Stages, run_pipeline
-from semgrid_edu.story import cell_story
-from semgrid_edu.story.what_if import CHANGES
-from semgrid_edu.story.words import FAULTS
-from semgrid_edu.workshop.demo import write_demo
+from semgrid_edu.workshop.demo import story_text, write_demo
 from semgrid_edu.workshop.demo.details import FILTER_STEPS, NOT_SEEN, STEPS, VERDICTS, states_bytes
 from semgrid_edu.workshop.demo.record import Record
 from semgrid_edu.workshop.demo.run import STORIES, _stories_every
+from semgrid_edu.workshop.demo.what_if import CHANGES, FAULTS
 
 SPEC = GridSpec.compact()
 CELLS = [(81, 31), (82, 25), (120, 33), (30, 5), (0, 0), (141, 61)]
@@ -33,30 +29,11 @@ SCRIPTS = Path(page_module.__file__).parent
 
 
 @pytest.fixture(scope="module")
-def drive(tmp_path_factory):
-    root = tmp_path_factory.mktemp("drive")
-    write_tiny_drive(root, labelled=(2,))
-    return KittiRawDrive(root, DATE, "0001")
-
-
-@pytest.fixture(scope="module")
-def out(drive, tmp_path_factory):
+def page(last_labelled, net, tmp_path_factory):
     folder = tmp_path_factory.mktemp("out")
-    save_net(build_net(Architecture(), drive.camera, seed=3), folder / "net.safetensors")
-    write_demo(drive, folder / "net.safetensors", folder, memory=True)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def page(out):
-    return Page((out / "index.html").read_text(encoding="utf-8"))
-
-
-@pytest.fixture(scope="module")
-def stories(drive, out):
-    net = load_net(out / "net.safetensors", drive.camera)
-    results = list(run_pipeline(drive, Stages.of(net, keep_steps=True, memory=True)))
-    return results, [cell_story(results[-1], cell, net, past=results[:-1]) for cell in CELLS]
+    save_net(net, folder / "net.safetensors")
+    written = write_demo(last_labelled, folder / "net.safetensors", folder, memory=True)
+    return Page(written.read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="module")
@@ -87,25 +64,25 @@ def wide(maps, cell):
 
 class TestBytes:
     def test_states_of_every_step(self, maps, stories):
-        for story in stories[1]:
+        for story in stories:
             known = dict(zip(FILTER_STEPS, np.split(maps["states"][:, *story.cell].astype(int), 5), strict=True))
             for name, states in story.steps.items():
                 np.testing.assert_allclose(known[name], 255 * states, atol=1.001)
 
     def test_what_the_scan_says(self, maps, stories):
-        for story in stories[1]:
+        for story in stories:
             at = (0, *story.cell)
-            assert maps["obstacles"][at] == len(story.scan.obstacles)
-            assert maps["ground"][at] == len(story.scan.ground)
+            assert maps["obstacles"][at] == story.scan.obstacles
+            assert maps["ground"][at] == story.scan.ground
             assert VERDICTS[maps["verdict"][at]] == story.scan.verdict
             assert maps["reach"][at] * STEPS["reach"] == pytest.approx(story.scan.reach, abs=STEPS["reach"] / 2)
 
     def test_parts_of_the_score(self, maps, stories):
-        for story in stories[1]:
-            why = story.for_label.minus(story.for_rival)
-            for name, axis in (("planes", 0), ("scores", 1)):
+        for story in stories:
+            why = story.why
+            for name, expected in (("planes", why.planes), ("scores", why.classes)):
                 parts = STEPS["part"] * (maps[name][:, *story.cell].astype(int) - 128)
-                np.testing.assert_allclose(parts, why.planes.sum(axis=axis), atol=0.051)
+                np.testing.assert_allclose(parts, expected, atol=0.051)
             *states, image, occupancy, rest, score = STEPS["part"] * (wide(maps["totals"], story.cell) - 2**15)
             np.testing.assert_allclose(states, why.occupancy, atol=0.051)
             expected = [why.planes.sum(), why.occupancy.sum(), why.score]
@@ -115,35 +92,33 @@ class TestBytes:
             assert digits * 10.0 ** (power - 1) == pytest.approx(np.exp(why.score), rel=0.051)
 
     def test_classes_and_their_probabilities(self, maps, stories):
-        for story in stories[1]:
+        for story in stories:
             classes = [story.label, story.rival, story.refined]
             assert maps["classes"][:, *story.cell].tolist() == [*classes, story.truth]
-            np.testing.assert_allclose(maps["before"][:, *story.cell], 255 * story.pull.before[classes], atol=0.51)
-            np.testing.assert_allclose(maps["after"][:, *story.cell], 255 * story.pull.after[classes], atol=0.51)
+            np.testing.assert_allclose(maps["before"][:, *story.cell], 255 * story.before[classes], atol=0.51)
+            np.testing.assert_allclose(maps["after"][:, *story.cell], 255 * story.after[classes], atol=0.51)
 
     def test_what_the_sentences_are_filled_with(self, maps, stories):
-        for story in stories[1]:
-            np.testing.assert_array_equal(maps["called"][:, *story.cell], story.pixel_classes)
-            np.testing.assert_array_equal(maps["shown"][:, *story.cell], story.pixel_truth)
+        for story in stories:
+            np.testing.assert_array_equal(maps["called"][:, *story.cell], story.called)
+            np.testing.assert_array_equal(maps["shown"][:, *story.cell], story.shown)
             assert maps["otherwise"][:, *story.cell].tolist() == [story.otherwise[change] for change in CHANGES]
             assert FAULTS[maps["fault"][0, *story.cell]] == story.fault
 
-    def test_what_the_neighbours_add(self, maps, stories):
-        for story in stories[1]:
+    def test_what_the_neighbours_add(self, maps, stories, story_maps):
+        for story in stories:
             found = STEPS["message"] * maps["messages"][:, *story.cell]
-            expected = story.pull.messages[[story.label, story.rival, story.refined]]
+            expected = story.messages[[story.label, story.rival, story.refined]]
             np.testing.assert_allclose(found, expected, atol=0.051)
             rows, cols, pull = np.split(maps["strongest"][:, *story.cell].astype(int), 3)
-            expected = story.pull.strongest(story.refined)[1]
+            np.testing.assert_array_equal(np.stack([rows, cols]) - 128, story_maps.neighbours.steps[:, :, *story.cell])
+            expected = story_maps.neighbours.pull[:, *story.cell]
             np.testing.assert_allclose(STEPS["message"] * pull, expected, atol=0.051)
-            places = np.stack([rows, cols], axis=-1) - 128 + story.cell
-            terms = story.pull.weights * story.pull.neighbours[story.refined]
-            np.testing.assert_allclose(terms[tuple(places.T)], expected, rtol=1e-4)  # cells, where none pull alike
 
     def test_what_holds_in_every_frame(self, page, stories):
         data = json.loads(page.text["storydata"])
         places = unpacked(data["places"], data["places_layout"])
-        for story in stories[1]:
+        for story in stories:
             assert STEPS["distance"] * wide(places["distance"], story.cell) == pytest.approx(
                 story.scan.distance, abs=0.051
             )
@@ -171,7 +146,7 @@ class TestScript:
 
     @pytest.fixture(scope="class")
     @staticmethod
-    def told(page, tmp_path_factory):
+    def read(page, tmp_path_factory):
         program = tmp_path_factory.mktemp("node") / "tell.js"
         cells = [row * SPEC.shape[1] + col for row, col in CELLS]
         program.write_text(
@@ -196,17 +171,17 @@ class TestScript:
         run = subprocess.run(["node", str(program)], capture_output=True, text=True, check=True, timeout=120)
         return json.loads(run.stdout)
 
-    def test_states(self, told, stories):
-        for one, story in zip(told, stories[1], strict=True):
+    def test_states(self, read, stories):
+        for one, story in zip(read, stories, strict=True):
             np.testing.assert_allclose(np.sum(one["steps"], axis=1), 1, atol=1e-12)
             for name, states in zip(FILTER_STEPS, one["steps"], strict=True):
                 np.testing.assert_allclose(states, story.steps[name], atol=0.005)
 
-    def test_parts(self, told, stories):
-        for one, story in zip(told, stories[1], strict=True):
-            parts, why = one["parts"], story.for_label.minus(story.for_rival)
-            np.testing.assert_allclose(parts["planes"], why.planes.sum(axis=0), atol=0.051)
-            np.testing.assert_allclose(parts["scores"], why.planes.sum(axis=1), atol=0.051)
+    def test_parts(self, read, stories):
+        for one, story in zip(read, stories, strict=True):
+            parts, why = one["parts"], story.why
+            np.testing.assert_allclose(parts["planes"], why.planes, atol=0.051)
+            np.testing.assert_allclose(parts["scores"], why.classes, atol=0.051)
             np.testing.assert_allclose(parts["occupancy"], why.occupancy, atol=0.051)
             image, occupancy, rest, score = parts["totals"]
             assert image + occupancy + rest == pytest.approx(score)
@@ -214,31 +189,31 @@ class TestScript:
             assert rest == pytest.approx(why.rest, abs=0.151)
             assert parts["times"] == pytest.approx(np.exp(why.score), rel=0.051)
 
-    def test_sentences(self, told, stories):
-        for one, story in zip(told, stories[1], strict=True):
-            lines = str(story).splitlines()
+    def test_sentences(self, read, stories):
+        for one, story in zip(read, stories, strict=True):
+            lines = story_text(story).splitlines()
             assert one["sentences"] == [line for line in lines[2:-1] if not line.startswith("LIDAR")]
 
-    def test_points_above_a_cell(self, told, stories):
-        for one, story in zip(told, stories[1], strict=True):
+    def test_points_above_a_cell(self, read, stories):
+        for one, story in zip(read, stories, strict=True):
             assert one["centre"] == pytest.approx(story.xy)
             assert [point is not None for point in one["pixels"]] == story.visible.tolist()
             uv = np.array([point for point in one["pixels"] if point]).reshape(-1, 2)
             np.testing.assert_allclose(uv, story.pixels[story.visible], atol=STEPS["pixel"] / 2)
 
-    def test_a_place_is_followed_through_the_poses(self, told):
-        for one, (row, col) in zip(told, CELLS, strict=True):  # the vehicle drives two rows a frame
+    def test_a_place_is_followed_through_the_poses(self, read):
+        for one, (row, col) in zip(read, CELLS, strict=True):  # the vehicle drives two rows a frame
             then = [(row - 2 * back) * SPEC.shape[1] + col if row >= 2 * back else -1 for back in (2, 1, 0)]
             assert one["then"] == then
 
-    def test_neighbours(self, told, stories):
-        for one, story in zip(told, stories[1], strict=True):
-            expected = story.pull.messages[[story.label, story.rival, story.refined]]
+    def test_neighbours(self, read, stories, story_maps):
+        for one, story in zip(read, stories, strict=True):
+            expected = story.messages[[story.label, story.rival, story.refined]]
             np.testing.assert_allclose(one["messages"], expected, atol=0.051)
-            terms = (story.pull.weights * story.pull.neighbours[story.refined]).ravel()
-            pulls = [(terms[neighbour["cell"]], neighbour["pull"]) for neighbour in one["strongest"]]
-            np.testing.assert_allclose([term for term, _ in pulls], story.pull.strongest(story.refined)[1], rtol=1e-4)
-            np.testing.assert_allclose(*zip(*pulls, strict=True), atol=0.051)
+            rows, cols = np.reshape(story.cell, (2, 1)) + story_maps.neighbours.steps[:, :, *story.cell]
+            assert [neighbour["cell"] for neighbour in one["strongest"]] == (rows * SPEC.shape[1] + cols).tolist()
+            pulls = [neighbour["pull"] for neighbour in one["strongest"]]
+            np.testing.assert_allclose(pulls, story_maps.neighbours.pull[:, *story.cell], atol=0.051)
 
     @pytest.mark.parametrize("name", ["page.js", "story.js", "panel.js"])
     def test_is_written_without_mistakes_of_grammar(self, name):

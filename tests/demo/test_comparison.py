@@ -20,10 +20,12 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import State
-from semgrid_edu.pipeline import StageError, Stages, load_stages, run_side_by_side
+from semgrid_edu.pipeline import StageError, Stages
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.demo import example_stages, write_demo
 from semgrid_edu.workshop.demo.comparison import MADE_BY, Comparison
+from semgrid_edu.workshop.demo.run import run_side_by_side
+from semgrid_edu.workshop.demo.stages_file import load_stages
 
 EXAMPLE = Path(example_stages.__file__)
 
@@ -74,7 +76,7 @@ def frames(page):
 
 @pytest.fixture(scope="module")
 def results(drive):
-    own = Stages.of(load_net(sample_weights(), drive.camera))
+    own = Stages.fast(load_net(sample_weights(), drive.camera))
     return list(run_side_by_side(drive, own, load_stages(EXAMPLE).over(own)))
 
 
@@ -102,7 +104,7 @@ class TestExample:
 
     def test_runs_on_the_first_frames_of_the_shipped_drive(self):
         shipped = sample_drive()
-        own = Stages.of(load_net(sample_weights(), shipped.camera))
+        own = Stages.fast(load_net(sample_weights(), shipped.camera))
         (before, _), (package, yours) = run_side_by_side(shipped[:2], own, load_stages(EXAMPLE).over(own))
         assert before.belief.probability.shape == yours.belief.probability.shape
         np.testing.assert_array_equal(package.scores, yours.scores)

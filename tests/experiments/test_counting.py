@@ -19,7 +19,6 @@ from semgrid_edu.workshop.paper.score_runs import (
     CONFUSIONS,
     RELIABILITY,
     SEARCHED,
-    WEIGHTS_FOR_CLASSES,
     CountingRun,
 )
 from semgrid_edu.workshop.paper.variants import EXACT, CalibrationError
@@ -156,5 +155,3 @@ def test_searched_parameters_are_those_of_the_searches():
         found = json.loads((results / name).read_text())
         assert temperature == pytest.approx(found["temperature"], abs=1e-4)
         assert params == CrfParams(**found["chosen"]["pixel accuracy"]["params"])
-        chosen = found["chosen"]["class accuracy"]["params"]
-        assert WEIGHTS_FOR_CLASSES[segmenter] == {name: chosen[name] for name in ("w_bilateral", "w_spatial")}

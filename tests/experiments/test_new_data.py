@@ -34,10 +34,10 @@ import semgrid_edu
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.workshop.course.street import motion_between
 
 COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "real_drive.json"

@@ -11,11 +11,11 @@ from torch import nn
 from semgrid_edu.datasets import training_cache
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SEGMENTERS
-from semgrid_edu.networks.backbones.segmenter import Segmenter
-from semgrid_edu.storage.workplace import Workplace
+from semgrid_edu.networks.segmenter import Segmenter
 from semgrid_edu.workshop.paper import reproduce as reports
 from semgrid_edu.workshop.paper.data_runs import DataRun
 from semgrid_edu.workshop.paper.scales import SCALES, Scale, scale_named
+from semgrid_edu.workshop.workplace import Workplace
 
 
 class OneLayer(Segmenter):

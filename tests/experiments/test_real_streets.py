@@ -19,7 +19,7 @@ from worlds.lecture_08_real_streets import (
 
 import semgrid_edu
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
-from semgrid_edu.datasets.readers.pandaset import CAMERAS
+from semgrid_edu.datasets.pandaset import CAMERAS
 from semgrid_edu.datasets.samples import samples_dir
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError

@@ -19,7 +19,6 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
-from semgrid_edu.storage.workplace import Workplace
 from semgrid_edu.workshop.commands.experiments import check
 from semgrid_edu.workshop.paper import reproduce as reports
 from semgrid_edu.workshop.paper import training_runs
@@ -39,6 +38,7 @@ from semgrid_edu.workshop.scoring.confusions import (
     save_confusions,
 )
 from semgrid_edu.workshop.scoring.grids import NETWORK
+from semgrid_edu.workshop.workplace import Workplace
 
 TINY = Scale(
     name="tiny",

@@ -18,7 +18,6 @@ from semgrid_edu.datasets import training_cache
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.storage.files import sole_writer
-from semgrid_edu.storage.workplace import Workplace, workplace
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.loop import claim_folder, execute_plan, run_one
 from semgrid_edu.workshop.paper.reproduce import Request, plan_table, reproduce
@@ -26,6 +25,7 @@ from semgrid_edu.workshop.paper.run import estimate, left_to_do, with_needs
 from semgrid_edu.workshop.paper.scales import SCALES, scale_named
 from semgrid_edu.workshop.paper.variants import Variant
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
+from semgrid_edu.workshop.workplace import Workplace, workplace
 
 A = Note("a")
 B, C = Note("b", (A,)), Note("c", (A,))
@@ -182,7 +182,9 @@ SCRIPT = """
 import sys
 from pathlib import Path
 from tiny_runs import tiny_training_runs
-from semgrid_edu.storage.workplace import workplace
+from semgrid_edu.workshop.paper.loop import execute_plan
+from semgrid_edu.workshop.paper.run import with_needs
+from semgrid_edu.workshop.workplace import workplace
 if __name__ == "__main__":
     with workplace(1) as place:
         assert execute_plan(with_needs(tiny_training_runs()), Path(sys.argv[1]), place) == {}

@@ -10,8 +10,7 @@ from semgrid_edu.datasets import training_cache
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.labels import KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.metrics import confusion_matrix
-from semgrid_edu.storage.workplace import Workplace
-from semgrid_edu.training.run import chosen_truth
+from semgrid_edu.workshop.flaws import TruthFlaws
 from semgrid_edu.workshop.paper import truth_costs as costs
 from semgrid_edu.workshop.paper.data_runs import ArraysRun, DataRun
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS
@@ -20,11 +19,10 @@ from semgrid_edu.workshop.paper.run import with_needs
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.scales import SCALES
 from semgrid_edu.workshop.paper.score_runs import LABELS, LabelsRun
-from semgrid_edu.workshop.paper.truth_costs import (
-    LEARNED_FROM,
-    truth_costs_markdown,
-)
+from semgrid_edu.workshop.paper.truth_costs import LEARNED_FROM, truth_costs_markdown
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
+from semgrid_edu.workshop.training_run import chosen_truth
+from semgrid_edu.workshop.workplace import Workplace
 
 REDUCED = SCALES["reduced"]
 LABORATORY = {
@@ -44,7 +42,7 @@ def test_each_policy_is_one_whose_errors_the_laboratory_measures():
 
 
 def test_the_usual_truth_is_the_one_without_a_choice():
-    assert repr(chosen_truth("lidar")) == repr(LidarTruth())  # kept grids are named by it
+    assert repr(chosen_truth("lidar")) == repr(LidarTruth(flaws=TruthFlaws()))  # kept grids are named by it
     assert chosen_truth("true") is None
 
 

@@ -18,12 +18,13 @@ from worlds.lecture_09_counts import (
 from worlds.lecture_09_policies import TRIALS, Trial
 
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.ground_truth import NO_FLAWS, TruthPolicy
+from semgrid_edu.datasets.ground_truth import TruthPolicy
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.workshop.flaws import NO_FLAWS
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.writer import write_calibration, write_drive
 

@@ -568,20 +568,6 @@ def beam_evidence(x, y, spec, L_hit, L_pass):
         evidence[row, col] = L_hit
     return evidence""",
         ),
-        right(
-            "the package's walk",
-            task="beam-evidence",
-            code="""
-from semgrid_edu.occupancy.literal.evidence import walk_ray
-
-def beam_evidence(x, y, spec, L_hit, L_pass):
-    evidence = np.zeros(spec.shape)
-    rows, cols, _ = walk_ray(spec, (0, 0), np.arctan2(y, x), np.hypot(x, y))
-    evidence[rows, cols] = L_pass
-    rows, cols, inside = spec.cells(np.array([[x, y]]))
-    evidence[rows[inside], cols[inside]] = L_hit
-    return evidence""",
-        ),
         mistake(
             "row and column swapped",
             task="beam-evidence",

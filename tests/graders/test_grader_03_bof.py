@@ -622,9 +622,12 @@ def arrive(own, arrives):
             says="you strike out one pair, as the lecture does",
             code="""
 def arrive(own, arrives):
-    from semgrid_edu.occupancy.literal.cmcdot import collide_literal
-    none = np.zeros_like(arrives)
-    return collide_literal(own, own[2], none, none, arrives, none)[0]""",
+    from semgrid_edu.occupancy.cellwise import strike_out
+    possible = arrives * (1 - own[1])
+    keep, take = strike_out(arrives, possible)
+    after = keep * own
+    after[2] += take * possible
+    return after""",
         ),
         mistake(
             "the package's function, wrapped",
@@ -645,8 +648,8 @@ def mean_and_covariance(joint, velocities, slow):
             says="on inputs you haven't seen: wrong for a way of 0",
             code="""
 def shift(mass, down, right):
-    from semgrid_edu.occupancy.literal.bof import elsewhere_literal
-    return elsewhere_literal(mass, np.array([[down, right]]))[0]""",
+    from semgrid_edu.occupancy.bof import _elsewhere
+    return _elsewhere(mass, np.array([down, right]))""",
         ),
         mistake(
             "the zero velocity alone left out",

@@ -9,6 +9,7 @@ from grader_checks import GraderChecks, mistake, right
 from scipy.ndimage import gaussian_filter
 from scipy.special import log_softmax
 from submissions import reference_answers
+from worlds.lecture_10_crf import all_free
 
 from semgrid_edu.crf import (
     CrfParams,
@@ -20,7 +21,6 @@ from semgrid_edu.crf import (
     pair_weights,
 )
 from semgrid_edu.pipeline import load_stages
-from semgrid_edu.stage_models.crf import all_free
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 

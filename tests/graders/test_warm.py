@@ -23,9 +23,9 @@ def points(start, answers, timeout=5):
 
 
 SPOILS = """
-import builtins, pathlib, semgrid_edu.answers, sys, tempfile
+import builtins, pathlib, semgrid_edu.workshop.course.answers, sys, tempfile
 np.asarray = np.array = np.zeros = sum
-builtins.len = builtins.enumerate = semgrid_edu.answers.answer_array = lambda *a: None
+builtins.len = builtins.enumerate = semgrid_edu.workshop.course.answers.answer_array = lambda *a: None
 sys.modules["numpy"] = None
 for folder in (".", "..", tempfile.gettempdir()):
     try: pathlib.Path(folder, "left").write_text("x")

@@ -22,7 +22,7 @@ from nbgrader_scores import CellScore, error_message, tasks
 from numba.core.caching import UserProvidedCacheLocator
 from submissions import submission
 
-from semgrid_edu.storage.compiled import PACKAGE
+from semgrid_edu.fast.numba_cache import PACKAGE
 from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells, use_instructor
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.limits import Limits

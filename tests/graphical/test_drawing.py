@@ -1,18 +1,15 @@
 """Drawings: every variable, arrow, factor and text is there, large enough to read, where it was asked for."""
 
-import itertools
-
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Ellipse, FancyArrow, FancyArrowPatch, PathPatch, Rectangle
-from random_models import chain, one_of_you, random_directed, random_undirected
+from random_models import one_of_you
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical import Factor, GraphicalModel, draw, in_rows
-from semgrid_edu.graphical.drawing import Dashed, curve
-from semgrid_edu.graphical.layout import NODE
+from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, draw, in_rows
+from semgrid_edu.graphical.rendering import NODE, GraphPicture
 
 ROWS = in_rows(["m1", "m2"], ["z"])
 
@@ -45,8 +42,10 @@ def test_a_directed_model_has_a_node_per_variable_and_an_arrow_per_parent():
 
 def test_an_undirected_model_has_a_square_per_factor_and_a_line_per_variable_of_it():
     model = GraphicalModel([Factor("a", [1, 2]), Factor(("a", "b"), [[2, 1], [1, 2]])])
-    ax = draw(model)
+    ax = draw(model, positions=in_rows(["a", "b"]))
     assert len(pieces(ax, Rectangle)) == 2
+    squares = [np.mean(square.get_bbox().get_points(), axis=0) for square in pieces(ax, Rectangle)]
+    np.testing.assert_allclose(squares, [(-0.35, 0.35), (0.5, 0)], atol=1e-9)
     assert len(ax.lines) == 3
     assert not pieces(ax, FancyArrow)
 
@@ -86,47 +85,15 @@ def test_equations_and_own_labels_are_written():
 def test_it_draws_into_the_given_axes_and_opens_no_figure():
     figure, axes = plt.subplots(1, 2, figsize=(4, 2))
     for ax, model in zip(axes, (one_of_you(), GraphicalModel(one_of_you().factors)), strict=True):
-        assert draw(model, ax=ax) is ax
+        assert draw(model, ax=ax, positions=ROWS) is ax
     figure.canvas.draw()
     assert plt.get_fignums() == [figure.number]
     assert min(text.get_fontsize() for ax in axes for text in ax.texts) >= 8
 
 
-@pytest.mark.parametrize("make", [random_directed, random_undirected])
-@pytest.mark.parametrize("seed", range(8))
-def test_automatic_places_keep_nodes_apart_and_inside(make, seed):
-    model = make(seed)
-    ax = draw(model)
-    ax.figure.canvas.draw()
-    places = centres(ax)
-    assert len(places) >= len(model.names)
-    assert all(np.hypot(*np.subtract(one, other)) > 0.2 for one, other in itertools.combinations(places, 2))
-    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    assert all(left < x < right and bottom < y < top for x, y in places)
-
-
-def test_many_factors_around_one_variable_find_a_place():
-    ax = draw(GraphicalModel([Factor("x", [1, 2])] * 12 + [Factor(("x", "y"), np.ones((2, 2)))] * 12))
-    squares = [np.mean(square.get_bbox().get_points(), axis=0) for square in pieces(ax, Rectangle)]
-    assert len(squares) == 24
-    assert all(np.hypot(*(one - other)) > 0.25 for one, other in itertools.combinations(squares, 2))
-
-
-def test_parents_stand_above_their_children():
-    model = chain(3)[0]
-    ax = draw(model)
-    heights = {text.get_text(): text.xy[1] for text in ax.texts}
-    assert heights["$x_{0}$"] > heights["$x_{1}$"] > heights["$x_{2}$"] > heights["$z_{2}$"]
-
-
 def test_rows_are_centred_and_gaps_stay_free():
     assert in_rows(["a", "b", "c"], ["d"]) == {"a": (0, 0), "b": (1, 0), "c": (2, 0), "d": (1, -1)}
     assert in_rows(["a", None, "c"], [None, "d"]) == {"a": (0, 0), "c": (2, 0), "d": (1.5, -1)}
-
-
-def test_there_must_be_something_to_draw():
-    with pytest.raises(ArgumentError, match="at least one variable"):
-        draw(GraphicalModel([Factor((), 1.0)]))
 
 
 @pytest.mark.parametrize(
@@ -136,11 +103,12 @@ def test_there_must_be_something_to_draw():
         ({"plates": {"K": ["w"]}}, "found w"),
         ({"equations": {"P(w)": "w"}}, r"equations: .* found P\(w\)"),
         ({"positions": dict.fromkeys(["m1", "m2", "z"], (0, 0))}, "one for m1, m2, z"),
+        ({"positions": {"m1": (0, 0)}}, "none for m2, z"),
     ],
 )  # fmt: skip
 def test_unknown_names_and_nodes_on_top_of_each_other_are_refused(arguments, says):
     with pytest.raises(ArgumentError, match=says):
-        draw(one_of_you(), **arguments)
+        draw(one_of_you(), **{"positions": ROWS} | arguments)
 
 
 def test_a_straight_dashed_edge_stands_for_the_arrow_and_a_bent_one_beside_it():
@@ -152,8 +120,9 @@ def test_a_straight_dashed_edge_stands_for_the_arrow_and_a_bent_one_beside_it():
 
 
 def test_a_curve_begins_and_ends_at_the_outlines_of_its_nodes():
-    places, names = {"a": (0.0, 0.0), "b": (2.0, 0.0)}, {"a": "a", "b": "b"}
-    start, middle, end = curve(Dashed(("a", "b"), bend=0.25), places, names)
+    picture = GraphPicture(one_of_you(), {"m1": (0.0, 0.0), "m2": (2.0, 0.0), "z": (1.0, -1.0)}, {}, {})
+    picture.connect(Dashed(("m1", "m2"), bend=0.25))
+    start, middle, end = picture.curves[0][1]
     np.testing.assert_allclose([np.hypot(*start), np.hypot(*(end - (2, 0)))], NODE / 2 + 0.03)
     np.testing.assert_allclose(middle, (1, 1))
 

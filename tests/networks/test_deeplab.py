@@ -4,8 +4,7 @@ from torch import nn
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import build_segmenter
-from semgrid_edu.networks.backbones.deeplab import DeepLab, interpolate
-from semgrid_edu.networks.backbones.resnet import ResNet
+from semgrid_edu.networks.deeplab import DeepLab, ResNet, interpolate
 
 
 def _count(module):

@@ -4,8 +4,8 @@ import torch
 from torch import nn
 
 from semgrid_edu.networks import build_segmenter
-from semgrid_edu.networks.backbones.fcn import enlarge
-from semgrid_edu.networks.backbones.vgg import Vgg
+from semgrid_edu.networks.fcn import enlarge
+from semgrid_edu.networks.vgg import Vgg
 
 PAPER = (64, 128, 256, 512, 512)
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SEGMENTERS, build_net, load_imagenet, load_net, save_net
-from semgrid_edu.networks.backbones.segmenter import Segmenter
+from semgrid_edu.networks.segmenter import Segmenter
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.workshop.commands.main import app
 

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from semgrid_edu.fast import Cmcdot, predict
+from semgrid_edu.fast.occupancy import cmcdot
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, PlanarMotion, SensorModel, State, cmcdot, predict
+from semgrid_edu.occupancy import Belief, CmcdotParams, PlanarMotion, SensorModel, State
 
 SPEC, SPEED, PERIOD = GridSpec.compact(), 10.0, 0.1
 REAR, FRONT, RIGHT, LEFT = 12.0, 16.0, -3.4, -1.8

@@ -1,4 +1,4 @@
-"""The whole filter on small worlds whose truth is known."""
+"""The whole filter on small worlds whose truth is known: the compiled one, and where it says so the book's as well."""
 
 import os
 import subprocess
@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 from worlds.lecture_04_scenes import hit_cells
 
+from semgrid_edu import fast, occupancy
 from semgrid_edu.camera import Camera, rigid_transform
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import Cmcdot, track_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Cmcdot, CmcdotParams, PlanarMotion, State, track_drive
+from semgrid_edu.occupancy import CmcdotParams, PlanarMotion, State
 
 SMALL = GridSpec(0, 40, -10, 10, 0.5)
 PARAMS = CmcdotParams(n_particles=50_000)
@@ -28,18 +30,23 @@ def street(time: float) -> list[Box]:
     return [WALL, PARKED, Box.around(36 - 8 * time, 3, 4, 1.8, 1.5), Box.around(12 + 6 * time, -2, 4, 1.8, 1.5)]
 
 
-def drive(speed: float, steps: int, spec: GridSpec = SMALL, seed: int = 0):
+def drive(speed: float, steps: int, spec: GridSpec = SMALL, seed: int = 0, filter_class: type = Cmcdot):
     """Yield time, the vehicle's x, the scan and the belief, for a vehicle that drives along x."""
-    tracker, rng = Cmcdot(spec, PARAMS, seed), np.random.default_rng(seed)
+    tracker, rng = filter_class(spec, PARAMS, seed), np.random.default_rng(seed)
     for k in range(steps):
         x = speed * k * 0.1
         points = scan_boxes(street(k * 0.1), x=x, noise=0.02, rng=rng)
         yield k * 0.1, x, points, tracker.step(points, PlanarMotion(speed * 0.1, 0, 0), 0.1)
 
 
-@pytest.fixture(scope="module", params=[0.0, 4.0], ids=["standing", "driving"])
+@pytest.fixture(
+    scope="module",
+    params=[(0.0, fast.Cmcdot), (4.0, fast.Cmcdot), (4.0, occupancy.Cmcdot)],
+    ids=["standing", "driving", "driving, the book's filter"],
+)
 def street_seen(request):
-    return list(drive(request.param, 26))
+    speed, filter_class = request.param
+    return list(drive(speed, 26, filter_class=filter_class))
 
 
 @pytest.fixture(scope="module")
@@ -160,10 +167,11 @@ def test_without_scans_what_was_seen_is_forgotten():
     st.sampled_from([0.0, 0.1, 5.0]),
     st.floats(-100, 100),
     st.floats(-7, 7),
+    st.sampled_from([fast.Cmcdot, occupancy.Cmcdot]),
 )
-def test_any_scans_keep_every_cell_a_distribution(seed, count, spread, dt, shift, yaw):
+def test_any_scans_keep_every_cell_a_distribution(seed, count, spread, dt, shift, yaw, filter_class):
     rng = np.random.default_rng(seed)
-    tracker = Cmcdot(SMALL, CmcdotParams(n_particles=2000), seed)
+    tracker = filter_class(SMALL, CmcdotParams(n_particles=2000), seed)
     for _ in range(3):
         points = rng.normal(0, 1, (count, 4)) * [spread, spread, 1, 1] + [10, 0, 0.5, 0]
         belief = tracker.step(points, PlanarMotion(shift, 0, yaw), dt)
@@ -213,7 +221,8 @@ PAGES = """
 import resource
 import numpy as np
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Cmcdot, PlanarMotion
+from semgrid_edu.fast import Cmcdot
+from semgrid_edu.occupancy import PlanarMotion
 
 wall = np.array([[20.0 + x, y, 1.0] for x in range(30) for y in np.arange(-10, 10, 0.1)], np.float32)
 tracker = Cmcdot(GridSpec.paper())
@@ -239,6 +248,7 @@ def test_the_memory_of_one_step_serves_the_next(environment):
 
 
 def test_importing_the_filter_loads_nothing_heavy():
-    code = "import sys, semgrid_edu.occupancy as _; print({'torch', 'matplotlib', 'scipy.stats'} & set(sys.modules))"
+    heavy = {"torch", "matplotlib", "scipy.stats", "numba"}
+    code = f"import sys, semgrid_edu.occupancy as _; print({heavy} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from semgrid_edu import fast
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import Cmcdot, track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
-    Cmcdot,
     CmcdotParams,
     FilterState,
     PlanarMotion,
@@ -15,8 +16,6 @@ from semgrid_edu.occupancy import (
     State,
     SystematicResampling,
     resample,
-    resample_literal,
-    track_drive,
 )
 
 SPEC = GridSpec(0, 20, -5, 5, 0.5)
@@ -84,9 +83,9 @@ def test_both_twins_draw_by_it():
     state = FilterState.unknown(SPEC)
     state.probability[State.DYNAMIC], state.probability[State.UNKNOWN] = 0.25, 0.75
     state.newborn[:] = 0.25
-    twins = resample, resample_literal
-    fast, literal = (twin(state, SPEC, params_with(Stratified()), np.random.default_rng(0)) for twin in twins)
-    np.testing.assert_allclose(fast.particles.position, literal.particles.position, atol=1e-5)
+    twins = resample, fast.resample
+    book, compiled = (twin(state, SPEC, params_with(Stratified()), np.random.default_rng(0)) for twin in twins)
+    np.testing.assert_allclose(book.particles.position, compiled.particles.position, atol=1e-5)
 
 
 class Returns:

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import rigid_transform
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast.occupancy.planar_motion import _look_up, look_up
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion
-from semgrid_edu.occupancy.planar_motion import _look_up, look_up
 
 metres, radians = st.floats(-50, 50), st.floats(-3, 3)
 motions = st.builds(PlanarMotion, metres, metres, radians)

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semgrid_edu.occupancy.polar import ROUGH, beam_of, beams_of, rough_azimuth
+from semgrid_edu.fast.occupancy.polar import ROUGH, beam_of, beams_of, rough_azimuth
+from semgrid_edu.occupancy import polar
 
 BEAMS = st.sampled_from([1, 2, 7, 360, 1200, 36_000, 400_000])
 
@@ -43,7 +44,8 @@ def test_the_same_on_the_axes_and_at_the_origin(dtype):
 
 def test_beams_begin_behind_the_vehicle_and_go_counter_clockwise():
     right_behind, right, ahead, left = [-1, -0.01], [0.0, -1], [1, 0.0], [0.0, 1]
-    assert beams_of(*np.transpose([right_behind, right, ahead, left]), 4).tolist() == [0, 1, 2, 3]
+    for of in (beams_of, polar.beams_of):
+        assert of(*np.transpose([right_behind, right, ahead, left]), 4).tolist() == [0, 1, 2, 3]
 
 
 def test_rough_azimuths_err_by_less_than_half_of_what_they_may():

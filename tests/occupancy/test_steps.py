@@ -9,6 +9,7 @@ from filterpy.monte_carlo import resampling
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from semgrid_edu import fast, occupancy
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
@@ -264,18 +265,19 @@ OTHER = GridSpec(0, 12, -4, 4, 1)
 @pytest.mark.parametrize(
     ("step", "name"),
     [
-        (lambda state, rng: move(state, OTHER, PlanarMotion(1, 0, 0)), "state"),
-        (lambda state, rng: predict(state, OTHER, PARAMS, 0.1, rng), "state"),
-        (lambda state, rng: resample(state, OTHER, PARAMS, rng), "state"),
-        (lambda state, rng: update(state, OTHER, Evidence(*np.ones((2, *OTHER.shape))), PARAMS), "state"),
-        (lambda state, rng: update(state, GRID, Evidence(*np.ones((2, *OTHER.shape))), PARAMS), "evidence"),
-        (lambda state, rng: update(state, GRID, Evidence(*np.ones((2, 1, 4))), PARAMS), "evidence"),
+        (lambda of, state, rng: of.move(state, OTHER, PlanarMotion(1, 0, 0)), "state"),
+        (lambda of, state, rng: of.predict(state, OTHER, PARAMS, 0.1, rng), "state"),
+        (lambda of, state, rng: of.resample(state, OTHER, PARAMS, rng), "state"),
+        (lambda of, state, rng: of.update(state, OTHER, Evidence(*np.ones((2, *OTHER.shape))), PARAMS), "state"),
+        (lambda of, state, rng: of.update(state, GRID, Evidence(*np.ones((2, *OTHER.shape))), PARAMS), "evidence"),
+        (lambda of, state, rng: of.update(state, GRID, Evidence(*np.ones((2, 1, 4))), PARAMS), "evidence"),
     ],
 )
-def test_a_belief_or_a_scan_over_other_cells_is_refused(step, name):
+@pytest.mark.parametrize("module", [occupancy, fast], ids=["book", "fast"])
+def test_a_belief_or_a_scan_over_other_cells_is_refused(module, step, name):
     """Such as over the vehicle's cells instead of the map's: compiled loops would read past the end of them."""
     with pytest.raises(ArgumentError, match=f"^{name}: expected shape"):
-        step(random_state(0), np.random.default_rng(0))
+        step(module, random_state(0), np.random.default_rng(0))
 
 
 @pytest.mark.parametrize("field", ["position", "velocity", "weight"])

@@ -7,15 +7,15 @@ import pytest
 import torch
 from tiny_drive import DATE, write_tiny_drive
 
-from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
+from semgrid_edu.crf import CrfParams, unary_from_log_probability
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import real_weights, sample_weights
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import mean_field, track_drive
 from semgrid_edu.frame import Frame
-from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, build_net, load_net
-from semgrid_edu.occupancy import CmcdotParams, track_drive
-from semgrid_edu.pipeline import STAGES, Stages, network_image, run_pipeline, run_side_by_side
+from semgrid_edu.occupancy import CmcdotParams
+from semgrid_edu.pipeline import STAGES, Stages, network_image, run_frame, run_pipeline
 
 FEW = CmcdotParams(n_particles=2000)
 
@@ -71,7 +71,7 @@ def assert_equal_results(result, expected):
 
 
 def test_the_stages_of_a_net_do_what_the_net_does(drive, net, results):
-    for result, expected in zip(run_pipeline(drive, Stages.of(net, FEW)), results, strict=True):
+    for result, expected in zip(run_pipeline(drive, Stages.fast(net, FEW)), results, strict=True):
         assert_equal_results(result, expected)
 
 
@@ -86,56 +86,41 @@ def test_stages_that_are_left_out_are_the_packages_own(drive):
         np.testing.assert_array_equal(result.refined, expected.grid)
 
 
-def test_without_learned_stages_left_out_no_network_is_read(drive, monkeypatch):
-    monkeypatch.setattr("semgrid_edu.pipeline.stages.load_net", None)
-    small = Architecture(image_size=(6, 20), grid=GridSpec(0, 4, -2, 2, 1), heights=(0.0, 1.0))
-    stages = Stages(
-        segment=lambda image: np.ones((14, 6, 20)),
-        sample=lambda s: np.ones((14, 2, 4, 4)),
-        fuse=lambda p, o: np.full((14, 4, 4), -np.log(14)),
-        architecture=small,
-    )
-    for result in run_pipeline(drive, stages, FEW):
-        assert result.belief.probability.shape == (4, 4, 4)
-        np.testing.assert_allclose(result.refined, 1 / 14, rtol=1e-5)
+def test_the_book_gives_what_the_fast_twins_give(drive, net):
+    """The same random numbers, in double and in single precision."""
+    few = CmcdotParams(n_particles=200)
+    fast = next(run_pipeline(drive, Stages.fast(net, few, memory=True)))
+    book = next(run_pipeline(drive, Stages.of(net, few, memory=True)))
+    np.testing.assert_allclose(book.belief.probability, fast.belief.probability, atol=1e-4)
+    for name in ("scores", "grid", "refined", "remembered"):
+        np.testing.assert_allclose(getattr(book, name), getattr(fast, name), atol=2e-3)
 
 
-def test_sets_of_stages_side_by_side_give_what_each_gives_alone_and_share_the_same_work(drive, net, results):
-    calls = []
-
-    def segment(image):
-        calls.append(image)
-        return own.segment(image)
-
-    own = Stages.of(net, FEW)
-    first = replace(own, segment=segment)
-    second = replace(first, refine=lambda log_g, o: np.exp(log_g))
-    for (a, b), expected in zip(run_side_by_side(drive, first, second), results, strict=True):
-        assert_equal_results(a, expected)
-        assert_equal_results(b, replace(expected, refined=expected.grid))
-    assert len(calls) == len(drive)
+def test_run_frame_carries_the_filter_from_frame_to_frame(drive, net, results):
+    stages = Stages.fast(net, FEW)
+    for frame, expected in zip(drive, results, strict=True):
+        assert_equal_results(run_frame(frame, stages), expected)
 
 
-def test_networks_with_other_image_networks_are_mixed_and_compared(drive, net):
-    """The shipped real network has three image networks, and FCN is another one: their stages pass the same arrays."""
-    own = Stages.of(net, FEW)
-    real = Stages.of(load_net(real_weights(), drive.camera), FEW)
-    fcn = Stages.of(build_net(Architecture("fcn"), drive.camera).eval(), FEW)
-    mixed = replace(real, segment=None, sample=None).over(own)
-    for a, b, c, d in run_side_by_side(drive[:1], own, real, fcn, mixed):
-        assert a.grid.shape == b.grid.shape == c.grid.shape
-        np.testing.assert_array_equal(d.scores, a.scores)
-        assert not np.array_equal(d.grid, a.grid)
+def test_a_set_can_be_used_for_several_drives(drive, net, results):
+    stages = Stages.fast(net, FEW)
+    for _ in range(2):
+        for result, expected in zip(run_pipeline(drive, stages), results, strict=True):
+            assert_equal_results(result, expected)
 
 
-def test_only_complete_sets_of_one_architecture_run_side_by_side(drive, net):
-    own = Stages.of(net)
-    for other, message in (
-        (Stages(refine=lambda log_g, o: np.exp(log_g)), r"complete sets of stages, .* found only \('refine',\)"),
-        (replace(own, architecture=Architecture(heights=(0.0,))), "one architecture"),
-    ):
-        with pytest.raises(ArgumentError, match=f"^several: expected {message}"):
-            next(run_side_by_side(drive, own, other))
+def test_stages_of_networks_with_other_image_networks_can_be_mixed(drive, net, results):
+    """The shipped real network has three image networks: its stages take and give the same arrays."""
+    real = Stages.fast(load_net(real_weights(), drive.camera), FEW)
+    mixed = replace(real, segment=None, sample=None).over(Stages.fast(net, FEW))
+    result = next(run_pipeline(drive, mixed))
+    np.testing.assert_array_equal(result.scores, results[0].scores)
+    assert not np.array_equal(result.grid, results[0].grid)
+
+
+def test_a_set_that_lacks_stages_does_not_start(net):
+    with pytest.raises(ArgumentError, match=r"^stages: expected all of track, .*, found none for fuse"):
+        replace(Stages.fast(net), fuse=None).started()
 
 
 @pytest.mark.parametrize("stages", [lambda log_g, o: np.exp(log_g), {"refine": None}, Stages, None])

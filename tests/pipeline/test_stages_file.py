@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.pipeline import load_stages
+from semgrid_edu.workshop.demo.stages_file import load_stages
 
 
 def write(folder, text, name="my_stages.py"):

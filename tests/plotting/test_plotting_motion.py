@@ -7,14 +7,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from matplotlib.offsetbox import OffsetImage
-from matplotlib.patches import Ellipse
 from matplotlib.text import Text
 from PIL import Image
 
 from semgrid_edu import plotting
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Belief, BofState, Particles, State, VelocityLattice, bof_velocity
+from semgrid_edu.occupancy import Belief, Particles, State
 from semgrid_edu.plotting.moving import MAX_POINTS
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -112,47 +111,6 @@ def test_no_particles_are_no_points():
     assert len(ax.collections[0].get_offsets()) == 0
 
 
-def test_the_spread_of_velocities_is_marked_by_mean_and_two_standard_deviations():
-    # four velocities around (6, 1): variance 4 forward, 1 to the left, not correlated; weights need not sum to 1
-    velocity = np.array([[8, 2], [8, 0], [4, 2], [4, 0]])
-    ax = plotting.velocity_spread(velocity, np.full(4, 3.0))
-    (ellipse,) = ax.findobj(Ellipse)
-    assert ellipse.center == (1, 6)
-    along = np.radians(ellipse.angle)
-    np.testing.assert_allclose([ellipse.width, ellipse.height], [8, 4])
-    np.testing.assert_allclose(np.abs([np.cos(along), np.sin(along)]), [0, 1], atol=1e-9)
-    np.testing.assert_allclose(ax.collections[0].get_offsets(), velocity[:, ::-1])
-    left, right = ax.get_xlim()
-    assert left > right, "what moves to the left is drawn on the left"
-
-
-def test_an_ellipse_leans_as_its_velocities_do():
-    # all spread lies along forward = left, so the long axis is that diagonal, and the short one has no length
-    _, ax = plt.subplots()
-    (ellipse,) = plotting.velocity_ellipse(np.zeros(2), np.array([[1, 1], [1, 1]]), ax).findobj(Ellipse)
-    np.testing.assert_allclose([ellipse.width, ellipse.height], [4 * np.sqrt(2), 0], atol=1e-6)
-    assert ellipse.angle % 180 == pytest.approx(45)
-
-
-def test_the_ellipse_of_a_single_velocity_is_a_point_however_it_was_rounded():
-    lattice = VelocityLattice()
-    spec = GridSpec(0, len(lattice) - 1, 0, 1, 1)
-    state = BofState.nothing_known(spec, lattice)
-    weight = np.random.default_rng(0).uniform(0.1, 1, len(lattice) - 1)
-    state.occupied[np.arange(1, len(lattice)), np.arange(len(lattice) - 1), 0] = weight
-    mean, covariance = bof_velocity(state)
-    _, ax = plt.subplots()
-    for k in range(0, len(lattice) - 1, 10):
-        ellipse = plotting.velocity_ellipse(mean[:, k, 0], covariance[:, :, k, 0], ax).patches[-1]
-        assert max(ellipse.width, ellipse.height) < 0.1
-
-
-def test_an_area_is_a_weight():
-    ax = plotting.velocity_spread(np.eye(2), np.array([1.0, 3.0]))
-    first, second = ax.collections[0].get_sizes()
-    assert second == pytest.approx(3 * first)
-
-
 def test_an_animation_shows_each_belief_with_its_time():
     beliefs, times = [scene(row) for row in range(4)], [5.0, 5.1, 5.2, 5.3]
     animation = plotting.animate_occupancy(SPEC, (b for b in beliefs), times, "something moves down")
@@ -190,14 +148,6 @@ def test_an_animation_of_one_belief_stands_still():
         (lambda: plotting.velocity_wheel(SPEC, np.zeros((3, 4, 2)), np.zeros((2, 4, 2))), "probability"),
         (lambda: plotting.occupancy_colours(np.full((4, 4, 2), np.nan)), "probability"),
         (lambda: plotting.velocity_colours(np.zeros((3, 4))), "velocity"),
-        (lambda: plotting.velocity_spread(np.zeros((3, 2)), np.ones(2)), "velocity"),
-        (lambda: plotting.velocity_spread(np.zeros((2, 2)), np.zeros(2)), "weight"),
-        (lambda: plotting.velocity_spread(np.zeros((2, 2)), np.array([1, -1])), "weight"),
-        (lambda: plotting.velocity_spread(np.zeros((2, 2)), np.array([1, np.inf])), "weight"),
-        (lambda: plotting.velocity_spread(np.full((2, 2), np.nan), np.ones(2)), "velocity"),
-        (lambda: plotting.velocity_ellipse(np.zeros(2), np.diag([1, -1]), plt.figure().gca()), "covariance"),
-        (lambda: plotting.velocity_ellipse(np.zeros(2), np.full((2, 2), np.nan), plt.figure().gca()), "covariance"),
-        (lambda: plotting.velocity_ellipse(np.zeros(3), np.eye(2), plt.figure().gca()), "covariance"),
         (lambda: plotting.animate_occupancy(SPEC, [], [], "none"), "times"),
         (lambda: plotting.animate_occupancy(SPEC, [scene()] * 2, [0.0], "two"), "times"),
         (lambda: plotting.animate_occupancy(SPEC, [scene()] * 2, [1.0, 1.0], "two"), "times"),

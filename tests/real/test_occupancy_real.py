@@ -11,8 +11,9 @@ import pytest
 from worlds.lecture_04_scenes import hit_cells
 
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import SensorModel, State, track_drive
+from semgrid_edu.occupancy import SensorModel, State
 from semgrid_edu.occupancy.sensor import prepare_scan
 
 pytestmark = pytest.mark.real

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from semgrid_edu.datasets import PandasetScene
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.workshop.simulation.real_excerpt import needed_returns
 
 pytestmark = pytest.mark.real

@@ -10,8 +10,9 @@ import pytest
 from worlds.lecture_04_scenes import hit_cells
 
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import State, track_drive
+from semgrid_edu.occupancy import State
 from semgrid_edu.plotting.grids import velocity_arrows
 
 pytestmark = pytest.mark.real

@@ -11,9 +11,9 @@ from semgrid_edu.camera import invert_rigid
 from semgrid_edu.datasets import KittiRawDrive, PandasetScene
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.real_excerpt import needed_returns, write_real_excerpt

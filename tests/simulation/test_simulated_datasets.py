@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from semgrid_edu.datasets import KittiRawDrive, load_index
-from semgrid_edu.datasets.readers.kitti_raw import drive_folder
+from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.storage.files import sha256, sole_writer

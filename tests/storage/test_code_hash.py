@@ -6,14 +6,13 @@ from pathlib import Path
 import pytest
 
 import semgrid_edu
-from semgrid_edu.datasets import label_policies, training_arrays
-from semgrid_edu.datasets.readers import kitti_raw
+from semgrid_edu.datasets import kitti_raw, label_policies, training_arrays
 from semgrid_edu.storage.provenance import ROOT, code_hash, import_closure
 
 PACKAGE = Path(semgrid_edu.__file__).parent
 ARRAYS = [Path(module.__file__).relative_to(ROOT) for module in (training_arrays, kitti_raw)]
 LABELS = [Path(label_policies.__file__).relative_to(ROOT)]
-READERS, FILTER = "datasets/readers", "occupancy"
+READERS, FILTER = "datasets", "occupancy"
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +69,7 @@ def test_a_change_of_how_labels_are_made_changes_theirs_alone(keys, before):
     ("module", "old", "new"),
     [
         (f"{READERS}/frames.py", "Read the returns of one scan.", "Read all returns of a scan."),
-        (f"{READERS}/drive_doubts.py", "metres. KITTI's HDL-64E", "metres. The HDL-64E"),
+        (f"{READERS}/frames.py", "metres. KITTI's HDL-64E", "metres. The HDL-64E"),
         (f"{READERS}/kitti_raw.py", "# a scan that was never recorded", "# what was never recorded"),
         (f"{READERS}/frames.py", "class FrameSequence", "\n\nclass FrameSequence"),
         ("networks/fusion.py", "N_REDUCED = 16", "N_REDUCED = 17"),

@@ -4,6 +4,7 @@ import base64
 import gzip
 import os
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -93,6 +94,17 @@ def test_runs_nothing(tmp_path, monkeypatch, kind):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["table.pkl.gz"]
 
 
+def test_reaches_nothing_inside_of_what_is_allowed(tmp_path):
+    with pytest.raises(DataError, match=r"names pandas\.DataFrame\.to_pickle, which no table needs"):
+        read_pickled_table(written(tmp_path, gzip.compress(b"\x80\x04cpandas\nDataFrame.to_pickle\n.")))
+
+
+def test_names_the_extra_when_pandas_is_missing(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(DataError, match=r"pip install 'semgrid_edu\[pandaset\]'"):
+        read_pickled_table(tmp_path / "table.pkl.gz")
+
+
 @pytest.mark.parametrize("kind", ["cut short", "not packed", "packed noise", "a damaged pickle", "empty"])
 def test_says_that_a_file_is_damaged(tmp_path, kind):
     sound = pickled_table({"x": np.arange(100.0)})
@@ -124,11 +136,11 @@ def test_a_small_file_cannot_ask_for_much_memory(tmp_path, content):
 
 
 def test_a_column_is_a_row_of_numbers(tmp_path):
-    with pytest.raises(DataError, match="columns differ in length"):
+    with pytest.raises(DataError, match="a column of the shape"):
         read_pickled_table(written(tmp_path, gzip.compress(pickled_table({"x": np.zeros((4, 3))}))))
 
 
 def test_an_array_of_anything_else_is_refused(tmp_path):
     for values in (np.zeros(2, "M8[s]"), np.zeros(2, [("a", "f8")])):
-        with pytest.raises(DataError, match=r"an array of the type|expected a gzipped pickle"):
+        with pytest.raises(DataError, match="expected a gzipped pickle"):
             read_pickled_table(written(tmp_path, gzip.compress(pickled_table({"x": values}))))

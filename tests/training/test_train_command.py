@@ -14,12 +14,13 @@ from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import SEGMENTERS, Architecture, build_net, load_net, save_net
-from semgrid_edu.networks.backbones.fcn import Fcn
+from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.training import run as experiment
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 from semgrid_edu.workshop.commands.main import app
+from semgrid_edu.workshop.flaws import TruthFlaws
 
 
 class _Noise:
@@ -155,7 +156,7 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     assert given["net"] == experiment.architecture("segnet", "paper")
     assert given["imagenet"] == (_Net.segmenter, imagenet)
     net, dataset, folder, params, seed, resume, device = given["train"]
-    assert dataset.truth == LidarTruth(POLICIES[truth])
+    assert dataset.truth == LidarTruth(POLICIES[truth], TruthFlaws())
     assert (net, folder, seed, resume, device) == (_Net, out, 2, True, torch.device("cpu"))
     assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
     provenance = json.loads((out / "provenance.json").read_text())

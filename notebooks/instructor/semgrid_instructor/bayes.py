@@ -6,8 +6,8 @@ import numpy as np
 from filterpy import discrete_bayes
 from scipy.linalg import expm, logm
 
-from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.occupancy import CmcdotParams, transition_matrix
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_instructor import close, generator, hidden, keeping
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from filterpy.discrete_bayes import update as discrete_update
 from scipy import ndimage
 
-from semgrid_edu.answers import answer_array, answer_arrays
+from semgrid_edu.workshop.course.answers import answer_array, answer_arrays
 from semgrid_instructor import close, generator, hidden, keeping
 
 

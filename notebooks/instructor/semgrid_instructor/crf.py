@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from semgrid_edu.answers import answer_array, answer_number
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_instructor import close, generator, hidden, keeping
 
 W1, W2 = 4.0, 3.0

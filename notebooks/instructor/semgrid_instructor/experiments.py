@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.metrics import METRICS, class_accuracy
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_edu.workshop.scoring.confusions import drive_confusions
 from semgrid_edu.workshop.scoring.statistics import drive_interval
 from semgrid_instructor import close, generator, hidden

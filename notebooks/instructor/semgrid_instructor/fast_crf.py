@@ -1,4 +1,4 @@
-"""Hidden tests of exercise 11, the fast CRF: sums over all pairs and the literal lattice are the reference."""
+"""Hidden tests of exercise 11, the fast CRF: sums over all pairs and the package's simplices are the reference."""
 
 from collections.abc import Callable
 
@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from semgrid_edu.answers import answer_array, answer_number, peak_megabytes
-from semgrid_edu.crf.lattice.literal import enclosing_simplex_literal
+from semgrid_edu.crf import enclosing_simplices
+from semgrid_edu.workshop.course.answers import answer_array, answer_number, peak_megabytes
 from semgrid_instructor import close, generator, hidden, keeping
 
 
@@ -34,8 +34,8 @@ def _vertices(d: int, n: int, seed: int) -> NDArray:
     """Return the corners of the simplices of a cloud of n points in d dimensions, (V, d + 1), shuffled."""
     rng = generator(seed)
     points = rng.normal(0, 4, (n, d + 1))
-    corners = {corner for point in points for corner in enclosing_simplex_literal(point - point.mean())[0]}
-    return rng.permutation(np.array(sorted(corners)))
+    corners, _ = enclosing_simplices(points - points.mean(axis=1, keepdims=True))
+    return rng.permutation(np.unique(corners.reshape(-1, d + 1), axis=0))
 
 
 @hidden
@@ -88,9 +88,12 @@ def check_lattice_filter(lattice_filter: Callable) -> None:
     for d in (1, 2, 3, 5):
         rng = generator(117 + d)
         points = rng.normal(0, 4, (25, d + 1))
-        simplices = [enclosing_simplex_literal(point - point.mean()) for point in points]
+        corners, weights = enclosing_simplices(points - points.mean(axis=1, keepdims=True))
         values = rng.random((25, 3))
-        got = answer_array(lattice_filter([(np.array(c), np.array(w)) for c, w in simplices], values.copy()))
+        got = answer_array(
+            lattice_filter([(c.copy(), w.copy()) for c, w in zip(corners, weights, strict=True)], values.copy())
+        )
+        simplices = [(list(map(tuple, c.tolist())), w) for c, w in zip(corners, weights, strict=True)]
         assert got.shape == values.shape, "another shape"
         vertices = {}
         for (corners, weights), value in zip(simplices, values, strict=True):

@@ -7,9 +7,9 @@ from itertools import combinations, pairwise, permutations
 import numpy as np
 from scipy.special import logsumexp
 
-from semgrid_edu.answers import answer_array
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, enumerate_marginals
 from semgrid_edu.graphical import eliminate as eliminate_exactly
+from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_instructor import close, generator, hidden
 
 

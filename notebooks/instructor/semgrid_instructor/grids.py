@@ -1,4 +1,4 @@
-"""Hidden tests of exercise 02, occupancy grids: scipy, and the package's walk along a ray, are the reference."""
+"""Hidden tests of exercise 02, occupancy grids: held to scipy, and to where a beam enters and leaves each cell."""
 
 from collections.abc import Callable
 
@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, logit
 
-from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.graphical import Factor, product
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.literal.evidence import walk_ray
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_instructor import close, generator, hidden, keeping
 
 CLIPPED = 0.05
@@ -178,11 +177,11 @@ def check_as_belief(as_belief: Callable) -> None:
 
 def _crossed(spec: GridSpec, x: float, y: float) -> NDArray:
     """Return how far the beam to (x, y) runs in each cell, metres, (H, W)."""
-    length = np.hypot(x, y)
-    rows, cols, leaves_at = walk_ray(spec, (0.0, 0.0), np.arctan2(y, x), length)
-    inside = np.zeros(spec.shape)
-    inside[rows, cols] = np.diff(np.minimum(leaves_at, length), prepend=0.0)
-    return inside
+    towards = np.where(np.array([x, y]) == 0, 1e-12, [x, y])
+    near, far = ((spec.centers() - sign * np.copysign(spec.cell / 2, towards)) / towards for sign in (1, -1))
+    enters = near.max(axis=-1).clip(0, 1)
+    leaves = far.min(axis=-1).clip(0, 1)
+    return np.maximum(leaves - enters, 0) * np.hypot(x, y)
 
 
 def _judge_passes(got: NDArray, inside: NDArray, spec: GridSpec) -> None:
@@ -193,7 +192,7 @@ def _judge_passes(got: NDArray, inside: NDArray, spec: GridSpec) -> None:
 
 
 def _judge_beam(beam_evidence: Callable, spec: GridSpec, x: float, y: float) -> None:
-    """Compare one beam with a return in the grid, cell by cell, with the package's walk along the ray."""
+    """Compare one beam with a return in the grid, cell by cell, with where the beam enters and leaves it."""
     got = answer_array(beam_evidence(x, y, spec, 1.5, -0.4))
     assert got.shape == spec.shape, "another shape"
     (row,), (col,), _ = spec.cells(np.array([[x, y]]))

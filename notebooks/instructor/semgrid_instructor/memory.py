@@ -8,7 +8,6 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.answers import answer_array
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
@@ -16,6 +15,7 @@ from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import run_pipeline
+from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_edu.workshop.course.street import frames_since_seen
 from semgrid_instructor import close, generator, hidden, keeping
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from semgrid_edu.answers import answer_array
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
 from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_instructor import close, generator, hidden, keeping
 
 AXES = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
-from semgrid_edu.answers import answer_array
+from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_instructor import close, generator, hidden, keeping
 
 

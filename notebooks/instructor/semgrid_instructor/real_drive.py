@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.camera import invert_rigid, rigid_transform, transform_points
 from semgrid_edu.datasets.samples import real_drive
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_edu.workshop.course.street import semantic_truths, street_results
 from semgrid_instructor import close, generator, hidden
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import correlate, map_coordinates
 from scipy.special import log_softmax
 
-from semgrid_edu.answers import answer_array
+from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_instructor import close, generator, hidden, keeping
 
 

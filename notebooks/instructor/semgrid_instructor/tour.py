@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array
 from semgrid_edu.camera import Camera, project, rigid_transform, transform_points
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import class_accuracy, frequency_weighted_iou, pixel_accuracy
+from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_instructor import close, generator, hidden, keeping
 
 

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from semgrid_edu.answers import answer_array, answer_number
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets.ground_truth import TruthPolicy, lidar_truth
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.graphical import Factor, GraphicalModel, eliminate
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_instructor import close, generator, hidden
 
 

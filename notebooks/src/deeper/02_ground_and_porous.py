@@ -26,8 +26,8 @@ from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import LogOddsGrid, LogOddsParams, PlanarMotion, SensorModel, State, log_odds
-from semgrid_edu.occupancy import scan_evidence, scan_evidence_literal, update_log_odds
-from semgrid_edu.occupancy.literal.evidence import walk_sector
+from semgrid_edu.occupancy import scan_evidence, update_log_odds
+from semgrid_edu.occupancy.ground import walk_sector
 from semgrid_edu.occupancy.polar import beyond_reach
 from semgrid_edu.plotting.colours import STATE_COLOURS, colour_legend
 from semgrid_edu.workshop.simulation import simulate
@@ -36,6 +36,7 @@ from semgrid_edu.workshop.simulation.things.materials import Kind
 
 sys.path.append("..")  # for worlds/, in the folder above
 from worlds.lecture_02_boxes import Box, scan_boxes
+from worlds.lecture_02_rays import evidence_by_rays
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 RED = (225, 20, 30)
@@ -203,7 +204,7 @@ assert 0.5 < np.median(lost) < 1
 # ## Ask each cell for its beam
 #
 # The most literal way from a scan to passed cells is to walk along each ray, from one grid line to the next. The
-# package's fast way turns the question round: it doesn't ask a ray for its cells but **each cell for its beam**. In
+# package turns the question round: it doesn't ask a ray for its cells but **each cell for its beam**. In
 # polar coordinates a scan is one number per beam, its *reach*: the range of its first obstacle, or of its last ground
 # return when it has none. A cell is passed when it ends before the reach of its beam. With $a$ for the side of a
 # cell:
@@ -231,18 +232,18 @@ block = GridSpec(x_min=0, x_max=30, y_min=-10, y_max=10, cell=0.5)
 points = scan_boxes(street, columns=600)
 reach = sensor.scan(points).reach
 passed = look_up(reach, block)
-beyond = beyond_reach(reach, block.shape, block.x_max, block.y_max, block.cell, 0.0, 0.0, 0.0)
+beyond = beyond_reach(reach, block, PlanarMotion())
 np.testing.assert_array_equal(passed, beyond <= -block.cell / 2)
 
 # %% jupyter={"source_hidden": true} alt="left, reach against azimuth: a plateau at 24 m for the wall with a notch at 12 m for the car; middle, the map with grey shadows behind car and wall; right, the same map with red cells along the edges of what is seen"
-fast, literal = scan_evidence(points, block, sensor), scan_evidence_literal(points, block, sensor)
-differ = (fast.occupied != literal.occupied) | (fast.free != literal.free)
+asked, walked = scan_evidence(points, block, sensor), evidence_by_rays(points, block, sensor)
+differ = (asked.occupied != walked.occupied) | (asked.free != walked.free)
 fig, axes = plt.subplots(1, 3, figsize=(11, 4), layout="constrained", width_ratios=(1.3, 1, 1))
 azimuth = (np.arange(sensor.beams) + 0.5) / sensor.beams * 360 - 180
 axes[0].plot(azimuth, reach, color="tab:red")
 axes[0].set(xlim=(89, -89), xlabel="azimuth, to the left [degrees]", ylabel="reach [m]", title="one range per beam")
-draw(block, believed(fast), axes[1], "each cell asks for its beam")
-draw(block, believed(fast), axes[2], "where walking differs", differ, "the two ways\ndiffer")
+draw(block, believed(asked), axes[1], "each cell asks for its beam")
+draw(block, believed(asked), axes[2], "where walking differs", differ, "the two ways\ndiffer")
 plt.show()
 
 # %% [markdown]
@@ -255,22 +256,22 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# Walking: a cell is free as soon as any of the rays through it gets to its end. The fast way asks only the beam
+# Walking: a cell is free as soon as any of the rays through it gets to its end. The package asks only the beam
 # through the cell's centre, so it is the more careful one.
 #
 # </details>
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true}
 scan = sample_drive()[0].points_grid
-fast, literal = scan_evidence(scan, spec, sensor), scan_evidence_literal(scan, spec, sensor)
-np.testing.assert_array_equal(fast.occupied > fast.free, literal.occupied > literal.free)  # the same cells are hit
-differ = (fast.occupied != literal.occupied) | (fast.free != literal.free)
+asked, walked = scan_evidence(scan, spec, sensor), evidence_by_rays(scan, spec, sensor)
+np.testing.assert_array_equal(asked.occupied > asked.free, walked.occupied > walked.free)  # the same cells are hit
+differ = (asked.occupied != walked.occupied) | (asked.free != walked.free)
 for name, band in (("up to 20 m", spec.centers()[..., 0] < 20), ("beyond 20 m", spec.centers()[..., 0] >= 20)):
-    seen = band & (literal.occupied != literal.free)
+    seen = band & (walked.occupied != walked.free)
     print(f"{name:<12} {100 * (differ & band).sum() / seen.sum():.0f} % of the cells seen differ")
 jumps = np.mean(abs(np.diff(sensor.scan(scan).reach)) > 1)
 print(f"{100 * jumps:.0f} % of the beams reach more than a metre farther or less far than the next one")
-more = (differ & (literal.free > literal.occupied)).sum() / differ.sum()
+more = (differ & (walked.free > walked.occupied)).sum() / differ.sum()
 print(f"where they differ, walking says free in {100 * more:.0f} % of the cells")
 assert more > 0.8
 
@@ -465,5 +466,5 @@ assert sum(sorted(porous for porous, _ in flips)[-2:]) > 0.9 * sum(porous for po
 # - Himmelsbach, von Hundelshausen, Wuensche, *Fast segmentation of 3D point clouds for ground vehicles*, IV 2010:
 #   walking out the ground.
 # - Amanatides, Woo, *A fast voxel traversal algorithm for ray tracing*, Eurographics 1987: from grid line to grid
-#   line; the package's `semgrid_edu.occupancy.literal.evidence.walk_ray`.
+#   line; the `walk_ray` in `notebooks/worlds/lecture_02_rays.py`.
 # - Back to lecture [02](../02_grids.ipynb).

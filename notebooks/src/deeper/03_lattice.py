@@ -26,7 +26,7 @@ from filterpy.discrete_bayes import update as discrete_update
 from semgrid_edu import plotting
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import BofParams, BofState, Evidence, State, VelocityLattice, WorldModel
-from semgrid_edu.occupancy import bof_predict, bof_predict_literal, bof_update, bof_velocity, scan_evidence
+from semgrid_edu.occupancy import bof_predict, bof_update, bof_velocity, scan_evidence
 from semgrid_edu.occupancy import transition_matrix
 
 sys.path.append("..")  # for worlds/, in the folder above
@@ -35,7 +35,7 @@ from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 NO_CHANGE = ((0.0,) * 4,) * 4
-steady = WorldModel(rates=NO_CHANGE, stop_rate=0, max_acceleration=0, clearing_time=0)  # things move, and that is all
+steady = WorldModel(rates=NO_CHANGE, stop_rate=0, max_acceleration=0, walls=None)  # things move, and that is all
 lattice = VelocityLattice(max_speed=1, spacing=1)
 coarse = VelocityLattice(max_speed=8, spacing=2)
 
@@ -113,9 +113,8 @@ occupied = np.zeros((len(coarse), 11, 11), np.float32)
 occupied[at_4, 5, 5] = 0.5
 changed = accelerate(occupied[:, 5, 5], coarse.velocities, spacing=2, jump=(6 * 0.1) ** 2 / (6 * 2**2))
 hurried = BofParams(coarse, WorldModel(rates=NO_CHANGE, stop_rate=0, max_acceleration=6))
-for package in (bof_predict, bof_predict_literal):
-    predicted = package(state_of(occupied, coarse), square, hurried, dt=0.1)
-    np.testing.assert_allclose(predicted.occupied.sum(axis=(1, 2)), changed, atol=1e-6)
+predicted = bof_predict(state_of(occupied, coarse), square, hurried, dt=0.1)
+np.testing.assert_allclose(predicted.occupied.sum(axis=(1, 2)), changed, atol=1e-6)
 for v in ([4, 0], [6, 0], [2, 0], [4, 2], [4, -2]):
     print(v, f"{changed[coarse.velocities.tolist().index(v)]:.4f}")
 

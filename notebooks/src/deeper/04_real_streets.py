@@ -29,14 +29,17 @@ from IPython.display import Markdown
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu import plotting
+from semgrid_edu.fast import Cmcdot
+from worlds.lecture_04_filters import markdown_table, per_cent
+from worlds.lecture_04_street_scores import LEAST_DYNAMIC, StreetScores
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
-    Cmcdot, CmcdotParams, Evidence, FilterState, Particles, State, predict, update,
+    CmcdotParams, Evidence, FilterState, Particles, State, Walls, predict, update,
 )  # fmt: skip
-from semgrid_edu.occupancy.cellwise import clear_wakes, collide
-from semgrid_edu.occupancy.particles import keeps_pace
+from semgrid_edu.occupancy.cellwise import strike_out
 from semgrid_edu.occupancy.planar_motion import look_up
+from semgrid_edu.occupancy.walls import strike_out_wakes
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 
 sys.path.append("..")  # for worlds/, in the folder above
@@ -285,10 +288,10 @@ def wall_and_particle():
 
 
 # %% tags=["uncover"]
-def uncover(cells, clearing_time):
+def uncover(cells, walls):
     """Uncover a wall cell by cell while one particle flies along with its edge; return P(DYNAMIC) of each new cell."""
     calm = {"rates": ((0.0,) * 4,) * 4, "stop_rate": 0.0, "max_acceleration": 0.0}
-    world = CmcdotParams(first_sight=(1 - P_STATIC, P_STATIC, 0.0), clearing_time=clearing_time, **calm)
+    world = CmcdotParams(first_sight=(1 - P_STATIC, P_STATIC, 0.0), walls=walls, **calm)
     state, found = wall_and_particle(), []
     for row in range(9, 9 - cells, -1):
         occupied = np.full(line.shape, 0.5, np.float32)
@@ -304,7 +307,7 @@ def uncover(cells, clearing_time):
 # %%
 n = np.arange(1, 7)
 odds = P0 / (1 - P0) / P_STATIC**n
-as_it_was = uncover(6, clearing_time=0.0)
+as_it_was = uncover(6, walls=None)
 np.testing.assert_allclose(as_it_was, odds / (1 + odds), atol=1e-4)
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true}
@@ -443,7 +446,7 @@ plt.show()
 # **A car leaves its place.** Where a car was a short time $T_b$ ago, it isn't any more: that place is free now, or
 # something else has come there. A phantom comes *out of a wall that still stands*. So each particle is asked for its
 # **origin**, which is the place where it was, $x - v\,T_b$. If something stands there now, that thing did not fly away.
-# The **look-back time** $T_b$ is half a second (`clearing_time`), and for slow things as long as they need for three
+# The **look-back time** $T_b$ is half a second (`Walls.clearing_time`), and for slow things as long as they need for three
 # cells (`clearing_cells`); what each half of this rule is good for you will measure below.
 #
 # **Ahead of a car the wall ends.** Somebody who sets off also comes out of a place where something stood, and so does
@@ -494,10 +497,10 @@ def collide_literal(cell, a, along_wall):
 
 
 def collide_of_package(cell, a, along_wall):
-    """Ask the package's compiled rule, which works on whole maps."""
-    mixed = np.array(cell, np.float32).reshape(4, 1, 1)
-    zero, arrives, doubtful = (np.full((1, 1), x, np.float32) for x in (0, a, along_wall))
-    return collide(mixed, mixed[DYNAMIC], zero, zero, arrives, doubtful)[0][:, 0, 0]
+    """Ask the package's rule, which works on whole maps."""
+    possible = a * (1 - cell[STATIC]) - along_wall * cell[UNKNOWN]
+    keep, take = strike_out(np.array(a), np.array(possible))
+    return keep * np.array(cell) + take * possible * np.eye(4)[DYNAMIC]
 
 
 for cell in ((0.2, 0, 0, 0.8), (1.0, 0, 0, 0), (0.1, 0.3, 0.2, 0.4)):
@@ -513,7 +516,7 @@ for cell in ((0.2, 0, 0, 0.8), (1.0, 0, 0, 0)):
         "->",
         *(f"{state.name} {p:.2f}" for state, p in zip(State, collide_literal(cell, 0.6, 0.54), strict=True)),
     )
-now = uncover(6, AFTER.clearing_time)
+now = uncover(6, AFTER.walls)
 print("wall on the line, P(DYNAMIC):", *(f"{p:.3f}" for p in now))
 assert now.max() < 0.01
 
@@ -541,10 +544,10 @@ def clear_wake_literal(static, has_left):
 
 cell = np.array([0.1, 0.8, 0, 0.1], np.float32).reshape(4, 1, 1)
 left = np.full((1, 1), 0.5, np.float32)
-hidden = clear_wakes(cell, left, np.full((1, 1), True))[:, 0, 0]
+hidden = strike_out_wakes(cell, left, np.full((1, 1), True))[:, 0, 0]
 np.testing.assert_allclose(hidden[STATIC], clear_wake_literal(0.8, 0.5), atol=1e-6)
 np.testing.assert_allclose(hidden.sum(), 1, atol=1e-6)
-np.testing.assert_array_equal(clear_wakes(cell, left, np.full((1, 1), False)), cell)  # what is seen needs no rule
+np.testing.assert_array_equal(strike_out_wakes(cell, left, np.full((1, 1), False)), cell)  # what is seen needs no rule
 print(*(f"{state.name} {p:.2f}" for state, p in zip(State, hidden, strict=True)))
 
 # %% [markdown]
@@ -567,10 +570,9 @@ print(*(f"{state.name} {p:.2f}" for state, p in zip(State, hidden, strict=True))
 # </details>
 
 # %%
-pace = AFTER.pace(driven=1.0, dt=0.1, cell=spec.cell)
 others = {"beside us": (10, 0), "overtakes": (15, 0), "comes towards us": (-10, 0), "crosses": (0, 1.4)}
-with_us = {name: bool(keeps_pace(*np.array([v], float).T, pace)[0]) for name, v in others.items()}
-assert [name for name, keeps in with_us.items() if keeps] == ["beside us", "overtakes"]
+with_us = AFTER.walls.keeps_pace(np.array(list(others.values())), car_speed=10.0, cell=spec.cell)
+assert [name for name, keeps in zip(others, with_us, strict=True) if keeps] == ["beside us", "overtakes"]
 
 # %% [markdown]
 # In frames 24 to 60 of drive 0013 an arrow of 6 m/s or more stood beside the road in 13.5 % of the frames before this
@@ -658,7 +660,7 @@ print("worse, in per cent:", *lost, sep="\n  ")
 # This is no free lunch. A vehicle that meets fences all day and people now and then may accept the price, one that
 # drives past a bus stop may not. The list leaves out changes of less than 0.3
 # points in the first column or 2 in the others, and shares of fewer than 100 cells. The parameters are yours:
-# `clearing_time=0` switches all three rules off.
+# `walls=None` switches all three rules off.
 #
 # ### Half a second, and at least three cells
 #
@@ -691,9 +693,9 @@ def phantoms_left(params):
 
 
 # %%
-settings = {"before": BEFORE, "new first_sight alone": replace(AFTER, clearing_time=0.0)}
-settings["half a second alone"] = replace(AFTER, clearing_cells=0.0)
-settings |= {f"and at least {k} cells": replace(AFTER, clearing_cells=k) for k in (2, 3, 4, 6)}
+settings = {"before": BEFORE, "new first_sight alone": replace(AFTER, walls=None)}
+settings["half a second alone"] = replace(AFTER, walls=Walls(clearing_cells=0.0))
+settings |= {f"and at least {k} cells": replace(AFTER, walls=Walls(clearing_cells=k)) for k in (2, 3, 4, 6)}
 walkers = {name: walkers_found(params) for name, params in settings.items()}
 ghosts = {name: phantoms_left(params) for name, params in settings.items()}
 assert settings["and at least 3 cells"] == AFTER
@@ -773,10 +775,10 @@ plt.show()
 #
 # ## Questions to try
 #
-# 1. Take `replace(AFTER, clearing_time=t, clearing_cells=0)` for $t$ of 0.1, 0.25, 1 and 2 s, and print `phantoms_left`
+# 1. Take `replace(AFTER, walls=Walls(clearing_time=t, clearing_cells=0))` for $t$ of 0.1, 0.25, 1 and 2 s, and print `phantoms_left`
 #    and `walkers_found`. Why does a short time cost walkers, and why does a long time bring phantoms back? And what
 #    becomes of the origin of a car that brakes if the time is very long?
-# 2. Set `first_sight=(0.47, 0.527, 0.003)`, as if each new cell were beside a wall, with `clearing_time=0`. Do the
+# 2. Set `first_sight=(0.47, 0.527, 0.003)`, as if each new cell were beside a wall, with `walls=None`. Do the
 #    phantoms go? What happens on the street `"convoy"`, to cars that come out of a shadow?
 # 3. Compute `first_sights` for `scenes_of("pedestrians", 1, spec, Suspect())`. How much is DYNAMIC beside something
 #    that stands? Is "doubtful" the right word there?

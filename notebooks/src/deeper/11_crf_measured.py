@@ -9,7 +9,7 @@
 # - say what mean field, messages and early stopping cost, in marginals and in labels, as the coupling grows;
 # - split the error of an approximate CRF into a part from the kernel and a part from stopping early;
 # - choose a way to run the CRF for a given purpose;
-# - say what a search for better weights and widths, or learning them, brings and what it costs.
+# - say what a search for better weights and widths brings and what it costs.
 #
 # **Prerequisites.** Lectures [10](../10_crf.ipynb) and [11](../11_fast_crf.ipynb).
 #
@@ -19,20 +19,22 @@
 
 # %% jupyter={"source_hidden": true}
 import json
+import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 from IPython.display import Markdown
-
 from scipy.special import rel_entr, xlogy
 
 from semgrid_edu import plotting
 from semgrid_edu.crf import CrfParams, free_energy, gram_matrix, log_partition, mean_field_updates
-from semgrid_edu.workshop.studies.crf.crf_coupling import COUPLINGS, random_crf
-from semgrid_edu.workshop.studies.crf.crf_error import crf_error_tables
-from semgrid_edu.stage_models.crf import all_free, coupled
-from semgrid_edu.plotting.charts import coupling_errors, error_against_time
+
+sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_10_crf import all_free, coupled
+from worlds.lecture_11_charts import coupling_errors, error_against_time
+from worlds.lecture_11_coupling import COUPLINGS, random_crf
+from worlds.lecture_11_error import crf_error_tables
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 results = Path("../../docs/results")
@@ -46,7 +48,7 @@ error = json.loads((results / "crf_error.json").read_text(encoding="utf-8"))
 # random CRFs for each of four sizes. Scores are drawn from a normal distribution, occupancy from a Dirichlet
 # distribution (one over numbers that sum to 1), and the coupling $w_1$ goes from 0 to 4, the package's default ($w_2$
 # is 3/4 of it). A grid of 4 x 4 cells and 3 classes has 43 million labellings; visiting each of them gives the exact
-# marginals and the most likely labelling (`semgrid-edu reproduce crf-coupling`). Against these stand mean field, its
+# marginals and the most likely labelling (`worlds/lecture_11_coupling.py`). With these we compare mean field, its
 # fast version by the lattice (lecture 11), and messages (lecture 10): *sum-product* for the marginals, *max-product*,
 # which takes the largest term in place of each sum, for the most likely labelling.
 #
@@ -159,7 +161,7 @@ for seed, w in enumerate(COUPLINGS):
 # %% [markdown]
 # ## Error against time
 #
-# On a real map nothing exact can be computed. What we can do is split what is left. `semgrid-edu reproduce crf-error`
+# On a real map nothing exact can be computed. What we can do is split what is left. `worlds/lecture_11_error.py`
 # runs every way on maps of the sample drive, from one update to a hundred, and measures the total variation of a
 # cell's distribution against three references:
 #
@@ -208,24 +210,18 @@ Markdown(crf_error_tables(error))
 #
 # The default CRF costs about five points of class accuracy on 110 test frames (lectures 10 and 11), and with the
 # exact kernel small classes don't come back (lecture 11). Are its weights and widths to blame? Better ones must not be
-# chosen on the test frames, because whatever is chosen on some frames looks better on them than it is. Two ways were
-# tried with 72 other simulated drives, from which no network has learned (*validation data*):
-#
-# - **Search** (`semgrid-edu search-crf`). First the scores are divided by a temperature, 1.23 for SegNet, chosen such
-#   that of the cells called with 80 % certainty about 80 % are right (*calibration*). Then 120 settings of two weights
-#   and three widths are tried (left picture), and one is chosen for each of the two metrics.
-# - **Learning** (`semgrid-edu reproduce learned-crf`). Five iterations of mean field are a chain of differentiable
-#   steps, so gradient descent can learn weights, widths and *label costs* (a price for each pair of labels, in place of
-#   the Potts rule) like any other layer. Eight variants differ in what they learn, from which drives (*known* ones,
-#   from which the network has learned, or the 72 *new* ones), and by which loss (*plain* cross-entropy, or *balanced*,
-#   where rare classes weigh more).
+# chosen on the test frames, because whatever is chosen on some frames looks better on them than it is. So they were
+# searched on 72 other simulated drives, from which no network has learned (*validation data*). First the scores are
+# divided by a temperature, 1.23 for SegNet, chosen such that of the cells called with 80 % certainty about 80 % are
+# right (*calibration*). Then 120 settings of two weights and three widths are tried (left picture), and one is chosen
+# for each of the two metrics. `worlds/lecture_11_search.py` is such a search in sixty lines.
 #
 # **Predict before you run.** Does any of these CRFs clearly gain in both pixel accuracy and class accuracy on the test
-# frames? And what becomes of the weights, which begin at 4 and 3, when class accuracy is the goal, or when they are learned?
+# frames? And what becomes of the weights, 4 and 3 by default, when class accuracy is the goal?
 #
 # <details><summary>Answer</summary>
 #
-# None clearly gains in both. The weights shrink to a tenth of what they were or less: for class accuracy the best of these
+# None clearly gains in both. For class accuracy the weights shrink to a tenth of the default or less: the best of these
 # CRFs do hardly anything.
 #
 # </details>
@@ -272,11 +268,9 @@ def draw_search(ax):
 
 # %% jupyter={"source_hidden": true}
 def draw_test(ax):
-    """Draw default, searched and learned CRFs, on the test frames, and once more, enlarged, those close to zero."""
+    """Draw default and searched CRFs, on the test frames, and once more, enlarged, those close to zero."""
     close = ax.inset_axes((0.09, 0.1, 0.44, 0.28), xlim=(-0.17, 0.31), ylim=(-0.19, 0.13))
     for on, size in ((ax, 6), (close, 3.5)):
-        for k, name in enumerate(learned["learnt"]):
-            cross(on, learned["gains"][name], "o", "C3", None if k else "SegNet, learned in eight ways", size)
         for color, (name, file) in zip(("C0", "C1", "C2"), FILES.items(), strict=True):
             gains = kept(file)["test"]["gains"]
             cross(on, gains["CRF"], "s", color, f"{name}, marks as on the left", size)
@@ -289,8 +283,8 @@ def draw_test(ax):
     ax.set(title="110 test frames, 95 % intervals over drives", xlim=(-9, 1), ylim=(-1.3, 1.3))
 
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left: settings of the search as dots, change in pixel accuracy against change in class accuracy; those above zero in pixel accuracy lie left of zero in class accuracy. Right: default, chosen and learned CRFs on test frames, with intervals; none clearly gains in both; an inset enlarges the eleven that lie close to zero"
-search, learned = kept("crf_search"), kept("learned_crf")
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left: settings of the search as dots, change in pixel accuracy against change in class accuracy; those above zero in pixel accuracy lie left of zero in class accuracy. Right: default and chosen CRFs on test frames, with intervals; none clearly gains in both; an inset enlarges the three that are close to zero"
+search = kept("crf_search")
 fig, axes = plt.subplots(1, 2, figsize=(11, 4.6), layout="compressed", sharex=True, sharey=True)
 for ax, draw_on in zip(axes, (draw_search, draw_test), strict=True):
     draw_on(ax)
@@ -309,10 +303,6 @@ for name, file in FILES.items():
         row = "".join(f"{100 * gains[m][1]:+18.2f}" for m in METRIC_NAMES[::-1])
         assert min(gains[m][0] for m in METRIC_NAMES) < 0
         print(f"{name + ', searched for ' + goal:<57}{row}{found['w_bilateral']:8.2f}{found['w_spatial']:8.2f}")
-for name, values in learned["learnt"].items():
-    row = "".join(f"{100 * learned['gains'][name][m][1]:+18.2f}" for m in METRIC_NAMES[::-1])
-    assert min(learned["gains"][name][m][1] for m in METRIC_NAMES) < 0
-    print(f"{name.replace('learnt', 'learned').replace(', ', ' · '):<57}{row}{values['w1']:8.2f}{values['w2']:8.2f}")
 
 # %% [markdown]
 # (The box in the right picture shows what lies at zero, enlarged.)
@@ -320,11 +310,9 @@ for name, values in learned["learnt"].items():
 # **A searched CRF gains pixel accuracy and still costs class accuracy.** Chosen for pixel accuracy, it gains 0.4 to 0.5
 # points of it for each of the three networks, and loses 1.7 to 1.8 points of class accuracy, a bit more than a third of
 # what the default loses. Chosen for class accuracy, it hardly does anything: all changes are below 0.1 point,
-# and the weights are a tenth or less. **Learning ends in the same place**: all weights shrink from 4 and 3 to below
-# 0.3. The variant that gains most class accuracy, 0.17 points, has learned which labels may stand beside each other,
-# and loses 0.10 points of pixel accuracy. None of these fourteen CRFs clearly gains in both metrics. (One search for each
-# network and one training run for each variant, on simulated streets. The ranges of the search were changed once, after
-# we had looked at the scores of an earlier search.)
+# and the weights are a tenth or less. None of these six CRFs clearly gains in both metrics. (One search for each
+# network, on simulated streets. The ranges of the search were changed once, after we had looked at the scores of an
+# earlier search.)
 
 # %% [markdown]
 # ### One table for lectures 10, 11 and 12
@@ -376,7 +364,7 @@ Markdown("\n".join(table))
 # 3. F(Q) + log Z is a distance. It was never negative and never rose.
 # 4. Errors of an approximate CRF have two parts, from the kernel and from stopping early, each with its own reference.
 #    At ten updates, stopping early costs these maps more than the lattice does; on another map it cost less.
-# 5. Fourteen CRFs with searched or learned weights clearly gain pixel accuracy or class accuracy, or neither, never both.
+# 5. Six CRFs with searched weights clearly gain pixel accuracy or class accuracy, or neither, never both.
 #
 # ## Further reading
 #

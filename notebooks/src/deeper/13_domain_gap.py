@@ -26,7 +26,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from semgrid_edu import plotting
-from semgrid_edu.datasets.readers.frames import resize_labels
+from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_image_stage
 from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.labels import IGNORE

@@ -17,6 +17,7 @@
 # **Time.** 76 minutes, of which the computer needs a few seconds.
 
 # %% jupyter={"source_hidden": true}
+import sys
 from functools import reduce
 
 import matplotlib.pyplot as plt
@@ -28,9 +29,17 @@ from semgrid_edu import plotting
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate, enumerate_marginals, in_rows
 from semgrid_edu.graphical import max_product, mean_field_graph, min_fill_order, product, sum_product, why_dependent
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.stage_models import bayes_on_a_line, beam_over_cells, bof_stage, cmcdot_stage, crf_stage
-from semgrid_edu.stage_models import lidar_label_stage, one_cell, one_log_odds_cell, read_scans
-from semgrid_edu.stage_models import scan_with_pose_error, whole_system
+
+sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_00_system import whole_system
+from worlds.lecture_01_line import bayes_on_a_line
+from worlds.lecture_02_beam import beam_over_cells
+from worlds.lecture_02_cell import one_cell, one_log_odds_cell, read_scans
+from worlds.lecture_02_thick_walls import scan_with_pose_error
+from worlds.lecture_03_bof import bof_stage
+from worlds.lecture_04_cmcdot_graph import cmcdot_stage
+from worlds.lecture_09_label import lidar_label_stage
+from worlds.lecture_10_crf import crf_stage
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, OCCUPIED = 0, 1
@@ -775,7 +784,7 @@ plt.show()
 # on it are its **price** on a toy world: first the exact answer, then the system's (mostly a
 # probability; 1.24 counts things, and what starts from 0 is an error). Without numbers the price wasn't
 # measured. A dashed circle is a node that the
-# toy model leaves out. `StageGraph.cut` holds a sentence for each dashed edge, and lecture [00](../00_tour.ipynb) shows
+# toy model leaves out. `StageGraph.cut` has a sentence for each dashed edge, and lecture [00](../00_tour.ipynb) shows
 # the whole ledger.
 
 # %% tags=["stages"] jupyter={"source_hidden": true} alt="four graphs with dashed edges: places on a line, .46 to .34 for later readings; one cell of the log-odds grid with three dashed edges without a price; one cell with four states, also three; a beam over eight cells, .34 to .57 between the fifth and the sixth"

@@ -18,6 +18,7 @@
 # **Time.** 45 minutes, of which the computer needs a few seconds.
 
 # %% jupyter={"source_hidden": true}
+import sys
 from dataclasses import replace
 
 import matplotlib.pyplot as plt
@@ -27,14 +28,16 @@ from ipywidgets import IntSlider, interact
 from semgrid_edu import plotting
 from semgrid_edu.graphical import Factor, d_separated, max_product, sum_product
 from semgrid_edu.metrics import total_variation
-from semgrid_edu.stage_models import bof_stage
-from semgrid_edu.stage_models.bof import AT_THE_EDGE, HEAD_ON, STANDING_OR_DRIVING, TOWARDS_A_FENCE
-from semgrid_edu.stage_models.bof import bof_beliefs, expected_things
-from semgrid_edu.stage_models.cells_in_a_row import HIT, NOT_SEEN, Cell
-from semgrid_edu.stage_models.cmcdot import LEFT_OR_RIGHT, sampling_error
-from semgrid_edu.stage_models.joint_row import exact_beliefs, hit_probability, joint_belief
-from semgrid_edu.stage_models.line import bayes_on_a_line
-from semgrid_edu.stage_models.stage_graph import directed
+
+sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_00_stage_graph import directed
+from worlds.lecture_01_line import bayes_on_a_line
+from worlds.lecture_01_lines import belief_history
+from worlds.lecture_03_bof import (
+    AT_THE_EDGE, HEAD_ON, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs, bof_stage, expected_things,
+)  # fmt: skip
+from worlds.lecture_03_row import HIT, NOT_SEEN, Cell, exact_beliefs, hit_probability, joint_belief
+from worlds.lecture_04_cmcdot import LEFT_OR_RIGHT, sampling_error
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 
@@ -470,7 +473,7 @@ assert sampled.to_bof[-1] < 0.3 * sampled.to_bof[0]
 def show(n, ax=None):
     """Draw the particle filter's belief over the trip."""
     belief, _ = particle_filter(n, np.random.default_rng(1))
-    return plotting.belief_history(belief, ax).set_title(f"{n} particles", fontsize=10)
+    return belief_history(belief, ax).set_title(f"{n} particles", fontsize=10)
 
 
 _ = interact(lambda n: (show(n), plt.show())[1], n=IntSlider(value=30, min=2, max=300))

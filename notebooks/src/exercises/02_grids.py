@@ -23,7 +23,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from semgrid_edu import plotting
-from semgrid_edu.answers import answer_array, answer_number
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion, SensorModel, scan_evidence

@@ -23,13 +23,11 @@ import warnings
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array, answer_arrays
+from semgrid_edu.workshop.course.answers import answer_array, answer_arrays
 from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import CmcdotParams, track_drive
-from semgrid_edu.stage_models.bof import bof_beliefs
-from semgrid_edu.stage_models.cells_in_a_row import DT, Cell, CellsInARow
-from semgrid_edu.stage_models.joint_row import exact_beliefs
+from semgrid_edu.occupancy import CmcdotParams
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 # Names that begin with _ belong to the tests.
@@ -264,8 +262,8 @@ _test()
 # For each edge, `PROBES` below holds a world in which that edge matters and the two others don't. At most one thing is in a cell.
 #
 # Complete `cuts`: it returns a dictionary with the number of each edge that the filter cuts, and its **price**: what the filter predicts in that world,
-# minus the exact answer. An edge counts as cut when the two differ by more than 0.001. How you get the exact answers is up to you: by hand, from all
-# combinations without the impossible ones, or by `exact_beliefs(CellsInARow((left, own, right), ("???",)))[0, 1]`, (5,), whose entries have the order of `Cell`.
+# minus the exact answer. An edge counts as cut when the two differ by more than 0.001. Get the exact answers from all
+# combinations without the impossible ones: a combination in which two things share a cell can't be. By hand or by code, that is up to you.
 
 # %% nbgrader={"grade": false, "grade_id": "probes", "locked": true, "schema_version": 3, "solution": false, "task": false}
 PROBES = {
@@ -277,8 +275,14 @@ PROBES = {
 
 def package_filter(left, own, right):
     """What CMCDOT's `predict` tends to, with ever more particles."""
-    cell = bof_beliefs(CellsInARow((left, own, right), ("???",), clearing_time=DT))[0, 1]
-    return cell[[Cell.LEFT, Cell.RIGHT]].sum()
+    total = left.get("right", 0) + right.get("left", 0)
+    moves = 0.0
+    for origin, moving, ahead in ((left, "right", right), (right, "left", left)):
+        # It may be only the next piece of a wall: STATIC behind it, STATIC or UNKNOWN ahead, and nobody has seen the middle cell.
+        wall = origin.get("static", 0) * (ahead.get("static", 0) + ahead.get("unknown", 0)) * own.get("unknown", 0)
+        moves += origin.get(moving, 0) * (1 - own.get("static", 0) - wall)
+    moves *= min(total, 0.999) / max(total, 1e-9)
+    return moves / (moves + 1 - min(total, 0.999))
 
 
 # %% nbgrader={"grade": false, "grade_id": "cuts", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -287,7 +291,10 @@ def cuts(predicts):
     ### BEGIN SOLUTION
     prices = {}
     for edge, cells in PROBES.items():
-        exact = exact_beliefs(CellsInARow(cells, ("???",)))[0, 1, [Cell.LEFT, Cell.RIGHT]].sum()
+        left, own, right = cells
+        a, b, stands = left.get("right", 0), right.get("left", 0), own.get("static", 0)
+        comes = (a * (1 - b) + b * (1 - a)) * (1 - stands)
+        exact = comes / (comes + (1 - a) * (1 - b))
         prices[edge] = float(predicts(*cells) - exact)
     return {edge: price for edge, price in prices.items() if abs(price) > 0.001}
     ### END SOLUTION

@@ -23,7 +23,7 @@ import warnings
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array
+from semgrid_edu.workshop.course.answers import answer_array
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 

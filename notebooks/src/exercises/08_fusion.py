@@ -25,7 +25,7 @@ import warnings
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array, answer_number
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 IGNORE = 255

@@ -25,7 +25,7 @@ from math import comb
 import numpy as np
 from scipy import ndimage  # task 3 may use it
 
-from semgrid_edu.answers import answer_array
+from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets.ground_truth import TruthPolicy, lidar_truth
 from semgrid_edu.datasets.samples import sample_drive

@@ -27,7 +27,7 @@ from itertools import product
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array
+from semgrid_edu.workshop.course.answers import answer_array
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 

@@ -22,8 +22,8 @@ import warnings
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array
-from semgrid_edu.answers import peak_megabytes
+from semgrid_edu.workshop.course.answers import answer_array
+from semgrid_edu.workshop.course.answers import peak_megabytes
 from semgrid_edu.crf import PermutohedralLattice, SeparableGaussian  # task 5 may use them
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does

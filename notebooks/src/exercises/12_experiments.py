@@ -23,7 +23,7 @@ import warnings
 import numpy as np
 from scipy import stats  # stats.t.ppf(p, df) is the p-quantile of Student's distribution with df degrees of freedom
 
-from semgrid_edu.answers import answer_array, answer_number
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_edu.metrics import pixel_accuracy  # the tests of tasks 3 and 4 use it
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does

@@ -23,7 +23,7 @@ import warnings
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array, answer_number
+from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.workshop.scoring.statistics import paired_interval

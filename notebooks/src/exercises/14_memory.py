@@ -24,11 +24,11 @@ from dataclasses import replace as _replace
 
 import numpy as np
 
-from semgrid_edu.answers import answer_array
+from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_edu.memory import View, remember_drive as _remember_drive
 from semgrid_edu.occupancy import Belief, PlanarMotion  # for task 5
 from semgrid_edu.occupancy.planar_motion import look_up  # for task 5
-from semgrid_edu.pipeline.tracker_adapter import MemoryAdapter
+from semgrid_edu.stages.stepping import CheckedMemory
 from semgrid_edu.workshop.course.street import street_results as _street_results
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
@@ -308,10 +308,11 @@ def remember(views, spec):
 
 def maps(frames, occupancy, grids, spec):
     """Return the most probable class of each cell after each frame, (T, H, W), with your memory as a stage."""
-    stage, nothing, called = MemoryAdapter(remember, spec), np.full((2, 2, *spec.shape), np.nan, np.float32), []
-    for k, (frame, o, g) in enumerate(zip(frames, occupancy, grids, strict=True)):
+    stage = CheckedMemory("remember", remember, grids[0].shape, spec)
+    nothing, called = np.full((2, 2, *spec.shape), np.nan, np.float32), []
+    for frame, o, g in zip(frames, occupancy, grids, strict=True):
         view = View(frame, Belief(o, nothing[0], nothing), g)
-        called.append(stage.grid(view, k)[0].argmax(axis=0))
+        called.append(stage.step(view).argmax(axis=0))
     return np.array(called)
 
 

@@ -33,7 +33,7 @@ def carry_labels(
     labels : (h, w) uint8
         The class of each pixel: a network's arg-max, or the truth for an upper bound; 255 where unlabelled.
     pixels, cells : (N,) int
-        Pixel and cell of each return, from `semgrid_edu.datasets.readers.project_lidar.seen_returns`.
+        Pixel and cell of each return, from `semgrid_edu.datasets.project_lidar.seen_returns`.
     occupancy : (4, H, W) float
         Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
     label_set : LabelSet

@@ -10,7 +10,7 @@ from semgrid_edu.camera import invert_rigid, project, transform_points
 from semgrid_edu.datasets.ground_truth.carrying import carry_labels, close_and_spread, close_gaps, unknown_numbers
 from semgrid_edu.datasets.ground_truth.policy import TruthPolicy
 from semgrid_edu.datasets.ground_truth.window import Moment, gather_returns
-from semgrid_edu.datasets.readers.project_lidar import seen_returns
+from semgrid_edu.datasets.project_lidar import seen_returns
 from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import invert_rigid, transform_points
 from semgrid_edu.datasets.ground_truth.policy import TruthPolicy
-from semgrid_edu.datasets.readers.project_lidar import closest_returns
+from semgrid_edu.datasets.project_lidar import closest_returns
 from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec

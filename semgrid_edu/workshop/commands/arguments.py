@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 from semgrid_edu.errors import ArgumentError
 
 if TYPE_CHECKING:  # a command that needs no drive starts faster without numpy
-    from semgrid_edu.datasets.readers.frames import FrameSequence
+    from semgrid_edu.datasets.frames import FrameSequence
 
 LARGEST = 2**63 - 1
 """The largest whole number that a command takes: PyTorch's generators take no larger seed."""
@@ -92,7 +92,7 @@ def tell(doubts: Iterable[str]) -> None:
     Parameters
     ----------
     doubts : iterable of str
-        What `KittiRawDrive.doubts`, `dataset_doubts` or `weights_doubts` return.
+        What `drive_doubts`, `dataset_doubts` or `weights_doubts` return.
     """
     doubts = list(doubts) if os.environ.get("RANK", "0") == "0" else []
     for doubt in doubts[:TOLD]:
@@ -119,7 +119,7 @@ def chosen_drive(kitti: dict[str, object], pandaset: dict[str, object], camera: 
         When options of one data set are missing, both are named, or the shipped drives have no such camera.
     """
     from semgrid_edu.datasets import KittiRawDrive, PandasetScene
-    from semgrid_edu.datasets.readers.kitti_raw import VIEWS
+    from semgrid_edu.datasets.kitti_raw import VIEWS
 
     opened = []
     for named, reader, option in ((kitti, KittiRawDrive, "view"), (pandaset, PandasetScene, "camera")):

@@ -51,7 +51,7 @@ def fetch(
     folder: Annotated[Path, typer.Option(help="Where the day's folder and the archives go.")] = Path("kitti_raw"),
 ) -> None:
     """Download a drive of KITTI and its calibration, and unpack them. After an interruption, run the same command."""
-    from semgrid_edu.datasets.readers.fetch import KITTI_LICENCE, PANDASET_LICENCE, fetch_kitti
+    from semgrid_edu.workshop.commands.fetch import KITTI_LICENCE, PANDASET_LICENCE, fetch_kitti
 
     if name == "pandaset" and drive:
         raise ArgumentError("--drive", "no drive of PandaSet: its scenes aren't downloaded", drive)
@@ -95,7 +95,7 @@ def excerpt(
     frames: Annotated[int, typer.Option(min=1, help="Number of frames.")] = 6,
 ) -> None:
     """Keep a few labelled frames of a data set, in the form that a network takes."""
-    from semgrid_edu.datasets.training_set import write_excerpt
+    from semgrid_edu.workshop.commands.excerpt import write_excerpt
 
     write_excerpt(data, frames, folder)
 

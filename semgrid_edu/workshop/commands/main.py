@@ -11,7 +11,8 @@ from typer.core import TyperCommand
 
 from semgrid_edu import __version__
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.compiled import CACHE_VARIABLE, keep_compiled_functions
+from semgrid_edu.fast.numba_cache import keep_compiled_functions
+from semgrid_edu.storage.files import CACHE_VARIABLE
 from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
@@ -78,10 +79,11 @@ def demo(
     from semgrid_edu.datasets.samples import real_weights
     from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.workshop.demo import write_both_streets, write_demo
+    from semgrid_edu.workshop.doubts import drive_doubts
 
     kitti_named = {"--kitti": kitti, "--date": date, "--drive": drive}
     chosen = chosen_drive(kitti_named, {"--pandaset": pandaset, "--scene": scene}, camera)
-    tell([*(chosen.doubts() if chosen else ()), *(weights_doubts(weights) if weights else ())])
+    tell([*(drive_doubts(chosen) if chosen else ()), *(weights_doubts(weights) if weights else ())])
     if chosen is None:
         page = write_both_streets(out, weights, stages=stages, frames=frames, force=force, memory=memory)
     else:
@@ -126,38 +128,13 @@ def train(
     ImageNet weights (VGG16 or ResNet-101) are a safetensors file. --truth lidar makes labels from image labels and
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
-    from semgrid_edu.datasets.index import dataset_doubts
-    from semgrid_edu.training.run import chosen_truth, train_network, training_params
+    from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
+    from semgrid_edu.workshop.training_run import chosen_truth, train_network, training_params
 
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
     choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
     train_network(data, out, segmenter, params, seed, resume, start=start or (), **choices)
-
-
-@app.command()
-def train_crf(
-    data: Annotated[Path, typer.Option(help="A data set; best one that the network has never seen.")],
-    weights: Annotated[Path, typer.Option(help="A trained network, which stays as it is.")],
-    out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
-    split: Annotated[str, typer.Option(help="The frames of the data set to learn from.")] = "validation",
-    label_costs: Annotated[bool, typer.Option("--label-costs", help="Learn a cost for every two labels.")] = False,
-    weight_limit: Annotated[float, typer.Option(help="Limit of the class weights; 1: all cells count the same.")] = 4.0,
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the order of the frames.")] = 0,
-    iterations: Annotated[int, typer.Option(min=1, help="Steps of two frames each.")] = 150,
-    resume: Resume = False,
-) -> None:
-    """Train a CRF on the grids of a trained network: its weights, widths, and costs of labels."""
-    from dataclasses import replace
-
-    from semgrid_edu.datasets.index import dataset_doubts
-    from semgrid_edu.networks.weights import weights_doubts
-    from semgrid_edu.training.crf import CRF_TRAINING
-    from semgrid_edu.workshop.studies.crf.learned_crf import CrfVariant, train_crf_on
-
-    tell(dataset_doubts(data, split) + weights_doubts(weights))
-    params, variant = replace(CRF_TRAINING, grid_iterations=iterations), CrfVariant(split, label_costs, weight_limit)
-    train_crf_on(data, weights, out, variant, params, seed, resume)
 
 
 @app.command()
@@ -192,9 +169,9 @@ def evaluate(
     force: Force = False,
 ) -> None:
     """Score a trained network and the baselines on the test frames."""
-    from semgrid_edu.datasets.index import dataset_doubts
     from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.storage.files import check_ours
+    from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
     from semgrid_edu.workshop.scoring.confusions import confusion_key, distance_band_names
     from semgrid_edu.workshop.scoring.evaluate import evaluate, scores_table
 
@@ -208,29 +185,6 @@ def evaluate(
         return evaluate(data, weights, confusions_file=confusions)
 
     keep_result(out, scored, lambda result: scores_table(result["scores"], result["intervals"]), force=force)
-
-
-@app.command()
-def search_crf(
-    data: Annotated[Path, typer.Option(help="A data set with validation frames, such as data/validation.")],
-    test: Annotated[Path, typer.Option(help="The data set that the network was trained on, with test frames.")],
-    weights: Annotated[Path, typer.Option(help="A network trained on its train frames.")],
-    seed: Annotated[int, typer.Option(min=0, help="Seed for the parameters that are tried.")] = 0,
-    trials: Annotated[
-        int, typer.Option(min=1, max=100_000, help="Number of trials in all; a search that ended can go on.")
-    ] = 200,
-    out: Annotated[Path, typer.Option(help="Takes each trial; the same command goes on.")] = Path("crf_search.json"),
-) -> None:
-    """Calibrate a network, search the CRF's parameters on validation frames, and score the best on test frames."""
-    from semgrid_edu.datasets.index import dataset_doubts
-    from semgrid_edu.networks.weights import weights_doubts
-    from semgrid_edu.workshop.studies.crf.crf_search import search_crf, search_table
-
-    def searched() -> dict:
-        tell(dataset_doubts(data, "validation") + dataset_doubts(test, "test") + weights_doubts(weights))
-        return search_crf(data, test, weights, out, seed=seed, n_trials=trials)
-
-    keep_result(out, searched, search_table, goes_on=True)
 
 
 def run() -> None:

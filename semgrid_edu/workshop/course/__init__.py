@@ -1,1 +1,1 @@
-"""The course: notebooks, registers, exercises and their grading."""
+"""The course: notebooks, exercises and their grading."""

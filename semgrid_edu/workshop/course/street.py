@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import invert_rigid, transform_points
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.grid_truth import truth_to_learn
-from semgrid_edu.datasets.readers.frames import FrameSequence
 from semgrid_edu.datasets.samples import real_drive, sample_weights
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec

@@ -1,28 +1,38 @@
-"""A student's stages beside the package's own: which pictures they can change, and what the page says of them."""
+"""A student's stages beside the package's: which pictures they can change, and what the page says about them."""
 
 from dataclasses import dataclass
 from html import escape
 
-from semgrid_edu.storage.files import table_beside
+MADE_BY = {
+    "scores": ("segment",),
+    "occupancy": ("track",),
+    "grid": ("track", "segment", "sample", "fuse"),
+    "refined": ("track", "segment", "sample", "fuse", "refine"),
+    "remembered": ("track", "segment", "sample", "fuse", "remember"),
+}
+"""The stages on which each picture of the page depends."""
 
-_TABLES = table_beside(__file__)
-MADE_BY: dict[str, tuple[str, ...]] = _TABLES["made_by"]
-"""The stages that a picture depends on."""
-
-STAGE_WORDS: dict[str, tuple[str, str]] = _TABLES["stages"]
+STAGE_WORDS = {
+    "track": ("l → o", "Bayes filter, CMCDOT"),
+    "segment": ("i → s", "image network"),
+    "sample": ("s → p", "sampling on planes"),
+    "fuse": ("(p, o) → g", "reduction and fusion"),
+    "refine": ("g → g", "CRF, mean field"),
+    "remember": ("g → g", "memory of classes"),
+}
 """Input and output of each stage, in the symbols of the paper's Fig. 2, and what the package's own stage does."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Which stages of the second run come from a student's file; all others are the package's own in both runs.
+    """Which stages of the second run come from a student's file; all others are the package's in both runs.
 
     Parameters
     ----------
     file : str
         Name of the student's file, without its folder.
     stages : tuple of str
-        Names of the stages that the file holds, such as ("track", "refine").
+        Names of the stages that the file defines, such as ("track", "refine").
     memory : bool
         Whether both runs remember classes over frames.
     """

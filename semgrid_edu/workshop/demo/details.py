@@ -1,4 +1,4 @@
-"""The numbers from which the page tells the story of any cell, rounded to bytes, one map of the grid for each."""
+"""The stories of all cells as bytes, which the page's script reads: rounded numbers, one map of the grid for each."""
 
 import base64
 import zlib
@@ -10,33 +10,30 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.crf import CrfParams
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LABEL_SETS
-from semgrid_edu.networks import Architecture, SemanticGridNet
-from semgrid_edu.occupancy import SensorModel
+from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.plotting import STATE_COLOURS
-from semgrid_edu.story import ContributionMaps, contribution_maps, last_sight, scan_maps, what_if
-from semgrid_edu.story.cell_evidence import VERDICTS, classes_at
-from semgrid_edu.story.cell_story import label_and_rival
-from semgrid_edu.story.crf_messages import beliefs_before_last_update, neighbour_messages, strongest_neighbours
-from semgrid_edu.story.what_if import CHANGES
-from semgrid_edu.story.words import FAULTS, SENTENCES, faults
+from semgrid_edu.workshop.demo.all_cells import frame_story
+from semgrid_edu.workshop.demo.contributions import Contributions
+from semgrid_edu.workshop.demo.evidence import VERDICTS, Sight
+from semgrid_edu.workshop.demo.what_if import CHANGES, FAULTS
+from semgrid_edu.workshop.demo.words import SENTENCES
 
 STEPS = {"part": 0.1, "reach": 0.5, "distance": 0.1, "pixel": 1 / 32, "message": 0.1}
-"""To what the numbers are rounded: parts of a score, metres, pixels, and what neighbours add.
+"""The steps to which numbers are rounded: parts of a score, metres, pixels, and what neighbours add.
 
-A byte then holds parts up to 12.7, which nearly every plane stays below, and a reach up to 127 m.
+A byte then holds parts up to 12.7, which nearly no plane exceeds, and a reach up to 127 m.
 """
 
 NOT_SEEN = 2**16 - 1
 """Both coordinates of a point that the camera doesn't see."""
 
 FILTER_STEPS = ("move", "predict", "update", "resample", "shown")
-"""After which of the filter's steps the states are told, see `CellStory.steps`."""
+"""The steps of the filter after which the page shows the states, see `FrameStory.states`."""
 
 Maps = dict[str, NDArray[np.uint8]]
 """By name (K, H, W); what doesn't fit into a byte has K high bytes followed by K low ones."""
@@ -48,9 +45,9 @@ class StoryMaps(NamedTuple):
     Parameters
     ----------
     alike : dict of str to (K, H, W) uint8
-        Maps of which a cell has often what another cell has: all bytes of a cell stand together.
+        Maps in which many cells have the same numbers: the bytes of a cell are stored side by side.
     smooth : dict of str to (K, H, W) uint8
-        Maps that change little from row to row: one after the other, each row as the difference to the one before.
+        Maps that change little from row to row: one after the other, each row as the difference from the row before.
     """
 
     alike: Maps
@@ -76,78 +73,56 @@ class StoryMaps(NamedTuple):
         return places
 
 
-def frame_details(
-    result: FrameResult, net: SemanticGridNet, truth: NDArray | None, past: Sequence[tuple[Frame, NDArray]] = ()
-) -> StoryMaps:
-    """Collect what the page tells of the cells of a frame.
+def frame_details(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[Frame, NDArray]] = ()) -> StoryMaps:
+    """Collect what the page tells about the cells of a frame.
 
     Parameters
     ----------
-    result : FrameResult
-        The frame's result from the package's own stages, with the filter's steps.
-    net : SemanticGridNet
-        The network that made it.
-    truth : (H, W) uint8 or None
-        The true classes, where they are known.
-    past : sequence of (Frame, (H, W) int)
-        The earlier frames, and what each by itself called the cells: for a result with memory.
+    result, net, past
+        As for `frame_story`, which does the work.
 
     Returns
     -------
     StoryMaps
         The same names with the same numbers of maps for every frame of a network.
     """
-    spec, o = net.need_architecture().grid, result.belief.probability
-    params = CrfParams.for_cells(spec.cell)
-    known = np.full(spec.shape, IGNORE) if truth is None else truth
-    named = np.stack([*label_and_rival(result.grid, known), result.refined.argmax(axis=0)])
-    before, after = (np.take_along_axis(g, named, axis=0) for g in (result.grid, result.refined))
-    states = {"shown": o, **result.belief.steps}
-    Q = beliefs_before_last_update(result.grid, o, params)
-    messages = np.take_along_axis(neighbour_messages(Q, o, params), named, axis=0)
-    (rows, cols), pull = strongest_neighbours(Q, named[2], o, params)
+    story = frame_story(result, net, past)
+    named = np.stack([story.label, story.rival, story.refined])
+    before = np.take_along_axis(result.grid, named, axis=0)
+    after = np.take_along_axis(result.refined, named, axis=0)
+    messages = np.take_along_axis(story.neighbours.messages, named, axis=0)
+    rows, cols = story.neighbours.steps
+    unknown = np.full_like(story.label, IGNORE)
     alike = {
-        "states": np.concatenate([states_bytes(states[step]) for step in FILTER_STEPS]),
-        **_scan(result, spec),
-        "classes": np.stack([*named, known]).astype(np.uint8),
-        **_words(result, net, named, known),
+        "states": np.concatenate([states_bytes(story.states[step]) for step in FILTER_STEPS]),
+        "obstacles": _bytes(story.scan.obstacles[None]),
+        "ground": _bytes(story.scan.ground[None]),
+        "verdict": _bytes(story.scan.verdict[None]),
+        "reach": _bytes(story.scan.reach[None] / STEPS["reach"]),
+        "classes": _bytes(np.stack([*named, story.truth])),
+        "called": _bytes(story.called),
+        "shown": _bytes(story.shown),
+        "otherwise": _bytes(np.stack([story.otherwise.get(change, unknown) for change in CHANGES])),
+        "fault": _bytes(story.fault[None]),
         "after": _bytes(255 * after),
-        "strongest": _bytes(np.concatenate([rows + 128, cols + 128, pull / STEPS["message"]])),
-        **_memory(result, [*past, (result.frame, named[0])], net.need_architecture()),
+        "strongest": _bytes(np.concatenate([rows + 128, cols + 128, story.neighbours.pull / STEPS["message"]])),
     }
+    if story.sight is not None:
+        alike["memory"] = _memory(result.remembered, story.sight, len(past))
     smooth = {
         "before": _bytes(255 * before),
         "messages": _bytes(messages / STEPS["message"]),
-        **_parts(contribution_maps(net, result.scores, o), *named[:2]),
+        **_parts(story.why),
     }
     return StoryMaps(alike, smooth)
 
 
-def _words(result: FrameResult, net: SemanticGridNet, named: NDArray, truth: NDArray) -> Maps:
-    """Return what the sentences of each cell are filled with: `CellStory`'s classes of pixels, `otherwise`, `fault`."""
-    architecture, otherwise = net.need_architecture(), what_if(result, net)
-    called, shown = classes_at(result, *plane_pixels(architecture.grid, architecture.heights, result.frame.camera))
-    label, _, refined = named
-    unknown = np.full_like(label, IGNORE)
-    maps = {
-        "called": called,
-        "shown": shown,
-        "otherwise": np.stack([otherwise.get(change, unknown) for change in CHANGES]),
-        "fault": faults(label, refined, truth, otherwise)[None],
-    }
-    return {name: values.astype(np.uint8) for name, values in maps.items()}
-
-
-def _memory(result: FrameResult, seen: Sequence[tuple[Frame, NDArray]], architecture: Architecture) -> Maps:
-    """Return the numbers of `CellMemory` in its order, per cent and tenths of a second; nothing without memory."""
-    if result.remembered is None:
-        return {}
-    frames, labels = zip(*seen, strict=True)
-    sight = last_sight(frames, labels, architecture.grid, LABEL_SETS[architecture.label_set].n_semantic)
-    ago = np.array([10 * (result.frame.time - frame.time) for frame in frames[::-1]])[np.maximum(sight.back, 0)]
-    sure, label = 100 * result.remembered.max(axis=0), result.remembered.argmax(axis=0)
-    earlier = np.full(label.shape, len(seen) - 1)
-    return {"memory": _wide(np.rint(np.stack([label, sure, sight.back + 1, sight.label, ago, earlier])))}
+def _memory(remembered: NDArray, sight: Sight, earlier: int) -> NDArray[np.uint8]:
+    """Return the numbers of `CellMemory`, in per cent and tenths of a second: kept, sure, known, then, ago, earlier."""
+    label = remembered.argmax(axis=0)
+    probability = 100 * remembered.max(axis=0)
+    numbers = [label, probability, sight.back + 1, sight.label, 10 * sight.seconds, np.full(label.shape, earlier)]
+    return _wide(np.rint(np.stack(numbers)))
 
 
 def states_bytes(probability: NDArray) -> NDArray[np.uint8]:
@@ -173,46 +148,26 @@ def _wide(values: NDArray) -> NDArray[np.uint8]:
     return np.concatenate([values >> 8, values & 255]).astype(np.uint8)
 
 
-def _scan(result: FrameResult, spec: GridSpec) -> Maps:
-    """Return the numbers of returns, the reach of the beam and what the scan says: `cell_scan` for all cells."""
-    said = scan_maps(result.frame.points_grid, spec, SensorModel())
-    rows, cols, inside = spec.cells(said.points)
-    counts = {}
-    for name, kind in (("obstacles", said.obstacle), ("ground", said.ground)):
-        cells = (rows * spec.shape[1] + cols)[inside & kind]
-        counts[name] = np.bincount(cells, minlength=said.verdict.size).reshape(1, *spec.shape)
-    maps = {**counts, "verdict": said.verdict[None], "reach": said.reach[None] / STEPS["reach"]}
-    return {name: _bytes(values) for name, values in maps.items()}
-
-
-def _parts(parts: ContributionMaps, label: NDArray, rival: NDArray) -> Maps:
+def _parts(why: Contributions) -> Maps:
     """Return what speaks for one class rather than another.
 
-    The totals are the four states, then image, occupancy, constants and their sum: what rounding loses is counted among
-    the constants, so that the page's numbers add up. Last comes how many times as probable the class is, as two digits
-    and a power of ten.
+    The totals are the four states, then image, occupancy, constants and their sum. What rounding loses is counted among
+    the constants, so that the page's numbers add up. "times" says how many times as probable the class is, as two
+    digits and a power of ten.
     """
-
-    def difference(part: NDArray) -> NDArray:
-        of = [np.take_along_axis(part, c.reshape((1,) * (part.ndim - 2) + c.shape), axis=-3) for c in (label, rival)]
-        return (of[0] - of[1])[..., 0, :, :]
-
-    planes, scores, states = map(difference, (parts.by_plane, parts.by_class, parts.occupancy))
-    score = difference(parts.score)
-    *tenths, image, occupancy, total = np.rint(
-        np.stack([*states, planes.sum(axis=0), states.sum(axis=0), score]) / STEPS["part"]
-    )
-    power = np.floor(np.maximum(score, 0) / np.log(10))
+    sums = np.stack([*why.occupancy, why.planes.sum(axis=0), why.occupancy.sum(axis=0), why.score])
+    *states, image, occupancy, total = np.rint(sums / STEPS["part"])
+    power = np.floor(np.maximum(why.score, 0) / np.log(10))
     return {
-        "planes": _bytes((planes / STEPS["part"]).clip(-127, 127) + 128),
-        "scores": _bytes((scores / STEPS["part"]).clip(-127, 127) + 128),
-        "totals": _wide(np.stack([*tenths, image, occupancy, total - image - occupancy, total]) + 2**15),
-        "times": _bytes(np.stack([10 * np.exp(score - power * np.log(10)), power])),
+        "planes": _bytes((why.planes / STEPS["part"]).clip(-127, 127) + 128),
+        "scores": _bytes((why.classes / STEPS["part"]).clip(-127, 127) + 128),
+        "totals": _wide(np.stack([*states, image, occupancy, total - image - occupancy, total]) + 2**15),
+        "times": _bytes(np.stack([10 * np.exp(why.score - power * np.log(10)), power])),
     }
 
 
 def cell_places(spec: GridSpec, heights: ArrayLike, camera: Camera) -> StoryMaps:
-    """Return what holds of a cell in every frame: its distance, and the pixels of its points on the planes (eq. (1)).
+    """Return what is the same in every frame: a cell's distance, and the pixels of its points on the planes (eq. (1)).
 
     Parameters
     ----------
@@ -235,7 +190,7 @@ def cell_places(spec: GridSpec, heights: ArrayLike, camera: Camera) -> StoryMaps
 
 
 def story_data(net: SemanticGridNet, camera: Camera, frame_layout: dict[str, list[int]]) -> dict[str, object]:
-    """Gather what the page's script needs besides the maps of each frame, as plain numbers and text for JSON.
+    """Return what the page's script needs besides the maps of each frame, as plain numbers and text for JSON.
 
     Parameters
     ----------

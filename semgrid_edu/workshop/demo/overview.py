@@ -1,4 +1,4 @@
-"""One frame through every stage in one picture, such as the one that opens the README (paper, Fig. 2)."""
+"""One frame through every stage in one picture, as at the top of the README (paper, Fig. 2)."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -36,9 +36,9 @@ class GridPicture(NamedTuple):
     Parameters
     ----------
     title : str
-        What stands above it.
+        Its title.
     result : FrameResult
-        Whose it is.
+        The result that it shows.
     labels : (H, W) int or None
         A map of classes; None for the occupancy grid.
     """
@@ -49,16 +49,16 @@ class GridPicture(NamedTuple):
 
 
 def save_overview(record: Record, path: str | Path, words: str = "") -> None:
-    """Draw image and grids of the frame in which most moves, and save them as PNG.
+    """Draw image and grids of the frame in which most cells move, and save them as PNG.
 
     Parameters
     ----------
     record : Record
-        What was recorded of the drive. In a comparison, the student's own grids follow, as far as they can differ.
+        What was recorded of the drive. In a comparison, the student's grids follow if they can differ.
     path : path-like
         The file to write; its folder is made when missing.
     words : str
-        What stands below the picture: what to expect of it, and whose data it shows.
+        The text below the picture: what to expect of it, and whose data it shows.
     """
     with plt.rc_context(STYLE):
         figure = _draw(record, wrap(words, 190))

@@ -21,16 +21,16 @@ SCAN_MILLISECONDS = 1000 * LIDAR_PERIOD
 """Time from one scan of KITTI's LIDAR to the next, ms."""
 
 COMPARED = " The package's occupancy grid names the unknown cells of the truth, so that both runs have the same truth."
-
+"""Added to the table of metrics in a comparison."""
 
 REMEMBERED = (
     " This truth calls unknown what the camera doesn't see now, so among all cells a memory counts as wrong wherever "
     "it still knows the class: compare the semantic cells."
 )
-"""Added to the table of metrics when a map with memory is scored."""
+"""Added to the table of metrics if a map with memory is scored."""
 
 GAPS = " White cells are left out: they are in view, but nobody labelled what is there."
-"""Added to what the truth shows, when its labels have gaps."""
+"""Added to the caption of the truth if its labels have gaps."""
 
 
 class Panel(NamedTuple):
@@ -41,7 +41,7 @@ class Panel(NamedTuple):
     name : str
         Name of its raster among the images of a `FrameView`.
     title, symbol : str
-        The first words of its caption, and its symbol in Fig. 2, if any.
+        The beginning of its caption, and its symbol in Fig. 2, if any.
     see : str
         What to look for, as HTML.
     """
@@ -79,9 +79,9 @@ def page_html(
     story : dict of str to object, optional
         `story_data`; without it, the page tells no stories of cells.
     choice : str
-        Which frames of the drive are shown, as `ChosenFrames.told` says it.
+        Which frames of the drive are shown, from `ChosenFrames.told`.
     broken : str
-        What could not be read, so that the page ends before it; empty when all could.
+        What could not be read, so that the page ends there; empty if everything could.
     expected : str
         What to expect of the classes, in plain text; its first sentence is set in bold.
     credit : str
@@ -94,7 +94,9 @@ def page_html(
     str
         HTML that refers to nothing outside itself.
     """
-    first, (near, far), comparison = record.views[0], DEPTH_RANGE, record.comparison
+    first = record.views[0]
+    near, far = DEPTH_RANGE
+    comparison = record.comparison
     panels = [Panel(name, **words) for name, words in table_beside(__file__, "captions").items()]
     made = {*first.images, *["truth"] * bool(record.labelled)}
     shown = [panel for panel in panels if panel.name in made]
@@ -136,7 +138,7 @@ def page_html(
 
 
 def _single_or_pair(panel: Panel, record: Record, camera: Camera) -> str:
-    """Return a panel as a figure; in a comparison, the package's and the student's in a pair if they can differ."""
+    """Return a panel as a figure; in a comparison, if they can differ, the package's and the student's side by side."""
     comparison = record.comparison
     if comparison is None or panel.name not in comparison.changed:
         return _figure(panel, record, camera)
@@ -213,10 +215,13 @@ def _metrics(record: Record) -> str:
 
 def _times(record: Record) -> str:
     """Return the table of the stages' times beside the LIDAR's period."""
-    runs, comparison = [record.milliseconds()], record.comparison
-    heads, replaced = ["ms"], ()
+    runs = [record.milliseconds()]
+    heads = ["ms"]
+    replaced = ()
+    comparison = record.comparison
     if comparison:
-        runs, replaced = [*runs, record.milliseconds(YOURS)], comparison.stages
+        runs.append(record.milliseconds(YOURS))
+        replaced = comparison.stages
         heads = ["the package's, ms", f"{_breakable(comparison.file)}, ms"]
     totals = [{"all": sum(run.values())} for run in runs]
     full = max(SCAN_MILLISECONDS, *(total["all"] for total in totals))
@@ -244,12 +249,12 @@ def _time_row(
 
 
 def _breakable(text: str) -> str:
-    """Escape a text in which a long name of a file may go on in the next line after each underscore."""
+    """Escape a text, and let the browser break a long file name after each underscore."""
     return escape(text).replace("_", "_<wbr>")
 
 
 def _json(data: object) -> str:
-    """Write data for a script element, which no text in it can end."""
+    """Return data for a script element as JSON in which no text can end that element."""
     return json.dumps(data).replace("<", "\\u003c")
 
 

@@ -126,7 +126,7 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, 
     Parameters
     ----------
     name : str
-        Name by which the page's script finds the raster and its text.
+        The name by which the page's script finds the raster and its text.
     spec : GridSpec
         The grid that the raster shows.
     camera : Camera

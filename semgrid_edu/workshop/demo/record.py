@@ -1,4 +1,4 @@
-"""What the demo records while a drive runs: encoded frames, confusion matrices and times."""
+"""What the demo records during a drive: encoded frames, confusion matrices and times."""
 
 from dataclasses import astuple, dataclass, replace
 
@@ -44,7 +44,7 @@ class FrameView:
     time : float
         Time of the frame, seconds.
     pose : (float, float, float)
-        Where the vehicle stands, seen from above: x, y (m) and yaw (rad) in the grid frame of the first shown frame.
+        Where the vehicle is, seen from above: x, y (m) and yaw (rad) in the grid frame of the first shown frame.
     details : str
         `frame_details`, packed; empty for frames whose stories the page leaves out.
     scanned : bool
@@ -71,14 +71,13 @@ class Record:
     label_set : LabelSet
         The network's classes.
     shown : range, optional
-        Numbers of the frames that the page shows. The first is that of the first frame to be recorded; all are shown
-        when left out.
+        Numbers of the frames that the page shows; by default all. The first one is the first frame that is recorded.
     comparison : Comparison, optional
         Which stages come from a student's file. With it, each frame has two results, the package's and the student's.
     net : SemanticGridNet, optional
         The network of the package's results; without it, the page tells no stories of cells.
     stories : int
-        One shown frame in this many has the stories of its cells.
+        The page tells the stories of one in this many shown frames.
     memory : bool
         Whether the results carry `remembered`.
 
@@ -106,10 +105,15 @@ class Record:
         stories: int = 1,
         memory: bool = False,
     ) -> None:
-        self.net, self.stories, self.layout = net, stories, {}
+        self.spec = spec
+        self.label_set = label_set
+        self.shown = shown
+        self.comparison = comparison
+        self.net = net
+        self.stories = stories
         self.stages = tuple(STAGES | REMEMBER if memory else STAGES)
-        self.spec, self.label_set, self.shown, self.comparison = spec, label_set, shown, comparison
         self.views: list[FrameView] = []
+        self.layout: dict[str, list[int]] = {}
         self.labelled = 0
         self.liveliest: tuple[FrameResult, FrameResult | None] | None = None
         self._number = shown[0] if shown else 0
@@ -179,7 +183,7 @@ class Record:
 
     @property
     def start(self) -> int:
-        """The number of the view with which the page begins: the one in which most moves, of those with stories."""
+        """The view with which the page begins: of those with stories, the one in which most cells move."""
         return max([k for k, view in enumerate(self.views) if view.details] or [0], key=self._moving.__getitem__)
 
     @property
@@ -192,7 +196,7 @@ class Record:
         self._moving.append(_moving(package))
         if self.liveliest is None or self._moving[-1] > _moving(self.liveliest[0]):
             self.liveliest = package, runs.get(YOURS)
-        view = self._view(package, self._details(package, maps.get("truth")))
+        view = self._view(package, self._details(package))
         for prefix, result in runs.items():
             self._draw(view, result, prefix)
         for name, labels in maps.items():
@@ -203,7 +207,8 @@ class Record:
 
     def _view(self, result: FrameResult, details: str) -> FrameView:
         """Return a view with what the sensors gave, and none of the stages' pictures yet."""
-        frame, scanned = result.frame, len(result.frame.points) > 0
+        frame = result.frame
+        scanned = len(frame.points) > 0
         clock = f"frame {self._number}, {frame.time:.1f} s" + ("" if scanned else ", no scan: predicted")
         images = {"photo": pictures.photo_uri(frame.image), "points": pictures.raster_uri(pictures.points_layer(frame))}
         returns = f"Camera image with the {len(visible_points(frame)[1])} LIDAR returns that the camera sees."
@@ -212,24 +217,26 @@ class Record:
         pose = astuple(PlanarMotion.from_poses(self._first_pose, frame.T_world_from_lidar))
         return FrameView(clock, images, {"points": returns}, {}, frame.time, pose, details, scanned)
 
-    def _details(self, package: FrameResult, truth: NDArray | None) -> str:
-        """Return what the stories of the frame's cells are told from, if the page tells them."""
+    def _details(self, package: FrameResult) -> str:
+        """Return the packed stories of the frame's cells, if the page tells them."""
         if self.net is None or len(self.views) % self.stories:
             return ""
-        maps = frame_details(package, self.net, truth, self._past)
+        maps = frame_details(package, self.net, self._past)
         self.layout = maps.layout()
         return maps.packed()
 
     def _draw(self, view: FrameView, result: FrameResult, prefix: str) -> None:
-        """Add scores and occupancy grid of a result to a view, where they can differ from the package's."""
+        """Add the scores and the occupancy grid of a result to a view, if they can differ from the package's."""
         if "scores" in self._pictures[prefix]:
-            name, best = f"{prefix}scores", _best(result.scores)
+            name = f"{prefix}scores"
+            best = _best(result.scores)
             self._occurs[np.unique(best)] = True
             view.images[name] = pictures.raster_uri(pictures.scores_layer(result.scores, self.label_set))
             shares = _shares(best, self.label_set)
             view.texts[name] = f"{self._whose(name)}Camera image painted with classes: {shares}."
         if "occupancy" in self._pictures[prefix]:
-            name, belief = f"{prefix}occupancy", result.belief
+            name = f"{prefix}occupancy"
+            belief = result.belief
             view.images[name] = pictures.raster_uri(occupancy_colours(belief.probability))
             view.texts[name] = f"{self._whose(name)}Occupancy grid seen from above: {_states(belief.probability)}."
             view.arrows[name] = pictures.arrows_path(self.spec, belief.probability, belief.velocity)

@@ -1,20 +1,22 @@
 """The demo: run every stage over every frame of a drive, then write the page and its picture."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import tee
 from pathlib import Path
 from typing import NamedTuple
 
 from numba.core.event import Listener, install_listener
 from tqdm.auto import tqdm
 
-from semgrid_edu.datasets.readers.frames import FrameSequence
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import load_net
-from semgrid_edu.pipeline import FrameResult, Stages, load_stages, run_side_by_side
+from semgrid_edu.pipeline import FrameResult, Stages, run_pipeline
 from semgrid_edu.storage.files import check_ours, write_text
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.demo.comparison import Comparison
@@ -22,9 +24,10 @@ from semgrid_edu.workshop.demo.details import story_data
 from semgrid_edu.workshop.demo.overview import save_overview
 from semgrid_edu.workshop.demo.page import page_html
 from semgrid_edu.workshop.demo.record import Record
+from semgrid_edu.workshop.demo.stages_file import load_stages
 
 SHOWN = 40
-"""Most frames that the page shows if nobody asks for more, evenly spaced, so that its size stays near 10 MB."""
+"""How many frames the page shows at most by default, evenly spaced, so that its size stays near 10 MB."""
 
 
 class ChosenFrames(NamedTuple):
@@ -33,9 +36,9 @@ class ChosenFrames(NamedTuple):
     Parameters
     ----------
     run : range
-        The numbers of those that every stage runs over; the filter needs each, also those that aren't shown.
+        The numbers of those that are run; the filter needs each of them, also those that aren't shown.
     shown : range
-        The numbers of those that the page shows, the first of `run` and then one in so many.
+        The numbers of those that the page shows: the first of `run`, then every so many.
     """
 
     run: range
@@ -50,14 +53,14 @@ class ChosenFrames(NamedTuple):
         n_frames : int
             Number of frames of the drive, at least one.
         wanted : str, optional
-            FIRST:LAST or FIRST:LAST:STEP. Frames from FIRST up to the one before LAST are run, as Python slices a list,
-            and one in STEP is shown. Each number may be left out. All frames by default, of which at most `SHOWN` are
-            shown if there is no STEP.
+            FIRST:LAST or FIRST:LAST:STEP, as in a Python slice: the frames from FIRST up to LAST, without it, are run,
+            and one in STEP is shown. Each number may be left out. By default all frames are run, and without STEP at
+            most `SHOWN` are shown.
 
         Raises
         ------
         ArgumentError
-            When it isn't such a choice, chooses no frame, or one that the drive hasn't.
+            When it has another form, chooses no frame, or a frame that the drive doesn't have.
 
         Examples
         --------
@@ -75,7 +78,7 @@ class ChosenFrames(NamedTuple):
         return cls(run, run[:: step or -(-len(run) // SHOWN)])
 
     def told(self, n_frames: int) -> str:
-        """Say which frames are shown, as part of a sentence.
+        """Return which frames are shown, as part of a sentence.
 
         Parameters
         ----------
@@ -85,7 +88,7 @@ class ChosenFrames(NamedTuple):
         Returns
         -------
         str
-            Empty when all are.
+            Empty if all are.
         """
         if len(self.shown) == n_frames:
             return ""
@@ -94,7 +97,7 @@ class ChosenFrames(NamedTuple):
 
 
 class CompileBar(Listener):
-    """A bar that counts the functions that numba compiles, which takes half a minute and is kept for the next time."""
+    """A bar that counts the functions that numba compiles in the first run, which takes half a minute."""
 
     bar: tqdm | None = None
 
@@ -104,7 +107,7 @@ class CompileBar(Listener):
         Parameters
         ----------
         event : numba.core.event.Event
-            What begins or ends.
+            The start or the end of a compilation.
         """
         if self.bar is None:
             self.bar = tqdm(desc="compiling, only the first time", unit=" functions")
@@ -115,7 +118,7 @@ class CompileBar(Listener):
 
 
 CARD = "card.json"
-"""A model card beside weights; its "other_streets" says what is known of the network on other real streets."""
+"""A model card beside weights; its "other_streets" says how well the network does on other real streets."""
 
 POOR = (
     "Expect poor semantics here. The truth is not known for this drive, and no card beside the weights says how well "
@@ -125,7 +128,7 @@ POOR = (
 """What to expect on a drive without labels, with weights that have no card."""
 
 STORIES = 200_000
-"""Most cells that have a story, in all frames together: one takes some 55 bytes of the page."""
+"""How many cells have a story at most, in all frames together: a story takes about 55 bytes of the page."""
 
 
 def write_demo(
@@ -182,7 +185,7 @@ def write_demo(
         raise DataError(drive.folder, f"images of {getattr(drive, 'view', 'its camera')}", "none")
     mine = load_stages(stages) if stages is not None else Stages()
     memory = memory or mine.remember is not None
-    own, yours, comparison = Stages.of(net, keep_steps=True, memory=memory), (), None
+    own, yours, comparison = Stages.fast(net, keep_steps=True, memory=memory), (), None
     if stages is not None:
         yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given, memory)
     label_set = LABEL_SETS[net.architecture.label_set]
@@ -231,21 +234,40 @@ def write_both_streets(out: str | Path, weights: str | Path | None = None, **opt
     return page
 
 
+def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tuple[FrameResult, ...]]:
+    """Send each frame through several sets of stages, to compare them.
+
+    Parameters
+    ----------
+    frames : iterable of Frame
+        The frames in the order of time; each is read once.
+    *several : Stages
+        Complete sets of stages, such as `Stages.fast(net)` and `mine.over(Stages.fast(net))`.
+
+    Yields
+    ------
+    tuple of FrameResult
+        One result for each set of stages, in their order.
+    """
+    streams = tee(frames, len(several))
+    yield from zip(*(run_pipeline(*one) for one in zip(streams, several, strict=True)), strict=True)
+
+
 def _check_page(out: str | Path, force: bool | None) -> tuple[Path, Path]:
-    """Return where page and picture go, once it is known that nobody else's would be lost."""
+    """Return where page and picture go, after checking that no other file would be overwritten."""
     files = Path(out) / "index.html", Path(out) / "overview.png"
     check_ours("<h1>From a laser scan and a picture to a map with meaning</h1>", *files, force=force)
     return files
 
 
 def _said_by_card(weights: str | Path) -> str:
-    """Return what the card beside the weights says of other streets; nothing without a card."""
+    """Return what the card beside the weights says about other streets; nothing without a card."""
     card = Path(weights).with_name(CARD)
     return str(read_json(card).get("other_streets", "")) if card.is_file() else ""
 
 
 def _record_all(results: Iterable[tuple[FrameResult, ...]], record: Record) -> DataError | None:
-    """Record every frame up to one that can't be read, whose error is returned; raised when it is the first."""
+    """Record the frames up to one that can't be read, and return its error; raise it if that is the first frame."""
     try:
         for of_frame in results:
             record.add(*of_frame)
@@ -257,5 +279,5 @@ def _record_all(results: Iterable[tuple[FrameResult, ...]], record: Record) -> D
 
 
 def _stories_every(n_shown: int, spec: GridSpec) -> int:
-    """Return of which one in how many shown frames the page tells the stories of the cells."""
+    """Return n such that the page tells the stories of one in n shown frames."""
     return max(1, -(-n_shown * spec.shape[0] * spec.shape[1] // STORIES))

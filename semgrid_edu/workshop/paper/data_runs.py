@@ -6,9 +6,9 @@ from pathlib import Path
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.training.run import architecture, chosen_truth
 from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.simulation.datasets import RECIPES, make_from_recipe, read_recipes
+from semgrid_edu.workshop.training_run import architecture, chosen_truth
 
 RECIPE_OF = RECIPES | read_recipes("small_recipes")
 """Every data set that a run can make, by name."""

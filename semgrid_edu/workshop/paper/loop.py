@@ -17,8 +17,8 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import commit, versions
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.storage.workplace import Workplace
 from semgrid_edu.workshop.paper.run import CLAIM, ENDED, OUTPUT, Run, left_to_do
+from semgrid_edu.workshop.workplace import Workplace
 
 THREADS = 1
 """Threads of a run. The order of sums depends on it, so it is fixed: the same run gives the same bytes everywhere. Two

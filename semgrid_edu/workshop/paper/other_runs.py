@@ -12,7 +12,7 @@ from scipy import stats
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.index import load_index
-from semgrid_edu.datasets.readers.kitti_raw import drive_folder
+from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14

@@ -10,7 +10,6 @@ import matplotlib.pyplot as plt
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import atomic_path, check_ours, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import versions
-from semgrid_edu.storage.workplace import check_workers, usable_cores, workplace
 from semgrid_edu.training.devices import choose_device
 from semgrid_edu.workshop.paper.deviations import deviations, frame_counts
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS, Experiment
@@ -19,6 +18,7 @@ from semgrid_edu.workshop.paper.run import OUTPUT, Run, estimate, with_needs
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.scales import Scale, scale_named
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
+from semgrid_edu.workshop.workplace import check_workers, usable_cores, workplace
 
 
 @dataclass(frozen=True, kw_only=True)

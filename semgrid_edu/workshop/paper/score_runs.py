@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.crf import CrfParams, at_temperature, mean_field, unary_from_log_probability
+from semgrid_edu.crf import CrfParams, at_temperature, unary_from_log_probability
 from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets.index import load_index
-from semgrid_edu.datasets.readers.kitti_raw import KittiRawDrive
-from semgrid_edu.datasets.readers.project_lidar import depth_scan, seen_returns
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.project_lidar import depth_scan, seen_returns
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError
+from semgrid_edu.fast import mean_field
 from semgrid_edu.storage.files import table_beside
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.data_runs import ArraysRun
@@ -35,9 +36,9 @@ WITH_CRF, WITH_SEARCHED = f"{NETWORK} + CRF", f"{NETWORK} + searched CRF"
 """The network's grid, refined with the CRF's default parameters, and with those that were searched."""
 
 SEARCHED = {name: (row["temperature"], CrfParams(**row["crf"])) for name, row in table_beside(__file__).items()}
-"""For each image network the temperature and the CRF's parameters that `semgrid-edu search-crf` chose for pixel
-accuracy on validation drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for
-which nothing was searched is scored without them."""
+"""For each image network the temperature and the CRF's parameters that a search chose for pixel accuracy on validation
+drives, with the shipped network of that kind (docs/results/crf_search*.json). A network for which nothing was searched
+is scored without them."""
 
 GEOMETRY, TRUE_GEOMETRY, FLAT_GROUND = "geometry", "geometry with true image labels", "flat ground"
 """Image labels carried by the LIDAR's depth with gaps closed, from the image network and true ones; and image labels

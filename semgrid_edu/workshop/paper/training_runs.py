@@ -20,12 +20,12 @@ from semgrid_edu.training import Objective, TrainingParams, train
 from semgrid_edu.training.batches import Batch
 from semgrid_edu.training.devices import choose_device
 from semgrid_edu.training.loop import learn
-from semgrid_edu.training.run import architecture, training_params
 from semgrid_edu.workshop.paper.data_runs import ArraysRun
 from semgrid_edu.workshop.paper.loop import few_threads
 from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.paper.variants import USUAL, Variant
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.training_run import architecture, training_params
 
 TIMED_STEPS = 2
 """Number of steps that a trial times, after one that it doesn't."""

@@ -10,18 +10,18 @@ import numpy as np
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.index import INDEX_FILE
-from semgrid_edu.datasets.readers.kitti_raw import drive_folder
+from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError, check_whole
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.storage.files import LOCK, sole_writer, table_beside, write_json
 from semgrid_edu.storage.provenance import versions, write_provenance
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.storage.workplace import check_workers, workplace
 from semgrid_edu.workshop.simulation import writer
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import SAMPLE_WISHES, wishes_of
 from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD, SAMPLE_RIG, Rig
 from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes
+from semgrid_edu.workshop.workplace import check_workers, workplace
 
 FORMAT = 2
 """Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, lidar_from_grid
 from semgrid_edu.datasets.index import INDEX_FILE
-from semgrid_edu.datasets.readers.kitti_labels import WITH_GAPS
-from semgrid_edu.datasets.readers.pandaset import PandasetScene
+from semgrid_edu.datasets.kitti_labels import WITH_GAPS
+from semgrid_edu.datasets.pandaset import PandasetScene
 from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import LABEL_GRID

@@ -1,4 +1,4 @@
-"""One submission, graded by nbgrader: its score and messages are then in the course's gradebook and folders."""
+"""One submission, graded by nbgrader, which writes score and messages to the course's gradebook and folders."""
 
 import hashlib
 import warnings
@@ -14,15 +14,15 @@ from semgrid_edu.workshop.course.nbgrader import build
 from semgrid_edu.workshop.course.nbgrader.build import MARKER
 
 PATIENCE = 10
-"""How often a submission is tried when another process keeps its grades from being written."""
+"""How often a submission is tried while another process blocks the gradebook."""
 
 
 class UnfitError(Exception):
-    """A file can't be graded, whatever is in its answers. The text is shown to the student, so it quotes nothing."""
+    """A file can't be graded, whatever its answers are. The message is shown to the student, so it quotes nothing."""
 
 
 class UngradedError(Exception):
-    """Grading failed, and not as a file makes it fail: the submission has no grade, and can be graded another time."""
+    """Grading failed for a reason that isn't the submission's: it has no grade, and can be graded another time."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class GradeSettings:
     container : tuple of str
         A command that starts a program in a container; () for none.
     seed_by_student : bool
-        Whether each student's hidden tests draw inputs of their own.
+        Whether the hidden tests draw other inputs for each student.
     """
 
     timeout: int = 30
@@ -66,7 +66,7 @@ def autograde_one(
     Raises
     ------
     UnfitError
-        When this file can't be graded: the 0 in its gradebook is then not a score.
+        When this file can't be graded; the 0 in the gradebook is then not a score.
     UngradedError
         When nbgrader failed in any other way, such as a full disk or a gradebook that stays locked.
     """
@@ -87,7 +87,7 @@ def autograde_one(
 
 
 def _may_pass(error: BaseException) -> bool:
-    """Return whether another process was in the way: it held the gradebook, or entered the same student first."""
+    """Return whether another process interfered: it held the gradebook, or entered the same student first."""
     return isinstance(error, InvalidEntry) or "database is locked" in str(error)
 
 
@@ -107,7 +107,7 @@ def place(course: Path, step: str, student: str, assignment: str) -> Path:
 
 
 def student_variant(course: Path, student: str) -> int:
-    """Return which inputs a student's hidden tests draw: the same each time, and known to nobody without the salt.
+    """Return which inputs a student's hidden tests draw: the same each time, and unknown without the salt.
 
     Parameters
     ----------

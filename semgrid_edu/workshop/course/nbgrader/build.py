@@ -29,20 +29,20 @@ from semgrid_edu.workshop.course.notebooks.build import (
 )
 
 CLEARED = steps.LockCells, steps.ClearSolutions, steps.ClearOutput, steps.ClearHiddenTests
-"""What takes out of an exercise all that students must not see."""
+"""The steps that remove from an exercise what students must not see."""
 
 RELEASE_STEPS = *CLEARED, steps.ComputeChecksums, steps.CheckCellMetadata
 """What nbgrader's generate_assignment does to a notebook, without its gradebook."""
 
 MARKER = "semgrid_course.json"
-"""The file by which a folder is recognised as a course that `build_course` wrote."""
+"""The file that marks a folder as a course that `build_course` wrote."""
 
 GRADEBOOK_LOG = logging.getLogger("tornado.application")
-"""Where nbgrader's gradebook writes a page of traceback whenever it is locked."""
+"""The log to which nbgrader's gradebook writes a page of traceback whenever it is locked."""
 
 
 def exercise_sources(folder: Path = NOTEBOOKS) -> list[Path]:
-    """Return the percent sources of all exercises: the lectures' in the order of the course, then the companions'.
+    """Return the percent sources of all exercises: those of lectures in the order of the course, then of companions.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def exercise_sources(folder: Path = NOTEBOOKS) -> list[Path]:
 
 
 def student_version(source: Path) -> NotebookNode:
-    """Take solutions and hidden tests out of an exercise, as `nbgrader generate_assignment` does.
+    """Remove solutions and hidden tests from an exercise, as `nbgrader generate_assignment` does.
 
     Parameters
     ----------
@@ -81,14 +81,14 @@ def build_exercise(source: Path) -> Path:
 
 @dataclass(frozen=True)
 class BuiltCourse:
-    """What `build_course` has laid out.
+    """What `build_course` has written.
 
     Parameters
     ----------
     assignments : list of str
         Names of the assignments.
     kept : list of str
-        Files that the instructor has changed, and that stay as they are although this version has others.
+        Files that the instructor has changed, and that were therefore not updated.
     """
 
     assignments: list[str]
@@ -98,22 +98,22 @@ class BuiltCourse:
 def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str | None = None) -> BuiltCourse:
     """Write a complete nbgrader course: sources, settings, the instructor's module, gradebook and released versions.
 
-    Run again, it brings up to date what the instructor hasn't changed, and leaves everything else, with submissions and
-    grades, as it is.
+    A second run updates the files that the instructor hasn't changed. Everything else, with submissions and grades,
+    stays as it is.
 
     Parameters
     ----------
     directory : path-like
-        The folder of the course: missing, empty, or with a course that was written before.
+        The folder of the course: missing, empty, or with an earlier course.
     folder : Path
         The folder of notebooks.
     lectures : str, optional
-        Where students find the lectures, to which exercises link: see `point_links`. By default as the last time.
+        Where students find the lectures to which exercises link, see `point_links`. By default as in the last run.
 
     Raises
     ------
     DataError
-        When the folder holds something else, there are no exercises, or nbgrader can't release one.
+        When the folder contains something else, there are no exercises, or nbgrader can't release one.
     """
     directory = Path(directory).resolve()
     _refuse_other_folders(directory)
@@ -152,7 +152,7 @@ def _course_files(folder: Path, sources: list[Path], lectures: str) -> dict[str,
 
 
 def _source_text(source: Path, lectures: str) -> str:
-    """Return an exercise as the instructor gets it: with solutions, and links that its students can follow."""
+    """Return an exercise as the instructor gets it: with solutions, and links that students can follow."""
     notebook = read_percent(source)
     for cell in notebook.cells:
         if cell.cell_type == "markdown":
@@ -161,7 +161,7 @@ def _source_text(source: Path, lectures: str) -> str:
 
 
 def point_links(text: str, lectures: str) -> str:
-    """Let an exercise link to the lectures where its students find them.
+    """Make an exercise link to the lectures where its students find them.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def point_links(text: str, lectures: str) -> str:
     Raises
     ------
     ArgumentError
-        When the folder can't stand in a link.
+        When a link can't contain the folder.
 
     Examples
     --------
@@ -190,7 +190,7 @@ def point_links(text: str, lectures: str) -> str:
 
 
 def _write_unless_changed(directory: Path, texts: dict, before: dict) -> tuple[dict[str, str], list[str]]:
-    """Write files, but not over one that was changed since the last time; return all digests, and what was kept."""
+    """Write files except those that were changed since the last time; return all digests, and which files were kept."""
     digests, kept = {}, []
     for name, text in texts.items():
         path = directory / name
@@ -211,7 +211,7 @@ def _digest(content: bytes) -> str:
 
 @contextmanager
 def course_api(directory: Path) -> Iterator[NbGraderAPI]:
-    """Open a course with the settings in its own folder, and yield nbgrader's commands on it.
+    """Open a course with its settings, and yield nbgrader's commands on it.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def course_api(directory: Path) -> Iterator[NbGraderAPI]:
 
 
 def _release(api: NbGraderAPI, name: str, source: Path) -> None:
-    """Let nbgrader release an exercise; raise when it doesn't."""
+    """Let nbgrader release an exercise; raise an error if it can't."""
     with caught_errors(api.log) as errors:
         result = api.generate_assignment(name)
     if not result["success"]:
@@ -238,12 +238,12 @@ def _release(api: NbGraderAPI, name: str, source: Path) -> None:
 
 @contextmanager
 def caught_errors(log: logging.Logger) -> Iterator[list[BaseException]]:
-    """Collect the errors that nbgrader catches while a block runs: it logs each, and raises another without the reason.
+    """Collect the errors that nbgrader catches in a block: it logs each, and raises another one without the reason.
 
     Parameters
     ----------
     log : Logger
-        nbgrader's log. Its gradebook writes nothing meanwhile.
+        nbgrader's log. Its gradebook is silent meanwhile.
     """
     errors: list[BaseException] = []
     handler = logging.Handler(logging.ERROR)
@@ -258,28 +258,28 @@ def caught_errors(log: logging.Logger) -> Iterator[list[BaseException]]:
 
 
 def failure_reason(result: dict, errors: list[BaseException]) -> str:
-    """Say in one line why nbgrader failed.
+    """Return in one line why nbgrader failed.
 
     Parameters
     ----------
     result : dict
         What nbgrader's API returned.
     errors : list of BaseException
-        What `caught_errors` collected. The last one counts; without any, the last line of nbgrader's own words.
+        What `caught_errors` collected. The last one counts; without any, the last line of nbgrader's message.
     """
     said = result.get("error") or result.get("log") or "no reason"
     return one_line(errors[-1]) if errors else said.strip().splitlines()[-1]
 
 
 def one_line(error: BaseException) -> str:
-    """Return an error's kind, unless it is one of this package's own errors, and its first line.
+    """Return the class of an error, unless it is one of this package's, and the first line of its message.
 
     Parameters
     ----------
     error : BaseException
         The error.
     """
-    # What a student has written may stand in it, and terminals obey some characters.
+    # It may quote what a student wrote, and some characters control terminals.
     says = "".join(one if one.isprintable() else "?" for one in [*str(error).splitlines(), ""][0][:300])
     ours = type(error).__module__.startswith("semgrid_edu.")
     return says if ours else f"{type(error).__name__}: {says}".removesuffix(": ")

@@ -1,4 +1,4 @@
-"""Text cells of submissions as they may be shown: the instructor who looks at them is logged in."""
+"""Text cells of submissions made safe to show: the instructor who reads them is logged in."""
 
 import re
 from html import escape
@@ -9,25 +9,25 @@ from nbconvert.filters import strip_files_prefix
 from semgrid_edu.storage.files import table_beside
 
 SHOWN_TAGS = (*bleach.ALLOWED_TAGS, *table_beside(__file__)["tags"])
-"""The HTML that Markdown becomes, and nothing that runs."""
+"""The HTML tags that Markdown turns into; none of them runs anything."""
 
 SHOWN_ATTRIBUTES: dict[str, str] = table_beside(__file__)["attributes"]
-"""The pattern of an attribute's value, by its name, or by tag and name."""
+"""The pattern of an attribute's value, by its name or by tag and name."""
 
 MACROS = re.compile(rf"\\({'|'.join(table_beside(__file__)['macros'])})\b")
 """The macros of formulas that aren't shown, with their backslash."""
 
 MOST_TAGS = 1500
-"""A text with more tags is shown as it was written: to clean it may take the square of their number."""
+"""A text with more tags is shown as it was written, because cleaning may take quadratic time."""
 
 
 def without_scripts(html: str) -> str:
-    """Take out of a text cell's HTML whatever could run in a browser: the instructor's is logged in.
+    """Remove from a text cell's HTML everything that could run in a browser.
 
     Parameters
     ----------
     html : str
-        What nbconvert made of Markdown. This function stands in for its filter `strip_files_prefix`, the last that
+        What nbconvert made of Markdown. This function replaces its filter `strip_files_prefix`, the last one that
         nbgrader applies.
     """
     html = MACROS.sub(r"\1", strip_files_prefix(html))
@@ -37,6 +37,6 @@ def without_scripts(html: str) -> str:
 
 
 def _is_shown(tag: str, name: str, value: str) -> bool:
-    """Return whether an attribute stays: links, colours of code, pictures within the text, but none from elsewhere."""
+    """Return whether an attribute stays: links, colours of code, pictures within the text, but not from elsewhere."""
     pattern = SHOWN_ATTRIBUTES.get(f"{tag} {name}", SHOWN_ATTRIBUTES.get(name, "(?!)"))
     return re.fullmatch(pattern, value, re.IGNORECASE | re.DOTALL) is not None

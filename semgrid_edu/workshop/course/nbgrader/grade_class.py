@@ -1,4 +1,4 @@
-"""A whole class: every submission that was collected, graded by nbgrader on all cores."""
+"""A whole class: every collected submission, graded by nbgrader on several cores."""
 
 import tempfile
 from collections.abc import Generator, Iterator, Sequence
@@ -29,43 +29,43 @@ from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_grader
 from semgrid_edu.workshop.course.sandbox.taken import delete_folder
 
 KILLED = "the file can't be graded: twice it ended the process that grades, perhaps for want of memory"
-"""The note on a submission that took the grader with it, among others and alone."""
+"""The note on a submission that ended the grader twice: among others, and alone."""
 
 UNREADABLE = "unreadable"
-"""The folder with notebooks that stand in for files that can't be read."""
+"""The folder of notebooks that replace files that can't be read."""
 
 
 def grade_course(
     course: Path, settings: GradeSettings, assignments: Sequence[str] = (), again: bool = False, workers: int = 1
 ) -> Iterator[Graded]:
-    """Grade what was handed in and isn't graded yet; interrupted, it goes on when it is called again.
+    """Grade what was handed in and isn't graded yet; after an interruption, a second call goes on.
 
     Parameters
     ----------
     course : Path
         A course that `build_course` wrote.
     settings : GradeSettings
-        How.
+        How it is graded.
     assignments : sequence of str
         Only these; all when empty.
     again : bool
-        Whether to grade also what is graded already.
+        Whether to grade again what is graded already.
     workers : int
         How many submissions are graded at the same time.
 
     Yields
     ------
     Graded
-        One submission after the other, as they end.
+        The submissions in the order in which they are finished.
 
     Raises
     ------
     DataError
-        When the folder is no course.
+        When the folder isn't a course.
     ArgumentError
         When there is no such assignment.
     UngradedError
-        In the end, when submissions stay ungraded for a reason that isn't theirs; it names them, one per line.
+        At the end, if submissions stay ungraded for a reason that isn't theirs. It lists them, one per line.
     """
     course, failed = course.resolve(), {}
     wanted = submissions(course, assignments) if again else book.ungraded(course, assignments)
@@ -75,7 +75,7 @@ def grade_course(
 
 
 def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int, failed: dict) -> Iterator[Graded]:
-    """Yield results; what was in work when a process died is graded again alone, to find out whose fault it was."""
+    """Yield results; what was in progress when a process died is graded again alone, to find out whose fault it was."""
     with _pool(workers) as pool:
         failed |= _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
         ready = [one for one in wanted if one[0] not in failed]
@@ -94,7 +94,7 @@ def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int,
 
 @contextmanager
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Start processes that grade, with temporary files in a folder that is deleted in the end, however they ended."""
+    """Start processes that grade, with temporary files in a folder that is always deleted at the end."""
     with ExitStack() as stack:
         folder = tempfile.mkdtemp(prefix="semgrid-grading-")
         stack.callback(delete_folder, Path(folder))
@@ -110,7 +110,7 @@ def _begin(folder: str) -> None:
 
 
 def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: dict[str, str]) -> Generator:
-    """Yield results; note submissions whose grading failed, and return those that have none since a process died."""
+    """Yield results and note failures; return the submissions that have no result because a process died."""
     left = []
     for done in tqdm(as_completed(waiting), "submissions", len(waiting)):
         try:
@@ -124,14 +124,14 @@ def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: d
 
 
 def _which(submission: tuple[str, str]) -> str:
-    """Return how a submission is named."""
+    """Return the name of a submission."""
     return ", ".join(reversed(submission))
 
 
 def _failing_references(
     pool: ProcessPoolExecutor, course: Path, settings: GradeSettings, assignments: Sequence[str]
 ) -> dict[str, str]:
-    """Grade the reference answers of exercises; return what is wrong, by exercise, where they fail."""
+    """Grade the reference answers of exercises; return the errors of those that fail."""
     trials = {
         name: pool.submit(prepare, course, name, settings.memory, settings.container)
         for name in dict.fromkeys(assignments)
@@ -141,12 +141,12 @@ def _failing_references(
 
 
 def missing_limits(settings: GradeSettings) -> list[str]:
-    """Start a process as students' code gets it, and return which of `limits.PARTS` can't be limited.
+    """Start a process as for a student's code, and return which of `limits.PARTS` can't be limited.
 
     Parameters
     ----------
     settings : GradeSettings
-        How a class is graded. With a container nothing is missing: its own command says what is limited.
+        How a class is graded. With a container nothing is missing, because its command sets the limits.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def missing_limits(settings: GradeSettings) -> list[str]:
 
 
 def grade_one(course: Path, assignment: str, student: str, settings: GradeSettings) -> Graded:
-    """Grade one submission; a file that can't be read is graded as an empty one, and the note says so.
+    """Grade one submission; a file that can't be read is graded as an empty one, with a note.
 
     Parameters
     ----------
@@ -168,12 +168,12 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
     assignment, student : str
         Whose submission.
     settings : GradeSettings
-        How.
+        How it is graded.
 
     Raises
     ------
     UngradedError
-        When grading fails for a reason that isn't the submission's; it then has no grade.
+        When grading fails for a reason that isn't the submission's, which then has no grade.
     """
     if has_magic(student):
         note = f"{CRASHED}nbgrader takes * ? [ in a student's name for a pattern: rename the folder"
@@ -189,7 +189,7 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
 
 
 def _graded_or_fault(course: Path, assignment: str, student: str, settings: GradeSettings) -> str:
-    """Grade a submission; return what is wrong with its file, quoting nothing, "" when it has been graded."""
+    """Grade a submission; return what is wrong with its file, without quoting it, or "" if it has been graded."""
     path = place(course, "submitted", student, assignment)
     book.check_time(path)
     try:
@@ -201,7 +201,7 @@ def _graded_or_fault(course: Path, assignment: str, student: str, settings: Grad
 
 
 def _grade_stand_in(course: Path, assignment: str, student: str, settings: GradeSettings, note: str) -> Graded:
-    """Grade the exercise as students get it in place of a file that can't be graded; say so in the gradebook."""
+    """Grade the empty exercise in place of a file that can't be graded, with a note in the gradebook."""
     _stand_in(course, assignment, student, note)
     with book.unfinished(course, assignment, student):
         autograde_one(course, assignment, student, settings, UNREADABLE)
@@ -213,7 +213,7 @@ def _grade_stand_in(course: Path, assignment: str, student: str, settings: Grade
 
 
 def _stand_in(course: Path, assignment: str, student: str, note: str) -> None:
-    """Write the exercise as students get it, with a note, in place of a file that can't be graded."""
+    """Write the empty exercise, with a note, in place of a file that can't be graded."""
     notebook = nbformat.read(course / "release" / assignment / f"{assignment}.ipynb", as_version=4)
     notebook.cells.insert(0, new_markdown_cell(f"**{note}**"))
     write_notebook(notebook, place(course, UNREADABLE, student, assignment))

@@ -1,4 +1,4 @@
-"""What was handed in, whether it can be graded and has been, and what the gradebook says of it."""
+"""What was handed in, whether it can be graded and has been graded, and its result in the gradebook."""
 
 import csv
 import io
@@ -19,16 +19,16 @@ from semgrid_edu.workshop.course.nbgrader.build import MARKER
 from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED
 
 LARGEST = 100_000_000
-"""Bytes of a submission with all its files."""
+"""Limit for a submission with all its files, bytes."""
 
 MOST = 1000
-"""Files and folders of a submission, and cells of its notebook: nbgrader takes time for each."""
+"""Limit for the files and folders of a submission, and for the cells of its notebook: each takes nbgrader time."""
 
 GRADED = "graded.csv"
 """The file with one line for each submission."""
 
 UNFINISHED = "unfinished"
-"""The folder with an empty file for each submission whose grading has begun and not ended, also when it was killed."""
+"""The folder with an empty file for each submission whose grading has begun and not ended, even if it was killed."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,11 @@ class Graded:
     student, assignment : str
         Whose it is.
     score, points : float
-        What it has so far, and what it could have.
+        Its points so far, and the most that are possible.
     to_read : int
-        Written answers that wait for a person.
+        How many written answers wait for a person.
     note : str
-        What ended Python or could not be read; "" when all went well.
+        What ended Python or could not be read; "" if nothing went wrong.
     """
 
     student: str
@@ -68,7 +68,7 @@ def submissions(course: Path, assignments: Sequence[str] = ()) -> list[tuple[str
     Raises
     ------
     DataError
-        When the folder is no course.
+        When the folder isn't a course.
     ArgumentError
         When there is no such assignment.
     """
@@ -82,7 +82,7 @@ def submissions(course: Path, assignments: Sequence[str] = ()) -> list[tuple[str
 
 
 def misplaced(course: Path) -> list[Path]:
-    """Return notebooks that nobody grades, because of their names or places, as paths within the course.
+    """Return notebooks that aren't graded because of their names or places, as paths within the course.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def misplaced(course: Path) -> list[Path]:
 
 
 def check_file(path: Path) -> None:
-    """Raise when a submission can't be graded whatever is in its answers.
+    """Check that a submission can be graded, whatever its answers are.
 
     Parameters
     ----------
@@ -105,8 +105,8 @@ def check_file(path: Path) -> None:
     Raises
     ------
     UnfitError
-        When it is no notebook, has thousands of cells or files, is huge with the files beside it, or comes with links,
-        which nbgrader would follow to other people's files, or with pipes and the like, on which it would wait.
+        When it isn't a notebook, has thousands of cells or files, is huge with the files beside it, or contains links,
+        which nbgrader would follow to other people's files, or pipes and the like, which would block it.
     """
     folder = path.parent
     files = [*folder.rglob("*")]
@@ -131,17 +131,17 @@ def check_file(path: Path) -> None:
 
 
 def check_time(path: Path) -> None:
-    """Raise when the instructor's note on when a submission came can't be read.
+    """Check that the instructor's note on the time of a submission can be read.
 
     Parameters
     ----------
     path : Path
-        The notebook; `timestamp.txt` may lie beside it.
+        The notebook; there may be a `timestamp.txt` beside it.
 
     Raises
     ------
     DataError
-        When that file holds no time.
+        When that file contains no time.
     """
     note = path.with_name("timestamp.txt")
     text = note.read_text(encoding="utf-8", errors="replace").strip() if note.exists() else ""
@@ -153,14 +153,14 @@ def check_time(path: Path) -> None:
 
 @contextmanager
 def unfinished(course: Path, assignment: str, student: str) -> Iterator[None]:
-    """Mark a submission as unfinished while a block grades it: when the process is killed, the mark stays.
+    """Mark a submission as unfinished while a block grades it; if the process is killed, the mark stays.
 
     Parameters
     ----------
     course : Path
         The course.
     assignment, student : str
-        Whose submission. When the block fails, what it has left of it is deleted.
+        Whose submission. If the block fails, its incomplete result is deleted.
     """
     mark = _mark(course, assignment, student)
     try:
@@ -173,14 +173,14 @@ def unfinished(course: Path, assignment: str, student: str) -> Iterator[None]:
 
 
 def forget(course: Path, assignment: str, student: str) -> None:
-    """Delete what an unfinished grading has left, so that nbgrader, too, doesn't take the submission for graded.
+    """Delete what an unfinished grading has left, so that nbgrader doesn't consider the submission graded.
 
     Parameters
     ----------
     course : Path
         The course.
     assignment, student : str
-        Whose submission; one that isn't marked as unfinished stays as it is.
+        Whose submission; without a mark it stays as it is.
     """
     mark = _mark(course, assignment, student)
     if mark.exists():
@@ -189,7 +189,7 @@ def forget(course: Path, assignment: str, student: str) -> None:
 
 
 def _mark(course: Path, assignment: str, student: str) -> Path:
-    """Return the empty file that is there while a submission is being graded."""
+    """Return the empty file that exists while a submission is being graded."""
     return course / UNFINISHED / student / assignment
 
 
@@ -199,7 +199,7 @@ def has_begun(course: Path, assignment: str, student: str) -> bool:
 
 
 def ungraded(course: Path, assignments: Sequence[str] = ()) -> list[tuple[str, str]]:
-    """Return the submissions that are not graded, all of each and as it is now.
+    """Return the submissions that aren't completely graded in their present state.
 
     Parameters and errors are those of `submissions`.
     """
@@ -209,7 +209,7 @@ def ungraded(course: Path, assignments: Sequence[str] = ()) -> list[tuple[str, s
 
 
 def _is_up_to_date(course: Path, assignment: str, student: str) -> bool:
-    """Return whether nbgrader wrote all of a submission's graded notebook, and did so after it was handed in."""
+    """Return whether nbgrader has finished a submission's graded notebook since it was handed in."""
     submitted, graded = (place(course, step, student, assignment) for step in ("submitted", "autograded"))
     begun = has_begun(course, assignment, student)
     return not begun and graded.exists() and graded.stat().st_mtime >= submitted.stat().st_mtime
@@ -257,7 +257,7 @@ def open_gradebook(course: Path) -> Gradebook:
     Raises
     ------
     DataError
-        When another file stands in its place.
+        When it is another kind of file.
     """
     path = course / "gradebook.db"
     with path.open("rb") as file:

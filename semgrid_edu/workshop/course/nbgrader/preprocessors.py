@@ -1,4 +1,4 @@
-"""What this course adds to nbgrader's autograde: submissions are made whole, and run apart from their tests."""
+"""What this course adds to nbgrader's autograde: submissions are completed, and run apart from their tests."""
 
 import re
 import sys
@@ -18,32 +18,32 @@ from traitlets import Bool, Integer, Unicode
 from traitlets import List as ListTrait
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage.compiled import PACKAGE, takes_files, user_cache
+from semgrid_edu.fast.numba_cache import PACKAGE, takes_files, user_cache
 from semgrid_edu.workshop.course.nbgrader.autograde import UnfitError, student_variant
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import INSTRUCTOR, cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
 CRASHED = "Crashed: "
-"""How a comment begins that says what ended Python."""
+"""The beginning of a comment that says what ended Python."""
 
 KEPT = ("kernelspec",)
-"""What is kept of a notebook's metadata; nbgrader replaces it by the exercise's."""
+"""The metadata of a notebook that are kept; nbgrader replaces them by the exercise's."""
 
 CRASHES = "crashes"
-"""The name under which `ExecuteApart` leaves for `NoteCrashes` what ended a student's process."""
+"""The name under which `ExecuteApart` tells `NoteCrashes` what ended a student's process."""
 
 PATIENCE = 600.0
-"""Seconds that a cell of the reference may take; it compiles functions that submissions then find compiled."""
+"""How many seconds a cell of the reference may take: it compiles functions, which submissions then needn't."""
 
 FONTS = "import matplotlib.pyplot"
-"""Lets matplotlib look for the system's fonts, which takes seconds."""
+"""Makes matplotlib look for the system's fonts, which takes seconds."""
 
 
 class MakeWhole(NbGraderPreprocessor):
-    """Gives a submission all cells of the exercise, each once, whatever the student deleted, split or changed.
+    """Gives a submission every cell of the exercise once, whatever the student deleted, split or changed.
 
-    A locked cell that she changed, such as the imports, is restored and runs before her own version of it.
+    A locked cell that she changed, such as the imports, is restored, and her version runs after it.
     """
 
     def preprocess(self, nb: NotebookNode, resources: ResourcesDict) -> tuple[NotebookNode, ResourcesDict]:
@@ -54,13 +54,13 @@ class MakeWhole(NbGraderPreprocessor):
         nb : NotebookNode
             The notebook.
         resources : ResourcesDict
-            nbgrader's account of it: student, assignment, gradebook.
+            nbgrader's information about it: student, assignment, gradebook.
         """
         where = resources["nbgrader"]
         with Gradebook(where["db_url"]) as gradebook:
             exercise = gradebook.find_notebook(where["notebook"], where["assignment"])
             blanks = {cell.name: _blank(cell, exercise) for cell in exercise.source_cells}
-        # Any other metadata would be the student's: widgets, a title, what else is shown in feedback.
+        # All other metadata would be the student's, such as widgets or a title, and shown in feedback.
         nb.metadata = NotebookNode({name: nb.metadata[name] for name in KEPT if name in nb.metadata})
         if not any(cell_name(cell) in blanks for cell in nb.cells):
             _recognise(nb.cells, [blank for blank in blanks.values() if is_solution(blank)])
@@ -71,7 +71,7 @@ class MakeWhole(NbGraderPreprocessor):
 
 
 def _blank(source: SourceCell, exercise) -> NotebookNode:
-    """Return a cell of the exercise as students get it, hidden tests and all."""
+    """Return a cell of the exercise as students get it, but with hidden tests."""
     points = {cell.name: cell.max_score for cell in exercise.grade_cells}
     answers = {cell.name for cell in exercise.solution_cells}
     cell = {"code": new_code_cell, "markdown": new_markdown_cell}[source.cell_type](source.source)
@@ -90,7 +90,7 @@ def _blank(source: SourceCell, exercise) -> NotebookNode:
 
 
 def _recognise(cells: list[NotebookNode], answers: list[NotebookNode]) -> None:
-    """Name answers by what they define, in a notebook that has lost its metadata: the written one is its last text."""
+    """Find answers by what they define in a notebook without metadata; the written answer is its last text."""
     found = 0
     for answer in answers:
         wanted = _defined(answer.source)
@@ -108,19 +108,19 @@ def _defined(source: str) -> set[str]:
 
 
 def _mark(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> None:
-    """Give the last cell of each name the exercise's metadata for it, and all other cells none."""
+    """Give the last cell of each name the exercise's metadata, and all other cells none."""
     left = dict(blanks)
     for cell in reversed(cells):
         blank = left.pop(cell_name(cell), None)
         cell.metadata = NotebookNode()
         if cell.cell_type == "raw":
-            cell.cell_type = "markdown"  # pages show a raw cell as HTML, which `without_scripts` never sees
+            cell.cell_type = "markdown"  # raw cells are shown as HTML that `without_scripts` never sees
         if blank is not None:
             cell.metadata["nbgrader"] = blank.metadata.nbgrader.copy()
 
 
 def _with_own_versions(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> list[NotebookNode]:
-    """Return the cells; behind a locked one that the student changed, unless it is a test, stands her own version."""
+    """Return the cells, with the student's version after each locked cell that she changed, unless it is a test."""
     found = []
     for cell in cells:
         found.append(cell)
@@ -132,7 +132,7 @@ def _with_own_versions(cells: list[NotebookNode], blanks: dict[str, NotebookNode
 
 
 def _insert_missing(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> None:
-    """Insert cells that were deleted, each behind the one that it follows in the exercise."""
+    """Insert cells that were deleted, each after its predecessor in the exercise."""
     place = 0
     for name, blank in blanks.items():
         present = [k for k, cell in enumerate(cells) if cell_name(cell) == name]
@@ -143,7 +143,7 @@ def _insert_missing(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) 
 
 
 class ExecuteApart(NbGraderPreprocessor):
-    """Runs a submission: its answers in a process that can do no harm, its tests in this one."""
+    """Runs a submission: the answers in a process that can do no harm, the tests in this one."""
 
     course = Unicode(help="The folder of the course.").tag(config=True)
     timeout = Integer(30, help="Seconds for a cell, or for all calls of a test.").tag(config=True)
@@ -165,7 +165,7 @@ class ExecuteApart(NbGraderPreprocessor):
 
 
 def use_instructor(folder: Path) -> None:
-    """Let test cells import the hidden tests of this course, and of no other.
+    """Make test cells import the hidden tests of this course, and of no other.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def use_instructor(folder: Path) -> None:
 def starter(
     memory: int, container: tuple[str, ...], keeps: bool = False, beside: Path | None = None
 ) -> Callable[[Path | None], StudentProcess]:
-    """Return a function that starts a process for a student's code, given the folder of what is prepared.
+    """Return a function that takes a folder of compiled functions and starts a process for a student's code.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def starter(
 
 
 def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ...] = ()) -> Path:
-    """Grade the reference answers once in each course; return the folder of what they had compiled.
+    """Grade the reference answers once in each course; return the folder of the functions that they compiled.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ..
     memory : int
         Megabytes of memory for the process.
     container : tuple of str
-        A command that starts a program in a container: what passes outside needn't pass in there. () for none.
+        A command that starts a program in a container, where the answers are graded separately; () for none.
 
     Raises
     ------
@@ -232,7 +232,7 @@ def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ..
 
 
 def prepared_folder(course: Path, assignment: str) -> Path:
-    """Return the folder of what is compiled: in the user's cache, one for each copy of the package, or in this course.
+    """Return the folder of compiled functions: in the user's cache, one for each copy of the package, or in the course.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def prepared_folder(course: Path, assignment: str) -> Path:
     assignment : str
         The exercise.
     """
-    # Numba knows a function by its file: what another copy of the package compiled is of no use to this one.
+    # Numba identifies a function by its file, so one copy of the package can't use what another one compiled.
     shared = user_cache().joinpath("semgrid_edu", "prepared", *PACKAGE.parts[1:], assignment)
     folder = shared if takes_files(shared) else course / "prepared" / assignment
     folder.mkdir(parents=True, exist_ok=True)
@@ -249,7 +249,7 @@ def prepared_folder(course: Path, assignment: str) -> Path:
 
 
 def _grade_reference(course: Path, assignment: str, folder: Path, start: Callable[[Path], StudentProcess]) -> None:
-    """Run an exercise with the instructor's answers in it."""
+    """Run an exercise with the instructor's answers."""
     path = course / "source" / assignment / f"{assignment}.ipynb"
     notebook = nbformat.read(path, as_version=4)
     notebook.cells.insert(0, new_code_cell(FONTS))
@@ -272,7 +272,7 @@ def instructors_cells(notebook: NotebookNode) -> dict[str, str]:
 
 
 class NoteCrashes(NbGraderPreprocessor):
-    """Says in the gradebook which answers ended Python or had to be stopped: 0 points alone would say "did nothing"."""
+    """Notes in the gradebook which answers ended Python or had to be stopped, since 0 points alone don't say why."""
 
     def preprocess(self, nb: NotebookNode, resources: ResourcesDict) -> tuple[NotebookNode, ResourcesDict]:
         """Write the comments of one notebook.
@@ -282,7 +282,7 @@ class NoteCrashes(NbGraderPreprocessor):
         nb : NotebookNode
             The notebook.
         resources : ResourcesDict
-            nbgrader's account of it: student, assignment, gradebook.
+            nbgrader's information about it: student, assignment, gradebook.
         """
         where, answer = resources["nbgrader"], ""
         with Gradebook(where["db_url"]) as gradebook:

@@ -1,4 +1,4 @@
-"""What earns the points of a written answer, shown below it wherever the instructor or the student reads it."""
+"""The rubric of a written answer, shown below it wherever the instructor or the student reads it."""
 
 import re
 from pathlib import Path
@@ -14,11 +14,11 @@ from traitlets import Unicode
 from semgrid_edu.workshop.course.sandbox.notebook import cell_name
 
 BEGINS = re.compile(r"\b(One|Half a) point for\b")
-"""How a rubric begins; it is what remains of the model answer's cell from there."""
+"""The beginning of a rubric, which is the rest of the model answer's cell."""
 
 
 class ShowRubric(NbGraderPreprocessor):
-    """Puts the rubric of each written answer below it: Formgrader and feedback show what is in the notebook."""
+    """Inserts the rubric below each written answer, because Formgrader and feedback show what is in the notebook."""
 
     course = Unicode(help="The folder of the course.").tag(config=True)
 
@@ -39,7 +39,7 @@ def rubrics(notebook: NotebookNode) -> dict[str, str]:
     Parameters
     ----------
     notebook : NotebookNode
-        The exercise's source. A model answer without a sentence that begins as `BEGINS` says has no rubric.
+        The exercise's source. A model answer without a sentence that matches `BEGINS` has no rubric.
     """
     written = (c for c in notebook.cells if c.cell_type == "markdown" and is_grade(c) and is_solution(c))
     found = {cell_name(cell): (cell.source, BEGINS.search(cell.source)) for cell in written}

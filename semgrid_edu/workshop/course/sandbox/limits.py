@@ -11,24 +11,24 @@ from semgrid_edu.storage.files import shipped_folder, table_beside
 from semgrid_edu.workshop.course.sandbox import linux
 
 PARTS = ("memory", "written files", "processes", "files", "modes and dates of files", "network", "signals")
-"""All that is limited here; the grader's own process limits time."""
+"""Everything that is limited here; the grader's process limits time."""
 
 MEGABYTE = 1_000_000
 
 SYSTEM: tuple[str, ...] = table_beside(__file__)["system"]
-"""What programs need of a Linux system."""
+"""The parts of a Linux system that programs need."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How much a student's process may take.
+    """How much a student's process may use.
 
     Parameters
     ----------
     memory : int
-        How much memory its code may take, megabytes.
+        How much memory its code may use, megabytes.
     written : int
-        The size of the largest file that it may write, megabytes; all its files may take three times as much.
+        The size of the largest file that it may write, megabytes; all its files together may be three times as large.
     processes : int
         How many processes and threads the user may have in all.
     """
@@ -39,27 +39,27 @@ class Limits:
 
 
 def limit_this_process(limits: Limits, folder: Path) -> list[str]:
-    """Limit this process, and all that it will start, for good; return which of `PARTS` have been limited.
+    """Limit this process and everything that it will start, for good; return which of `PARTS` are limited.
 
     Parameters
     ----------
     limits : Limits
-        How much it may take.
+        How much it may use.
     folder : Path
         The only folder to which it may write.
     """
-    # Linux ends this process and its children before any other when all memory is taken.
+    # If memory runs out, Linux kills this process and its children first.
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("1000")
     done = _limit_resources(limits)
     if linux.landlock_version():
         done += linux.give_up_files(*_readable(), [folder, Path("/dev/null")])
-    # Landlock knows of networks only TCP; without sockets there is none.
+    # Landlock restricts TCP only; without sockets there is no network at all.
     return [*done, "network", "modes and dates of files"] if linux.give_up_calls() else done
 
 
 def _limit_resources(limits: Limits) -> list[str]:
-    """Set what POSIX offers: memory beyond what the process holds now, files, processes."""
+    """Set the limits of POSIX: memory beyond what the process holds now, files, processes."""
     if sys.platform == "win32":
         return []
     import resource
@@ -76,12 +76,12 @@ def _limit_resources(limits: Limits) -> list[str]:
 
 
 def limit_grader(megabytes: int) -> None:
-    """Limit the memory of this process: what a student's answer makes of it is then an error, not the end of a class.
+    """Limit the memory of this process, so that a huge answer raises an error and doesn't end a class's grading.
 
     Parameters
     ----------
     megabytes : int
-        How much it may take beyond what it holds now. Processes that it starts may set another limit.
+        How much it may use beyond what it holds now. Processes that it starts may set another limit.
     """
     if sys.platform != "win32":
         import resource
@@ -92,7 +92,7 @@ def limit_grader(megabytes: int) -> None:
 
 
 def _held() -> int:
-    """Return the bytes of addresses that this process holds; 0 where there is no `/proc` to ask."""
+    """Return the size of this process's address space, bytes; 0 where there is no `/proc`."""
     import resource
 
     held = Path("/proc/self/statm")
@@ -100,7 +100,7 @@ def _held() -> int:
 
 
 def _set(kind: int, value: int) -> bool:
-    """Set one limit of POSIX; False when the system refuses."""
+    """Set one limit of POSIX; return False if the system doesn't allow it."""
     import resource
 
     try:
@@ -111,9 +111,9 @@ def _set(kind: int, value: int) -> bool:
 
 
 def _readable() -> tuple[list[Path], list[Path]]:
-    """Return folders that a student's code may look into, and files and folders that it may read.
+    """Return folders that a student's code may list, and files and folders that it may read.
 
-    It may read Python, its libraries, the system's, and this package without the sources of the exercises.
+    It may read Python, libraries, and this package except for the sources of the exercises.
     """
     package, hidden = Path(semgrid_edu.__file__).parent, shipped_folder("notebooks")
     look, read = [], [Path(path) for path in SYSTEM]
@@ -125,14 +125,14 @@ def _readable() -> tuple[list[Path], list[Path]]:
 
 
 def _all_but(folder: Path, hidden: Path) -> tuple[list[Path], list[Path]]:
-    """Return the folders between a folder and one that is hidden in it, and all else in them."""
+    """Return the folders on the way to a hidden folder, and everything else in them."""
     if hidden in (folder, *folder.parents):
         return [], []
     if folder not in hidden.parents:
         return [], [folder]
     look, read = [folder], []
     for child in folder.iterdir():
-        # What a link points to is named by itself, or not to be read.
+        # The target of a link is readable only if it is listed itself.
         if not child.is_symlink():
             inner = _all_but(child, hidden)
             look += inner[0]

@@ -1,6 +1,6 @@
-"""What a Linux process gives up for good: all files but those it names (Landlock), and some system calls (seccomp).
+"""Rights that a Linux process gives up for good: to all files except some (Landlock), to some system calls (seccomp).
 
-Landlock came with kernel 5.13: landlock(7). Seccomp's filter is a small program for the kernel: seccomp(2), bpf(2).
+Landlock needs kernel 5.13: landlock(7). Seccomp's filter is a small program for the kernel: seccomp(2), bpf(2).
 """
 
 import ctypes
@@ -15,35 +15,35 @@ from pathlib import Path
 from semgrid_edu.storage.files import table_beside
 
 LIBRARY = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
-"""The C library, looked up once: among the libraries of a process with torch that takes milliseconds."""
+"""The C library, looked up once: in a process that has loaded torch, a look-up takes milliseconds."""
 
 NO_NEW_PRIVILEGES = 38
-"""The argument of prctl without which the kernel refuses both."""
+"""The argument of prctl that the kernel requires before either."""
 
 CREATE, ADD, RESTRICT = 444, 445, 446
 """Numbers of Landlock's three system calls, the same on every processor."""
 
 EXECUTE, READ_FILE, READ_DIR, TRUNCATE, DEVICE_CONTROL = 1 << 0, 1 << 2, 1 << 3, 1 << 14, 1 << 15
 READ = EXECUTE | READ_FILE | READ_DIR
-"""The rights to what may only be read."""
+"""The rights to files and folders that may only be read."""
 
 OF_FILES = EXECUTE | 1 << 1 | READ_FILE | TRUNCATE | DEVICE_CONTROL
 """The rights that a single file can have; the others belong to folders."""
 
 FILE_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 15) - 1, 5: (1 << 16) - 1}
-"""All rights to files that a version of Landlock knows; later versions know those of version 5."""
+"""All rights to files by version of Landlock; later versions have those of version 5."""
 
 PROCESSORS = table_beside(__file__)
-"""By processor the number of its own calls ("audit"), and those that seccomp refuses or leaves idle, by name."""
+"""By processor: the code of its native calls ("audit"), and the calls that seccomp refuses or ignores, by name."""
 
 NEWER = 467
-"""From this number on calls are refused as by a system that doesn't know them: x86_64 has all once more from 2^30."""
+"""Calls from this number on fail as if the system didn't know them: x86_64 has all calls a second time from 2^30."""
 
 LOAD, EQUAL, AT_LEAST, ANY_BIT, RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 """The five instructions of the filter: load a word, compare it in three ways, and end."""
 
 NUMBER, ARCHITECTURE, FIRST = 0, 4, 16
-"""Where the number of a call stands, its processor, and the low word of its first argument: struct seccomp_data."""
+"""Offsets of the number of a call, its processor, and the low word of its first argument in struct seccomp_data."""
 
 ALLOW, IDLE, REFUSE, UNKNOWN = 0x7FFF0000, 0x00050000, 0x00050000 | errno.EPERM, 0x00050000 | errno.ENOSYS
 """The filter's verdicts: do it, do nothing and report success, or fail."""
@@ -52,12 +52,12 @@ SET_SECCOMP, FILTER = 22, 2
 """Arguments of prctl."""
 
 CAPABILITIES, READ_ANY = 0x20080522, 1 << 2
-"""The version of capset's arguments, and the one capability that root's process keeps: Python may be another user's."""
+"""The version of capset's arguments, and the one capability that root keeps: Python may belong to another user."""
 
 
 def landlock_version() -> int:
-    """Return the version of Landlock that the kernel has; 0 without one, and on other systems."""
-    # The number of the call means something else there.
+    """Return the kernel's version of Landlock; 0 without it, and on other systems."""
+    # On other systems this number is another call.
     if sys.platform != "linux":
         return 0
     try:
@@ -67,16 +67,16 @@ def landlock_version() -> int:
 
 
 def give_up_files(look: Iterable[Path], read: Iterable[Path], write: Iterable[Path]) -> list[str]:
-    """Give up all other files, and TCP and signals to other processes where Landlock can.
+    """Give up all other files, and TCP and signals to other processes if Landlock supports that.
 
     Parameters
     ----------
     look : iterable of Path
-        Folders of which one may see what is in them and below; the files in them can't be opened.
+        Folders that may be listed, with the folders below; the files in them can't be opened.
     read : iterable of Path
-        Files and folders, with all in them, that may be read and executed. What doesn't exist is left out.
+        Files and folders that may be read and executed, with everything in them. Missing ones are ignored.
     write : iterable of Path
-        Folders and devices with which one may do anything.
+        Folders and devices to which everything is allowed.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def give_up_files(look: Iterable[Path], read: Iterable[Path], write: Iterable[Pa
     Raises
     ------
     OSError
-        When the kernel refuses.
+        When the kernel doesn't allow it.
     """
     known = landlock_version()
     files = FILE_RIGHTS[min(known, 5)]
@@ -102,7 +102,7 @@ def give_up_files(look: Iterable[Path], read: Iterable[Path], write: Iterable[Pa
 
 
 def _allow(rules: int, path: Path, rights: int) -> None:
-    """Add a rule for a path and all below it."""
+    """Add a rule for a path and everything below it."""
     handle = os.open(path, os.O_PATH)
     try:
         _call(ADD, rules, 1, struct.pack("=Qi", rights if path.is_dir() else rights & OF_FILES, handle), 0)
@@ -111,7 +111,7 @@ def _allow(rules: int, path: Path, rights: int) -> None:
 
 
 def _call(number: int, *arguments: bytes | int | None) -> int:
-    """Do a system call; one that fails raises OSError."""
+    """Make a system call; raise OSError if it fails."""
     passed = [ctypes.c_long(one) if isinstance(one, int) else one for one in arguments]
     result = LIBRARY.syscall(ctypes.c_long(number), *passed)
     if result < 0:
@@ -120,7 +120,7 @@ def _call(number: int, *arguments: bytes | int | None) -> int:
 
 
 def give_up_calls() -> bool:
-    """Give up the system calls of `linux.toml`, and all capabilities; False where that isn't possible."""
+    """Give up the system calls of `linux.toml`, and all capabilities; return False if that isn't possible."""
     machine = platform.machine()
     if sys.platform != "linux" or machine not in PROCESSORS:
         return False
@@ -129,14 +129,14 @@ def give_up_calls() -> bool:
     # struct sock_fprog: the number of instructions, and where they are.
     described = struct.pack("HP", len(code) // 8, ctypes.addressof(program))
     LIBRARY.prctl(NO_NEW_PRIVILEGES, 1, 0, 0, 0)
-    for kept in (READ_ANY, 0):  # Docker's root hasn't got the first
+    for kept in (READ_ANY, 0):  # root in Docker doesn't have the first
         if LIBRARY.capset(struct.pack("Ii", CAPABILITIES, 0), struct.pack("6I", kept, kept, 0, 0, 0, 0)) == 0:
             break
     return LIBRARY.prctl(SET_SECCOMP, FILTER, described, 0, 0) == 0
 
 
 def _filter(audit: int, refused: dict[str, int], unknown: dict, idle: dict, refused_if: dict) -> bytes:
-    """Return the filter's instructions: each has a code, how many to skip if it holds and if not, and a number."""
+    """Return the filter's instructions: a code, how many to skip if it is true and if it is not, and a number."""
     lines = [(LOAD, 0, 0, ARCHITECTURE), (EQUAL, 1, 0, audit), (RETURN, 0, 0, REFUSE), (LOAD, 0, 0, NUMBER)]
     lines += [(AT_LEAST, 0, 1, NEWER), (RETURN, 0, 0, UNKNOWN)]
     for calls, verdict in ((refused, REFUSE), (unknown, UNKNOWN), (idle, IDLE)):

@@ -26,19 +26,19 @@ INSTRUCTOR = "semgrid_instructor"
 """The instructor's module, with the hidden tests; their lines aren't shown."""
 
 MOST_PRINTED = 2000
-"""Characters that are kept of what an answer printed while a test ran."""
+"""How many characters are kept of what an answer printed during a test."""
 
 PRINTED = "your code printed:\n"
-"""What stands before that, so that it can't pass for the grader's words."""
+"""The heading above it, so that it can't be mistaken for the grader's words."""
 
 MOST_OUTPUT = 30_000_000
-"""Characters that are kept of all outputs of a notebook."""
+"""How many characters of outputs are kept in a notebook."""
 
 STREAMS = "stdout", "stderr"
 """The streams of a cell."""
 
 PICTURES, BASE64 = ("image/png", "image/jpeg"), re.compile(r"[A-Za-z0-9+/=\s]*")
-"""The pictures that are kept, and how their data must look."""
+"""The kinds of pictures that are kept, and the form of their data."""
 
 ENDS = (AnswerEndedError, AnswerTimeoutError)
 """The errors of an answer that ended its process, or had to be ended."""
@@ -58,7 +58,7 @@ def run_submission(
     notebook : NotebookNode
         The submission.
     trusted : mapping of str to str
-        The text of the instructor's cells, by grade_id. A test runs in the grader's process, so only with this text.
+        The text of the instructor's cells, by grade_id. A test runs in the grader's process, and only with this text.
     start : callable
         () -> StudentProcess.
     timeout : float
@@ -69,19 +69,19 @@ def run_submission(
     Returns
     -------
     dict of str to str
-        What ended a student's process, by the grade_id of the cell in which it happened ("" for a cell of her own).
+        What ended the student's process, by the grade_id of the cell that it ran ("" for a cell that she added).
 
     Raises
     ------
     ChildProcessError
-        When no process could be started for her code: that says nothing about her answers.
+        When no process could be started for her code, which says nothing about her answers.
     """
     seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
     tests = TestCells(seen, unseen, variant)
     try:
         _prepare(notebook, trusted, tests)
         ended = _run_seen(notebook, trusted, tests)
-        # Whatever the student is shown has been said, and nobody listens any more when the hidden inputs come.
+        # Hidden inputs are sent only after the process whose output the student sees has ended.
         seen.close()
         _run_unseen(notebook, tests)
         return ended
@@ -106,12 +106,12 @@ def cell_name(cell: NotebookNode) -> str:
 
 
 class TestCells:
-    """The test cells of one submission, run in this process: the answers that they call work elsewhere.
+    """The test cells of one submission, run in this process; the answers that they call run in others.
 
     Parameters
     ----------
     seen, unseen : Session
-        The student's notebook, twice: for the tests that she can read, and for the hidden ones.
+        The student's notebook in two processes: for the tests that she can read, and for the hidden ones.
     variant : tuple of int
         Which inputs the hidden tests draw.
     """
@@ -125,7 +125,7 @@ class TestCells:
         self.postponed: dict[str, list[Callable[[], str]]] = {}
 
     def prepare(self, source: str) -> None:
-        """Run one of the instructor's cells that isn't a test, for what it imports and defines.
+        """Run one of the instructor's cells that aren't tests, for its imports and definitions.
 
         Parameters
         ----------
@@ -137,9 +137,9 @@ class TestCells:
         _run(lambda: exec(code, self.names))
 
     def test(self, source: str, name: str) -> list[NotebookNode]:
-        """Run a test cell; return what belongs below it: what the answer printed, and the error that makes it fail.
+        """Run a test cell; return its outputs: what the answer printed, and the error that makes it fail.
 
-        Its hidden part waits for `judge`.
+        `judge` runs the hidden part later.
 
         Parameters
         ----------
@@ -164,7 +164,7 @@ class TestCells:
         return outputs + ([] if error is None else [_as_output(error, file)])
 
     def judge(self, name: str) -> list[NotebookNode]:
-        """Run the hidden part of a test cell; return the sentence that makes it fail, as it belongs below the cell.
+        """Run the hidden part of a test cell; return the sentence that makes it fail, as an output.
 
         Parameters
         ----------
@@ -189,14 +189,14 @@ class TestCells:
         return error
 
     def _answers(self, names: set[str]) -> dict[str, Any]:
-        """Return what names that the grader doesn't know stand for in the student's notebook."""
+        """Return the student's functions and values for the names that the grader doesn't know."""
         self.seen.begin()
         wanted = sorted(names - self.names.keys() - vars(builtins).keys())
         return self.seen.names(wanted, self.unseen)
 
 
 def _run(work: Callable[[], object]) -> Exception | None:
-    """Do something quietly; return the error that ended it."""
+    """Call a function quietly; return the error that ended it."""
     with warnings.catch_warnings(), np.errstate(), redirect_stderr(io.StringIO()), redirect_stdout(io.StringIO()):
         try:
             work()
@@ -206,13 +206,13 @@ def _run(work: Callable[[], object]) -> Exception | None:
 
 
 def _global_names(code: CodeType) -> set[str]:
-    """Return the global names that code, with the functions in it, looks up."""
+    """Return the global names that code and the functions in it look up."""
     here = {one.argval for one in dis.get_instructions(code) if one.opname in ("LOAD_GLOBAL", "LOAD_NAME")}
     return here.union(*(_global_names(inner) for inner in code.co_consts if isinstance(inner, CodeType)))
 
 
 def _as_output(error: Exception, file: str) -> NotebookNode:
-    """Return an error as a notebook holds it: the line of the test, unless it is a hidden one, and what it says."""
+    """Return an error as an output: the line of the test, unless it is a hidden one, and the message."""
     kind = type(error).__name__
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
     line = frames[-1].line if frames else ""
@@ -221,19 +221,19 @@ def _as_output(error: Exception, file: str) -> NotebookNode:
 
 
 def _run_seen(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -> dict[str, str]:
-    """Run each cell, of tests what students can read; return what ended the student's process, by grade_id."""
+    """Run each cell, and the visible part of tests; return what ended the student's process, by grade_id."""
     room, ended = MOST_OUTPUT, {}
     for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
         cell.execution_count, tests.seen.ended = number, ""
         cell.outputs, room = _shortened(_outputs(cell, trusted, tests), room)
-        # A student's own error may have any name; what ended her process is told by the grader's side alone.
+        # A student can raise errors of any name, so only the grader's side decides what ended her process.
         if tests.seen.ended:
             ended[cell_name(cell)] = tests.seen.ended
     return ended
 
 
 def _run_unseen(notebook: NotebookNode, tests: TestCells) -> None:
-    """Run the hidden parts of tests in their order, each after the cells that stand above it."""
+    """Run the hidden parts of tests in their order, each after the cells above it."""
     for cell in (c for c in notebook.cells if c.cell_type == "code"):
         if is_grade(cell) and not is_solution(cell):
             cell.outputs += tests.judge(cell_name(cell))
@@ -242,7 +242,7 @@ def _run_unseen(notebook: NotebookNode, tests: TestCells) -> None:
 
 
 def _prepare(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -> None:
-    """Run the instructor's cells that aren't tests, in the course's order, whatever order the student gave them."""
+    """Run the instructor's cells that aren't tests, in the order of the exercise, not of the submission."""
     cells = {cell_name(cell): cell for cell in notebook.cells if cell.cell_type == "code"}
     for name, source in trusted.items():
         if name in cells and not is_grade(cells[name]) and not is_solution(cells[name]):
@@ -254,13 +254,13 @@ def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -
     if is_grade(cell) and not is_solution(cell):
         if trusted.get(cell_name(cell)) == cell.source:
             return tests.test(cell.source, cell_name(cell))
-        # Without an error nbgrader would give all points.
+        # Without an error nbgrader would give full points.
         return [_error("ValueError", "not the course's test")]
     return _as_outputs(tests.seen.run(cell.source))
 
 
 def _as_outputs(reply: dict) -> list[NotebookNode]:
-    """Return what a cell put out as a notebook holds it."""
+    """Return what a cell put out as outputs of a notebook."""
     streams = [
         new_output("stream", name=k, text=reply["streams"][k]) for k in STREAMS if reply.get("streams", {}).get(k)
     ]
@@ -272,12 +272,12 @@ def _as_outputs(reply: dict) -> list[NotebookNode]:
 
 
 def _harmless(shown: dict[str, str]) -> dict[str, str]:
-    """Return text and pictures. HTML and SVG could hold scripts, which would run in the browser of who grades."""
+    """Return text and pictures. HTML and SVG could contain scripts, which would run in the grader's browser."""
     return {k: data for k, data in shown.items() if k == "text/plain" or (k in PICTURES and BASE64.fullmatch(data))}
 
 
 def _shortened(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNode], int]:
-    """Return outputs, without most of them when the notebook has no room left, and the room that is left then."""
+    """Return outputs, or only their errors if the notebook has no room left, and the room that is left then."""
     size = len(json.dumps(outputs))
     if size <= room:
         return outputs, room - size
@@ -286,5 +286,5 @@ def _shortened(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNod
 
 
 def _error(kind: str, says: str, lines: Sequence[str] = ()) -> NotebookNode:
-    """Return an error as a notebook holds it."""
+    """Return an error as an output of a notebook."""
     return new_output("error", ename=kind, evalue=says, traceback=[*lines] or [f"{kind}: {says}"])

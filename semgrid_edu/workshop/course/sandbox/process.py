@@ -1,4 +1,4 @@
-"""The grader's side of one student's process: starts it, asks it, and ends it when it takes too long or too much."""
+"""The grader's side of one student's process: starts it, asks it, and ends it if it takes too long or uses too much."""
 
 import os
 import queue
@@ -37,57 +37,57 @@ from semgrid_edu.workshop.course.sandbox.taken import (
 from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES, MOST_INPUT, Wire, check_reply, decode, encode
 
 WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
-"""What Python is started with."""
+"""The arguments with which Python is started."""
 
 ALONE: tuple[str, ...] = table_beside(__file__)["alone"]
-"""Starts a program that sees no network and no processes but its own, and ends with this one (util-linux)."""
+"""Starts a program without network that sees no other processes, and ends with this one (util-linux)."""
 
 WATCHED = 0.5
-"""Seconds from one look at the files of a process to the next."""
+"""Seconds between two checks of what a process uses."""
 
 STARTED = 60.0
-"""Seconds that a process may take to start."""
+"""How many seconds a process may take to start."""
 
 ENDING = 5.0
-"""Seconds that the system may take to end a process."""
+"""How many seconds the system may take to end a process."""
 
 LONGEST_REPLY = 2 * MOST_BYTES
-"""Bytes of a message without changed arguments: results and what given functions are called with are never as long."""
+"""Limit for a message without changed arguments, bytes: results, and arguments of callbacks, are shorter."""
 
 MOST_SAID = 1000
-"""Characters of an error that are sent back to a student's process, whose arguments it may quote."""
+"""How many characters of an error are sent back to a student's process: it may quote that process's arguments."""
 
 
 class ProcessEndedError(Exception):
-    """A student's process is no more: it ended itself, or was ended because it took too long."""
+    """A student's process has ended by itself, or was ended because it took too long."""
 
 
 class StudentProcess:
-    """A process of its own for one student's code, in a fresh folder.
+    """A separate process for one student's code, in a fresh folder.
 
     Parameters
     ----------
     limits : Limits
-        How much it may take; its number of processes is added to those that the user has now.
+        How much it may use; its number of processes is added to those that the user has now.
     prepared : Path, optional
-        A folder that is copied into the fresh one: functions that are compiled already, and fonts.
+        A folder that is copied into the fresh one, with compiled functions and fonts.
     keeps : bool
-        Whether what is compiled in the fresh folder goes back to that folder in the end: for trusted code alone.
+        Whether what is compiled in the fresh folder is copied back at the end; for trusted code only.
     container : tuple of str
-        A command before the worker's that starts it in a container, such as ("docker", "run", ...); otherwise it is
-        started in namespaces of its own where the system can.
+        A prefix that starts the worker in a container, such as ("docker", "run", ...). Without one the worker gets
+        namespaces of its own where the system allows it.
     beside : Path, optional
-        A folder with a notebook and what was handed in with it, which is copied beside the student's code.
+        A folder with a notebook and the files that were handed in with it, which are copied beside the student's code.
 
     Raises
     ------
     ChildProcessError
-        When the process ends, or stays silent, before any code of a student has run in it.
+        When the process ends, or doesn't answer, before it has run any of the student's code.
 
     Attributes
     ----------
     unlimited : list of str
-        Of `PARTS` what could not be limited. A container is taken to limit everything.
+        Which of `PARTS` could not be limited. A container is assumed to limit everything.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class StudentProcess:
         if prepared is not None:
             shutil.copytree(prepared, self.folder / around.PREPARED, ignore=around.ONLY_WHOLE)
         alone = () if container or not _can_be_alone() else ALONE
-        # A container has a Python of its own.
+        # A container has its own Python.
         self.process = self._started([*container, *alone, "python" if container else sys.executable, *WORKER])
         self.wire = Wire(self.process.stdout, self.process.stdin)
         self.sent: queue.Queue[bytes | None] = queue.Queue()
@@ -144,7 +144,7 @@ class StudentProcess:
             raise
 
     def _limit(self, limits: Limits, alone: tuple[str, ...]) -> list[str]:
-        """Let the process limit itself; return what it couldn't."""
+        """Let the process limit itself; return what it couldn't limit."""
         ours = threads_of(Path("/proc").glob("[0-9]*"), os.getuid()) if hasattr(os, "getuid") else 0
         limits = replace(limits, processes=limits.processes + ours)
         message = {"do": "limit", "limits": asdict(limits), "folder": str(self.folder)}
@@ -152,28 +152,28 @@ class StudentProcess:
         return [part for part in PARTS if part not in (*done, *(("network", "processes", "signals") if alone else ()))]
 
     def _speak(self) -> None:
-        """Send and receive in a thread: neither a full pipe nor a silent process may hold up the grader for ever."""
+        """Send and receive in a thread, so that neither a full pipe nor a silent process blocks the grader."""
         while (data := self.sent.get()) is not None:
             try:
                 self.wire.send(data)
                 self.received.put(self.wire.receive())
             except (OSError, ValueError, MemoryError):
-                self.received.put(None)  # the process is no more
+                self.received.put(None)  # the process has ended
 
     def _watch(self, limits: Limits) -> None:
-        """End the process when it, and what it has started, take too much together."""
+        """End the process if it and everything that it has started use too much together."""
         most = memory_held(processes_in(self.namespace)) + limits.memory * MEGABYTE
         while self.process.poll() is None:
             try:
                 too_much = self._takes_more(limits, most)
             except Exception:
-                too_much = True  # what can't be watched isn't let go on
+                too_much = True  # a process that can't be watched must not go on
             if too_much:
                 self._kill()
             time.sleep(WATCHED)
 
     def _takes_more(self, limits: Limits, memory: int) -> bool:
-        """Return whether there are too many processes, or their memory or files together are too large, or too many."""
+        """Return whether there are too many processes or files, or they are too large together."""
         running = processes_in(self.namespace)
         if threads_of(running) > limits.processes or memory_held(running) > memory:
             return True
@@ -181,7 +181,7 @@ class StudentProcess:
         return takes_too_much(self.folder, 3 * each - deleted_bytes(running, each))
 
     def _kill(self) -> None:
-        """End the process, those in its session, and those in its namespace, which may be in sessions of their own."""
+        """End the process, and all processes in its session and in its namespace."""
         with suppress(OSError):
             os.killpg(self.process.pid, signal.SIGKILL) if hasattr(os, "killpg") else self.process.kill()
         for place in processes_in(self.namespace):
@@ -198,14 +198,14 @@ class StudentProcess:
         deadline : float
             When the reply must be here, `time.monotonic()` seconds.
         callbacks : list of callable, optional
-            Takes the functions in the message; the process may call them before it replies.
+            Collects the functions in the message; the process may call them before it replies.
 
         Raises
         ------
         TimeoutError
-            When there was none in time. The process has been ended.
+            When there is no reply in time. The process has then been ended.
         ProcessEndedError
-            When the process is no more, or sends what is no message.
+            When the process has ended, or sends something that isn't a message.
         """
         callbacks = [] if callbacks is None else callbacks
         data = encode(message, callbacks, MOST_INPUT)
@@ -234,10 +234,10 @@ class StudentProcess:
             raise ProcessEndedError from None
 
     def begin_measuring(self) -> bool:
-        """Let the peak of the process's memory begin anew, seen from outside; False where the system can't tell it."""
+        """Reset the process's peak of memory, measured from outside; return False if the system can't measure it."""
         try:
             outer = self.process.pid
-            # In namespaces of its own the worker is the only child of the program that made them.
+            # The program that makes the namespaces has the worker as its only child.
             self.inner = int(Path(f"/proc/{outer}/task/{outer}/children").read_text()) if self.namespace else outer
             Path(f"/proc/{self.inner}/clear_refs").write_text("5")
             self.held = memory_of(self.inner)["VmRSS"]
@@ -247,19 +247,19 @@ class StudentProcess:
         return not self.contained
 
     def _with_children(self) -> float:
-        """Return the megabytes that the process holds together with those that it has started, 0 without any."""
+        """Return the megabytes that the process and its descendants hold together, 0 without descendants."""
         below = processes_below(self.inner)
         return memory_held([Path(f"/proc/{self.inner}"), *below]) / MEGABYTE if below else 0
 
     def megabytes(self) -> float:
         """Return the most memory that the process has held since `begin_measuring`, beyond what it held then.
 
-        What it maps of files counts, and what processes hold that it has started.
+        Mapped files and the memory of descendants count.
         """
         return max((memory_of(self.inner)["VmHWM"] - self.held) / 1000, self.family.growth())
 
     def stop(self) -> None:
-        """End the process with all that it has started, and delete its folder."""
+        """End the process with everything that it has started, and delete its folder."""
         if self.family:
             self.family.ended.set()
         self.sent.put(None)
@@ -276,14 +276,14 @@ class StudentProcess:
         delete_folder(self.folder)
 
     def _wait_for_the_last(self) -> None:
-        """Wait until the system has ended all that the process has started, at most some seconds."""
+        """Wait, at most some seconds, until the system has ended everything that the process has started."""
         until = time.monotonic() + ENDING
         while not all(map(has_ended, processes_in(self.namespace))) and time.monotonic() < until:
             time.sleep(0.01)
 
 
 def _called(callbacks: list[Callable], reply: dict) -> bytes:
-    """Work out a function for the student's process; return what it is sent, an error when the result can't be."""
+    """Call a function for the student's process; return the reply as bytes, an error if the result can't be sent."""
     try:
         return encode({"result": callbacks[reply["callback"]](*reply["arguments"], **reply["named"])})
     except Exception as error:
@@ -292,5 +292,5 @@ def _called(callbacks: list[Callable], reply: dict) -> bytes:
 
 @cache
 def _can_be_alone() -> bool:
-    """Return whether this system lets a program have namespaces of its own."""
+    """Return whether this system allows a program namespaces of its own."""
     return bool(shutil.which(ALONE[0])) and not subprocess.run([*ALONE, "true"], capture_output=True).returncode

@@ -1,4 +1,4 @@
-"""A student's notebook to run and its functions to call: whatever one cell or call does, the next finds the others."""
+"""A student's notebook, whose cells run and whose functions are called; a crash in one leaves the others intact."""
 
 import builtins
 import time
@@ -12,14 +12,14 @@ from semgrid_edu.workshop.course.sandbox.process import ProcessEndedError, Stude
 from semgrid_edu.workshop.course.sandbox.values import put_back
 
 ALL = 20
-"""How many times the time of a cell all cells and calls together may take."""
+"""All cells and calls together may take this many times the time limit of a cell."""
 
 MOST_LINES = 300
-"""The last line of a cell that is named where inputs are secret: a longer cell could tell any number by its line."""
+"""With secret inputs, errors name no line beyond this one: a longer cell could report any number by its line."""
 
 
 class AnswerTimeoutError(Exception):
-    """An answer has not come back in time."""
+    """An answer has not returned in time."""
 
 
 class AnswerEndedError(Exception):
@@ -27,18 +27,18 @@ class AnswerEndedError(Exception):
 
 
 class AnswerError(Exception):
-    """An answer has raised an error that isn't one of Python's own."""
+    """An answer has raised an error that isn't a standard one."""
 
 
 class NoProcessError(BaseException):
     """No process could be started for the student's code.
 
-    It isn't an `Exception`: tests catch those, and would take it for a fault of the answer.
+    It isn't an `Exception`, because tests catch those and would blame the answer.
     """
 
 
 class Session:
-    """A student's notebook in a process of its own, which is started again when it has ended.
+    """A student's notebook in a separate process, which is restarted when it has ended.
 
     Parameters
     ----------
@@ -47,16 +47,16 @@ class Session:
     timeout : float
         How long a cell may take, or all calls of a test cell together, seconds.
     secret : bool
-        Whether the student must not learn what functions are called with, so that what they say in errors is left out.
+        Whether the student must not learn the inputs of functions, so that errors are reported without their messages.
 
     Attributes
     ----------
     printed : str
         What the student's functions have printed since it was last emptied.
     ended : str
-        What ended the process since the time of this cell began; "" when nothing did.
+        What ended the process since this cell began; "" if nothing did.
     postponed : list of callable
-        Checks, () -> str, of what was asked to be judged later.
+        Checks, () -> str, that were postponed by `RemoteFunction.judge_later`.
     """
 
     def __init__(self, start: Callable[[], StudentProcess], timeout: float, secret: bool = False) -> None:
@@ -71,11 +71,11 @@ class Session:
         self.begin()
 
     def begin(self) -> None:
-        """Let the time of a cell begin."""
+        """Start the time of a cell."""
         self.left, self.ended = self.timeout, ""
 
     def run(self, code: str) -> dict[str, Any]:
-        """Run a cell; one that ends the process, or doesn't end, is left out from then on.
+        """Run a cell; one that ends the process, or doesn't end, isn't run again.
 
         Parameters
         ----------
@@ -97,7 +97,7 @@ class Session:
         return reply
 
     def run_later(self, code: str) -> None:
-        """Run a cell when a function is called, and not at all when none is.
+        """Run a cell before the next call of a function, and not at all if there is none.
 
         Parameters
         ----------
@@ -117,12 +117,12 @@ class Session:
             Where the functions are called with the inputs of hidden tests.
         """
         reply = self._ask({"do": "names", "wanted": wanted})
-        # The reply may hold any names; those that weren't asked for would replace what the tests rely on.
+        # The reply may contain any names; those that weren't asked for would replace what the tests rely on.
         functions = {name: RemoteFunction(self, name, unseen) for name in reply.get("functions", []) if name in wanted}
         return {name: value for name, value in reply.get("values", {}).items() if name in wanted} | functions
 
     def call(self, name: str, arguments: tuple, named: dict, measured: bool) -> tuple[Any, float]:
-        """Call a function of the notebook, and change the arguments that it changes.
+        """Call a function of the notebook, and apply the changes that it makes to its arguments.
 
         Parameters
         ----------
@@ -138,13 +138,12 @@ class Session:
         result : object
             What it returns.
         megabytes : float
-            The most memory that it held; NaN when that was not measured.
+            The most memory that it held; NaN if that was not measured.
 
         Raises
         ------
         Exception
-            What it raises, if that is one of Python's own errors; otherwise AnswerError, AnswerTimeoutError or
-            AnswerEndedError.
+            What it raises, if that is a standard error; otherwise AnswerError, AnswerTimeoutError or AnswerEndedError.
         """
         self._catch_up()
         inside = measured and not self._alive().begin_measuring()
@@ -159,14 +158,14 @@ class Session:
         return reply["result"], megabytes
 
     def _as_error(self, error: dict[str, Any]) -> Exception:
-        """Return the error that an answer raised; where its inputs are secret, no more of it than the line."""
+        """Return the error that an answer raised; with secret inputs, only its line."""
         if self.secret:
             lines = min(MOST_LINES, max((cell.count("\n") + 1 for cell in self.cells), default=0))
             says = f"an error in line {error['number']}" if error["number"] in range(1, lines + 1) else "an error"
             found = _standard_error(error | {"kind": "", "says": says, "line": ""})
             found.secret = says
             return found
-        # A line that is in no cell was put there to say something else.
+        # A line that is in no cell was forged to say something else.
         known = any(error["line"] in cell for cell in self.cells)
         return _standard_error(error | {"line": error["line"] if known else ""})
 
@@ -178,7 +177,7 @@ class Session:
             self.begin()
 
     def _ask(self, message: dict, callbacks: list[Callable] | None = None) -> dict[str, Any]:
-        """Ask the process, one that is alive; only the time that passes meanwhile counts as the student's."""
+        """Ask the process, which is started if need be; only the time of the reply counts as the student's."""
         if self.left_in_all <= 0:
             self.ended = f"all cells together have used up their time, {ALL * self.timeout:g} s"
             raise AnswerTimeoutError(self.ended)
@@ -196,7 +195,7 @@ class Session:
             self.left_in_all -= time.monotonic() - began
 
     def _alive(self) -> StudentProcess:
-        """Return a process; without one, start it, and run in it the cells that ran before."""
+        """Return the process; if there is none, start one and run the earlier cells in it."""
         if self.closed:
             raise NoProcessError("a hidden test calls an answer whose output the student sees")
         if self.process is None:
@@ -204,7 +203,7 @@ class Session:
         return self.process
 
     def _start_again(self) -> None:
-        """Start a process, and run in it the cells that ran before."""
+        """Start a process, and run the earlier cells in it."""
         began = time.monotonic()
         try:
             self.process = self.start()
@@ -229,7 +228,7 @@ class Session:
 
 
 class RemoteFunction:
-    """A function that works in a student's process.
+    """A function that runs in a student's process.
 
     Parameters
     ----------
@@ -243,7 +242,7 @@ class RemoteFunction:
     Attributes
     ----------
     unseen : RemoteFunction
-        The same function in a process of which the student is shown nothing, for the inputs of hidden tests.
+        The same function in a process whose output the student doesn't see, for the inputs of hidden tests.
     """
 
     def __init__(self, session: Session, name: str, unseen: Session | None = None) -> None:
@@ -255,7 +254,7 @@ class RemoteFunction:
         return self.session.call(self.__name__, arguments, named, measured=False)[0]
 
     def judge_later(self, check: Callable[[], str]) -> str:
-        """Keep a check of this answer until nothing more of its process is shown to the student.
+        """Postpone a check of this answer until the process whose output the student sees has ended.
 
         Parameters
         ----------
@@ -271,22 +270,22 @@ class RemoteFunction:
         return ""
 
     def peak_megabytes(self, *arguments: Any) -> tuple[Any, float]:
-        """Call the function, and return its result and how much memory it held, as `Session.call` does.
+        """Call the function; return its result and how much memory it held, as `Session.call` does.
 
         Parameters
         ----------
         *arguments
             What it is called with.
         """
-        # What is compiled or loaded on a first call isn't counted. It has no order from which the next can be foreseen.
-        order = cache(np.random.default_rng().permutation)  # axes of one length belong together
+        # The first call isn't measured: it compiles and loads. Its inputs are shuffled, so that no result can be kept.
+        order = cache(np.random.default_rng().permutation)  # axes of the same length are shuffled in the same way
         arrays = (one[np.ix_(*map(order, one.shape))] if isinstance(one, np.ndarray) else one for one in arguments)
         self(*arrays)
         return self.session.call(self.__name__, arguments, {}, measured=True)
 
 
 def _standard_error(reported: dict[str, Any]) -> Exception:
-    """Return the error that an answer raised, of the same standard kind."""
+    """Return the error that an answer raised, as the same standard kind."""
     kind = getattr(builtins, reported["standard"], Exception)
     # A StopIteration would silently end a loop of the test.
     if not issubclass(kind, Exception) or kind is Exception or issubclass(kind, StopIteration | StopAsyncIteration):

@@ -1,4 +1,4 @@
-"""What a student's process finds around it: environment, compiled functions, and files that were handed in."""
+"""The surroundings of a student's process: environment, compiled functions, and files that were handed in."""
 
 import os
 import shutil
@@ -11,17 +11,17 @@ from semgrid_edu.storage.files import atomic_path
 from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES
 
 INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
-"""What a student's process inherits of the environment."""
+"""The environment variables that a student's process inherits."""
 
 PREPARED = ".prepared"
-"""The folder of what is compiled already, in the folder of a process; no file that is handed in gets there."""
+"""The folder of compiled functions, in the folder of a process; no file that is handed in gets there."""
 
 ONLY_WHOLE = shutil.ignore_patterns(".*")
-"""For copies of what is compiled: a file that another process is still writing has such a name."""
+"""For copies of compiled functions: a file that another process is still writing has such a name."""
 
 
 def worker_environment(folder: Path) -> dict[str, str]:
-    """Return the environment of a worker: one thread for each library, and all caches in its own folder.
+    """Return the environment of a worker: one thread per library, and all caches in its folder.
 
     Parameters
     ----------
@@ -31,14 +31,14 @@ def worker_environment(folder: Path) -> dict[str, str]:
     here = {name: str(folder / PREPARED) for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
     here |= {name: str(folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
-    # What is freed goes back at once, or else a measurement wouldn't see it taken again.
+    # Freed memory is returned at once; otherwise a measurement wouldn't see that it is allocated again.
     freed = dict.fromkeys(("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"), "1000000")
     inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
     return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | freed | inline
 
 
 def keep_compiled(source: Path, target: Path) -> None:
-    """Copy what was compiled to where others find it; nobody who reads an old file meanwhile gets half of a new one.
+    """Copy compiled functions to where others find them, so that a reader never gets half a file.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def keep_compiled(source: Path, target: Path) -> None:
 
 
 def files_beside(folder: Path) -> dict[str, NDArray]:
-    """Return the files that lie beside a notebook: their bytes by their paths, as far as a message may hold them.
+    """Return the files beside a notebook, their bytes by their paths, until a message is full.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a student's process and its folder take of the machine, seen from outside."""
+"""What a student's process and its folder use of the machine, measured from outside."""
 
 import os
 import shutil
@@ -14,11 +14,11 @@ MOST_FILES = 20_000
 """How many files and folders a process may have."""
 
 SAMPLED, LONGEST_SAMPLED = 0.01, 600.0
-"""Seconds between two looks at the memory of what a process has started, and the longest time of looking."""
+"""Seconds between two measurements of the memory of child processes, and for how long they are repeated."""
 
 
 def namespace_of(pid: int) -> str:
-    """Return the name of the namespace of a process's children, "" if that is this process's own, too.
+    """Return the name of the namespace of a process's children; "" if this process is in the same one.
 
     Parameters
     ----------
@@ -30,14 +30,14 @@ def namespace_of(pid: int) -> str:
 
 
 def _link(path: Path) -> str:
-    """Return what a link says, "" where it can't be read."""
+    """Return the target of a link, "" if it can't be read."""
     with suppress(OSError):
         return str(path.readlink())
     return ""
 
 
 def memory_of(pid: int) -> dict[str, int]:
-    """Return what Linux tells of a process's memory, by the names of proc(5), kilobytes of 1000 bytes.
+    """Return what Linux reports about a process's memory, by the names of proc(5), in kilobytes of 1000 bytes.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def processes_in(namespace: str) -> list[Path]:
     Parameters
     ----------
     namespace : str
-        What `namespace_of` returned; without a name there are none, since they can't be told from others.
+        What `namespace_of` returned. Without a name the list is empty, since the processes can't be told from others.
     """
     if not namespace:
         return []
@@ -62,7 +62,7 @@ def processes_in(namespace: str) -> list[Path]:
 
 
 def has_ended(process: Path) -> bool:
-    """Return whether a process has ended, with all its threads; at most its number is left, for a parent that asks.
+    """Return whether a process has ended with all its threads, so that at most a zombie is left.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def has_ended(process: Path) -> bool:
 
 
 def processes_below(pid: int) -> list[Path]:
-    """Return `/proc/PID` of each process that a process has started, and of those that these have.
+    """Return `/proc/PID` of all descendants of a process.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def threads_of(processes: Iterable[Path], owner: int | None = None) -> int:
     processes : iterable of Path
         `/proc/PID` of each.
     owner : int, optional
-        Number of the user whose processes count; without it all do.
+        Number of the user whose processes count; by default all count.
     """
     found = 0
     for tasks in (place / "task" for place in processes):
@@ -108,7 +108,7 @@ def threads_of(processes: Iterable[Path], owner: int | None = None) -> int:
 
 
 def memory_held(processes: list[Path]) -> int:
-    """Return the bytes of memory that some processes hold together, what they share counted once; not their files.
+    """Return the bytes of memory that some processes hold together, shared memory counted once, without their files.
 
     Parameters
     ----------
@@ -124,14 +124,14 @@ def memory_held(processes: list[Path]) -> int:
 
 
 def deleted_bytes(processes: list[Path], each: int) -> int:
-    """Return the bytes on disk of files that were deleted, while some processes still have them open or mapped.
+    """Return the bytes on disk of deleted files that some processes still have open or mapped.
 
     Parameters
     ----------
     processes : list of Path
         `/proc/PID` of each.
     each : int
-        What counts for a file of which the system doesn't tell the size.
+        What to count for a file whose size the system doesn't report.
     """
     sizes: dict[int, int] = {}
     for place in processes:
@@ -147,7 +147,7 @@ def deleted_bytes(processes: list[Path], each: int) -> int:
 
 
 def takes_too_much(folder: Path, most: int) -> bool:
-    """Return whether the files in a folder take more bytes, are too many, or lie where nobody can look.
+    """Return whether the files in a folder take more bytes, are too many, or can't be listed.
 
     Parameters
     ----------
@@ -161,7 +161,9 @@ def takes_too_much(folder: Path, most: int) -> bool:
         try:
             with os.scandir(waiting.pop()) as entries:
                 for entry in entries:
-                    with suppress(FileNotFoundError):  # one that has just gone must not hide the others beside it
+                    with suppress(
+                        FileNotFoundError
+                    ):  # one that has just been deleted must not hide the others beside it
                         found = entry.stat(follow_symlinks=False)
                         size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
                         if stat.S_ISDIR(found.st_mode):
@@ -176,7 +178,7 @@ def takes_too_much(folder: Path, most: int) -> bool:
 
 
 def delete_folder(folder: Path) -> None:
-    """Delete a folder, even if it was made unreadable, or too deep for Python's own way.
+    """Delete a folder, even if it was made unreadable, or too deep for `shutil.rmtree`.
 
     Parameters
     ----------
@@ -191,14 +193,14 @@ def delete_folder(folder: Path) -> None:
 
 
 class Sampled:
-    """Looks at a number again and again, until somebody asks how far it has grown.
+    """Measures a number again and again, until it is asked how far it has grown.
 
     Parameters
     ----------
     look : callable
         () -> float.
     first : float
-        The number before.
+        The number before the first measurement.
     """
 
     def __init__(self, look: Callable[[], float], first: float) -> None:
@@ -212,7 +214,7 @@ class Sampled:
             self.most = max(self.most, self.look())
 
     def growth(self) -> float:
-        """Return by how much the largest number exceeds the first, and stop."""
+        """Stop, and return by how much the largest number exceeds the first."""
         self.ended.set()
         self.thread.join()
         return max(self.most, self.look()) - self.first

@@ -1,7 +1,7 @@
 """Plain values as bytes: what may pass between a student's process and the grader's. Never a pickle.
 
-A message is one line of JSON and, behind it, the bytes of its arrays. Reading one makes numbers, texts, containers,
-arrays and a few of the package's own records, and runs nothing that the sender wrote.
+A message is one line of JSON, followed by the bytes of its arrays. Reading it creates numbers, texts, containers,
+arrays and a few of the package's records, and runs nothing that the sender wrote.
 """
 
 import json
@@ -18,22 +18,22 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import table_beside
 
 RECORDS: tuple[str, ...] = table_beside(__file__)["records"]
-"""The package's records that pass; the last part is the class."""
+"""The package's records that may pass; the last part is the class."""
 
 KINDS = "?biufcUS"
-"""The kinds of array that pass, numpy's letters: booleans, numbers and texts."""
+"""The kinds of array that may pass, in numpy's letters: booleans, numbers and texts."""
 
 MOST_BYTES = 10_000_000
-"""Bytes of all arrays of a result, a hundred times what exercises return: a test may broadcast them against its own."""
+"""Limit for all arrays of a result, bytes. It is 100 times what exercises return, as tests may broadcast results."""
 
 MOST_INPUT = 150_000_000
-"""Bytes of all arrays that are arguments: a drive of several frames with their images is more than a result."""
+"""Limit for all arrays among arguments, bytes: several frames of a drive, with images, are larger than a result."""
 
 MOST_JSON = 10_000_000
-"""Bytes of a message outside its arrays: room for lists of half a million numbers."""
+"""Limit for a message without its arrays, bytes: room for lists of half a million numbers."""
 
 MOST_KEYS = 20_000
-"""Entries of a set or dict: keys that were chosen to collide take the square of their number to put in."""
+"""Limit for the entries of a set or dict: keys that are chosen to collide take quadratic time."""
 
 REPLIES: dict[str, type | tuple[type, ...]] = {
     **dict.fromkeys(("result", "changed", "arguments", "named"), object),
@@ -42,14 +42,14 @@ REPLIES: dict[str, type | tuple[type, ...]] = {
     **dict.fromkeys(("callback", "number"), int),
     "megabytes": float,
 }
-"""What the parts of a reply must be, by their names; all others are texts."""
+"""The types of the parts of a reply, by their names; all others are texts."""
 
 LONGEST = MOST_INPUT + MOST_JSON
-"""Bytes of a message that is still read: arguments that an answer changed come back, images perhaps as float64."""
+"""Limit for a message that is read, bytes: changed arguments come back, images perhaps as float64."""
 
 
 class NotPlainError(TypeError):
-    """A value that can't pass."""
+    """A value that can't be sent."""
 
 
 def encode(value: Any, callbacks: list[Callable] | None = None, most: int = MOST_BYTES) -> bytes:
@@ -61,7 +61,7 @@ def encode(value: Any, callbacks: list[Callable] | None = None, most: int = MOST
         None, a boolean, number or text; a list, tuple, set or dict of such; an array of these, or what numpy turns
         into an array (a tensor, a table, a fraction); one of `RECORDS`.
     callbacks : list of callable, optional
-        Takes the functions within `value`; the other side gets their numbers. Without this list no function can pass.
+        Collects the functions within `value`; the other side gets their numbers. Without it no function can pass.
     most : int
         Bytes that all arrays together may have.
 
@@ -173,12 +173,12 @@ def _array_tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | N
 
 
 def _path(value: Any) -> str | None:
-    """Return where the class of a record stands."""
+    """Return the dotted path of a record's class."""
     return f"{type(value).__module__}.{type(value).__qualname__}" if is_dataclass(value) else None
 
 
 def _arrays(described: list, data: bytes) -> dict[int, NDArray]:
-    """Cut the bytes of a message into arrays, each of which may stand in one place of the value."""
+    """Cut the bytes of a message into arrays, each of which may be used once in the value."""
     found, start = [], 0
     for text, shape in described:
         dtype = np.dtype(text)
@@ -193,7 +193,7 @@ def _arrays(described: list, data: bytes) -> dict[int, NDArray]:
 
 
 def _value(tree: Any, arrays: dict[int, NDArray], callback: Callable[[int], Callable] | None) -> Any:
-    """Return the value that a tree of JSON stands for."""
+    """Return the value that a tree of JSON describes."""
     if isinstance(tree, list):
         return [_value(one, arrays, callback) for one in tree]
     if not isinstance(tree, dict):
@@ -221,12 +221,12 @@ def _record(path: str, values: list) -> Any:
 
 
 def put_back(original: Any, changed: Any) -> Any:
-    """Carry over to an argument what a function in another process did to its copy; return the result.
+    """Apply to an argument what a function in another process did to its copy; return the result.
 
     Parameters
     ----------
     original : object
-        What the caller holds. Its arrays, lists and dicts are changed in place; where that can't be, `changed` is
+        What the caller has. Its arrays, lists and dicts are changed in place; where that isn't possible, `changed` is
         returned.
     changed : object
         What the copy became.
@@ -281,7 +281,7 @@ class Wire:
         self.outgoing.flush()
 
     def receive(self) -> bytes | None:
-        """Return the next message; None when the other side has hung up, or sends what is no message."""
+        """Return the next message; None if the other side has hung up, or sends something that isn't a message."""
         head = self.incoming.read(8)
         length = int.from_bytes(head, "big")
         if len(head) < 8 or length > LONGEST:

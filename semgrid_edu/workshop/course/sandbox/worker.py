@@ -1,7 +1,7 @@
 """A student's process: it runs cells as a notebook's kernel does, and calls the functions that they define.
 
-It is started as `python -m semgrid_edu.workshop.course.sandbox.worker` and speaks with the grader over its standard
-input and output. Whatever the student's code does in here, only plain values leave it (`values`).
+It is started as `python -m semgrid_edu.workshop.course.sandbox.worker` and talks to the grader over its standard
+input and output. Whatever the student's code does here, only plain values leave the process (`values`).
 """
 
 import linecache
@@ -22,16 +22,16 @@ from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_this_proces
 from semgrid_edu.workshop.course.sandbox.values import MOST_INPUT, NotPlainError, Wire, decode, encode
 
 MOST_TEXT = 20_000
-"""Characters of a text that are kept."""
+"""How many characters of a text are kept."""
 
 FORBIDDEN = "not allowed where answers are graded: pools of processes, the network, files outside the notebook's folder"
-"""What is added to the error of a system that refuses."""
+"""Added to the message of a PermissionError."""
 
 MOST_OUTPUTS = 1000
 """How many of the things that a cell displays are kept."""
 
 MOST_SHOWN = 5_000_000
-"""Characters of all that a cell displays, pictures among it, that are kept."""
+"""How many characters of what a cell displays are kept, pictures included."""
 
 
 class Shell(InteractiveShell):
@@ -47,10 +47,10 @@ class Shell(InteractiveShell):
         """
 
     def ask_exit(self) -> None:
-        """End the cell or call that says `exit()`."""
+        """End the cell or call that runs `exit()`."""
         raise SystemExit
 
-    # A line that begins with "!" gets no terminal, as IPython would give it.
+    # Without the terminal that IPython would give a line that begins with "!".
     system = InteractiveShell.system_raw
 
 
@@ -77,14 +77,14 @@ class Worker:
             if message["do"] == "call":
                 message["sent"] = data
             try:
-                # Functions that were given go back by their numbers, among arguments that were changed.
+                # Functions among changed arguments go back by their numbers.
                 reply = encode(getattr(self, message.pop("do"))(**message), [], MOST_INPUT)
             except NotPlainError as error:
                 reply = encode({"error": _report(error)})
             self.wire.send(reply)
 
     def limit(self, limits: dict, folder: str) -> dict:
-        """Set limits; report which are set.
+        """Set limits; report which of them are set.
 
         Parameters
         ----------
@@ -96,7 +96,7 @@ class Worker:
         return {"done": limit_this_process(Limits(**limits), Path(folder))}
 
     def run(self, code: str) -> dict:
-        """Run a cell; report what it put out and the error that ended it.
+        """Run a cell; report its outputs and the error that ended it.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class Worker:
         return {}
 
     def names(self, wanted: list[str]) -> dict:
-        """Report which of these names are functions, and the values of the others.
+        """Report which of some names are functions, and the values of the others.
 
         Parameters
         ----------
@@ -167,7 +167,7 @@ class Worker:
         return reply | {"streams": _streams(captured)}
 
     def _callback(self, number: int) -> Callable:
-        """Return a function that the grader works out."""
+        """Return a function that the grader computes."""
 
         def call(*arguments: Any, **named: Any) -> Any:
             self.wire.send(encode({"callback": number, "arguments": arguments, "named": named}))
@@ -189,7 +189,7 @@ def _passes(value: Any, *options: Any) -> bool:
 
 
 def _what_passes(value: Any) -> Any:
-    """Return a value with NaN for each part that can't be sent: equal to nothing, so that a test sees the change."""
+    """Return a value with NaN for each part that can't be sent: NaN equals nothing, so a test sees the change."""
     if _passes(value, [], MOST_INPUT):
         return value
     if isinstance(value, dict):
@@ -201,7 +201,7 @@ def _what_passes(value: Any) -> Any:
 
 @contextmanager
 def _traced(measured: bool) -> Iterator[Callable[[], float]]:
-    """Measure memory, if asked to; yield a function that returns the most that was held so far, in megabytes."""
+    """Measure memory if `measured`; yield a function that returns the most that was held so far, megabytes."""
     if measured:
         tracemalloc.start()
     try:
@@ -216,12 +216,12 @@ def _streams(captured: Any) -> dict[str, str]:
 
 
 def _text(text: str) -> str:
-    """Return the beginning of a text, with a question mark for what can't be written to a file."""
+    """Return the beginning of a text, with question marks for characters that can't be encoded."""
     return text[:MOST_TEXT].encode("utf-8", "replace").decode()
 
 
 def _shown(outputs: list[RichOutput]) -> list[dict[str, str]]:
-    """Return what was displayed, as far as it is text or a picture in text, and not too much."""
+    """Return the displayed texts and pictures, until there are too many."""
     kept, size = [], 0
     for output in outputs[:MOST_OUTPUTS]:
         data = {kind: data for kind, data in output.data.items() if isinstance(data, str)}
@@ -233,7 +233,7 @@ def _shown(outputs: list[RichOutput]) -> list[dict[str, str]]:
 
 
 def _report(error: BaseException) -> dict[str, Any]:
-    """Describe an error in plain values: its kind, the standard kind that it is of, its message and its line."""
+    """Describe an error in plain values: its class, the standard class that it derives from, message and line."""
     kinds = [kind.__name__ for kind in type(error).__mro__ if kind.__module__ == "builtins"]
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename.startswith("<ipython")]
     line = linecache.getline(frames[-1].filename, frames[-1].lineno).strip() if frames else ""
@@ -243,12 +243,12 @@ def _report(error: BaseException) -> dict[str, Any]:
 
 
 def _main() -> None:
-    """Talk to the grader over standard input and output, which the student's code doesn't get."""
+    """Talk to the grader over standard input and output, to which the student's code has no access."""
     wire = Wire(os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb"))
     nothing = os.open(os.devnull, os.O_RDWR)
     for stream in (0, 1, 2):
         os.dup2(nothing, stream)
-    # What was handed in beside a notebook may be imported, and takes no library's place.
+    # Files that were handed in may be imported, but never replace a library.
     sys.path[:] = [*sys.path[1:], ""]
     Worker(wire).serve()
 

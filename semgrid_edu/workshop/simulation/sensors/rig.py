@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_from_grid, rigid_transform
-from semgrid_edu.datasets.readers.oxts import EARTH_RADIUS
+from semgrid_edu.datasets.oxts import EARTH_RADIUS
 
 HDL64E_ELEVATIONS = tuple(np.concatenate([np.linspace(2.0, -8.33, 32), np.linspace(-8.83, -24.9, 32)]).tolist())
 """Elevations of the Velodyne HDL-64E's 64 lasers, degrees: two blocks, the upper one finer (its manual)."""

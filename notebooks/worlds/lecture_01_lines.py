@@ -1,0 +1,93 @@
+"""Figures of beliefs: bars on a line of cells, and over time (filtering by Bayes' rule, section 3.2)."""
+
+from collections.abc import Mapping, Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, colour_legend
+
+TOP = 1.25
+"""Upper end of an axis as a multiple of its largest number, so that there is room for the number itself."""
+
+MAX_NUMBERS = 12
+"""Largest number of cells for which numbers are written: longer lines have no room for them."""
+
+
+def probability_lines(
+    lines: Mapping[str, NDArray], names: Sequence[str] | None = None, truth: int | None = None
+) -> Figure:
+    """Draw several lines of cells below each other, such as prior, likelihood and posterior, to one scale.
+
+    Parameters
+    ----------
+    lines : mapping of str to (N,) float
+        The numbers of each line, 0..1, by its title, from top to bottom.
+    names : sequence of str, optional
+        Names of the N cells; 0, 1, ... when left out.
+    truth : int, optional
+        The right cell, which a triangle marks in every line.
+    """
+    size = (6, 0.5 + 1.3 * len(lines))
+    top = TOP * (max(np.max(values, initial=0) for values in lines.values()) or 1)
+    figure, axes = plt.subplots(len(lines), 1, figsize=size, sharex=True, layout="constrained", squeeze=False)
+    for ax, (title, values) in zip(axes[:, 0], lines.items(), strict=True):
+        _line(np.asarray(values), ax, title, names, truth)
+        ax.set_ylim(0, top)
+        ax.label_outer()
+    return figure
+
+
+def _line(values: NDArray, ax: Axes, title: str, names: Sequence[str] | None, truth: int | None) -> None:
+    """Draw one number per cell, as bars from left to right."""
+    bars = ax.bar(range(len(values)), values, width=0.8, color="0.45")
+    if len(values) <= MAX_NUMBERS:
+        ax.bar_label(bars, [f"{value:.2f}" for value in values], fontsize="small")
+    if truth is not None:
+        ax.plot(truth, 1.02, "v", color="#d55e00", transform=ax.get_xaxis_transform(), clip_on=False)
+    ax.set_xticks(range(len(values)), [str(cell) for cell in range(len(values))] if names is None else names)
+    ax.set_title(title, loc="left", fontsize="medium")
+    ax.set(xlim=(-0.6, len(values) - 0.4), xlabel="cell" if names is None else "", ylabel="probability")
+
+
+def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | None = None) -> Axes:
+    """Draw a belief over a line of cells, step by step: one column per step, darker where more probable.
+
+    Parameters
+    ----------
+    belief : (T, N) float
+        The belief at each step, one row per step; each row sums to 1.
+    ax : Axes, optional
+        Axes to draw into; a new figure with a colour bar when left out.
+    truth : (T,) int, optional
+        The right cell at each step, which a circle marks.
+    """
+    if ax is None:
+        ax = plt.subplots(figsize=(6, 2.6), layout="constrained")[1]
+        ax.figure.colorbar(plt.cm.ScalarMappable(cmap="Blues"), ax=ax, label="probability")
+    ax.imshow(np.transpose(belief), cmap="Blues", vmin=0, vmax=1, origin="lower", aspect="auto")
+    if truth is not None:
+        ax.plot(np.arange(len(belief)), truth, "o", markersize=4, markerfacecolor="none", color="#d55e00")
+    ax.set(xlabel="step", ylabel="cell")
+    return ax
+
+
+def state_history(times: NDArray, probability: NDArray, ax: Axes | None = None) -> Axes:
+    """Draw the states of one cell over time as bands, each as high as its probability.
+
+    Parameters
+    ----------
+    times : (T,) float
+        Times of the steps, seconds, ascending, at least two.
+    probability : (4, T) float
+        Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 at each time.
+    ax : Axes, optional
+        Axes to draw into.
+    """
+    ax = ax or plt.subplots(figsize=(6, 2.2), layout="constrained")[1]
+    ax.stackplot(times, probability, colors=np.divide(STATE_COLOURS, 255), edgecolor="0.4", linewidth=0.5)
+    ax.set(xlabel="time [s]", ylabel="probability", ylim=(0, 1), xlim=(times[0], times[-1]))
+    return colour_legend(ax, STATE_NAMES, STATE_COLOURS)

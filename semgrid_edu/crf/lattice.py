@@ -1,0 +1,223 @@
+"""The permutohedral lattice: a Gaussian filter in many dimensions as three sparse matrices (Adams, Baek, Davis 2010).
+
+Simplices fill the space of features; where points are dense, many of them share corners. A filter is *splat*, *blur*,
+*slice*: each point gives its value to the d + 1 corners of its simplex, the corners are blurred with (1/4, 1/2, 1/4)
+along each of the d + 1 directions of the lattice, and each point takes the weighted mean of its corners.
+
+The d features of a point are written as d + 1 numbers that sum to zero. A vertex of the lattice is then d + 1 integers
+that sum to zero and have the same remainder modulo d + 1. A step in direction j adds 1 to all of them but the j-th,
+from which it takes d.
+"""
+
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import matmul
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import csr_array, diags_array, eye_array
+
+from semgrid_edu.errors import ArgumentError
+
+FARTHEST = 2**30
+"""The largest coordinate of a point in the space of the lattice, which `fast` counts in 32 bits."""
+
+
+def elevation(d: int) -> NDArray[np.float64]:
+    """Return the matrix that takes d features to d + 1 numbers that sum to zero.
+
+    Its scale gives the whole filter unit variance: splat and slice have variance (d + 1)^2 / 12 along each axis, the
+    blur (d + 1)^2 / 2 (Adams 2010, section 3.1).
+
+    Parameters
+    ----------
+    d : int
+        Number of features of a point.
+
+    Returns
+    -------
+    (d + 1, d) float64
+        The matrix; its columns are orthogonal.
+    """
+    basis = np.zeros((d + 1, d))
+    for j in range(d):
+        basis[: j + 1, j] = 1
+        basis[j + 1, j] = -(j + 1)
+    return (d + 1) * np.sqrt(2 / 3) * basis / np.linalg.norm(basis, axis=0)
+
+
+def peak(d: int) -> float:
+    """Return the factor that gives the filter of d features the integral of the Gaussian, (2 pi)^(d/2).
+
+    Without it the integral is the volume of feature space that belongs to one vertex, (3/2)^(d/2) / sqrt(d + 1).
+
+    Parameters
+    ----------
+    d : int
+        Number of features of a point.
+
+    Returns
+    -------
+    float
+        The factor.
+    """
+    return (4 * np.pi / 3) ** (d / 2) * np.sqrt(d + 1)
+
+
+def elevated(features: ArrayLike) -> NDArray[np.float64]:
+    """Write the features of each point as numbers that sum to zero.
+
+    Parameters
+    ----------
+    features : (N, d) float
+        One row per point, in units of the Gaussian's standard deviation.
+
+    Returns
+    -------
+    (N, d + 1) float64
+        The points in the space of the lattice.
+
+    Raises
+    ------
+    ArgumentError
+        When `features` isn't a table of finite numbers.
+    """
+    features = np.asarray(features, dtype=np.float64)
+    if features.ndim != 2 or 0 in features.shape or not np.isfinite(features).all():
+        raise ArgumentError("features", "finite numbers of shape (N, d)", f"shape {features.shape}")
+    # einsum, not @, so that no thread of BLAS changes the last bit: a point on a border falls to the same side always.
+    return np.einsum("nd,jd->nj", features, elevation(features.shape[1]))
+
+
+def enclosing_simplices(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Find the simplex around each point, and the weights with which the point is a mean of its corners.
+
+    Parameters
+    ----------
+    points : (N, d + 1) float
+        Points in the space of the lattice, see `elevated`.
+
+    Returns
+    -------
+    corners : (N, d + 1, d + 1) int64
+        For each point d + 1 vertices: corner m has coordinates of remainder m modulo d + 1.
+    weights : (N, d + 1) float64
+        Barycentric weights: not negative, they sum to 1, and the weighted mean of the corners is the point.
+
+    Examples
+    --------
+    >>> corners, weights = enclosing_simplices(np.array([[4.2, -0.4, -3.8]]))
+    >>> corners[0].tolist(), weights[0].round(2).tolist()
+    ([[3, 0, -3], [4, 1, -5], [5, -1, -4]], [0.33, 0.13, 0.53])
+    """
+    size = points.shape[1]
+    steps = np.rint(points / size).astype(np.int64)  # the nearest point whose coordinates are multiples of d + 1
+    residual = points - size * steps
+    rank = np.argsort(np.argsort(-residual, axis=1, kind="stable"), axis=1)  # 0 for the largest residual
+    # Rounding may leave the hyperplane of zero sum by some steps: those rounded the farthest are rounded the other way.
+    rank += steps.sum(axis=1, keepdims=True)
+    other_way = (rank < 0).astype(np.int64) - (rank >= size)
+    steps += other_way
+    rank += size * other_way
+    # Corner m is m steps from the origin, in the directions of the m smallest residuals.
+    origin = size * steps
+    m = np.arange(size)[:, None]
+    corners = origin[:, None] + m - size * (rank[:, None] >= size - m)
+    ranked = -np.sort(origin - points, axis=1) / size  # the residuals, largest first
+    gaps = ranked[:, :-1] - ranked[:, 1:]
+    return corners, np.hstack([1 - gaps.sum(axis=1, keepdims=True), gaps[:, ::-1]])
+
+
+@dataclass(frozen=True, eq=False)
+class PermutohedralLattice:
+    """Sums over points, weighted by a Gaussian of the distance between their features (eq. (4)).
+
+    A lattice is built once for the features and then filters any number of values. Its kernel approximates
+    ``exp(-|f_i - f_j|^2 / 2)``: the blur has the Gaussian's variance and integral but a finite reach, and what it
+    moves to a corner without points is lost.
+
+    Parameters
+    ----------
+    vertices : (M, d + 1) int64
+        The corners of all simplices around points, each once.
+    shares : (N, M) sparse
+        The weights with which points give to their corners and take from them, d + 1 in a row.
+    blurs : tuple of d + 1 (M, M) sparse
+        The blur along each direction.
+    """
+
+    vertices: NDArray[np.int64]
+    shares: csr_array
+    blurs: tuple[csr_array, ...]
+
+    @classmethod
+    def build(cls, features: ArrayLike) -> "PermutohedralLattice":
+        """Place points in the lattice.
+
+        Parameters
+        ----------
+        features : (N, d) float
+            One row per point, in units of the Gaussian's standard deviation.
+
+        Returns
+        -------
+        PermutohedralLattice
+            Ready to filter values at these points.
+
+        Raises
+        ------
+        ArgumentError
+            When `features` isn't a table of finite numbers, or the points are too many standard deviations apart.
+        """
+        points = elevated(features)
+        spans = np.ceil(np.ptp(points, axis=0)) + 3 * points.shape[1]  # of the vertices and their neighbours
+        if np.abs(points).max() > FARTHEST or np.prod(spans[:-1]) > 2**62:
+            expected = "points fewer standard deviations apart, so larger sigmas"
+            raise ArgumentError("features", expected, f"{np.ptp(features, axis=0).max():.4g}")
+        corners, weights = enclosing_simplices(points)
+        n_points, size = weights.shape
+        corners = corners.reshape(-1, size)
+        # Coordinates become the digits of one integer, so a step along the lattice adds a number to it. The last one
+        # needs no digit, because it follows from the others.
+        digits = np.append(np.cumprod([1, *spans[:-2]]), 0).astype(np.int64)
+        numbers, first, members = np.unique(corners @ digits, return_index=True, return_inverse=True)
+        ends = np.arange(0, corners.shape[0] + 1, size)
+        shares = csr_array((weights.ravel(), members, ends), shape=(n_points, len(numbers)))
+        steps = digits.sum() - size * digits
+        return cls(corners[first], shares, tuple(_blur(numbers, step) for step in steps))
+
+    @property
+    def diagonal(self) -> NDArray[np.float64]:
+        """k_ii, the share of its own value that each point gets back, (N,)."""
+        half = len(self.blurs) // 2
+        given = reduce(matmul, self.blurs[:half], self.shares)  # what a point gives, after half of the blurs
+        taken = reduce(matmul, self.blurs[: half - 1 : -1], self.shares)  # what it takes, from before the other half
+        return peak(len(self.blurs) - 1) * (given * taken).sum(axis=1)
+
+    def scaled(self, scale: NDArray) -> "PermutohedralLattice":
+        """Return the lattice of the kernel diag(scale) K diag(scale).
+
+        Parameters
+        ----------
+        scale : (N,) float
+            One factor per point.
+        """
+        return replace(self, shares=csr_array(diags_array(scale) @ self.shares))
+
+    def __call__(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Return sum_j k(f_i, f_j) values_j, the point itself included; one row per point, (N, K)."""
+        held = self.shares.T @ values  # splat
+        for blur in self.blurs:
+            held = blur @ held
+        return peak(len(self.blurs) - 1) * (self.shares @ held)  # slice
+
+
+def _blur(numbers: NDArray[np.int64], step: int) -> csr_array:
+    """Return the blur along one direction: a vertex keeps half of its value, and each neighbour gets a quarter of it.
+
+    A neighbour that doesn't exist gives nothing and gets nothing.
+    """
+    size = len(numbers)
+    _, ahead, here = np.intersect1d(numbers, numbers + step, assume_unique=True, return_indices=True)
+    forward = csr_array((np.ones(len(here)), (here, ahead)), shape=(size, size))
+    return csr_array(eye_array(size) / 2 + (forward + forward.T) / 4)

@@ -1,0 +1,299 @@
+"""What readers of drives have in common: what a labelled drive is, frames read on demand, KITTI's scans (section 4)."""
+
+import operator
+import re
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Protocol, overload
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from semgrid_edu.camera import Camera
+from semgrid_edu.errors import DataError
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE, LabelSet
+from semgrid_edu.storage.reading import read_bytes
+
+LIDAR_RANGE = 250.0
+"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so anything twice as far is no measurement."""
+
+
+class LabelledDrive(Protocol):
+    """What training and scoring ask of a drive: frames, and the truth of some of them.
+
+    Derive a reader from `FrameSequence`, which has most of it.
+
+    Attributes
+    ----------
+    name : str
+        Tells the drive from the others of its data set.
+    camera : Camera
+        The calibration, the same for all frames.
+    label_set : LabelSet
+        The classes of image labels and truth.
+    """
+
+    name: str
+    camera: Camera
+    label_set: LabelSet
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+
+    def __getitem__(self, k: int) -> Frame:
+        """Return frame k; the labelled ones have an image and its labels."""
+
+    def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
+        """Return the class of each cell at frame k, (H, W); 255 where nothing is known.
+
+        Parameters
+        ----------
+        k : int
+            Number of a labelled frame.
+        spec : GridSpec
+            The grid, (H, W) cells.
+        """
+
+    def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
+        """Return the cells in view of the camera when the labels have gaps, (H, W); no cell when they have none.
+
+        In these cells a 255 of `truth` means that nobody labelled what the camera may see, so training leaves it out.
+        The other cells become unknown classes, even where a LIDAR saw more. Parameters are those of
+        `LabelledDrive.truth`.
+        """
+
+    def image_labels(self, k: int, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """Return the class of each pixel of frame k when its image is resized, (h, w); 255 where unlabelled.
+
+        Parameters
+        ----------
+        k : int
+            Number of a labelled frame.
+        size : (int, int)
+            Height and width of the resized image, pixels.
+        """
+
+    def files(self) -> list[Path]:
+        """Return the files that the frames are read from: when one changes, what was made of the drive is stale."""
+
+
+class FrameSequence(Sequence[Frame]):
+    """The frames of a drive. Each is read, and checked, when it is asked for.
+
+    `drive[k]` is frame k, `drive[-1]` the last one, `drive[2:5]` a list of three. A reader derives from this class and
+    defines `__len__`, `_frame`, `name`, and `folder`, which holds the files of the drive; for a `LabelledDrive` also
+    `camera` and `label_set`. Where data are used under a licence that asks for it, `credit` names whose they are.
+    """
+
+    name: str
+    folder: Path
+    credit: str = ""
+
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        """Read a frame, or a list of frames."""
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        k = operator.index(index)
+        if not -len(self) <= k < len(self):
+            raise IndexError(f"frame {k} of a drive of {len(self)} frames")
+        return self._frame(k % len(self))
+
+    def problems(self) -> list[str]:
+        """Read everything and list what is missing or damaged.
+
+        Returns
+        -------
+        list of str
+            One line for each problem, which names the file or folder; empty when every frame can be read.
+        """
+        return [error for error in dict.fromkeys(map(error_of, self._readers())) if error]
+
+    def _readers(self) -> Iterator[Callable[[], object]]:
+        """Return functions that read the drive piece by piece (here: by frame), so that no error hides another."""
+        return (partial(self._frame, k) for k in range(len(self)))
+
+    def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
+        """Return what the bird's-eye labels of a frame say of the cells that the camera sees.
+
+        Parameters and result are those of `LabelledDrive.truth`.
+        """
+        return visible_labels(self._labels_of(k), spec)
+
+    def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
+        """Return `FrameLabels.undecided_on` of a frame's labels. Parameters are those of `LabelledDrive.truth`."""
+        return self._labels_of(k).undecided_on(spec)
+
+    def image_labels(self, k: int, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """Return the labels of a frame's image, resized (`resize_labels`).
+
+        Parameters and result are those of `LabelledDrive.image_labels`.
+        """
+        labels = self._labels_of(k)
+        return resize_labels(labels.image, size, sparse=labels.undecided is not None)
+
+    def _labels_of(self, k: int) -> FrameLabels:
+        """Return the labels of a frame that has some."""
+        labels = self[k].labels
+        if labels is None:
+            raise DataError(self.folder, f"labels of the frame {k}", "none")
+        return labels
+
+    def files(self) -> list[Path]:
+        """Return all files below the folder of the drive."""
+        return [path for path in self.folder.rglob("*.*") if path.is_file()]
+
+    @abstractmethod
+    def _frame(self, k: int) -> Frame:
+        """Read frame k, 0 <= k < len(self)."""
+
+    def without_labels(self, k: int) -> Frame:
+        """Read a frame that may lack its labels; readers whose labels take long to make override this.
+
+        Parameters
+        ----------
+        k : int
+            Number of the frame, 0 <= k < len(self).
+        """
+        return self._frame(k)
+
+
+def read_scan(path: Path) -> NDArray[np.float32]:
+    """Read the returns of one scan.
+
+    Parameters
+    ----------
+    path : Path
+        A file of little-endian floats, four for each return.
+
+    Returns
+    -------
+    (N, 4) float32
+        x forward, y left, z up in the LIDAR frame (metres), and reflectance.
+    """
+    content = read_bytes(path)
+    if len(content) % 16:
+        raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
+    points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
+    strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
+    if strange.any():
+        first = strange.argmax()
+        expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
+        raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
+    return points
+
+
+def frame_numbers(folder: Path, what: str, suffix: str, digits: int = 6) -> tuple[int, ...]:
+    """Return the numbers of the files of a folder that are named by numbers, such as 000000.png, in ascending order.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder with one file per frame; files of some frames may be missing.
+    what : str
+        What the files are, such as "images", for the error.
+    suffix : str
+        How their names end, such as ".png".
+    digits : int
+        How many digits a name has.
+    """
+    form = re.compile(rf"(\d{{{digits}}}){re.escape(suffix)}")
+    numbers = sorted(int(match[1]) for path in folder.glob(f"*{suffix}") if (match := form.fullmatch(path.name)))
+    if not numbers:
+        raise DataError(folder, f"{what} such as {0:0{digits}}{suffix}", "none" if folder.is_dir() else "no folder")
+    return tuple(numbers)
+
+
+def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int], sparse: bool = False) -> NDArray[np.uint8]:
+    """Give each larger pixel the class that covers most of it; between two equal shares the smaller number wins.
+
+    Parameters
+    ----------
+    labels : (h, w) uint8
+        The class of each pixel; 255 (unlabelled) counts as a class.
+    size : (int, int)
+        The new height and width, pixels.
+    sparse : bool
+        Whether 255 doesn't count: a larger pixel takes its class from the labelled ones, and is 255 if there are none.
+
+    Returns
+    -------
+    (*size,) uint8
+    """
+    classes = np.unique(labels)
+    masks = (Image.fromarray((labels == c).astype(np.float32)) for c in classes)
+    shares = [np.asarray(mask.resize(size[::-1], Image.Resampling.BOX)) for mask in masks]
+    if sparse and classes[-1] == IGNORE:
+        shares[-1] = np.full(size, 1e-6, np.float32)
+    return classes[np.argmax(shares, axis=0)]
+
+
+def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
+    """Return the class of each cell that the camera sees; where labels have gaps, that of each labelled cell.
+
+    Parameters
+    ----------
+    labels : FrameLabels
+        What is true of the frame.
+    spec : GridSpec
+        The grid: the extent of `LABEL_GRID`, a multiple of its cell.
+
+    Returns
+    -------
+    (H, W) uint8
+        255 where the camera doesn't see, or nothing is labelled.
+    """
+    birdseye = labels.birdseye_on(spec)
+    return birdseye if labels.undecided is not None else np.where(labels.visible_on(spec), birdseye, np.uint8(IGNORE))
+
+
+def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:
+    """Return labels that say nothing; a reader then replaces the fields that its data set knows.
+
+    Parameters
+    ----------
+    label_set : LabelSet
+        The classes of the fields that are replaced.
+    image_size : (int, int)
+        Height and width of the image, pixels.
+
+    Returns
+    -------
+    FrameLabels
+        Without a label, without a depth, and with nothing visible.
+    """
+    return FrameLabels(
+        label_set=label_set,
+        image=np.full(image_size, IGNORE, dtype=np.uint8),
+        depth=np.full(image_size, np.nan, dtype=np.float32),
+        birdseye=np.full(LABEL_GRID.shape, IGNORE, dtype=np.uint8),
+        visible=np.zeros(LABEL_GRID.shape, dtype=np.bool_),
+    )
+
+
+def error_of(read: Callable[[], object]) -> str:
+    """Return the error that a reader raises as text.
+
+    Parameters
+    ----------
+    read : callable
+        Reads something, and raises `DataError` when it is missing or damaged.
+
+    Returns
+    -------
+    str
+        Empty when it is sound.
+    """
+    try:
+        read()
+    except DataError as error:
+        return str(error)
+    return ""

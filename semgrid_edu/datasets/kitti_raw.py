@@ -1,0 +1,266 @@
+"""One drive in KITTI's raw layout, real or simulated, frame by frame (section 4; Geiger et al., IJRR 2013)."""
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import cached_property, partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import Camera, invert_rigid
+from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
+from semgrid_edu.datasets.frames import FrameSequence, error_of, read_scan
+from semgrid_edu.datasets.kitti_labels import (
+    KINDS,
+    have_gaps,
+    is_labelled,
+    read_label,
+    read_label_set,
+    read_labels,
+)
+from semgrid_edu.datasets.layouts import what_is
+from semgrid_edu.datasets.oxts import imu_pose, read_packet, read_timestamps
+from semgrid_edu.datasets.project_lidar import cells_in_view
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
+from semgrid_edu.labels import LabelSet
+from semgrid_edu.storage.reading import read_png
+
+VIEWS = ("image_02", "image_03")
+"""The folders of the cameras that take colours."""
+
+SAME_INSTANT = np.timedelta64(500, "ms")
+"""How much the sensors' times of one frame may differ; at 10 Hz they should lie within 0.1 s."""
+
+_FRAME_FILE = re.compile(r"(\d{10})\.(bin|png|txt)")
+
+
+def drive_folder(root: str | Path, date: str, drive: str) -> Path:
+    """Return where KITTI's layout keeps a drive.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder that holds the folders of the dates.
+    date : str
+        Date of the drive, such as "2011_09_26".
+    drive : str
+        Number of the drive, such as "0013".
+
+    Examples
+    --------
+    >>> drive_folder("kitti_raw", "2011_09_26", "0013").name
+    '2011_09_26_drive_0013_sync'
+    """
+    return Path(root) / date / f"{date}_drive_{drive}_sync"
+
+
+class KittiRawDrive(FrameSequence):
+    """The frames of a drive. Each is read, and checked, when it is asked for.
+
+    `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last one, `drive[2:5]` a list of three. Some of KITTI's
+    drives have gaps, such as 0009, which lacks the scans 177 to 180. A frame in a gap keeps its number, time and image;
+    it has no points, so that the filter predicts without being corrected. `gaps` lists these frames.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder that holds the folders of the dates.
+    date : str
+        Date of the drive, such as "2011_09_26".
+    drive : str
+        Number of the drive, such as "0013".
+    images : bool
+        Whether to read the images. Without them, as if the drive had none, reading is quicker.
+    view : str
+        The folder of the images: "image_02" for the left camera, "image_03" for the right one. Labels of simulated
+        drives belong to the left one.
+
+    Raises
+    ------
+    ArgumentError
+        When date or drive is empty, or there is no such view.
+    DataError
+        When there is no such drive; the error says which there are. `drive[k]` raises it when a file that the frame
+        needs is missing or damaged.
+
+    Examples
+    --------
+    >>> drive = KittiRawDrive("kitti_raw", "2011_09_26", "0013")    # doctest: +SKIP
+    >>> frame = drive[3]                                            # doctest: +SKIP
+    >>> frame.points.shape, frame.image.shape                       # doctest: +SKIP
+    ((113944, 4), (375, 1242, 3))
+    """
+
+    def __init__(self, root: str | Path, date: str, drive: str, *, images: bool = True, view: str = VIEWS[0]) -> None:
+        for name, value in (("date", date), ("drive", drive)):
+            if not value:
+                raise ArgumentError(name, "such as 2011_09_26 and 0013", repr(value))
+        if view not in VIEWS:
+            raise ArgumentError("view", " or ".join(VIEWS), repr(view))
+        self.date_folder, self.folder = _existing(Path(root), date, drive)
+        self.name = f"{date} {drive}"
+        self.view = view
+        self._sensors = ["velodyne_points", "oxts"]
+        if images and (self.folder / view).exists():
+            self._sensors.append(view)
+        self._length = 1 + max((_last_frame(self.folder / sensor / "data") for sensor in self._sensors), default=-1)
+        if self._length == 0:
+            raise DataError(self.folder, "frames in velodyne_points/data", "none")
+
+    def __len__(self) -> int:
+        """Return the number of frames, including those whose scans were never recorded."""
+        return self._length
+
+    @property
+    def label_set(self) -> LabelSet:
+        """The classes of the labels, which the file label_set.txt of a labelled drive names."""
+        return read_label_set(self.folder / "labels" / "label_set.txt")
+
+    def files(self) -> list[Path]:
+        """Return the files of the drive, and the calibration of its day."""
+        return [*self.date_folder.glob("*.txt"), *super().files()]
+
+    def _frame(self, k: int) -> Frame:
+        return Frame(
+            image=self._image(k),
+            points=self._points(k),
+            camera=self.camera,
+            T_world_from_lidar=self._pose(k),
+            time=self._time(k),
+            labels=self._labels(k),
+        )
+
+    @cached_property
+    def gaps(self) -> tuple[int, ...]:
+        """Numbers of the frames without a scan that lie between frames with one."""
+        scans = [k for k in range(len(self)) if self.file("velodyne_points", k, ".bin").exists()]
+        between = range(scans[0], scans[-1]) if scans else range(0)
+        return tuple(sorted(set(between) - set(scans)))
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The calibration of the view, the same for all frames."""
+        return read_camera(self.date_folder, self.view)
+
+    def _readers(self) -> Iterator[Callable[[], object]]:
+        """Yield a reader for each file, so that no damaged file hides another."""
+        yield partial(read_rectification, self.date_folder / "calib_cam_to_cam.txt", self.view)
+        yield partial(read_rigid, self.date_folder / "calib_velo_to_cam.txt")
+        yield partial(read_rigid, self.date_folder / "calib_imu_to_velo.txt")
+        for path in self._timestamp_files():
+            yield partial(read_timestamps, path, len(self))
+        size = None if error_of(lambda: self.camera) else self.camera.size
+        for k in range(len(self)):
+            yield partial(self._points, k)
+            yield partial(read_packet, self.file("oxts", k, ".txt"))
+            yield partial(self._time, k)
+            if self.view in self._sensors:
+                yield partial(read_png, self.file(self.view, k, ".png"), "RGB", size)
+            labels, name = self.folder / "labels", f"{k:010d}.png"
+            for kind in KINDS if is_labelled(labels, name) else ():
+                yield partial(read_label, labels, kind, name, size)
+
+    def file(self, sensor: str, k: int, suffix: str) -> Path:
+        """Return where a sensor's file of a frame is, whether it exists or not.
+
+        Parameters
+        ----------
+        sensor : str
+            Folder of the sensor: "velodyne_points", "oxts", "image_02" or "image_03".
+        k : int
+            Number of the frame.
+        suffix : str
+            ".bin", ".txt" or ".png".
+        """
+        return self.folder / sensor / "data" / f"{k:010d}{suffix}"
+
+    def _timestamp_files(self) -> list[Path]:
+        """Return timestamps.txt of every sensor, and the LIDAR's times of start and end where they are given."""
+        optional = [self.folder / "velodyne_points" / f"timestamps_{event}.txt" for event in ("start", "end")]
+        always = [self.folder / sensor / "timestamps.txt" for sensor in self._sensors]
+        return [*always, *filter(Path.exists, optional)]
+
+    @cached_property
+    def _times(self) -> dict[str, NDArray[np.datetime64]]:
+        """When each sensor took each frame, (frames,) datetime64[ns] by sensor."""
+        return {sensor: read_timestamps(self.folder / sensor / "timestamps.txt", len(self)) for sensor in self._sensors}
+
+    def _time(self, k: int) -> float:
+        """Return the seconds since the first scan, after checking that the sensors' times agree."""
+        times = {sensor: of_sensor[k] for sensor, of_sensor in self._times.items()}
+        if k in self.gaps and np.isnat(times["velodyne_points"]):
+            del times["velodyne_points"]  # a scan that was never recorded has no time in KITTI
+        (reference, time), *_ = times.items()
+        for sensor, other in times.items():
+            path = self.folder / sensor / "timestamps.txt"
+            if np.isnat(other):
+                raise DataError(path, f"a time in line {k + 1}", "an empty line")
+            if abs(other - time) > SAME_INSTANT:
+                first_path = self.folder / reference / "timestamps.txt"
+                expected = f"in line {k + 1} a time within {SAME_INSTANT} of {time}, which {first_path} has there"
+                raise DataError(path, expected, f"{other}")
+        lidar = self._times["velodyne_points"]
+        return float((time - lidar[~np.isnat(lidar)][0]) / np.timedelta64(1, "s"))
+
+    def _points(self, k: int) -> NDArray[np.float32]:
+        if k in self.gaps:
+            return np.zeros((0, 4), np.float32)
+        return read_scan(self.file("velodyne_points", k, ".bin"))
+
+    def _image(self, k: int) -> NDArray[np.uint8] | None:
+        """Read the image, (h, w, 3); None when the drive has no folder of this camera."""
+        if self.view not in self._sensors:
+            return None
+        return read_png(self.file(self.view, k, ".png"), "RGB", self.camera.size)
+
+    @cached_property
+    def _T_lidar_from_imu(self) -> NDArray[np.float64]:
+        return read_rigid(self.date_folder / "calib_imu_to_velo.txt")
+
+    @cached_property
+    def _first_packet(self) -> NDArray[np.float64]:
+        return read_packet(self.file("oxts", 0, ".txt"))
+
+    def _pose(self, k: int) -> NDArray[np.float64]:
+        """Return T_world_from_lidar; the world is the frame of the IMU at the drive's first packet."""
+        T_world_from_imu = imu_pose(self._first_packet, read_packet(self.file("oxts", k, ".txt")))
+        return T_world_from_imu @ invert_rigid(self._T_lidar_from_imu)
+
+    def _labels(self, k: int) -> FrameLabels | None:
+        if self.view != VIEWS[0]:
+            return None
+        labels = read_labels(self.folder / "labels", f"{k:010d}.png", self.camera.size)
+        return replace(labels, undecided=self._in_view) if labels and have_gaps(self.folder / "labels") else labels
+
+    @cached_property
+    def _in_view(self) -> NDArray[np.bool_]:
+        """The cells of `LABEL_GRID` that lie in view of the camera, hidden or not."""
+        return cells_in_view(self.camera, LABEL_GRID)
+
+
+def _existing(root: Path, date: str, drive: str) -> tuple[Path, Path]:
+    """Return the folders of the date and of the drive, or say what there is instead."""
+    folder = drive_folder(root, date, drive)
+    if not root.is_dir():
+        raise DataError(root, "a folder of dates", "no folder")
+    if not folder.parent.is_dir():
+        raise DataError(folder.parent, "a folder", _instead(root, root, "dates", "*_*_*"))
+    if not folder.is_dir():
+        raise DataError(folder, "a folder", _instead(root, folder.parent, "drives", "*_sync"))
+    return folder.parent, folder
+
+
+def _instead(root: Path, parent: Path, what: str, pattern: str) -> str:
+    """Say which dates or drives there are, and what the whole folder looks like."""
+    there, layout = sorted(path.name for path in parent.glob(pattern) if path.is_dir()), what_is(root)
+    names = f"only the {what} {', '.join(there)}" if there else f"no {what}"
+    return names + (f"; {root} looks like {layout}" if layout else "")
+
+
+def _last_frame(folder: Path) -> int:
+    """Return the highest frame number among the files of a folder, -1 without any."""
+    names = (path.name for path in folder.iterdir()) if folder.is_dir() else ()
+    return max((int(match[1]) for match in map(_FRAME_FILE.fullmatch, names) if match), default=-1)

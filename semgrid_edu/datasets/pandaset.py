@@ -1,0 +1,288 @@
+"""PandaSet (Xiao et al., ITSC 2021): scans whose returns all have a class, six cameras, and the truth of their streets.
+
+002/lidar/00.pkl.gz                 002/lidar/poses.json                 002/lidar/timestamps.json
+002/camera/front_camera/00.jpg      .../poses.json, timestamps.json, intrinsics.json
+002/annotations/semseg/00.pkl.gz    002/annotations/cuboids/00.pkl.gz
+"""
+
+from dataclasses import replace
+from functools import cached_property, lru_cache, partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
+from semgrid_edu.datasets import pandaset_files as files
+from semgrid_edu.datasets.calibration import camera_from
+from semgrid_edu.datasets.cuboids import LabelledScan, put_together
+from semgrid_edu.datasets.frames import FrameSequence, frame_numbers, nothing_known
+from semgrid_edu.datasets.project_lidar import birdseye_votes, cells_in_view, closest_returns, unhidden
+from semgrid_edu.errors import ArgumentError, DataError, check_whole
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.storage.reading import read_jpeg
+
+CAMERAS = ("front_camera", "front_left_camera", "front_right_camera", "left_camera", "right_camera", "back_camera")
+
+IMAGE_SIZE = (1080, 1920)
+"""Height and width of PandaSet's images, pixels."""
+
+ROWS = slice(216, 796)
+"""The rows of an image that are kept. They have KITTI's aspect; sky above and the vehicle's bonnet below are cut."""
+
+LIDAR_HEIGHT = 2.13
+"""Height of the Pandar64 above the ground where no labels show the ground, metres: as measured on scene 002."""
+
+_WINDOW = 20
+"""Scans that are kept in memory, 7 MB each: a frame's own, and nine before and after it."""
+
+
+class PandasetScene(FrameSequence):
+    """The frames of a scene as one of its cameras sees them. Each is read, and checked, when it is asked for.
+
+    There is a frame for each image of the camera on disk; `numbers` has their numbers in the published scene. Frames
+    have KITTI's form: x ahead is the direction in which the camera looks, along the ground, and the LIDAR is the
+    Pandar64 at the instant of the image, which is when it looks that way. Only its returns are in `Frame.points`; the
+    labels use both LIDARs. The vehicle sways, so each frame has a camera of its own. The world is PandaSet's.
+
+    In a `Frame`, `labels` are those of its own scan: the class and the depth of the pixels on which a return falls that
+    the camera sees, the class of the cells with a return, and which of these cells the camera sees. `truth`, `visible`
+    and `image_labels` take other scans too.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder that holds the scenes.
+    scene : str
+        Number of the scene, such as "002".
+    camera : str
+        One of `CAMERAS`.
+
+    Attributes
+    ----------
+    numbers : tuple of int
+        The published number of each frame.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such camera.
+    DataError
+        When there is no such scene, or no image. `scene[k]` raises it when a file that the frame needs is missing or
+        damaged.
+
+    Examples
+    --------
+    >>> scene = PandasetScene("pandaset", "002")                          # doctest: +SKIP
+    >>> truth = scene.truth(4, GridSpec.compact(), before=9, after=9)     # doctest: +SKIP
+    """
+
+    label_set, credit = KITTI_14, files.CREDIT
+
+    def __init__(self, root: str | Path, scene: str, camera: str = CAMERAS[0]) -> None:
+        if camera not in CAMERAS:
+            raise ArgumentError("camera", f"one of {', '.join(CAMERAS)}", repr(camera))
+        self.folder, self.view = Path(root) / scene, Path(root) / scene / "camera" / camera
+        if not self.folder.is_dir():
+            there = sorted(path.parent.name for path in Path(root).glob("*/lidar"))
+            raise DataError(self.folder, "a scene", f"only {', '.join(there)}" if there else "no scene beside it")
+        self.name, self._opened = f"{scene} {camera}", (root, scene, camera)
+        self.numbers = frame_numbers(self.view, "images", ".jpg", digits=2)
+        self._scan = lru_cache(_WINDOW)(partial(files.read_pandaset_scan, self.folder))
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.numbers)
+
+    def __reduce__(self) -> tuple:
+        """Open the scene anew in another process, which reads scans of its own."""
+        return type(self), self._opened
+
+    @cached_property
+    def gaps(self) -> tuple[int, ...]:
+        """Published numbers at which an image is missing: the others keep a constant spacing."""
+        spacing = min(np.diff(self.numbers), default=1)
+        return tuple(sorted(set(range(self.numbers[0], self.numbers[-1], spacing)) - set(self.numbers)))
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The calibration at the first frame."""
+        return self._camera(0)
+
+    @cached_property
+    def lidar_height(self) -> float:
+        """Height of the LIDAR above the road within 12 m, metres, at the first frame."""
+        number = self.numbers[0]
+        if self._scan(number).labelled is None:
+            return LIDAR_HEIGHT
+        points, classes, *_ = self._labelled_scan(number)
+        eye = self._T_world_from_lidar(0)[:3, 3]
+        near = (classes == KITTI_14.index("road")) & (np.hypot(*(points[:, :2] - eye[:2]).T) < 12)
+        return float(eye[2] - np.median(points[near, 2])) if near.any() else LIDAR_HEIGHT
+
+    def truth(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.uint8]:
+        """Return the class of each cell in which there is a labelled return, seen by the camera or not.
+
+        What stands outvotes the ground below it (`birdseye_votes`). Returns of moving things in other scans are put
+        where the things are at this frame, by their cuboids.
+
+        Parameters
+        ----------
+        k : int
+            Number of the frame.
+        spec : GridSpec
+            The grid, (H, W) cells.
+        before, after : int
+            How many scans before and after this frame's are added.
+
+        Returns
+        -------
+        (H, W) uint8
+            Classes of KITTI-14; 255 in a cell without a labelled return.
+
+        Raises
+        ------
+        ArgumentError
+            When `before` or `after` is negative.
+        DataError
+            When a scan has no labels, or its files are damaged.
+        """
+        points, classes = self._cloud(k, before, after)
+        return birdseye_votes(self._in_grid(points), classes, spec, KITTI_14)
+
+    def visible(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.bool_]:
+        """Return in which cells the camera sees a return (`unhidden`), (H, W). It doesn't see what is in the others.
+
+        Parameters and errors are those of `PandasetScene.truth`.
+        """
+        return self._visible(*self._cloud(k, before, after), self._camera(k), spec)
+
+    def image_labels(self, k: int, size: tuple[int, int], before: int = 0, after: int = 0) -> NDArray[np.uint8]:
+        """Return the class of each pixel of the resized image: that of the closest return on it that the camera sees.
+
+        Labels of single pixels can't be resized like an image, so the returns are projected anew for each size.
+        Parameters not named here are those of `LabelledDrive.image_labels`.
+
+        Parameters
+        ----------
+        before, after : int
+            How many scans before and after this frame's are added.
+
+        Returns
+        -------
+        (h, w) uint8
+            Classes of KITTI-14; 255 where there is no such return, or the closest one is unlabelled.
+        """
+        return _painted(*self._cloud(k, before, after), self._camera(k).resized(size))[0]
+
+    def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
+        """Return the cells in view of the camera, (H, W). Only some of them hold a labelled return.
+
+        Parameters are those of `LabelledDrive.truth`.
+        """
+        return cells_in_view(self._camera(k), spec)
+
+    def _frame(self, k: int) -> Frame:
+        frame = self.without_labels(k)
+        return replace(frame, labels=self._labels(k, frame.camera))
+
+    def without_labels(self, k: int) -> Frame:
+        """Read a frame without its labels. Parameters are those of `FrameSequence.without_labels`."""
+        scan, camera, T_world_from_lidar = self._scan(self.numbers[k]), self._camera(k), self._T_world_from_lidar(k)
+        turning = scan.lidars == files.TURNING
+        points = transform_points(invert_rigid(T_world_from_lidar), scan.points[turning])
+        points = np.column_stack([points, scan.reflectance[turning]]).astype(np.float32)
+        image = read_jpeg(self.view / f"{self.numbers[k]:02d}.jpg", IMAGE_SIZE)[ROWS]
+        start, now = self._camera_times[[self.numbers[0], self.numbers[k]]]
+        own = files.on_the_roof(scan.points[turning], self._poses[self.numbers[k]])
+        return Frame(image, points, camera, T_world_from_lidar, float(now - start), own=own)
+
+    def _labels(self, k: int, camera: Camera) -> FrameLabels | None:
+        if self._scan(self.numbers[k]).labelled is None:
+            return None
+        points, classes = self._cloud(k)
+        image, depth = _painted(points, classes, camera)
+        birdseye = birdseye_votes(self._in_grid(points), classes, LABEL_GRID, KITTI_14)
+        visible = self._visible(points, classes, camera, LABEL_GRID)
+        return FrameLabels(KITTI_14, image, depth, birdseye, visible, cells_in_view(camera, LABEL_GRID))
+
+    def _cloud(self, k: int, before: int = 0, after: int = 0) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+        """Return the returns of a window of scans in the LIDAR frame of frame k, and their classes."""
+        check_whole(before=before, after=after)
+        number, scans = self.numbers[k], frame_numbers(self.folder / "lidar", "scans", ".pkl.gz", digits=2)
+        earlier, later = [n for n in scans if n < number], [n for n in scans if n > number]
+        others = earlier[max(len(earlier) - before, 0) :] + later[:after]
+        now, *rest = (self._labelled_scan(n) for n in (number, *others))
+        points, classes = put_together(now, rest)
+        return transform_points(invert_rigid(self._T_world_from_lidar(k)), points), classes
+
+    def _in_grid(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return transform_points(invert_rigid(lidar_from_grid(self.lidar_height)), points)
+
+    def _visible(self, points: NDArray, classes: NDArray, camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
+        seen = unhidden(points, _standing(classes), camera)
+        rows, cols, inside = spec.cells(self._in_grid(points[seen]))
+        visible = np.zeros(spec.shape, np.bool_)
+        visible[rows[inside], cols[inside]] = True
+        return visible
+
+    def _labelled_scan(self, number: int) -> LabelledScan:
+        labelled = self._scan(number).labelled
+        if labelled is None:
+            raise DataError(files.semseg_folder(self.folder), "the classes of the returns", "no folder")
+        return labelled
+
+    def _camera(self, k: int) -> Camera:
+        """Return the calibration of the kept rows at a frame."""
+        path = self.view / "intrinsics.json"
+        K = files.read_intrinsics(path)
+        K[1, 2] -= ROWS.start
+        T = invert_rigid(self._camera_poses[self.numbers[k]]) @ self._T_world_from_lidar(k)
+        return camera_from(path, K, T, (ROWS.stop - ROWS.start, IMAGE_SIZE[1]), self.lidar_height)
+
+    def _T_world_from_lidar(self, k: int) -> NDArray[np.float64]:
+        """Return the pose of the Pandar64 at the instant of the image, turned to where the camera looks."""
+        number, poses, times = self.numbers[k], self._poses, self._times
+        places = poses[:, :3, :3] @ files.LIDAR_IN_POSE + poses[:, :3, 3]
+        velocity = np.gradient(places, times, axis=0)[number]
+        ahead = self._camera_poses[number][:3, 2]
+        turn = Rotation.from_euler("z", np.arctan2(ahead[1], ahead[0])).as_matrix()
+        return rigid_transform(turn, places[number] + velocity * (self._camera_times[number] - times[number]))
+
+    @cached_property
+    def _poses(self) -> NDArray[np.float64]:
+        # A velocity takes two poses, even at a single frame.
+        return files.read_poses(self.folder / "lidar" / "poses.json", max(self.numbers[-1] + 1, 2))
+
+    @cached_property
+    def _times(self) -> NDArray[np.float64]:
+        return files.read_times(self.folder / "lidar" / "timestamps.json", len(self._poses))
+
+    @cached_property
+    def _camera_poses(self) -> NDArray[np.float64]:
+        return files.read_poses(self.view / "poses.json", self.numbers[-1] + 1)
+
+    @cached_property
+    def _camera_times(self) -> NDArray[np.float64]:
+        return files.read_times(self.view / "timestamps.json", len(self._camera_poses))
+
+
+def _standing(classes: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Return which returns may hide something from a camera: all but those of the ground."""
+    return ~np.isin(classes, [KITTI_14.index(name) for name in ("road", "sidewalk")])
+
+
+def _painted(
+    points: NDArray, classes: NDArray[np.uint8], camera: Camera
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Return class and depth of the closest return on each pixel that the camera sees."""
+    seen = unhidden(points, _standing(classes), camera)
+    points, classes, blank = points[seen], classes[seen], nothing_known(KITTI_14, camera.size)
+    returns, uv = closest_returns(Frame(None, points, camera, np.eye(4), 0.0))
+    u, v = uv.T
+    blank.image[v, u] = classes[returns]
+    blank.depth[v, u] = transform_points(camera.T_camera_from_lidar, points[returns])[:, 2]
+    return blank.image, blank.depth

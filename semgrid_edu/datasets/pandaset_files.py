@@ -1,0 +1,241 @@
+"""The files of a PandaSet scene, read and checked one by one: scans with classes and cuboids, poses, times, cameras.
+
+Points, poses and cuboids are given in a world whose z axis points up, metres. Two LIDARs: the Pandar64 on the roof
+turns (d = 0), the PandarGT looks ahead (d = 1).
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from semgrid_edu.camera import invert_rigid, rigid_transform, transform_points
+from semgrid_edu.datasets.class_tables import ClassTable
+from semgrid_edu.datasets.cuboids import Cuboids, LabelledScan
+from semgrid_edu.errors import DataError
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.storage.pickled_tables import read_pickled_table
+from semgrid_edu.storage.reading import read_json
+
+CREDIT = "PandaSet by Hesai and Scale AI, CC BY 4.0 (creativecommons.org/licenses/by/4.0), cut and reduced."
+"""What stands beside whatever shows data of PandaSet."""
+
+TURNING = 0
+"""The number d of the Pandar64, the only LIDAR that the occupancy filter gets."""
+
+LIDAR_IN_POSE = np.array([0.0, 0.79, 1.86])
+"""Where the Pandar64 stands in the frame of lidar/poses.json (x right, y ahead, z up), metres. Measured on scene 002 as
+the place from which the returns of each laser have one elevation; the published extrinsics of the cameras say the same
+within 2 cm. The poses themselves are of a point near the ground."""
+
+ROOF = (-0.9, -1.7), (0.9, 1.4)
+"""Least and most metres to the right and ahead of the Pandar64 of returns from the vehicle itself: on scene 002 some
+630 in each scan come from the roof, 1.6 to 2 m above the ground."""
+
+FIRST_THING = 5
+"""Below this number are smoke, exhaust, spray and reflections: returns from where nothing is."""
+
+MOVABLE = range(13, 34)
+"""The numbers of the classes of things that may move: vehicles, people, animals."""
+
+PANDASET_CLASSES = ClassTable(
+    KITTI_14,
+    {
+        **dict.fromkeys((7, 8, 9, 10), "road"),  # road, lane lines, stop lines, other markings
+        **dict.fromkeys((11,), "sidewalk"),
+        **dict.fromkeys((5,), "vegetation"),
+        **dict.fromkeys((13, 14, 15, 16, 17), "car"),  # car, pickup, two sizes of trucks, towed object
+        **dict.fromkeys((19, 20, 22, 23), "car"),  # construction, uncommon and emergency vehicles, bus
+        **dict.fromkeys((27, 28, 29), "car"),  # train, trolley, tram
+        **dict.fromkeys((30, 31), "pedestrian"),  # also with an object
+        **dict.fromkeys((18, 25, 26), "bicycle"),  # motorcycle, scooter, bicycle
+        **dict.fromkeys((41,), "building"),
+        **dict.fromkeys((36, 38), "signage"),  # signs, also of construction sites
+        **dict.fromkeys((35, 39), "fence"),  # road barriers, also of construction sites
+        **dict.fromkeys((1, 2, 3, 4), None),  # smoke, exhaust, spray, reflection: nothing is there
+        **dict.fromkeys((6, 12), None),  # other ground and driveways: neither road nor sidewalk
+        **dict.fromkeys((21, 24, 32, 33), None),  # pedicab, mobility device, animals
+        **dict.fromkeys((34, 37, 40, 42), None),  # pylon, cone, rolling container, other static object
+    },
+)
+"""KITTI-14's class of each number in annotations/semseg; the numbers are those of PandaSet's classes.json.
+
+What could be several classes stays unlabelled: an "other static object" is a pole, a wall or a hydrant."""
+
+
+class PandasetScan(NamedTuple):
+    """What the files of one scan hold.
+
+    Parameters
+    ----------
+    points : (N, 3) float64
+        World, metres.
+    reflectance : (N,) float32
+        From 0 to 1.
+    lidars : (N,) int
+        Number of the LIDAR of each return.
+    labelled : LabelledScan or None
+        The returns with their classes, without those from where nothing is (`FIRST_THING`); None in a scene without
+        labels.
+    """
+
+    points: NDArray[np.float64]
+    reflectance: NDArray[np.float32]
+    lidars: NDArray[np.int64]
+    labelled: LabelledScan | None
+
+
+def semseg_folder(scene: Path) -> Path:
+    """Return where a scene keeps the classes of its returns; scenes without labels have no such folder.
+
+    Parameters
+    ----------
+    scene : Path
+        The folder of the scene.
+    """
+    return scene / "annotations" / "semseg"
+
+
+def on_the_roof(points: NDArray[np.float64], T_world_from_vehicle: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which returns come from the vehicle itself, whose heading only the front camera's grid shares.
+
+    Parameters
+    ----------
+    points : (N, 3) float64
+        Returns in the world, metres.
+    T_world_from_vehicle : (4, 4) float64
+        The scan's row of lidar/poses.json.
+
+    Returns
+    -------
+    (N,) bool
+        Whether each lies above `ROOF`.
+    """
+    from_lidar = (transform_points(invert_rigid(T_world_from_vehicle), points) - LIDAR_IN_POSE)[:, :2]
+    return ((ROOF[0] < from_lidar) & (from_lidar < ROOF[1])).all(axis=1)
+
+
+def read_pandaset_scan(scene: Path, number: int) -> PandasetScan:
+    """Read the returns of a scan, their classes and the cuboids of the things among them.
+
+    Parameters
+    ----------
+    scene : Path
+        The folder of the scene.
+    number : int
+        Number of the scan.
+    """
+    path = scene / "lidar" / f"{number:02d}.pkl.gz"
+    table = _table(path, ("x", "y", "z", "i", "d"))
+    points = np.column_stack([table[axis] for axis in "xyz"])
+    reflectance, lidars = (table["i"] / 255).astype(np.float32), table["d"]
+    if not ((reflectance >= 0) & (reflectance <= 1)).all():
+        raise DataError(path, "i from 0 to 255", f"{table['i'].min():g} to {table['i'].max():g}")
+    if not semseg_folder(scene).is_dir():
+        return PandasetScan(points, reflectance, lidars, None)
+    path = semseg_folder(scene) / f"{number:02d}.pkl.gz"
+    numbers = _table(path, ("class",))["class"]
+    if len(numbers) != len(points):
+        raise DataError(path, f"a class for each of the scan's {len(points)} returns", f"{len(numbers)}")
+    arrays = points, PANDASET_CLASSES.classes(path, numbers), np.isin(numbers, MOVABLE), lidars
+    cuboids = _read_cuboids(scene / "annotations" / "cuboids" / path.name)
+    labelled = LabelledScan(*(array[numbers >= FIRST_THING] for array in arrays), cuboids)
+    return PandasetScan(points, reflectance, lidars, labelled)
+
+
+def read_poses(path: Path, least: int) -> NDArray[np.float64]:
+    """Read the poses of a sensor, T_world_from_sensor, (N, 4, 4), metres.
+
+    Parameters
+    ----------
+    path : Path
+        The file poses.json.
+    least : int
+        How many poses there have to be at least.
+    """
+    entries = read_json(path, list)
+    if len(entries) < least:
+        raise DataError(path, f"at least {least} poses, one for each frame", f"{len(entries)}")
+    try:
+        places = np.array([[entry["position"][axis] for axis in "xyz"] for entry in entries], np.float64)
+        turns = np.array([[entry["heading"][axis] for axis in "xyzw"] for entry in entries], np.float64)
+        rotations = Rotation.from_quat(turns).as_matrix()
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(path, "poses of a position x, y, z and a heading w, x, y, z", repr(error)) from error
+    if not (np.isfinite(places).all() and np.isfinite(rotations).all()):
+        raise DataError(path, "finite poses", "others")
+    return np.array([rigid_transform(*pose) for pose in zip(rotations, places, strict=True)])
+
+
+def read_times(path: Path, count: int) -> NDArray[np.float64]:
+    """Read the times of a sensor's poses, (count,) seconds.
+
+    Parameters
+    ----------
+    path : Path
+        The file timestamps.json.
+    count : int
+        How many poses there are.
+    """
+    try:
+        times = np.array(read_json(path, list), np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(path, "times in seconds", repr(error)) from error
+    if times.shape != (count,) or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
+        raise DataError(path, f"{count} finite times that grow, one for each pose", f"{times.size} others")
+    return times
+
+
+def read_intrinsics(path: Path) -> NDArray[np.float64]:
+    """Read the intrinsic matrix of a camera, (3, 3), pixels.
+
+    Parameters
+    ----------
+    path : Path
+        The file intrinsics.json.
+    """
+    content = read_json(path)
+    try:
+        fx, fy, cx, cy = (float(content[key]) for key in ("fx", "fy", "cx", "cy"))
+    except (KeyError, TypeError, ValueError) as error:
+        raise DataError(path, "the numbers fx, fy, cx and cy", repr(content)[:200]) from error
+    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+
+
+def _table(path: Path, numbers: Sequence[str], others: Sequence[str] = ()) -> dict[str, NDArray]:
+    """Read a table that has to have some columns, of finite numbers and of other things."""
+    table, columns = read_pickled_table(path), [*numbers, *others]
+    if not set(columns) <= set(table):
+        raise DataError(path, f"the columns {', '.join(columns)}", ", ".join(table)[:200])
+    for name in numbers:
+        if len(table[name]) and (table[name].dtype == object or not np.isfinite(table[name]).all()):
+            raise DataError(path, f"finite numbers in the column {name}", "others")
+    return table
+
+
+def _read_cuboids(path: Path) -> Cuboids:
+    """Read the cuboids of a scan. A thing that moves has two, one for each LIDAR, which name each other."""
+    columns = [f"{what}.{axis}" for what in ("position", "dimensions") for axis in "xyz"]
+    which = ("uuid", "stationary", "cuboids.sibling_id")
+    table = _table(path, (*columns, "yaw", "cuboids.sensor_id"), which)
+    places, sizes = np.split(np.column_stack([table[column] for column in columns]).astype(np.float64), 2, axis=1)
+    turns = Rotation.from_rotvec(np.outer(table["yaw"], [0, 0, 1])).as_matrix()
+    T = np.array([rigid_transform(*pose) for pose in zip(turns, places, strict=True)]).reshape(-1, 4, 4)
+    lidars, sibling = table["cuboids.sensor_id"], table["cuboids.sibling_id"]
+    names = np.where((lidars > TURNING) & (sibling != "-"), sibling, table["uuid"])
+    stationary = table["stationary"].tolist()
+    _check_things(path, names, stationary, sizes)
+    return Cuboids(names, T, sizes, ~np.array(stationary, bool), lidars)
+
+
+def _check_things(path: Path, names: NDArray, stationary: list, sizes: NDArray[np.float64]) -> None:
+    """Refuse names that are no text, what is neither moving nor not, and boxes that hold nothing."""
+    if not all(isinstance(name, str) for name in names):
+        raise DataError(path, "text in the columns uuid and cuboids.sibling_id", "others")
+    if not all(isinstance(stands, bool) for stands in stationary):
+        raise DataError(path, "true or false in the column stationary", "others")
+    if (sizes < 0).any():
+        raise DataError(path, "dimensions from 0 m up", f"{sizes.min():g} m")

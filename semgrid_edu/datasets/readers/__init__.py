@@ -1,1 +1,0 @@
-"""Readers of published data sets: KITTI raw, tracking and Zhang labels, SYNTHIA, SemanticKITTI."""

@@ -1,0 +1,259 @@
+"""What the filter's steps do in each cell by itself, in compiled loops over cells.
+
+The loops compute with plain numbers, and choose between values without branching, so that the compiler can process
+several cells at a time.
+"""
+
+import numpy as np
+from numba import njit
+
+from semgrid_edu.occupancy.cellwise import CERTAIN
+from semgrid_edu.occupancy.state import State
+
+FREE, STATIC, DYNAMIC, UNKNOWN = (int(state) for state in State)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def renormalise(probability, claimed):
+    """Set P(DYNAMIC) to what the particles of a cell carry; the other states share the rest in their old proportions.
+
+    Parameters
+    ----------
+    probability : (4, H, W) float32
+        The four states; P(DYNAMIC) is ignored.
+    claimed : (H, W) float32
+        Sum of the weights of the particles in each cell; it may be above 1 where particles crowd.
+
+    Returns
+    -------
+    probability : (4, H, W) float32
+        The four states, with P(DYNAMIC) = min(claimed, 1). Where no other state was possible, the rest is UNKNOWN.
+    factor : (H, W) float32
+        Factor of the weights of the cell's particles.
+    """
+    shared, factor = np.empty_like(probability), np.empty_like(claimed)
+    for r in range(claimed.shape[0]):
+        for c in range(claimed.shape[1]):
+            dynamic = min(claimed[r, c], np.float32(1))
+            others = probability[FREE, r, c] + probability[STATIC, r, c] + probability[UNKNOWN, r, c]
+            share = (1 - dynamic) / others if others > 0 else 0.0  # others are 1 - P(DYNAMIC), with more digits
+            shared[FREE, r, c] = share * probability[FREE, r, c]
+            shared[STATIC, r, c] = share * probability[STATIC, r, c]
+            shared[DYNAMIC, r, c] = dynamic
+            shared[UNKNOWN, r, c] = share * probability[UNKNOWN, r, c] if others > 0 else 1 - dynamic
+            factor[r, c] = dynamic / claimed[r, c] if claimed[r, c] > 0 else 0.0
+    return shared, factor
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def mix(probability, newborn, going, M):
+    """Mix the states of each cell by the transition matrix: P(j) = sum_i M[i, j] P(i).
+
+    Parameters
+    ----------
+    probability : (4, H, W) float32
+        The four states at the previous instant.
+    newborn : (H, W) float32
+        The part of P(DYNAMIC) that no particle carries.
+    going : (H, W) float32
+        Sum of the weights in each cell after the matrix and after some of them have stopped. What stopped is STATIC.
+    M : (4, 4) float
+        Transition matrix, M[i, j] = P(state j now | state i before).
+
+    Returns
+    -------
+    probability : (4, H, W) float32
+        The four states now, with all particles still in their cells.
+    newborn : (H, W) float32
+        The part of P(DYNAMIC) that no particle carries, with what has become DYNAMIC of the other states.
+    """
+    mixed, born = np.empty_like(probability), np.empty_like(newborn)
+    for j in range(4):  # outermost, so that the compiler takes several cells at a time: four times as fast
+        from_free, from_static, from_dynamic, from_unknown = M[FREE, j], M[STATIC, j], M[DYNAMIC, j], M[UNKNOWN, j]
+        for r in range(newborn.shape[0]):
+            for c in range(newborn.shape[1]):
+                others = from_free * probability[FREE, r, c] + from_static * probability[STATIC, r, c]
+                dynamic = newborn[r, c] if j == DYNAMIC else probability[DYNAMIC, r, c]  # particles are added below
+                mixed[j, r, c] = others + from_dynamic * dynamic + from_unknown * probability[UNKNOWN, r, c]
+    for r in range(newborn.shape[0]):
+        for c in range(newborn.shape[1]):
+            # Of what particles carry and the matrix leaves DYNAMIC, a part goes on; the rest has stopped.
+            carried = M[DYNAMIC, DYNAMIC] * (probability[DYNAMIC, r, c] - newborn[r, c])
+            born[r, c] = mixed[DYNAMIC, r, c]
+            mixed[DYNAMIC, r, c] += going[r, c]
+            mixed[STATIC, r, c] += max(carried - going[r, c], 0.0)
+    return mixed, born
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def open_space(mixed):
+    """Return how much of each cell is open space: to most of what moves, and to what keeps pace with the vehicle.
+
+    What stands is ragged and often porous. So beams pass through cells of its face, and yet it is there: once the
+    vehicle looks in from another place, these cells are hit.
+
+    Parameters
+    ----------
+    mixed : (4, H, W) float32
+        The four states before particles flew, from `mix`.
+
+    Returns
+    -------
+    (2, H, W) float32
+        P(FREE) + P(DYNAMIC); and the same with P(FREE) times 1 - the largest P(STATIC) of the four neighbours.
+    """
+    room, (height, width) = np.empty((2, *mixed.shape[1:]), np.float32), mixed.shape[1:]
+    for r in range(height):
+        for c in range(width):
+            free, dynamic, beside = mixed[FREE, r, c], mixed[DYNAMIC, r, c], np.float32(0)
+            if free > 0:
+                beside = max(beside, mixed[STATIC, r - 1, c] if r > 0 else beside)
+                beside = max(beside, mixed[STATIC, r + 1, c] if r + 1 < height else beside)
+                beside = max(beside, mixed[STATIC, r, c - 1] if c > 0 else beside)
+                beside = max(beside, mixed[STATIC, r, c + 1] if c + 1 < width else beside)
+            room[0, r, c], room[1, r, c] = free + dynamic, (1 - beside) * free + dynamic
+    return room
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def collide(mixed, newborn, going, stays, arrives, doubtful):
+    """Let the dynamic mass that arrives in a cell meet what the cell holds, and strike out what can't both be true.
+
+    Parameters
+    ----------
+    mixed : (4, H, W) float32
+        The four states before particles flew, from `mix`.
+    newborn : (H, W) float32
+        The part of P(DYNAMIC) that no particle carries.
+    going, stays, arrives : (H, W) float32
+        Sums of weights in each cell: of the particles that were there before they flew, of those that are still there,
+        and of those that have come in.
+    doubtful : (H, W) float32
+        The part of `arrives` that comes out of a wall and goes on along it.
+
+    Returns
+    -------
+    probability : (4, H, W) float32
+        With a = min(arrives, CERTAIN), b the doubtful part of it, s = P(STATIC), u = P(UNKNOWN) plus what has left, and
+        d the mass that is newborn or stays, P(DYNAMIC) is [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u), and every
+        other state (1 - a) P / (1 - a s - b u). What has left is FREE.
+    newborn : (H, W) float32
+        Scaled like everything that was in the cell.
+    factor : (2, H, W) float32
+        Factors of the weights of the particles that stay, and of those that arrive.
+    less : (2, H, W) float32
+        By how much these factors are smaller for the doubtful part of a weight; 0 for particles that stay.
+    """
+    probability, born = np.empty_like(mixed), np.empty_like(newborn)
+    factor, less = np.empty((2, *newborn.shape), np.float32), np.zeros((2, *newborn.shape), np.float32)
+    for r in range(newborn.shape[0]):
+        for c in range(newborn.shape[1]):
+            static, claim = mixed[STATIC, r, c], min(arrives[r, c], CERTAIN)
+            vacated = going[r, c] - stays[r, c]
+            unseen = mixed[UNKNOWN, r, c] + vacated
+            share = claim / arrives[r, c] if arrives[r, c] > 0 else 0.0
+            struck = share * doubtful[r, c] * unseen
+            consistent = 1 - claim * static - struck
+            own, arrived = (1 - claim) / consistent, max(claim * (1 - static) - struck, 0.0) / consistent
+            probability[FREE, r, c] = own * (mixed[FREE, r, c] + vacated)
+            probability[STATIC, r, c] = own * static
+            probability[DYNAMIC, r, c] = own * (newborn[r, c] + stays[r, c]) + arrived
+            probability[UNKNOWN, r, c] = own * mixed[UNKNOWN, r, c]
+            born[r, c] = own * newborn[r, c]
+            factor[0, r, c] = own
+            factor[1, r, c] = share * (1 - static) / consistent
+            less[1, r, c] = share * unseen / consistent
+    return probability, born, factor, less
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def bayes(prior, occupied, free):
+    """Multiply by the likelihoods and normalise: P(state | z) = P(z | state) P(state) / P(z).
+
+    Parameters
+    ----------
+    prior : (4, H, W) float32
+        The four states before the scan.
+    occupied, free : (H, W) float
+        P(z | occupied) and P(z | free), not negative; UNKNOWN is as likely as free.
+
+    Returns
+    -------
+    posterior : (4, H, W) float32
+        The four states given the scan. Where nothing that was held possible explains the scan, all is UNKNOWN.
+    factor : (H, W) float64
+        P(DYNAMIC | z) / P(DYNAMIC), the factor of the weights of the cell's particles.
+    """
+    posterior, factor = np.empty_like(prior), np.empty(prior.shape[1:])
+    for r in range(prior.shape[1]):
+        for c in range(prior.shape[2]):
+            best = max(occupied[r, c], free[r, c])  # however small both are, the better explanation counts as 1
+            if_occupied = occupied[r, c] / best if best > 0 else 0.0
+            if_free = free[r, c] / best if best > 0 else 0.0
+            empty = np.float64(prior[FREE, r, c]) + prior[UNKNOWN, r, c]
+            full = np.float64(prior[STATIC, r, c]) + prior[DYNAMIC, r, c]
+            evidence = if_free * empty + if_occupied * full
+            if_free = if_free / evidence if evidence > 0 else 0.0
+            if_occupied = if_occupied / evidence if evidence > 0 else 0.0
+            posterior[FREE, r, c] = if_free * prior[FREE, r, c]
+            posterior[STATIC, r, c] = if_occupied * prior[STATIC, r, c]
+            posterior[DYNAMIC, r, c] = if_occupied * prior[DYNAMIC, r, c]
+            posterior[UNKNOWN, r, c] = if_free * prior[UNKNOWN, r, c] if evidence > 0 else 1.0
+            factor[r, c] = if_occupied
+    return posterior, factor
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def clear_wakes(probability, left, hidden):
+    """Strike out that something stands where a moving thing has been, in cells of which the scan says nothing.
+
+    Parameters
+    ----------
+    probability : (4, H, W) float32
+        The four states given the scan.
+    left : (H, W) float32
+        Sum of the weights of the particles that have left each cell.
+    hidden : (H, W) bool
+        Whether the scan says nothing of the cell.
+
+    Returns
+    -------
+    (4, H, W) float32
+        In hidden cells, with a = min(left, CERTAIN) and s = P(STATIC): STATIC is (1 - a) s / (1 - a s), and FREE gets
+        what it loses. All other cells are as they were.
+    """
+    cleared = probability.copy()
+    for r in range(left.shape[0]):
+        for c in range(left.shape[1]):
+            static, gone = probability[STATIC, r, c], min(left[r, c], CERTAIN) if hidden[r, c] else 0.0
+            cleared[STATIC, r, c] = (1 - gone) * static / (1 - gone * static)
+            cleared[FREE, r, c] += static - cleared[STATIC, r, c]
+    return cleared
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def rescale_weights(probability, carried):
+    """Make the particles of each cell carry its dynamic probability; without particles it turns UNKNOWN.
+
+    Parameters
+    ----------
+    probability : (4, H, W) float32
+        The four states.
+    carried : (H, W) float32
+        Sum of the weights of the particles in each cell.
+
+    Returns
+    -------
+    probability : (4, H, W) float32
+        The four states, with P(DYNAMIC) = 0 where no particle is.
+    factor : (H, W) float64
+        Factor of the weights of the cell's particles.
+    """
+    represented, factor = probability.copy(), np.empty(carried.shape)
+    for r in range(carried.shape[0]):
+        for c in range(carried.shape[1]):
+            dynamic = np.float64(probability[DYNAMIC, r, c])
+            represented[DYNAMIC, r, c] = dynamic if carried[r, c] > 0 else 0.0
+            represented[UNKNOWN, r, c] += 0.0 if carried[r, c] > 0 else dynamic
+            factor[r, c] = dynamic / carried[r, c] if carried[r, c] > 0 else 0.0
+    return represented, factor

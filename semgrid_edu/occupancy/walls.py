@@ -1,0 +1,197 @@
+"""What real streets need beyond the paper: walls, hedges and wakes, as one object that the filters are handed.
+
+A LIDAR sees a wall piece by piece and looks into the gaps of a hedge one after the other. To a filter that follows what
+arrives in a cell, both look like motion. `Walls` decides how much of an arrival to doubt, and frees the places that
+moving things have left out of sight. `CmcdotParams(walls=None)` is the paper's filter, without any of this.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.errors import check_fields, not_negative, types_named
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.cellwise import CERTAIN, ratio
+from semgrid_edu.occupancy.particles import at_cells, cells_of, weight_in_cells
+from semgrid_edu.occupancy.state import OUTSIDE, Particles, State
+
+FREE, STATIC, DYNAMIC, UNKNOWN = State
+
+
+@dataclass(frozen=True)
+class Walls:
+    """How far the filters look back and ahead along a path to tell a moving thing from a wall that comes into view.
+
+    *Walls.* A particle is suspect if the cell where it was `clearing_time` ago is STATIC now, and the cell where it
+    will be after `clearing_time` is not known to be free. Then its arrival in an unseen cell may be only the next piece
+    of the wall. A pedestrian who sets off also comes out of a STATIC cell, but walks into free space. And the side of a
+    long vehicle comes out of a cell where the vehicle moves.
+
+    *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. A particle at that speed is
+    suspect if a cell on its recent path was STATIC, or if the cell ahead borders one. While the car stands, none of
+    this applies.
+
+    *Wakes.* One thing can't be in two places. So what a moving particle occupied `clearing_time` ago is free now, even
+    if no scan sees it.
+
+    Parameters
+    ----------
+    clearing_time : float
+        Time in which a moving thing leaves the place that it occupies, seconds: a car of 4.5 m at 9 m/s, a pedestrian
+        of 0.5 m at 1 m/s. With 0 the filters look neither back nor ahead.
+    clearing_cells : float
+        Number of cells by which a thing must move before it counts as having left a place. Slow things are followed
+        for longer than `clearing_time`, because a thing shows in more cells than it fills: a pedestrian doesn't get
+        out of two cells of 0.5 m in half a second.
+    second_look : float
+        Fraction of `clearing_time` at which the past position of a particle at the car's speed is checked a second
+        time (0.4: two LIDAR revolutions).
+    """
+
+    clearing_time: float = 0.5
+    clearing_cells: float = 3.0
+    second_look: float = 0.4
+
+    @types_named
+    def __post_init__(self) -> None:
+        """Check that all three are numbers."""
+        names = "clearing_time", "clearing_cells", "second_look"
+        check_fields(self, "a finite number, not negative", not_negative, *names)
+
+    def displacement(self, velocity: NDArray, cell: float, fraction: float = 1.0) -> NDArray[np.float64]:
+        """Return how far things move in a fraction of `clearing_time`, but at least `clearing_cells`, (N, 2) metres.
+
+        Parameters
+        ----------
+        velocity : (N, 2) float
+            Their velocities, m/s. A thing at rest has no displacement.
+        cell : float
+            Side of a cell, metres.
+        fraction : float
+            Which fraction of the time; negative for the past.
+        """
+        path = fraction * self.clearing_time * velocity.astype(np.float64)
+        length = np.linalg.norm(path, axis=1, keepdims=True)
+        least = self.clearing_cells * cell
+        return path * np.maximum(1, ratio(np.full_like(length, least), length))
+
+    def keeps_pace(self, velocity: NDArray, car_speed: float, cell: float) -> NDArray[np.bool_]:
+        """Return which things move at the car's own speed, (N,).
+
+        Their velocity differs from the car's by at most the car's speed, as that of a standing thing does. And they
+        are fast enough to have left their cells within `second_look`. Nothing keeps pace with a car that stands.
+
+        Parameters
+        ----------
+        velocity : (N, 2) float
+            Velocities along the axes of the map, m/s.
+        car_speed : float
+            Speed of the vehicle along the x axis of the map, m/s, negative backwards.
+        cell : float
+            Side of a cell, metres.
+        """
+        time = self.second_look * self.clearing_time
+        if car_speed == 0 or time == 0:
+            return np.zeros(len(velocity), bool)
+        difference = np.hypot(velocity[:, 0] - car_speed, velocity[:, 1])
+        speed = np.hypot(velocity[:, 0], velocity[:, 1])
+        return (difference <= abs(car_speed)) & (speed >= self.clearing_cells * cell / time)
+
+    def doubt(
+        self,
+        particles: Particles,
+        cells: NDArray,
+        mixed: NDArray,
+        unseen: NDArray,
+        spec: GridSpec,
+        car_speed: float,
+    ) -> NDArray[np.float64]:
+        """Return the probability that a particle's arrival in its cell is only a wall that comes into view, (N,).
+
+        Parameters
+        ----------
+        particles : Particles
+            N particles after their flight.
+        cells : (N,) int
+            The cell of each, from `cells_of`.
+        mixed : (4, H, W) float
+            The four states before particles flew.
+        unseen : (H, W) float
+            Probability that no scan has found the cell free: P(UNKNOWN), and what has only just left the cell.
+        spec : GridSpec
+            The cells, (H, W).
+        car_speed : float
+            Speed of the vehicle along the x axis of the map, m/s.
+        """
+        keeps = self.keeps_pace(particles.velocity, car_speed, spec.cell)
+        before, shortly_before, ahead = (
+            self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
+        )
+        out_of_a_wall = at_cells(mixed[STATIC], before)
+        past_a_wall = keeps * at_cells(mixed[STATIC], shortly_before)
+        open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - keeps * at_cells(free_beside_static(mixed), ahead)
+        return np.maximum(out_of_a_wall, past_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)
+
+    def clear_wakes(
+        self, posterior: NDArray, particles: Particles, cells: NDArray, hidden: NDArray, spec: GridSpec
+    ) -> NDArray[np.float64]:
+        """Free the hidden cells that moving particles have left, by `strike_out_wakes`.
+
+        Parameters
+        ----------
+        posterior : (4, H, W) float
+            The four states given the scan.
+        particles : Particles
+            N particles, with their weights given the scan.
+        cells : (N,) int
+            The cell of each, from `cells_of`.
+        hidden : (H, W) bool
+            Cells about which the scan says nothing.
+        spec : GridSpec
+            The cells, (H, W).
+        """
+        before = self._other_cells(particles, cells, spec, -1)
+        return strike_out_wakes(posterior, weight_in_cells(particles.weight, before, spec.shape), hidden)
+
+    def _other_cells(self, particles: Particles, cells: NDArray, spec: GridSpec, fraction: float) -> NDArray[np.int64]:
+        """Return the cell of each particle at another time, (N,); `OUTSIDE` where it is the same cell as now."""
+        then = cells_of(particles.position + self.displacement(particles.velocity, spec.cell, fraction), spec)
+        return np.where(then == cells, OUTSIDE, then)
+
+
+def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDArray[np.float64]:
+    """Strike out that something stands where a moving thing has just been.
+
+    "A thing has left this cell", with probability a, and "a thing stands here", with probability s, can't both be true.
+    Without this combination P(STATIC) is (1 - a) s / (1 - a s), and FREE gets the difference.
+
+    Parameters
+    ----------
+    posterior : (4, H, W) float
+        The four states given the scan.
+    left : (H, W) float
+        Dynamic mass that has left each cell; a is at most `CERTAIN`.
+    hidden : (H, W) bool
+        Cells about which the scan says nothing. Others stay as they are, because there the scan decides.
+    """
+    a = np.where(hidden, np.minimum(left, CERTAIN), 0)
+    s = posterior[STATIC]
+    static = (1 - a) * s / (1 - a * s)
+    return np.stack([posterior[FREE] + s - static, static, posterior[DYNAMIC], posterior[UNKNOWN]])
+
+
+def free_beside_static(mixed: NDArray) -> NDArray[np.floating]:
+    """Return how much of P(FREE) borders a STATIC cell: P(FREE) times the largest P(STATIC) of the four neighbours.
+
+    Hedges are ragged and porous, so beams pass through cells of their face. Once the car looks in from another place,
+    these cells are hit. So to something at the car's speed they are not open space.
+
+    Parameters
+    ----------
+    mixed : (4, H, W) float
+        The four states.
+    """
+    static = np.pad(mixed[STATIC], 1)
+    beside = np.max([static[:-2, 1:-1], static[2:, 1:-1], static[1:-1, :-2], static[1:-1, 2:]], axis=0)
+    return mixed[FREE] * beside

@@ -1,0 +1,295 @@
+"""The five stages of the system as functions that can be exchanged, and a sixth that the paper leaves out (Fig. 2).
+
+`Stages.of` assembles the book's parts, `Stages.fast` their compiled twins. This is the only module in the book that
+knows of `semgrid_edu.fast`.
+"""
+
+import copy
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any, Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from semgrid_edu.camera import Camera
+from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
+from semgrid_edu.datasets.samples import sample_weights
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.memory import ClassMemory, MemoryParams
+from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
+from semgrid_edu.occupancy import CmcdotParams, DriveTracker
+from semgrid_edu.planes import PlaneSampler
+from semgrid_edu.stages.hints import REMEMBER, STAGES, check_usage
+from semgrid_edu.stages.stepping import checked
+
+
+class Tracker(Protocol):
+    """A stage with a memory: it is handed one frame after the other."""
+
+    def step(self, frame: Any) -> Any:
+        """Return the result for this frame, given all frames so far.
+
+        Parameters
+        ----------
+        frame : Frame
+            The next frame of the drive; a `View` for the stage `remember`.
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Stages:
+    """The stages as functions on numpy arrays, one frame at a time. Any of them may be your own.
+
+    C is the number of classes, D the number of planes.
+
+    Parameters
+    ----------
+    track : Tracker or callable, optional
+        l -> o: an object whose `step(frame)` returns a `Belief`, or an array (4, H, W) float: the probabilities of
+        FREE, STATIC, DYNAMIC and UNKNOWN, which sum to 1 in each cell. Or a generator function `track(frames, spec)`
+        that takes a frame, yields its belief, and only then takes the next frame.
+    segment : callable, optional
+        i -> s: `segment(image (3, h, w))` returns scores (C, h, w) float without soft-max; the image is RGB, 0..1.
+    sample : callable, optional
+        s -> p: `sample(s (C, h, w))` returns the scores on the planes, (C, D, H, W) float.
+    fuse : callable, optional
+        (p, o) -> g: `fuse(p (C, D, H, W), o (4, H, W))` returns log g (C, H, W) float, natural logarithms of
+        probabilities: exp(log g) sums to 1 in each cell.
+    refine : callable, optional
+        g -> g: `refine(log_g (C, H, W), o (4, H, W))` returns g (C, H, W) float, probabilities that sum to 1 in each
+        cell.
+    architecture : Architecture, optional
+        The grid, the image size, the planes and the classes that all stages work with; those of the shipped network
+        when left out.
+    remember : Tracker or callable, optional
+        g -> g over frames: an object whose `step(view)` returns (C, H, W) float, probabilities that sum to 1 in each
+        cell, for a `View` (frame, belief and g of that frame alone). Or a generator function `remember(views, spec)`.
+        Without it nothing is remembered.
+
+    Raises
+    ------
+    ArgumentError
+        When a stage isn't a function of the right number of arguments.
+
+    Examples
+    --------
+    >>> def forget(log_g, o):
+    ...     return np.full_like(log_g, 1 / len(log_g))
+    >>> Stages(refine=forget).given
+    ('refine',)
+    """
+
+    track: Tracker | Callable | None = None
+    segment: Callable[[NDArray], NDArray] | None = None
+    sample: Callable[[NDArray], NDArray] | None = None
+    fuse: Callable[[NDArray, NDArray], NDArray] | None = None
+    refine: Callable[[NDArray, NDArray], NDArray] | None = None
+    architecture: Architecture | None = None
+    remember: Tracker | Callable | None = None
+
+    def __post_init__(self) -> None:
+        """Reject what can't be called as its stage is."""
+        for name in self.given:
+            check_usage(name, getattr(self, name))
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """The names of the stages that weren't left out, in their order."""
+        return tuple(name for name in STAGES | REMEMBER if getattr(self, name) is not None)
+
+    @classmethod
+    def of(
+        cls,
+        net: SemanticGridNet,
+        occupancy: CmcdotParams | None = None,
+        crf: CrfParams | None = None,
+        seed: int = 0,
+        keep_steps: bool = False,
+        memory: bool | MemoryParams = False,
+    ) -> "Stages":
+        """Return the package's own stages, in the book's readable version.
+
+        Parameters
+        ----------
+        net : SemanticGridNet
+            A network from `build_net` or `load_net`, for the camera of the drive and in evaluation mode.
+        occupancy : CmcdotParams, optional
+            Parameters of the filter.
+        crf : CrfParams, optional
+            Parameters of the refinement; `CrfParams.for_cells` when left out.
+        seed : int
+            Seed for the particles of the filter.
+        keep_steps : bool
+            Whether each belief also holds what the filter had after each of its steps (`Belief.steps`).
+        memory : bool or MemoryParams
+            Whether class beliefs are carried over frames, or the parameters with which they are.
+
+        Raises
+        ------
+        ArgumentError
+            When the network was put together by hand, so that its grid isn't known, or its classes can't be remembered.
+
+        Examples
+        --------
+        >>> own = Stages.of(load_net(sample_weights(), drive.camera))                   # doctest: +SKIP
+        >>> dataclasses.replace(own, refine=my_refine)                                  # doctest: +SKIP
+        """
+        return _assembled(_BOOK, net, occupancy, crf, seed, keep_steps, memory)
+
+    @classmethod
+    def fast(cls, net: SemanticGridNet, *args: Any, **options: Any) -> "Stages":
+        """Return the same stages by the compiled twins of `semgrid_edu.fast`; the book's where numba is missing.
+
+        Parameters
+        ----------
+        net : SemanticGridNet
+            The network.
+        *args, **options
+            The other parameters of `of`.
+        """
+        return _assembled(_fast_parts(), net, *args, **options)
+
+    def over(self, other: "Stages") -> "Stages":
+        """Return these stages, and those of `other` where one was left out.
+
+        Parameters
+        ----------
+        other : Stages
+            The stages that fill the gaps, such as `Stages.of(net)`.
+
+        Raises
+        ------
+        ArgumentError
+            When both have an architecture and the two differ in what stages hand to each other.
+        """
+        if self.architecture and self.architecture.layout != other.architecture.layout:
+            raise ArgumentError("architecture", f"that of the other stages, {other.architecture}", self.architecture)
+        return replace(other, **{name: getattr(self, name) for name in self.given})
+
+    @classmethod
+    def completed(
+        cls,
+        stages: "Stages | SemanticGridNet",
+        camera: Camera,
+        occupancy: CmcdotParams | None = None,
+        crf: CrfParams | None = None,
+        seed: int = 0,
+        memory: bool | MemoryParams = False,
+    ) -> "Stages":
+        """Return a complete set for a drive: the package's fast stages fill the gaps.
+
+        Parameters
+        ----------
+        stages : Stages or SemanticGridNet
+            The stages that are given, or a network. Without `segment`, `sample` or `fuse` the shipped SegNet does
+            these three.
+        camera : Camera
+            The camera as it took the images of the drive.
+        occupancy, crf, seed, memory
+            Those of `of`.
+        """
+        options = {"occupancy": occupancy, "crf": crf, "seed": seed, "memory": memory}
+        if isinstance(stages, SemanticGridNet):
+            return cls.fast(stages, **options)
+        if set(STAGES) <= set(stages.given) and memory is False:
+            return stages
+        return stages.over(cls.fast(load_net(sample_weights(), camera), **options))
+
+    def started(self) -> "Stages":
+        """Return the stages for one drive: with a tracker and a memory of their own, and with their results checked."""
+        if missing := set(STAGES) - set(self.given):
+            raise ArgumentError("stages", f"all of {', '.join(STAGES)}", f"none for {', '.join(sorted(missing))}")
+        architecture = self.architecture or Architecture()
+        own = replace(self, track=copy.deepcopy(self.track), remember=copy.deepcopy(self.remember))
+        parts = {name: checked(name, getattr(own, name), architecture) for name in self.given}
+        return Stages(architecture=architecture, **parts)
+
+
+_BOOK = SimpleNamespace(
+    DriveTracker=DriveTracker, PlaneSampler=PlaneSampler, mean_field=mean_field, ClassMemory=ClassMemory
+)
+"""The readable parts that `Stages.of` puts together; `semgrid_edu.fast` has the same names."""
+
+
+def _fast_parts() -> Any:
+    """Return `semgrid_edu.fast`, or the book's parts where numba isn't installed."""
+    from semgrid_edu import fast
+
+    try:
+        fast.DriveTracker  # noqa: B018 (loads the compiled filter)
+    except ModuleNotFoundError as error:
+        if error.name != "numba":
+            raise
+        warnings.warn(
+            "numba is missing, so the slower readable stages run: pip install semgrid_edu[fast]", stacklevel=3
+        )
+        return _BOOK
+    return fast
+
+
+def _assembled(
+    parts: Any,
+    net: SemanticGridNet,
+    occupancy: CmcdotParams | None = None,
+    crf: CrfParams | None = None,
+    seed: int = 0,
+    keep_steps: bool = False,
+    memory: bool | MemoryParams = False,
+) -> Stages:
+    """Put the package's own stages together from the book's parts or from the fast ones."""
+    architecture = net.need_architecture()
+    sampler = net.sampler.as_kind(parts.PlaneSampler)
+    crf = crf or CrfParams.for_cells(architecture.grid.cell)
+
+    @torch.inference_mode()
+    def segment(image: NDArray) -> NDArray:
+        return net.segmenter(_tensor(image)[None])[0].numpy()
+
+    @torch.inference_mode()
+    def sample(s: NDArray) -> NDArray:
+        return sampler(_tensor(s)[None])[0].numpy()
+
+    @torch.inference_mode()
+    def fuse(p: NDArray, o: NDArray) -> NDArray:
+        planes = _tensor(p)
+        # PyTorch recognises channels-last planes by the stride of the batch axis too, and would copy them without it.
+        planes = planes.as_strided((1, *planes.shape), (planes.numel(), *planes.stride()))
+        return net.fusion(planes, _tensor(o)[None])[0].log_softmax(dim=0).numpy()
+
+    def refine(log_g: NDArray, o: NDArray) -> NDArray:
+        return parts.mean_field(unary_from_log_probability(log_g), o, crf)
+
+    return Stages(
+        track=parts.DriveTracker(architecture.grid, occupancy, seed, keep_steps),
+        segment=segment,
+        sample=sample,
+        fuse=fuse,
+        refine=refine,
+        architecture=architecture,
+        remember=_memory(parts, memory, architecture),
+    )
+
+
+def _memory(parts: Any, memory: bool | MemoryParams, architecture: Architecture) -> Tracker | None:
+    """Return the stage `remember`, or None without memory."""
+    if memory is False:
+        return None
+    if not isinstance(memory, bool | MemoryParams):
+        raise ArgumentError("memory", "True, False or MemoryParams", type(memory).__name__)
+    if architecture.label_set != KITTI_14.name:
+        found = f"{memory} with {architecture.label_set}"
+        raise ArgumentError(
+            "memory", f"False unless the classes are {KITTI_14.name}, which has the unknown ones", found
+        )
+    return parts.ClassMemory(architecture.grid, None if memory is True else memory)
+
+
+def _tensor(array: NDArray) -> Tensor:
+    """Return a tensor that shares the memory of a float32 array and has its layout."""
+    return torch.from_numpy(np.asarray(array, dtype=np.float32))

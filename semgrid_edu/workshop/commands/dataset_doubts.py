@@ -1,0 +1,27 @@
+"""What is doubtful about a data set; every command that uses one reports it before hours of work begin."""
+
+from pathlib import Path
+
+import semgrid_edu.workshop.paper.datasets  # noqa: F401 (adds the paper's readers to those that dataset.json can name)
+from semgrid_edu.datasets.index import load_index
+from semgrid_edu.workshop.doubts import drive_doubts
+
+
+def dataset_doubts(dataset_dir: str | Path, *splits: str) -> list[str]:
+    """List what is doubtful about the drives of some splits.
+
+    Parameters
+    ----------
+    dataset_dir : path-like
+        The folder of the data set, such as data/minikitti.
+    *splits : str
+        Such as "train".
+
+    Returns
+    -------
+    list of str
+        One line for each doubt, from `drive_doubts`.
+    """
+    index = load_index(dataset_dir)
+    drives = [drive for split in splits for drive, _ in index.drives(split)]
+    return [doubt for drive in drives for doubt in drive_doubts(drive)]

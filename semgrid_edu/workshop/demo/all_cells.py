@@ -1,0 +1,139 @@
+"""The story of a frame's cells: what each stage did to them, from returns and pixels to the class (paper, Fig. 2).
+
+The demo's page shows it for every cell, and `cell_story` picks one.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import softmax
+
+from semgrid_edu.crf import CrfParams, mean_field, unary_from_probability
+from semgrid_edu.datasets.grid_truth import grid_truth
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import Frame
+from semgrid_edu.labels import IGNORE, LABEL_SETS
+from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.occupancy import SensorModel
+from semgrid_edu.pipeline import FrameResult
+from semgrid_edu.planes import plane_pixels
+from semgrid_edu.workshop.demo.contributions import Contributions, contributions
+from semgrid_edu.workshop.demo.evidence import ScanMaps, Sight, classes_at, last_sight, scan_maps
+from semgrid_edu.workshop.demo.neighbours import Neighbours, neighbour_pull
+from semgrid_edu.workshop.demo.what_if import faults, what_if
+
+UPDATES = 10
+"""How many updates the CRF makes: the default of `mean_field`."""
+
+TOLERANCE = 1e-3
+"""How much the network's probabilities may differ from those of the result that it is to explain."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameStory:
+    """What each stage did to every cell of a frame.
+
+    Parameters
+    ----------
+    states : dict of str to (4, H, W) float32
+        The four states after "move", "predict", "update" and "resample", on the filter's map, and "shown", in the grid
+        that the filter returns. "shown" is the prediction updated with the returns of exactly this cell, while the
+        map's cell can be shifted by up to half a cell. Only "shown" if the filter wasn't asked to keep its steps.
+    scan : ScanMaps
+        What the frame's scan says.
+    pixels, visible : (D, H, W, 2) float64, (D, H, W) bool
+        Where eq. (1) finds the points of the planes in the frame's image, and whether the camera sees them.
+    called, shown : (D, H, W) int64
+        What the image network calls the pixels at these points, and what they show (`classes_at`).
+    label, rival : (H, W) int64
+        The class of the semantic grid, and the class that it is compared with: the truth where that is another class,
+        otherwise the second most probable class.
+    refined, truth : (H, W) int64
+        The class after the CRF, and the true class; 255 where it isn't known.
+    why : Contributions
+        The parts of the difference of the scores of `label` and `rival`.
+    neighbours : Neighbours
+        What the neighbours add in the CRF's last update; the strongest ones pull towards `refined`.
+    otherwise : dict of str to (H, W) int64
+        What each cell is called before the CRF if an input is true or removed, see `what_if`.
+    fault : (H, W) int64
+        The stage that is to blame, as an index of `FAULTS`.
+    sight : Sight or None
+        When a frame last named each place; None for a result without memory.
+    """
+
+    states: dict[str, NDArray[np.float32]]
+    scan: ScanMaps
+    pixels: NDArray[np.float64]
+    visible: NDArray[np.bool_]
+    called: NDArray[np.int64]
+    shown: NDArray[np.int64]
+    label: NDArray[np.int64]
+    rival: NDArray[np.int64]
+    refined: NDArray[np.int64]
+    truth: NDArray[np.int64]
+    why: Contributions
+    neighbours: Neighbours
+    otherwise: dict[str, NDArray[np.int64]]
+    fault: NDArray[np.int64]
+    sight: Sight | None
+
+
+def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[Frame, NDArray]] = ()) -> FrameStory:
+    """Explain what each stage did to every cell of a frame.
+
+    Parameters
+    ----------
+    result : FrameResult
+        The frame's result from the package's own stages with their default parameters. Made with
+        `Stages.of(net, keep_steps=True)`, it also has the filter's steps.
+    net : SemanticGridNet
+        The network that made the result, in evaluation mode.
+    past : sequence of (Frame, (H, W) int)
+        The earlier frames in the order of time, each with the most probable class of each cell by that frame alone.
+        For a result with memory.
+
+    Raises
+    ------
+    ArgumentError
+        When the network is in training mode, or another network made the result.
+    """
+    architecture = net.need_architecture()
+    spec = architecture.grid
+    o = result.belief.probability
+    parts = contributions(net, result.scores, o)
+    if not (apart := np.abs(softmax(parts.score, axis=0) - result.grid).max()) <= TOLERANCE:
+        raise ArgumentError("net", "the network that made the result", f"one whose probabilities are {apart:.3f} apart")
+    labels = result.frame.labels
+    truth = np.full(spec.shape, IGNORE) if labels is None else grid_truth(labels, o, spec).astype(np.int64)
+    label, second = np.argsort(-result.grid, axis=0, kind="stable")[:2]
+    rival = np.where((truth != label) & (truth < len(result.grid)), truth, second)
+    refined = result.refined.argmax(axis=0)
+    pixels, visible = plane_pixels(spec, architecture.heights, result.frame.camera)
+    called, shown = classes_at(result, pixels, visible)
+    params = CrfParams.for_cells(spec.cell)
+    before_last_update = mean_field(unary_from_probability(result.grid), o, params, UPDATES - 1)
+    otherwise = what_if(result, net)
+    sight = None
+    if result.remembered is not None:
+        n_semantic = LABEL_SETS[architecture.label_set].n_semantic
+        sight = last_sight([*past, (result.frame, label)], spec, n_semantic)
+    return FrameStory(
+        states={**result.belief.steps, "shown": o},
+        scan=scan_maps(result.frame.points_grid, spec, SensorModel()),
+        pixels=pixels,
+        visible=visible,
+        called=called,
+        shown=shown,
+        label=label,
+        rival=rival,
+        refined=refined,
+        truth=truth,
+        why=parts.versus(label, rival),
+        neighbours=neighbour_pull(before_last_update, refined, o, params),
+        otherwise=otherwise,
+        fault=faults(label, refined, truth, otherwise),
+        sight=sight,
+    )

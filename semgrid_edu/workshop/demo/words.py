@@ -1,0 +1,148 @@
+"""A cell's story in words: what it is called, which stage is to blame, and what each stage saw (paper, Fig. 2)."""
+
+from collections import Counter
+from collections.abc import Iterable
+
+from semgrid_edu.occupancy import State
+from semgrid_edu.storage.files import table_beside
+from semgrid_edu.workshop.demo.one_cell import CellStory
+from semgrid_edu.workshop.demo.what_if import NO_IMAGE, NO_OCCUPANCY, TRUE_BOTH
+
+SENTENCES = table_beside(__file__)
+"""The sentences by part and case, from `words.toml`; names in braces are filled in. The page's script uses them too."""
+
+
+def story_text(story: CellStory) -> str:
+    """Tell a cell's story in sentences, the numbers last.
+
+    Parameters
+    ----------
+    story : CellStory
+        The story.
+    """
+    parts = (_place, _called, _fault, _image, _memory, _scan, _otherwise, _numbers)
+    return "\n".join(filter(None, (part(story) for part in parts)))
+
+
+def counted(classes: Iterable[int], names: tuple[str, ...]) -> str:
+    """Return how often each class occurs, the most frequent first.
+
+    Parameters
+    ----------
+    classes : iterable of int
+        Class numbers; a number without a name isn't counted.
+    names : tuple of str
+        The names of the classes.
+
+    Examples
+    --------
+    >>> counted([0, 3, 3, 255], ("road", "sidewalk", "vegetation", "car"))
+    'car (2), road (1)'
+    """
+    found = Counter(int(c) for c in classes if 0 <= c < len(names))
+    return ", ".join(f"{names[c]} ({number})" for c, number in sorted(found.items(), key=lambda one: (-one[1], one[0])))
+
+
+def _place(story: CellStory) -> str:
+    row, col = story.cell
+    x, y = story.xy
+    side = "right" if y < 0 else "left"
+    return SENTENCES["place"]["cell"].format(row=row, col=col, ahead=f"{x:.1f}", aside=f"{abs(y):.1f}", side=side)
+
+
+def _called(story: CellStory) -> str:
+    case = "unsure" if story.truth is None else "right" if story.refined == story.truth else "wrong"
+    sure = round(100 * float(story.after[story.refined]))
+    return SENTENCES["called"][case].format(sure=sure, **_classes(story))
+
+
+def _classes(story: CellStory) -> dict[str, str | None]:
+    """Return the names of the classes that the sentences mention."""
+    truth = None if story.truth is None else story.names[story.truth]
+    return {"label": story.names[story.label], "refined": story.names[story.refined], "truth": truth}
+
+
+def _fault(story: CellStory) -> str:
+    if story.fault == "none":
+        return ""
+    words = _classes(story)
+    words["for_refined"] = f"{story.messages[story.refined]:.1f}"
+    words["for_truth"] = f"{story.messages[story.truth]:.1f}"
+    words["all_true"] = story.names[story.otherwise[TRUE_BOTH]]
+    words["image_here"] = _image_here(story)
+    words["occupancy_here"] = _occupancy_here(story)
+    return SENTENCES["fault"][story.fault].format(**words)
+
+
+def _image_here(story: CellStory) -> str:
+    """Say whether the image network is right at the pixels above the cell."""
+    labelled = story.shown < len(story.names)
+    wrong = int((story.called != story.shown)[labelled].sum())
+    case = "wrong" if wrong else "right" if labelled.any() else "unknown"
+    return SENTENCES["image_here"][case].format(wrong=wrong, labelled=int(labelled.sum()))
+
+
+def _occupancy_here(story: CellStory) -> str:
+    """Say whether the filter is right about the cell: the ground should be FREE, and a thing shouldn't."""
+    state = State(int(story.steps["shown"].argmax()))
+    if state == State.UNKNOWN:
+        return SENTENCES["occupancy_here"]["unknown"]
+    truth = story.names[story.truth]
+    semantic = not truth.startswith("unknown")
+    case = "wrong" if semantic and (truth in story.flat) != (state == State.FREE) else "right"
+    return SENTENCES["occupancy_here"][case].format(state=state.name)
+
+
+def _image(story: CellStory) -> str:
+    words = SENTENCES["image"]
+    points = {
+        "points": len(story.heights),
+        "lowest": f"{story.heights[0]:.1f}",
+        "highest": f"{story.heights[-1]:.1f}",
+    }
+    if not story.visible.any():
+        return words["none"].format(**points)
+    says = counted(story.called[story.visible], story.names)
+    shows = counted(story.shown[story.visible], story.names)
+    said = words["some"].format(seen=int(story.visible.sum()), says=says, **points)
+    if not shows:
+        return said
+    partly = (story.shown[story.visible] >= len(story.names)).any()
+    return f"{said} {words['partly' if partly else 'shown'].format(shows=shows)}"
+
+
+def _memory(story: CellStory) -> str:
+    memory = story.memory
+    if memory is None:
+        return ""
+    words = SENTENCES["memory"]
+    case = "never" if memory.back < 0 else "before" if memory.back else "now"
+    said = words[case].format(
+        kept=story.names[memory.label],
+        then=story.names[memory.then],
+        label=story.names[story.label],
+        sure=round(100 * memory.probability),
+        seconds=f"{memory.seconds:.1f}",
+        back=memory.back,
+        earlier=memory.earlier,
+    )
+    return f"{said} {words['moves']}" if story.steps["shown"][State.DYNAMIC] > 0.5 else said
+
+
+def _scan(story: CellStory) -> str:
+    words = SENTENCES["scan"]
+    returns = story.scan.obstacles if story.scan.verdict == "hit" else story.scan.ground
+    states = ", ".join(f"{s.name} {100 * story.steps['shown'][s]:.0f} %" for s in State)
+    return f"{words[story.scan.verdict].format(returns=returns)} {words['states'].format(states=states)}"
+
+
+def _otherwise(story: CellStory) -> str:
+    no_image, no_occupancy = (story.names[story.otherwise[change]] for change in (NO_IMAGE, NO_OCCUPANCY))
+    return SENTENCES["otherwise"]["removed"].format(no_image=no_image, no_occupancy=no_occupancy)
+
+
+def _numbers(story: CellStory) -> str:
+    why = story.why
+    parts = {"planes": why.planes.sum(), "occupancy": why.occupancy.sum(), "rest": why.rest, "score": why.score}
+    words = {name: f"{part:+.1f}" for name, part in parts.items()}
+    return SENTENCES["numbers"]["sum"].format(label=story.names[story.label], rival=story.names[story.rival], **words)

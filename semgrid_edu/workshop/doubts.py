@@ -1,0 +1,280 @@
+"""Data that can be read but can't be right: frozen sensors, wrong units or axes, jumping poses, scans cut short."""
+
+import filecmp
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import groupby, pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import project, transform_points
+from semgrid_edu.datasets.frames import LIDAR_RANGE, FrameSequence
+from semgrid_edu.datasets.kitti_raw import KittiRawDrive
+from semgrid_edu.datasets.oxts import mercator_pose, mercator_scale, read_packet, read_timestamps
+from semgrid_edu.datasets.pandaset import PandasetScene
+from semgrid_edu.errors import DataError
+from semgrid_edu.frame import Frame
+
+SHORT_SCAN = 0.6
+"""A scan smaller than this fraction of the drive's median scan was probably cut short: sound ones differ less."""
+
+FEWEST_RETURNS = 100
+"""Any scan of a street has this many returns, even that of a LIDAR with 16 beams."""
+
+RETURN_BYTES = 16
+"""Size of a return on disk: four floats."""
+
+FASTEST = 100.0
+"""Metres per second. No car drives faster."""
+
+LEVEL = (0.5, 0.05)
+"""How far the ground may be above or below its level under the vehicle: metres, and metres per metre of distance."""
+
+FEWEST_ON_GROUND = 0.05
+"""The smallest plausible fraction of returns near the level of the ground: 0.7 to 0.9 in KITTI and in the sample."""
+
+MISTAKES: dict[str, Callable[[NDArray], NDArray]] = {
+    "are they in kilometres?": lambda points: 1000 * points,
+    "are they in millimetres?": lambda points: points / 1000,
+    "are they in camera axes (x right, y down, z ahead)?": lambda points: points[:, [2, 0, 1]] * (1, -1, -1),
+    "were three columns read as four?": lambda points: points.ravel()[: points.size // 3 * 3].reshape(-1, 3),
+}
+"""How to undo common mistakes on the returns (N, 4). If undoing one puts them on the ground, its question is asked."""
+
+LIKELY = 0.4
+"""A mistake is named if undoing it puts at least this fraction of returns on the ground, and 1.5 times as many."""
+
+FEWEST_SEEN = 1e-3
+"""The smallest plausible fraction of returns ahead, or in the image: 0.14 to 0.26 in KITTI and in the sample."""
+
+CONTRAST = 8
+"""An image whose levels differ by no more than this in every channel shows nothing."""
+
+
+def drive_doubts(drive: FrameSequence) -> list[str]:
+    """List what is doubtful about a drive: its files, as far as the reader is known, and a few of its frames.
+
+    Parameters
+    ----------
+    drive : FrameSequence
+        The drive.
+
+    Returns
+    -------
+    list of str
+        One line for each doubt, which names the file or folder. For KITTI raw drives: missing and short scans, files
+        that repeat the one before, and poses that no car can have reached. For PandaSet: missing and repeated files.
+        For every drive: the doubts of `frame_doubts`.
+    """
+    in_files = []
+    if isinstance(drive, KittiRawDrive):
+        in_files = _kitti_doubts(drive)
+    elif isinstance(drive, PandasetScene):
+        in_files = _pandaset_doubts(drive)
+    return [*in_files, *frame_doubts(drive, drive.folder, drive.without_labels)]
+
+
+def _kitti_doubts(drive: KittiRawDrive) -> list[str]:
+    scans = [drive.file("velodyne_points", k, ".bin") for k in range(len(drive))]
+    images = [drive.file(drive.view, k, ".png") for k in range(len(drive))]
+    gaps = [str(DataError(scans[k], "a scan", "none: the filter predicts over the gap")) for k in drive.gaps]
+    return [*gaps, *repeats(scans, "scans"), *repeats(images, "images"), *short_scans(scans), *_kitti_jumps(drive)]
+
+
+def _kitti_jumps(drive: KittiRawDrive) -> list[str]:
+    """Check the poses whose packets and times can be read; what can't be read is an error, not a doubt."""
+    packets = {}
+    readable = []
+    for k in range(len(drive)):
+        with suppress(DataError):
+            path = drive.file("oxts", k, ".txt")
+            packets[path] = read_packet(path)
+            readable.append(k)
+    try:
+        times = read_timestamps(drive.folder / "oxts" / "timestamps.txt", len(drive))
+    except DataError:
+        return []
+    seconds = (times - times[0]) / np.timedelta64(1, "s")  # an unknown time (NaT) becomes NaN
+    return jumps(packets, seconds[readable])
+
+
+def _pandaset_doubts(scene: PandasetScene) -> list[str]:
+    scans = [scene.folder / "lidar" / f"{number:02d}.pkl.gz" for number in scene.numbers]
+    images = [scene.view / f"{number:02d}.jpg" for number in scene.numbers]
+    expected = f"an image, since there is one every {min(np.diff(scene.numbers), default=1)} frames"
+    gaps = [str(DataError(scene.view / f"{number:02d}.jpg", expected, "none")) for number in scene.gaps]
+    return [*gaps, *repeats(scans, "scans"), *repeats(images, "images")]
+
+
+def short_scans(paths: Iterable[Path]) -> list[str]:
+    """Name the scans that were probably cut short: much smaller than the drive's median scan, or almost empty.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        The files of a drive's scans; missing ones are skipped.
+
+    Returns
+    -------
+    list of str
+        One line for each such scan.
+    """
+    sizes = {path: path.stat().st_size for path in paths if path.is_file()}
+    median = np.median(list(sizes.values())) if sizes else 0
+    fewest_bytes = FEWEST_RETURNS * RETURN_BYTES
+    found = []
+    for path, size in sizes.items():
+        if size < fewest_bytes:
+            if size > 0 and size % RETURN_BYTES == 0:  # otherwise the reader raises an error
+                expected = f"a scan of at least {FEWEST_RETURNS} points"
+                found.append(str(DataError(path, expected, size // RETURN_BYTES)))
+        elif size < SHORT_SCAN * median:
+            found.append(str(DataError(path, f"a scan about as large as the drive's others, {median:g} bytes", size)))
+    return found
+
+
+def jumps(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str]:
+    """Name the packets whose position no car can have reached since the packet before.
+
+    Parameters
+    ----------
+    packets : mapping of Path to (30,) float
+        The packets of a drive, in order, from `read_packet`.
+    seconds : (N,) float
+        Time of each packet; steps that aren't positive or not known are skipped.
+
+    Returns
+    -------
+    list of str
+        One line for each such packet.
+    """
+    if len(packets) < 2:
+        return []
+    scale = mercator_scale(next(iter(packets.values())))
+    positions = np.array([mercator_pose(packet, scale)[:3, 3] for packet in packets.values()])
+    metres = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    steps = np.diff(seconds)
+    found = []
+    for path, distance, step in zip(list(packets)[1:], metres, steps, strict=True):
+        if step > 0 and distance > FASTEST * step:
+            expected = f"a place within {FASTEST * step:.0f} m of the packet before"
+            found.append(str(DataError(path, expected, f"{distance:.0f} m")))
+    return found
+
+
+def repeats(paths: Iterable[Path], what: str) -> list[str]:
+    """Name every run of files, anywhere in a drive, that are equal to the file before them.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        The files of one sensor in order; missing ones are skipped.
+    what : str
+        What the files hold, in the plural.
+
+    Returns
+    -------
+    list of str
+        One line for each run, which names its first and its last file.
+    """
+    found = []
+    pairs = pairwise(path for path in paths if path.is_file())
+    for equal, run in groupby(pairs, key=_equal):
+        if equal:
+            run = list(run)
+            before, first = run[0]
+            last = run[-1][1]
+            found.append(str(DataError(first, f"{what} that differ", f"{before.name} again, up to {last.name}")))
+    return found
+
+
+def _equal(pair: tuple[Path, Path]) -> bool:
+    """Compare two files; gzip files by the checksum and the length at their end, since their headers have a date."""
+    if pair[0].suffix == ".gz":
+        return pair[0].read_bytes()[-8:] == pair[1].read_bytes()[-8:]
+    return filecmp.cmp(*pair, shallow=False)
+
+
+def frame_doubts(
+    frames: Sequence[Frame], place: object = "frames", read: Callable[[int], Frame] | None = None
+) -> list[str]:
+    """List what can't be right about three pairs of successive frames: the first, one in the middle and the last.
+
+    The ground is about a LIDAR's height below it, some returns are ahead and in the image, the image shows something,
+    and no scan or image repeats the one before. Frames that can't be read are skipped.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        The frames of a drive.
+    place : object
+        What the lines begin with: the folder of the drive, or the name of the argument.
+    read : callable, optional
+        Reads frame k where that is quicker than `frames[k]`, for example without labels.
+
+    Returns
+    -------
+    list of str
+        One line for each kind of doubt, which names the first of these frames that causes it.
+    """
+    read = read or frames.__getitem__
+    n = len(frames)
+    found: dict[str, str] = {}
+    for k in sorted({0, n // 2, max(n - 2, 0)} & set(range(n))):
+        with suppress(DataError):
+            for expected, what in _doubts_of(read, k, n):
+                found.setdefault(expected, f"{what} (frame {k})")
+    return [str(DataError(place, expected, what)) for expected, what in found.items()]
+
+
+def _doubts_of(read: Callable[[int], Frame], k: int, n_frames: int) -> Iterator[tuple[str, str]]:
+    """Yield what was expected of frame k, and what was found."""
+    frame = read(k)
+    R = frame.camera.T_camera_from_lidar[:3, :3]
+    image = frame.image
+    if not R[1, 2] < -0.5:
+        found = "the identity" if np.allclose(R, np.eye(3)) else R.round(3).tolist()
+        yield "a rotation from LIDAR to camera that turns up (z) into up (-y)", found
+    elif len(frame.points):
+        yield from _scan_doubts(frame)
+    if image is not None and np.ptp(image, axis=(0, 1)).max() <= CONTRAST:
+        yield "an image that shows something", f"one colour, all levels from {image.min()} to {image.max()}"
+    if k + 1 < n_frames:
+        after = read(k + 1)
+        if len(frame.points) and np.array_equal(frame.points, after.points):
+            yield "scans that differ", "the same scan again in the next frame"
+        if image is not None and np.array_equal(image, after.image):
+            yield "images that differ", "the same image again in the next frame"
+
+
+def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
+    """Yield the first doubt about a scan: only zeros, no ground where it should be, nothing ahead or in the image."""
+    points = frame.points
+    height = frame.camera.lidar_height
+    n = len(points)
+    if not points[:, :3].any():
+        yield "returns from places around the LIDAR", "only zeros"
+        return
+    on_ground = _on_ground(points, height)
+    undone, question = max((_on_ground(undo(points), height), question) for question, undo in MISTAKES.items())
+    hint = ""
+    if undone > max(LIKELY, 1.5 * on_ground):
+        hint = question
+    elif on_ground < FEWEST_ON_GROUND:
+        hint = f"half of them lie below z = {np.median(points[:, 2]):.3g} m"
+    in_image = project(transform_points(frame.camera.T_camera_from_lidar, points[:, :3]), frame.camera)[1]
+    if hint:
+        yield f"ground about {height:.3g} m below the LIDAR", f"{on_ground:.0%} of the returns near there: {hint}"
+    elif (points[:, 0] > 0).mean() < FEWEST_SEEN:
+        yield "returns ahead of the LIDAR (x > 0)", f"{np.sum(points[:, 0] > 0)} of {n}: do all lie behind?"
+    elif in_image.mean() < FEWEST_SEEN:
+        yield "returns in the image", f"{in_image.sum()} of {n}: is the calibration that of this camera?"
+
+
+def _on_ground(points: NDArray, height: float) -> float:
+    """Return the fraction of returns (N, 3+) in range and near the ground, `height` metres below the LIDAR."""
+    distance = np.hypot(points[:, 0], points[:, 1])
+    near = np.abs(points[:, 2] + height) < LEVEL[0] + LEVEL[1] * distance
+    return float(np.mean(near & (distance < LIDAR_RANGE)))

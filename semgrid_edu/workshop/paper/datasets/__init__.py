@@ -1,0 +1,13 @@
+"""The data sets that the paper used: KITTI tracking with the labels of Zhang et al., and SYNTHIA (section 4).
+
+Importing this package adds "synthia" to the readers that a dataset.json can name.
+"""
+
+from semgrid_edu.datasets.index import READERS, Reader
+from semgrid_edu.workshop.paper.datasets.kitti_tracking import KittiTrackingRun
+from semgrid_edu.workshop.paper.datasets.synthia import SynthiaSequence
+from semgrid_edu.workshop.paper.datasets.zhang import ZhangDrive, ZhangLabels
+
+__all__ = ["KittiTrackingRun", "SynthiaSequence", "ZhangDrive", "ZhangLabels"]
+
+READERS["synthia"] = Reader(SynthiaSequence)

@@ -1,0 +1,249 @@
+"""SYNTHIA's sequences as drives: image, labels, and depth in place of a LIDAR (section 4; Ros et al., CVPR 2016).
+
+    SYNTHIA-SEQS-04-SPRING/RGB/Stereo_Left/Omni_F/000000.png          SYNTHIA-SEQS-04-SPRING/CameraParams/intrinsics.txt
+    SYNTHIA-SEQS-04-SPRING/GT/LABELS/Stereo_Left/Omni_F/000000.png
+    SYNTHIA-SEQS-04-SPRING/Depth/Stereo_Left/Omni_F/000000.png
+    SYNTHIA-SEQS-04-SPRING/CameraParams/Stereo_Left/Omni_F/000000.txt
+
+Of the eight cameras this is the left one that looks ahead: the paper uses one pair of camera and depth.
+
+From the readme of the data set (26 June 2016): 5 frames a second; the first channel of a label PNG is the class, the
+second one the instance; depth is in centimetres, 16 bits, in any of three channels. The rest is taken from published
+programs that read it, since no sequence could be looked at: label PNGs have 16 bits a channel; intrinsics.txt holds
+focal length, principal point (u, v) and stereo baseline; a pose is 16 numbers, column by column the matrix that takes
+points from the camera to the world, with a camera whose x points right, y up and z *back*. If a sequence keeps its
+poses otherwise, `SynthiaSequence.problems` says that the camera doesn't move the way it looks.
+"""
+
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
+from semgrid_edu.datasets.calibration import camera_from, check_rotation
+from semgrid_edu.datasets.class_tables import ClassTable
+from semgrid_edu.datasets.frames import FrameSequence, error_of, frame_numbers
+from semgrid_edu.datasets.project_lidar import birdseye_votes, depth_scan, points_from_depth
+from semgrid_edu.errors import DataError
+from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
+from semgrid_edu.labels import IGNORE, SYNTHIA_10
+from semgrid_edu.storage.reading import parse_numbers, read_png, read_text
+
+SYNTHIA_CLASSES = ClassTable(
+    SYNTHIA_10,
+    {
+        **dict.fromkeys((0, 1), "void"),  # nothing, sky
+        2: "building",
+        3: "road",
+        4: "sidewalk",
+        5: "fence",
+        6: "vegetation",
+        7: "pole",
+        8: "car",
+        9: "sign",
+        12: "lane",
+        **dict.fromkeys((10, 11, 13, 14, 15), "void"),  # pedestrian, bicycle, two reserved numbers, traffic light
+    },
+)
+"""SYNTHIA-10's class of each number in the labels: the paper leaves sky, people, bicycles and traffic lights out."""
+
+SYNTHIA_CAMERA_AXES = np.diag([1.0, -1.0, -1.0])
+"""(3, 3): from this package's camera axes (x right, y down, z ahead) to the axes of SYNTHIA's poses."""
+
+VIEW = "Stereo_Left/Omni_F"
+"""The camera that is read."""
+
+SYNTHIA_PERIOD = 0.2
+"""Seconds between frames: the readme says 5 a second."""
+
+GROUND_RANGE = 20.0
+"""Metres ahead. Road in the first image that is closer shows how high the camera stands."""
+
+STANDING, MOSTLY = 0.05, 0.9
+"""Metres a frame below which a camera stands; the share of a step that a driving camera goes ahead (median)."""
+
+_CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+"""From axes that point forward, left and up to the axes of a camera."""
+
+
+def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
+    """Read the class of each pixel.
+
+    Parameters
+    ----------
+    path : Path
+        A file of GT/LABELS.
+    size : (int, int) or None
+        Height and width that it must have, pixels; None where any size will do.
+
+    Returns
+    -------
+    (h, w) uint8
+        Classes of SYNTHIA-10.
+    """
+    return SYNTHIA_CLASSES.classes(path, read_png(path, "RGB;16", size)[..., 0].astype(np.int64))
+
+
+def read_synthia_depth(path: Path, size: tuple[int, int] | None) -> NDArray[np.float32]:
+    """Read the depth of each pixel.
+
+    Parameters
+    ----------
+    path : Path
+        A file of Depth.
+    size : (int, int) or None
+        Height and width that it must have, pixels; None where any size will do.
+
+    Returns
+    -------
+    (h, w) float32
+        Metres along the optical axis; NaN where the file holds 0 or 65535, so that nothing was met.
+    """
+    centimetres = read_png(path, "RGB;16", size)[..., 0]
+    nothing = (centimetres == 0) | (centimetres == np.iinfo(np.uint16).max)
+    return np.where(nothing, np.float32(np.nan), centimetres.astype(np.float32) * np.float32(0.01))
+
+
+def read_synthia_intrinsics(path: Path) -> NDArray[np.float64]:
+    """Read the intrinsic matrix of all cameras.
+
+    Parameters
+    ----------
+    path : Path
+        CameraParams/intrinsics.txt.
+
+    Returns
+    -------
+    (3, 3) float64
+        K, pixels.
+    """
+    numbers = parse_numbers(path, read_text(path), "focal length, principal point and baseline")
+    if numbers.size != 4 or numbers[0] <= 0:
+        raise DataError(path, "focal length (above 0), principal point u and v, baseline", numbers.tolist())
+    focal, u, v, _ = numbers
+    return np.array([[focal, 0, u], [0, focal, v], [0, 0, 1]])
+
+
+def read_synthia_pose(path: Path) -> NDArray[np.float64]:
+    """Read the pose of a camera in one frame.
+
+    Parameters
+    ----------
+    path : Path
+        A file of CameraParams/Stereo_Left/Omni_F.
+
+    Returns
+    -------
+    (4, 4) float64
+        T_world_from_camera, metres, for a camera whose x points right, y down and z ahead.
+    """
+    numbers = parse_numbers(path, read_text(path), "a pose")
+    if numbers.size != 16 or not np.array_equal(numbers[3::4], [0, 0, 0, 1]):
+        raise DataError(path, "16 numbers, every fourth of which is 0, 0, 0, 1", numbers.tolist())
+    T = numbers.reshape(4, 4).T
+    return rigid_transform(check_rotation(path, T[:3, :3], "the pose") @ SYNTHIA_CAMERA_AXES, T[:3, 3])
+
+
+class SynthiaSequence(FrameSequence):
+    """The frames of a sequence. Each is read, and checked, when it is asked for.
+
+    There is no LIDAR. Its frame is put where the camera is, x forward, y left and z up, and `Frame.points` is the depth
+    image thinned by `depth_scan`. The files don't say how high the camera stands: its height is taken from the road in
+    the first image, and it is taken to look horizontally. The bird's-eye truth is made of the labels, carried to the
+    grid by the whole depth image; what the camera doesn't see stays unlabelled. The world is the LIDAR's frame at the
+    first image.
+
+    Parameters
+    ----------
+    root : path-like
+        The folder that holds the sequences.
+    sequence : str
+        Name of the sequence's folder, such as "SYNTHIA-SEQS-04-SPRING".
+
+    Raises
+    ------
+    DataError
+        When there are no images of the sequence. `drive[k]` raises it when a file that the frame needs is missing or
+        damaged.
+    """
+
+    label_set = SYNTHIA_10
+
+    def __init__(self, root: str | Path, sequence: str) -> None:
+        self.folder, self.name = Path(root) / sequence, sequence
+        self._length = 1 + max(frame_numbers(self.folder / "RGB" / VIEW, "images", ".png"))
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return self._length
+
+    def problems(self) -> list[str]:
+        """Read every frame, and check that the camera moves the way it looks, as on a car that drives ahead.
+
+        Returns
+        -------
+        list of str
+            One line for each problem; empty when the sequence is sound.
+        """
+        return super().problems() or list(filter(None, [error_of(self._check_motion)]))
+
+    def _check_motion(self) -> None:
+        """Refuse poses by which the camera mostly moves otherwise than ahead: they are kept in another convention."""
+        poses = [self._pose(k) for k in range(len(self))]
+        steps = np.array([(invert_rigid(a) @ b)[:3, 3] for a, b in pairwise(poses)]).reshape(-1, 3)
+        lengths = np.linalg.norm(steps, axis=1)
+        ahead = steps[lengths > STANDING, 0] / lengths[lengths > STANDING]
+        if ahead.size and np.median(ahead) < MOSTLY:
+            found = f"of a step of the camera {np.median(ahead):.2f} ahead (median)"
+            raise DataError(self.folder / "CameraParams", f"steps of which at least {MOSTLY} are ahead", found)
+
+    def _frame(self, k: int) -> Frame:
+        size = self.camera.size
+        depth = read_synthia_depth(self._file("Depth", k), size)
+        return Frame(
+            image=read_png(self._file("RGB", k), "RGB", size),
+            points=depth_scan(depth, self.camera),
+            camera=self.camera,
+            T_world_from_lidar=invert_rigid(self._pose(0)) @ self._pose(k),
+            time=k * SYNTHIA_PERIOD,
+            labels=self._labels(read_synthia_labels(self._file("GT/LABELS", k), size), depth),
+        )
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The calibration, the same for all frames; its size is that of the first image."""
+        height, width = read_png(self._file("RGB", 0), "RGB", None).shape[:2]
+        path = self.folder / "CameraParams" / "intrinsics.txt"
+        K = read_synthia_intrinsics(path)
+        T_camera_from_lidar = rigid_transform(_CAMERA_FROM_LIDAR, np.zeros(3))
+        return camera_from(path, K, T_camera_from_lidar, (height, width), self._camera_height(K, (height, width)))
+
+    def _camera_height(self, K: NDArray[np.float64], size: tuple[int, int]) -> float:
+        """Return how far below the camera the nearby road of the first image lies, in the median."""
+        path = self._file("GT/LABELS", 0)
+        classes, depth = read_synthia_labels(path, size), read_synthia_depth(self._file("Depth", 0), size)
+        road = np.isin(classes, [SYNTHIA_10.index("road"), SYNTHIA_10.index("lane")]) & (depth < GROUND_RANGE)
+        rows = np.nonzero(road)[0]
+        if not rows.size:
+            raise DataError(path, f"road within {GROUND_RANGE:g} m, to know the camera's height", "none")
+        height = float(np.median((rows - K[1, 2]) / K[1, 1] * depth[road]))
+        if height <= 0:
+            raise DataError(path, "road below the camera", f"road {-height:.2f} m above it")
+        return height
+
+    def _labels(self, classes: NDArray[np.uint8], depth: NDArray[np.float32]) -> FrameLabels:
+        """Carry the labels of an image to the grid by its depth."""
+        points, rows, cols = points_from_depth(depth, self.camera)
+        points_grid = transform_points(invert_rigid(lidar_from_grid(self.camera.lidar_height)), points)
+        birdseye = birdseye_votes(points_grid, classes[rows, cols], LABEL_GRID, SYNTHIA_10)
+        return FrameLabels(SYNTHIA_10, classes, depth, birdseye, visible=birdseye != IGNORE)
+
+    def _pose(self, k: int) -> NDArray[np.float64]:
+        """Return the pose of the LIDAR in SYNTHIA's own world."""
+        return read_synthia_pose(self._file("CameraParams", k, ".txt")) @ self.camera.T_camera_from_lidar
+
+    def _file(self, kind: str, k: int, suffix: str = ".png") -> Path:
+        return self.folder / kind / VIEW / f"{k:06d}{suffix}"

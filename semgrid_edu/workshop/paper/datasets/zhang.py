@@ -1,0 +1,172 @@
+"""KITTI's image labels by Zhang, Candra, Vetter and Zakhor (ICRA 2015), which the paper learns from (section 4).
+
+What their own readme (12 August 2015) says: 252 acquisitions of eight runs of KITTI's *tracking* training set are
+labelled, every tenth or twentieth; 140 in the runs 9, 10, 11 and 19 for training, 112 in the runs 0, 4, 5 and 13 for
+testing (the paper says 142 and 110). Image labels are MATLAB files image_02/(trn or test)/(run)/(acquisition), each a
+matrix of the numbers in `ZHANG_CLASSES`.
+
+What is assumed here, since the archive itself couldn't be looked at: files end in .mat; their names and the runs'
+folders are numbers, with or without leading zeros; a matrix is the only two-dimensional variable of its file.
+"""
+
+import io
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import Camera
+from semgrid_edu.datasets.class_tables import ClassTable
+from semgrid_edu.datasets.frames import FrameSequence, nothing_known
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.frame import Frame, FrameLabels
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.storage.reading import read_bytes
+
+ZHANG_CLASSES = ClassTable(
+    KITTI_14,
+    {
+        0: None,  # not ground-truthed
+        1: "building",
+        2: "sky",
+        3: "road",
+        4: "vegetation",
+        5: "sidewalk",
+        6: "car",
+        7: "pedestrian",
+        8: "bicycle",  # cyclist
+        9: "signage",
+        10: "fence",
+    },
+)
+"""KITTI-14's class of each number in their matrices."""
+
+ZHANG_RUNS = {"train": (9, 10, 11, 19), "test": (0, 4, 5, 13)}
+"""The runs of KITTI's tracking training set that each split consists of."""
+
+
+class ZhangLabels:
+    """The labelled images of the data set.
+
+    Parameters
+    ----------
+    folder : path-like
+        Where the archive was unpacked: holds image_02.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        self._files: dict[tuple[int, int], Path] = {}
+        for path in sorted(self.folder.glob("image_02/*/*/*.mat")):
+            if re.fullmatch(r"\d+/\d+", f"{path.parent.name}/{path.stem}"):
+                self._files[int(path.parent.name), int(path.stem)] = path
+        if not self._files:
+            expected = "labels such as image_02/trn/0009/000000.mat"
+            raise DataError(self.folder, expected, "none" if self.folder.is_dir() else "no folder")
+
+    def frames(self, split: str) -> list[tuple[int, int]]:
+        """Return the labelled acquisitions of a split that are there.
+
+        Parameters
+        ----------
+        split : str
+            "train" or "test".
+
+        Returns
+        -------
+        list of (int, int)
+            Run and acquisition, in ascending order.
+        """
+        if split not in ZHANG_RUNS:
+            raise ArgumentError("split", f"one of {', '.join(ZHANG_RUNS)}", repr(split))
+        return sorted(key for key in self._files if key[0] in ZHANG_RUNS[split])
+
+    def read(self, run: int, acquisition: int, image_size: tuple[int, int]) -> FrameLabels | None:
+        """Read the labels of one image.
+
+        Parameters
+        ----------
+        run : int
+            Number of the run in KITTI's tracking training set.
+        acquisition : int
+            Number of the frame in it.
+        image_size : (int, int)
+            Height and width of the image, pixels.
+
+        Returns
+        -------
+        FrameLabels or None
+            Image labels only: depth is NaN and nothing of the bird's-eye view is labelled or visible, because the data
+            set says nothing about them. None for a frame without labels.
+        """
+        path = self._files.get((run, acquisition))
+        if path is None:
+            return None
+        numbers = _matrix(path)
+        if numbers.shape != image_size:
+            raise DataError(path, "labels of {} x {} pixels".format(*image_size), "{} x {}".format(*numbers.shape))
+        return replace(nothing_known(KITTI_14, image_size), image=ZHANG_CLASSES.classes(path, numbers))
+
+
+def _matrix(path: Path) -> NDArray:
+    """Read the one matrix of a MATLAB file."""
+    from scipy.io import loadmat  # here, because it is slow to load and no other reader needs it
+
+    content = read_bytes(path)
+    try:
+        variables = {name: value for name, value in loadmat(io.BytesIO(content)).items() if not name.startswith("__")}
+    except NotImplementedError:
+        raise DataError(path, "a MATLAB file up to version 7.2", "version 7.3; save it again with `-v7`") from None
+    except Exception as error:  # scipy lets through whatever a damaged file makes of it: IndexError, zlib.error, ...
+        raise DataError(path, "a MATLAB file", f"{type(error).__name__}: {error}") from error
+    found = [value for value in variables.values() if isinstance(value, np.ndarray) and min(value.shape) > 1]
+    if len(found) != 1 or found[0].ndim != 2 or found[0].dtype.kind not in "iufb":
+        raise DataError(path, "one matrix of numbers", f"the variables {', '.join(variables) or '(none)'}")
+    return found[0]
+
+
+class ZhangDrive(FrameSequence):
+    """The frames of a drive, with the labels of those that Zhang et al. labelled.
+
+    Parameters
+    ----------
+    drive : FrameSequence
+        The frames of the run: a `KittiTrackingRun`, or a raw drive that begins where the run does. By their numbers of
+        frames these seem to be, for the runs 0, 4, 5, 10, 11 and 13, the drives 0005, 0014, 0015, 0056, 0059 and 0091
+        of 2011_09_26, and for run 19 drive 0071 of 2011_09_29; look at some labels over their images first.
+    labels : ZhangLabels
+        The labels of all runs.
+    run : int
+        Number of the run in KITTI's tracking training set.
+
+    Examples
+    --------
+    >>> labels = ZhangLabels("zhang")                                               # doctest: +SKIP
+    >>> drive = ZhangDrive(KittiTrackingRun("kitti_tracking", 9), labels, 9)        # doctest: +SKIP
+    >>> [k for run, k in labels.frames("train") if run == 9][:3]                    # doctest: +SKIP
+    """
+
+    label_set = KITTI_14
+
+    def __init__(self, drive: FrameSequence, labels: ZhangLabels, run: int) -> None:
+        self.drive, self.labels, self.run = drive, labels, run
+        self.name, self.folder = f"run {run}", labels.folder
+
+    def __len__(self) -> int:
+        """Return the number of frames, labelled or not."""
+        return len(self.drive)
+
+    @property
+    def camera(self) -> Camera:
+        """The calibration, the same for all frames."""
+        return self.drive.camera
+
+    def files(self) -> list[Path]:
+        """Return the files of the drive, and all labels."""
+        return [*self.drive.files(), *super().files()]
+
+    def _frame(self, k: int) -> Frame:
+        frame = self.drive[k]
+        return replace(frame, labels=self.labels.read(self.run, k, frame.camera.size))

@@ -1,1 +1,0 @@
-"""The CRF measured: error against time, coupling, parameters searched and learnt."""

@@ -1,0 +1,250 @@
+"""Train a network on a data set and write down how it was made (paper, section 4.1)."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from semgrid_edu.camera import Camera
+from semgrid_edu.datasets.index import INDEX_FILE
+from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
+from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture, SemanticGridNet, build_net, build_segmenter, load_imagenet, load_net
+from semgrid_edu.networks.build import with_mean_scores
+from semgrid_edu.networks.semantic_grid import MOST_SEGMENTERS
+from semgrid_edu.networks.weights import read_architecture
+from semgrid_edu.storage.files import sha256
+from semgrid_edu.storage.provenance import write_provenance
+from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder
+from semgrid_edu.training.devices import first_process_first, process_group, rank, world_size
+from semgrid_edu.training.loop import train
+from semgrid_edu.training.params import TrainingParams
+from semgrid_edu.workshop.flaws import TruthFlaws
+
+PAPER_IMAGE = (375, 1242)
+"""Height and width of KITTI's images, pixels; the paper's networks see them at this size."""
+
+
+def architecture(segmenter: str, preset: str = "compact") -> Architecture:
+    """Return the architecture that a preset stands for, with its size of images and its grid.
+
+    Parameters
+    ----------
+    segmenter : str
+        Name of the image network, a key of `SEGMENTERS`.
+    preset : str
+        "compact" for the CPU; "paper" for the published networks, KITTI's images at full size, and 0.2 m cells.
+
+    Returns
+    -------
+    Architecture
+        What `build_net` takes.
+    """
+    if preset == "compact":
+        return Architecture(segmenter)
+    if preset == "paper":
+        return Architecture(segmenter, preset, image_size=PAPER_IMAGE, grid=GridSpec.paper())
+    raise ArgumentError("--preset", "compact or paper", repr(preset))
+
+
+def training_params(
+    preset: str, iterations: int, end_to_end: bool = True, from_imagenet: bool = False, tint: float = 0.0
+) -> TrainingParams:
+    """Return the training parameters that a preset stands for.
+
+    Parameters
+    ----------
+    preset : str
+        "compact" for the defaults; "paper" for section 4.1: a learning rate of 1e-3, and class weights without a
+        limit.
+    iterations : int
+        Number of steps of each stage.
+    end_to_end : bool
+        Whether the loss on the grid teaches the image network too.
+    from_imagenet : bool
+        Whether the image network starts from ImageNet weights. Training end to end then needs no first stage.
+    tint : float
+        How far each colour varies, see `TrainingParams`.
+
+    Returns
+    -------
+    TrainingParams
+        What `train` takes.
+    """
+    image_iterations = 0 if from_imagenet and end_to_end else iterations
+    params = TrainingParams(image_iterations, iterations, end_to_end=end_to_end, tint=tint)
+    return params if preset == "compact" else replace(params, learning_rate=1e-3, weight_limit=math.inf)
+
+
+def chosen_truth(name: str) -> LidarTruth | None:
+    """Return how the truth to learn from is made.
+
+    Parameters
+    ----------
+    name : str
+        "true" for what the data set says of its cells; a key of `POLICIES`, such as "lidar", for grids made from its
+        image labels and scans after these got errors like those of real data (`TruthFlaws`).
+
+    Returns
+    -------
+    LidarTruth or None
+        What `TrainingSet` takes; None for "true".
+    """
+    if name != "true" and name not in POLICIES:
+        raise ArgumentError("--truth", f"one of true, {', '.join(POLICIES)}", repr(name))
+    return None if name == "true" else LidarTruth(POLICIES[name], TruthFlaws())
+
+
+def train_network(
+    data: str | Path | Sequence[str | Path],
+    folder: str | Path,
+    segmenter: str,
+    params: TrainingParams,
+    seed: int = 0,
+    resume: bool = False,
+    *,
+    preset: str = "compact",
+    imagenet: str | Path | None = None,
+    device: str = "cpu",
+    truth: LidarTruth | None = None,
+    start: str | Path | Sequence[str | Path] = (),
+) -> None:
+    """Train a network on the split "train" of data sets; under torchrun, in all of its processes.
+
+    Parameters
+    ----------
+    data : path-like or sequence of path-like
+        The folder of the data set, such as data/minikitti; or of several, which take turns (see `Mixture`).
+    folder : path-like
+        Where to write the files of `train`, and `provenance.json`, which names the data by the SHA-256 of their index.
+    segmenter : str
+        Name of the image network, a key of `SEGMENTERS`.
+    params : TrainingParams
+        Numbers of iterations, rates and the like.
+    seed : int
+        Seed for the initial weights, and for the order and the jitter of the frames.
+    resume : bool
+        Whether to go on with a run that was interrupted, if there is one.
+    preset : str
+        "compact" or "paper", see `architecture`.
+    imagenet : path-like, optional
+        ImageNet weights for the image network of preset "paper": see `load_imagenet`.
+    device : str
+        "cpu", "cuda", "cuda:N" or "auto", see `choose_device`.
+    truth : LidarTruth, optional
+        How to make the truth from image labels and LIDAR; the data sets' own truth when left out.
+    start : path-like or sequence of path-like
+        A trained network of the same architecture to start from, in place of `imagenet`. Of several the image networks'
+        mean scores are fused, see `with_mean_scores`; they don't learn, so there is no first stage. Without any, the
+        weights are fresh.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such image network, preset or device, both `imagenet` and `start` are given, training end to
+        end would start from several, or as `train` raises it.
+    DataError
+        When a file is missing or damaged, `start` has another architecture, or the folder holds a run that would be
+        overwritten.
+    """
+    starts = [start] if isinstance(start, str | Path) else list(start)
+    if imagenet and starts:
+        raise ArgumentError("--from", "no network beside the ImageNet weights, which it would replace", str(starts[0]))
+    if len(starts) > 1 and params.end_to_end:
+        expected = "one network, or --two-stage beside several: their image networks don't learn"
+        raise ArgumentError("--from", expected, f"{len(starts)} networks without --two-stage")
+    began, description, folder = datetime.now(UTC), architecture(segmenter, preset), Path(folder)
+    check_folder(folder, resume)
+    # What can't be is refused before the data are prepared, which takes minutes.
+    params = replace(params, image_iterations=0) if len(starts) > 1 else params
+    like_it, resumed = build_segmenter(segmenter, n_classes=1, preset=preset), (folder / CHECKPOINT).exists()
+    if imagenet:
+        load_imagenet(like_it, imagenet)
+    kinds = [read_architecture(path) for path in starts]
+    for path, kind in zip(starts, kinds, strict=True):
+        _check_alike(path, replace(kind, label_set=description.label_set), description)
+    if sum(kind.n_segmenters for kind in kinds) > MOST_SEGMENTERS:
+        raise ArgumentError("--from", f"at most {MOST_SEGMENTERS} image networks together", f"{len(starts)} files")
+    folders = [data] if isinstance(data, str | Path) else list(data)
+    with process_group(device) as chosen:
+        with first_process_first():
+            dataset = _open(folders, description, truth)
+        description = replace(description, label_set=dataset.label_set.name)
+        camera = dataset.camera
+        net = _starts_as(starts, description, camera) if starts else build_net(description, camera, seed)
+        if imagenet:
+            load_imagenet(net.segmenter, imagenet)
+        train(net, dataset, folder, params, seed, resume, chosen)
+        processes, is_first = world_size(), rank() == 0
+    if is_first:
+        hashes = [sha256(Path(folder) / INDEX_FILE) for folder in folders]
+        details = {
+            "date": f"{began:%Y-%m-%d}",
+            "minutes": round((datetime.now(UTC) - began).total_seconds() / 60, 1),
+            "resumed": resumed,
+            "device": chosen.type,
+            "processes": processes,
+            # JSON has no infinity.
+            "params": {name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
+            "dataset": hashes[0] if len(hashes) == 1 else hashes,
+            **({"imagenet": sha256(imagenet)} if imagenet else {}),
+            **({"from": [sha256(path) for path in starts]} if starts else {}),
+            **({"truth": asdict(truth)} if truth else {}),
+        }
+        command = _command(folders, folder, description, imagenet, starts, seed, params, truth)
+        write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)
+
+
+def _open(folders: Sequence[str | Path], description: Architecture, truth: LidarTruth | None) -> TrainingSet | Mixture:
+    """Open the frames to learn from: those of one camera, or a mixture."""
+    chosen = {"spec": description.grid, "image_size": description.image_size, "truth": truth}
+    mixture = Mixture([sets_by_camera(folder, "train", **chosen) for folder in folders])
+    return mixture.parts[0] if len(mixture.parts) == 1 else mixture
+
+
+def _starts_as(paths: Sequence[str | Path], description: Architecture, camera: Camera) -> SemanticGridNet:
+    """Return the network of another training run, or the mean of several, and refuse those of another architecture."""
+    nets = [load_net(path, camera) for path in paths]
+    for path, net in zip(paths, nets, strict=True):
+        _check_alike(path, net.architecture, description)
+    return with_mean_scores(nets)
+
+
+def _check_alike(path: str | Path, found: Architecture, description: Architecture) -> None:
+    """Refuse a network of another architecture; one with several image networks is of the same."""
+    if replace(found, n_segmenters=1) != description:
+        raise DataError(path, f"a network like the one to train, {description}", found)
+
+
+def _command(
+    folders: Sequence[str | Path],
+    folder: str | Path,
+    description: Architecture,
+    imagenet: str | Path | None,
+    start: Sequence[str | Path],
+    seed: int,
+    params: TrainingParams,
+    truth: LidarTruth | None,
+) -> str:
+    """Return the command that makes the same training run, or as near as a command can: not every policy has a name."""
+    named = (name for name, policy in POLICIES.items() if truth == LidarTruth(policy, TruthFlaws()))
+    options = [
+        *(f"--data {_name(data)}" for data in folders),
+        f"--out {_name(folder)} --segmenter {description.segmenter}",
+        f"--preset {description.preset}" if description.preset != Architecture.preset else "",
+        f"--imagenet {_name(imagenet)}" if imagenet else "",
+        *(f"--from {_name(Path(path).parent)}/{_name(path)}" for path in start),
+        f"--seed {seed} --iterations {params.grid_iterations}",
+        f"--tint {params.tint:g}" if params.tint else "",
+        "" if params.end_to_end else "--two-stage",
+        f"--truth {next(named, 'lidar')}" if truth else "",
+    ]
+    return " ".join(["semgrid-edu train", *filter(None, options)])
+
+
+def _name(path: str | Path) -> str:
+    """Return the last part of a path, also for a path such as `.`."""
+    return Path(path).resolve().name

@@ -1,0 +1,216 @@
+"""The story of a cell: its numbers are the pipeline's own, and they add up."""
+
+import dataclasses
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import torch
+from scipy.special import softmax
+from tiny_drive import STEP
+from torch import nn
+
+from semgrid_edu.crf import CrfParams, damping, gram_matrix, mean_field_naive, pair_weights, unary_from_probability
+from semgrid_edu.datasets.grid_truth import grid_truth
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture, build_net
+from semgrid_edu.occupancy import CmcdotParams, SensorModel, track_drive
+from semgrid_edu.planes import plane_pixels
+from semgrid_edu.workshop.demo import cell_story, draw_cell_story
+from semgrid_edu.workshop.demo.all_cells import frame_story
+from semgrid_edu.workshop.demo.contributions import contributions
+from semgrid_edu.workshop.demo.evidence import VERDICTS, place_history, scan_maps
+from semgrid_edu.workshop.demo.neighbours import neighbour_pull
+
+SPEC = GridSpec.compact()
+SMALL_GRID = GridSpec(0, 16, -8, 8, 0.5)
+
+
+def by_gradient(net, scores, o, cell, label) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient times input of one logit, by a backward pass: (C, D) for the planes and (4,) for the occupancy."""
+    planes = net.sampler(torch.tensor(scores)[None]).detach().requires_grad_()
+    states = torch.tensor(o)[None].requires_grad_()
+    logit = net.fusion(planes, states)[0, label, *cell]
+    gradients = torch.autograd.grad(logit, (planes, states), materialize_grads=True)
+    of_planes, of_states = ((g * x)[0].sum(dim=(-2, -1)) for g, x in zip(gradients, (planes, states), strict=True))
+    return of_planes.detach().numpy(), of_states.detach().numpy()
+
+
+def test_keeping_the_steps_changes_no_bit_and_each_sums_to_one(last_labelled):
+    params = CmcdotParams(n_particles=5000)
+    both = [list(track_drive(last_labelled, SPEC, params, keep_steps=keep)) for keep in (False, True)]
+    for plain, kept in zip(*both, strict=True):
+        for name in ("probability", "velocity", "velocity_covariance"):
+            np.testing.assert_array_equal(getattr(plain, name), getattr(kept, name))
+        assert plain.steps == {}
+        assert list(kept.steps) == ["move", "predict", "update", "resample"]
+        for states in kept.steps.values():
+            assert states.shape == (4, *SPEC.shape)
+            np.testing.assert_allclose(states.sum(axis=0), 1, atol=1e-5)
+    np.testing.assert_array_equal(both[1][0].steps["move"][3], 1)  # nothing is known when the first frame begins
+
+
+def test_a_wall_by_hand():
+    wall = np.array([[8.25, y, 1.0] for y in np.arange(-1.99, 2, 0.02)])
+    ground = np.array([[x, 3.25, 0.0] for x in np.arange(3, 15.5, 0.1)])
+    points = np.concatenate([wall, ground]).astype(np.float32)
+    maps = scan_maps(points, SMALL_GRID, SensorModel(ground=None))
+    places = {"wall": (8.25, 0.25), "before": (5.75, 0.25), "behind": (11.75, 0.25), "ground": (15.25, 3.25)}
+    rows, cols, _ = SMALL_GRID.cells(np.array([*places.values(), (0.25, -7.75)]))
+    cells = dict(zip([*places, "nothing"], zip(rows, cols, strict=True), strict=True))
+    assert {name: VERDICTS[maps.verdict[cell]] for name, cell in cells.items()} == {
+        "wall": "hit", "before": "passed", "behind": "silent", "ground": "ground", "nothing": "silent",
+    }  # fmt: skip
+    assert maps.obstacles[cells["wall"]] == 25
+    assert (maps.obstacles.sum(), maps.ground.sum()) == (len(wall), len(ground))
+    assert maps.reach[cells["before"]] == pytest.approx(np.hypot(8.25, 0.2), abs=0.05)
+    assert maps.distance[cells["behind"]] > maps.reach[cells["behind"]] > 8
+    assert maps.reach[cells["nothing"]] == 0
+
+
+class TestContributions:
+    def test_are_gradient_times_input(self, story, told, net):
+        result, why = told[-1], story.why
+        o = result.belief.probability
+        of_label, of_rival = (by_gradient(net, result.scores, o, story.cell, c) for c in (story.label, story.rival))
+        planes, states = (a - b for a, b in zip(of_label, of_rival, strict=True))
+        np.testing.assert_allclose(why.planes, planes.sum(axis=0), atol=1e-4)
+        np.testing.assert_allclose(why.classes, planes.sum(axis=1), atol=1e-4)
+        np.testing.assert_allclose(why.occupancy, states, atol=1e-4)
+
+    def test_sum_to_the_logarithm_of_the_ratio_of_probabilities(self, story, told):
+        why = story.why
+        label, rival = told[-1].grid[[story.label, story.rival], *story.cell]
+        assert why.score == pytest.approx(np.log(label / rival), abs=1e-3)
+        assert why.planes.sum() + why.occupancy.sum() + why.rest == pytest.approx(why.score, abs=1e-4)
+        assert why.classes.sum() == pytest.approx(why.planes.sum(), abs=1e-4)
+
+    def test_the_rest_is_the_part_of_the_biases_and_of_the_shifts_of_the_normalisations(self, stories, told, net):
+        story = stories[0]
+        scores = torch.tensor(told[-1].scores)[None]
+        o = torch.tensor(told[-1].belief.probability)[None]
+        logits = net.fusion(net.sampler(scores), o)[0, :, *story.cell]
+        constants = []
+        for module in net.fusion.modules():
+            if isinstance(module, nn.BatchNorm2d | nn.BatchNorm3d):
+                scale = module.weight / (module.running_var + module.eps).sqrt()
+                constants.append((module.bias, module.bias - scale * module.running_mean))
+            elif getattr(module, "bias", None) is not None:
+                constants.append((module.bias, module.bias))
+        gradients = torch.autograd.grad(logits[story.label] - logits[story.rival], [bias for bias, _ in constants])
+        part = sum((g * constant).sum().item() for g, (_, constant) in zip(gradients, constants, strict=True))
+        assert story.why.rest == pytest.approx(part, rel=1e-3, abs=1e-3)
+
+    @pytest.mark.parametrize("changes", [{"uses_occupancy": False}, {"reduces": False}])
+    def test_of_other_architectures(self, last_labelled, told, make_net, changes):
+        net = make_net(last_labelled.camera, grid=SMALL_GRID, **changes)
+        o = np.ascontiguousarray(told[-1].belief.probability[:, -32:, 15:47])
+        planes, states = by_gradient(net, told[-1].scores, o, (12, 16), 3)
+        parts = contributions(net, told[-1].scores, o)
+        np.testing.assert_allclose(parts.planes[:, 3, 12, 16], planes.sum(axis=0), atol=1e-4)
+        np.testing.assert_allclose(parts.occupancy[:, 3, 12, 16], states, atol=1e-4)
+        assert states.any() == net.fusion.uses_occupancy
+
+    def test_a_network_in_training_mode_is_refused(self, last_labelled, told):
+        net = build_net(Architecture(), last_labelled.camera)
+        with pytest.raises(ArgumentError, match="evaluation mode"):
+            frame_story(told[0], net)
+
+
+class TestNeighbours:
+    RNG = np.random.default_rng(2)
+    STATES = RNG.dirichlet(np.full(4, 0.4), (14, 11)).transpose(2, 0, 1)
+    G = RNG.dirichlet(np.ones(5), (14, 11)).transpose(2, 0, 1)
+
+    @pytest.mark.parametrize("normalization", ["symmetric", "none"])
+    def test_are_those_of_the_matrix_of_all_pairs(self, normalization):
+        params = CrfParams(sigma_alpha=3.2, sigma_gamma=1.2, normalization=normalization)
+        label = self.G.argmax(axis=0)
+        found = neighbour_pull(self.G, label, self.STATES, params)
+        weights = pair_weights(self.STATES, params)
+        np.testing.assert_allclose(found.messages, (self.G.reshape(5, -1) @ weights).reshape(self.G.shape), rtol=1e-6)
+        for cell in [(0, 0), (7, 5), (13, 10), (3, 9)]:
+            terms = weights[cell[0] * 11 + cell[1]] * self.G[label[cell]].ravel()
+            best = np.argsort(-terms, kind="stable")[:5]
+            np.testing.assert_allclose(found.pull[:, *cell], terms[best], rtol=1e-6)
+            np.testing.assert_array_equal(found.steps[:, :, *cell].T + cell, np.argwhere(label >= 0)[best])
+
+    def test_explain_an_update_of_the_naive_mean_field(self):
+        params = CrfParams(sigma_alpha=3.2, sigma_gamma=1.2)
+        refined = mean_field_naive(unary_from_probability(self.G), self.STATES, params, iterations=1)
+        messages = neighbour_pull(self.G, self.G.argmax(axis=0), self.STATES, params).messages[:, 7, 5]
+        part = damping(gram_matrix(self.STATES, params)[7 * 11 + 5, 7 * 11 + 5])
+        updated = softmax(np.log(self.G[:, 7, 5]) + part * messages)  # from the unary term itself: nothing to undo
+        np.testing.assert_allclose(updated, refined[:, 7, 5], atol=1e-6)
+
+    def test_explain_the_fast_crf_too(self, story):
+        """Of the last update of a cell: all but how far it goes, which is nearly all the way."""
+        updated = softmax(np.log(story.before) + story.messages)
+        np.testing.assert_allclose(updated, story.after, atol=0.1)
+
+
+class TestStory:
+    def test_holds_the_pipelines_own_results(self, story, told, last_labelled):
+        result = told[-1]
+        assert story.label == result.grid[:, *story.cell].argmax()
+        assert story.refined == result.refined[:, *story.cell].argmax()
+        np.testing.assert_array_equal(story.after, result.refined[:, *story.cell])
+        for name, states in {**result.belief.steps, "shown": result.belief.probability}.items():
+            np.testing.assert_array_equal(story.steps[name], states[:, *story.cell])
+            assert story.steps[name].sum() == pytest.approx(1, abs=1e-5)
+        assert story.truth == grid_truth(result.frame.labels, result.belief.probability, SPEC)[story.cell]
+        pixels, visible = plane_pixels(SPEC, story.heights, last_labelled.camera)
+        np.testing.assert_array_equal(story.pixels, pixels[:, *story.cell])
+        np.testing.assert_array_equal(story.visible, visible[:, *story.cell])
+
+    def test_history_ends_with_now_and_sums_to_one(self, story):
+        assert story.history.shape == (4, 3)
+        np.testing.assert_array_equal(story.history[:, -1], story.steps["shown"])
+        np.testing.assert_allclose(story.history.sum(axis=0), 1, atol=1e-5)
+        np.testing.assert_allclose(np.diff(story.times), 0.1, atol=1e-6)
+
+    def test_the_vehicle_drives_a_metre_a_frame_so_the_place_was_two_rows_further_ahead(self, told):
+        _, history = place_history(told, SPEC, (90, 30))
+        rows = [90 - round(STEP / SPEC.cell) * (len(told) - 1 - k) for k in range(len(told))]
+        expected = [result.belief.probability[:, row, 30] for row, result in zip(rows, told, strict=True)]
+        np.testing.assert_array_equal(history, np.stack(expected, axis=1))
+        _, history = place_history(told, SPEC, (1, 30))
+        np.testing.assert_array_equal(history[:, 0], [0, 0, 0, 1])  # it was outside the grid
+
+    def test_a_class_is_compared_with_the_truth_or_with_the_second_best(self, story_maps, told):
+        second = np.argsort(-told[-1].grid, axis=0, kind="stable")[1]
+        wrong = (story_maps.truth != story_maps.label) & (story_maps.truth < 255)
+        np.testing.assert_array_equal(story_maps.rival, np.where(wrong, story_maps.truth, second))
+        assert 0 < wrong.sum() < wrong.size
+
+    def test_another_network_is_refused(self, told, last_labelled):
+        other = build_net(Architecture(), last_labelled.camera, seed=9).eval()
+        with pytest.raises(ArgumentError, match="network that made the result"):
+            cell_story(told[-1], (100, 30), other)
+
+    @pytest.mark.parametrize("cell", [(-1, 0), (142, 0), (0, 62), (1.5, 2.5), (3.0, 4), (1,), (1, 2, 3), 5, None, "ab"])
+    def test_a_cell_outside_the_grid_is_refused(self, told, net, cell):
+        with pytest.raises(ArgumentError, match="row and column"):
+            cell_story(told[-1], cell, net)
+
+    def test_is_told_without_steps_labels_and_memory_too(self, told, net):
+        result = told[0]
+        plain = dataclasses.replace(result, belief=dataclasses.replace(result.belief, steps={}), remembered=None)
+        story = cell_story(plain, (90, 30), net)
+        assert list(story.steps) == ["shown"]
+        assert (story.truth, story.fault, story.memory) == (None, "none", None)
+
+
+def test_the_figure_shows_the_numbers(stories, told):
+    story = stories[1]
+    figure = draw_cell_story(story, told[-1].frame.image)
+    column, steps, kinds, planes, *_ = figure.axes
+    image, occupancy, constants, total = (bar.get_width() for bar in kinds.patches)
+    assert image + occupancy + constants == pytest.approx(total, abs=1e-4)
+    assert sum(bar.get_width() for bar in planes.patches) == pytest.approx(image, abs=1e-4)
+    assert total == pytest.approx(story.why.score)
+    ends = [bar.get_x() + bar.get_width() for bar in steps.patches[-len(story.steps) :]]
+    np.testing.assert_allclose(ends, 1, atol=1e-5)
+    np.testing.assert_allclose(column.collections[0].get_offsets(), story.pixels[story.visible])
+    plt.close(figure)

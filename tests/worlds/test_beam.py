@@ -1,0 +1,209 @@
+"""A beam over several cells: explaining away by hand, the exemplar's numbers, and the package's own thick walls."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyagrum_oracle import assert_oracle_agrees
+from worlds.lecture_02_beam import (
+    BeamWorld,
+    beam_beliefs,
+    beam_likelihood,
+    beam_over_cells,
+    independent,
+    occupied,
+    range_state,
+    reflection,
+)  # fmt: skip
+from worlds.lecture_02_thick_walls import (
+    count_rings,
+    draw_ranges,
+    package_row,
+    same_sensor,
+    scan_with_pose_error,
+    thick_walls,
+)  # fmt: skip
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, why_dependent
+
+COARSE = [4.0, 4.6, 3.6, 4.2]
+"""Four returns from a wall in the fifth of eight cells, with a noise of one cell."""
+
+
+def exact_by_hand(world, ranges):
+    """P(map | ranges): prior times, for each range, the sum over which cell reflects, without any factor."""
+    weights = {}
+    for m in itertools.product((0, 1), repeat=world.n_cells):
+        weights[m] = np.prod([world.prior if one else 1 - world.prior for one in m])
+        for z in ranges:
+            reaches, likelihood = 1.0, 0.0
+            for k, one in enumerate(m):
+                reflects = world.hit if one else world.clutter
+                likelihood += reaches * reflects * np.exp(-0.5 * ((k - z) / world.noise) ** 2)
+                reaches *= 1 - reflects
+            weights[m] *= likelihood
+    table = np.reshape(list(weights.values()), [2] * world.n_cells)
+    return table / table.sum()
+
+
+def known_ranges(world, ranges):
+    return {f"z{b}": range_state(world, z) for b, z in enumerate(ranges, start=1)}
+
+
+def test_one_of_you_by_hand():
+    """Two cells side by side in one beam that always reflects: 0.56 each, and 0.2 once the other is known to stand."""
+    world = BeamWorld(n_cells=2, noise=0, width=2, hit=1.0, clutter=0.0)
+    model, known = beam_over_cells(world).model, {"z1": range_state(world, 0)}
+    assert eliminate(model, "m2", known).normalised().table[1] == pytest.approx(0.2 / 0.36)
+    assert eliminate(model, "m2", known | {"m1": 1}).normalised().table[1] == pytest.approx(0.2)
+    assert eliminate(model, "m2", known | {"m1": 0}).normalised().table[1] == pytest.approx(1.0)
+
+
+def test_cells_depend_on_each_other_once_the_range_is_known():
+    model = beam_over_cells(BeamWorld(n_cells=4)).model
+    assert d_separated(model, "m1", "m4")
+    assert not d_separated(model, "m1", "m4", given="z1")
+    assert why_dependent(model, "m1", "m4", given="z1") == ("m1", "r1", "m4")
+
+
+def test_the_graph_of_four_beams_is_the_sum_over_maps():
+    world = BeamWorld()
+    found = eliminate(beam_over_cells(world, 4).model, world.cells, known_ranges(world, COARSE)).normalised()
+    np.testing.assert_allclose(found.table, exact_by_hand(world, COARSE), atol=1e-9)
+
+
+def test_the_definition_agrees_on_a_short_row():
+    world = BeamWorld(n_cells=3)
+    model, known = beam_over_cells(world, 2).model, known_ranges(world, [1.0, 1.4])
+    found = enumerate_marginals(model, world.cells, known).normalised().table
+    np.testing.assert_allclose(found, eliminate(model, world.cells, known).normalised().table, atol=1e-12)
+    np.testing.assert_allclose(occupied(eliminate(model, world.cells, known).normalised()), _marginals(found))
+
+
+def _marginals(table):
+    return [table.take(1, axis=k).sum() for k in range(table.ndim)]
+
+
+def test_the_numbers_of_the_docstring():
+    beliefs = beam_beliefs(BeamWorld(), COARSE)
+    np.testing.assert_allclose(beliefs.loss[[0, 3]], [0.26, 0.40], atol=0.005)
+    np.testing.assert_allclose(beliefs.coupling[[0, 3]], [0.26, 0.23], atol=0.005)
+    assert beliefs.cell_by_cell[3, 5] == pytest.approx(0.57, abs=0.005)
+    assert beliefs.exact[3, 5] == pytest.approx(0.34, abs=0.005)
+
+
+def test_total_variation_by_hand_of_the_sum_over_maps():
+    world = BeamWorld()
+    table = exact_by_hand(world, COARSE)
+    apart = independent(world, _marginals(table)).table
+    expected = abs(table - apart).sum() / 2
+    assert beam_beliefs(world, COARSE).coupling[-1] == pytest.approx(expected, abs=1e-9)
+
+
+@settings(deadline=None, max_examples=20)
+@given(st.lists(st.none() | st.integers(0, 5).map(float), min_size=1, max_size=5), st.floats(0.05, 0.95))
+def test_an_exact_range_couples_nothing(ranges, prior):
+    world = BeamWorld(n_cells=6, noise=0, prior=prior)
+    beliefs = beam_beliefs(world, ranges)
+    assert beliefs.coupling.max() < 1e-12
+    assert beliefs.loss.max() < 1e-12
+    np.testing.assert_allclose(beliefs.cell_by_cell, beliefs.exact, atol=1e-12)
+
+
+def test_one_cell_alone_loses_nothing():
+    assert beam_beliefs(BeamWorld(n_cells=1), [0.3, -0.8, 0.0]).loss.max() < 1e-12
+
+
+def test_a_beam_wider_than_a_cell_couples_though_its_range_is_exact():
+    """Four returns from the third pair of cells: cell by cell both fill up, exactly one of them is enough."""
+    beliefs = beam_beliefs(BeamWorld(noise=0, width=2), [2.0] * 4)
+    assert beliefs.loss[-1] > 0.5 > beliefs.loss[0] > 0.3
+    assert beliefs.cell_by_cell[-1, 4] > 0.8
+    assert 0.5 < beliefs.exact[-1, 4] < 0.6
+
+
+def test_reflection_by_hand():
+    """Free, occupied: the first reflects in 0.01, the second in 0.99 * 0.9."""
+    table = reflection(BeamWorld(n_cells=2)).given(m1=0, m2=1).table
+    np.testing.assert_allclose(table, [0.01, 0.99 * 0.9, 0.99 * 0.1])
+
+
+def test_no_return_says_that_the_row_is_probably_free():
+    world = BeamWorld(n_cells=2)
+    np.testing.assert_allclose(beam_likelihood(world, None).table, [[0.99**2, 0.99 * 0.1], [0.1 * 0.99, 0.01]])
+
+
+def test_pyagrum_agrees():
+    world = BeamWorld(n_cells=5)
+    assert_oracle_agrees(beam_over_cells(world, 2).model, known_ranges(world, [2.0, 2.7]))
+    world = same_sensor(0.3, n_cells=4)
+    assert_oracle_agrees(scan_with_pose_error(world, 2).model, known_ranges(world, [2.0, 2.0]))
+
+
+def test_the_package_agrees_where_the_range_is_exact():
+    """The cell of a return takes P(z | occupied) / P(z | free) = 0.8 / 0.05 both ways; behind, the prior stays."""
+    exact, package = beam_beliefs(same_sensor(0), [4.0]).exact[0], package_row([4.0])[0]
+    np.testing.assert_allclose(exact[4:], [0.8, 0.2, 0.2, 0.2], atol=1e-6)
+    np.testing.assert_allclose(package[4:], [0.8, 0.2, 0.2, 0.2], atol=1e-6)
+    assert (package[:4] < 0.2).all()
+    assert (exact[:4] < 0.2).all()
+
+
+def test_the_package_makes_walls_thick():
+    """Within three standard deviations of 50 draws around the means of 600."""
+    walls = thick_walls()
+    behind = walls.exact[-1, 5], walls.cell_by_cell[-1, 5], walls.package[-1, 5]
+    assert (abs(walls.thickness[:, -1] - [1.06, 1.14, 2.4]) < [0.1, 0.18, 0.35]).all()
+    assert (abs(np.array(behind) - [0.08, 0.17, 0.74]) < [0.05, 0.12, 0.13]).all()
+    assert behind[1] - behind[0] < behind[2] - behind[1]
+
+
+def test_more_scans_make_the_packages_wall_thicker_and_the_exact_one_no_thicker_than_it_is():
+    walls = thick_walls(draws=20, seed=1)
+    assert (np.diff(walls.package[[0, 4, 9, 19], 5]) > 0).all()
+    assert walls.exact[-1, 5] < 0.2 < walls.package[-1, 5]
+
+
+def test_walls_stay_thin_when_every_return_lies_in_its_cell():
+    for ranges in ([4.0] * 10, [4.1, 3.8, 4.3, 4.0]):
+        assert (package_row(ranges)[-1] > 0.5).sum() == 1
+
+
+def test_a_second_ring_adds_little_when_it_shares_the_pose_error():
+    counted = count_rings()
+    np.testing.assert_allclose(counted.exact, [0.40, 0.46, 0.46], atol=0.005)
+    np.testing.assert_allclose(counted.independent, [0.40, 0.57, 0.69], atol=0.005)
+    np.testing.assert_allclose(counted.package, [0.80, 0.97, 0.97], atol=0.005)
+    assert 0 < counted.exact[2] - counted.exact[1] < 0.001
+
+
+def test_without_pose_error_to_speak_of_rings_are_independent():
+    counted = count_rings(noise=0.1, rings=2)
+    np.testing.assert_allclose(counted.exact, counted.independent, atol=1e-6)
+
+
+def test_rings_are_coupled_by_the_pose():
+    stage = scan_with_pose_error(same_sensor(0.3, n_cells=4))
+    model = stage.model
+    everything = ("m1", "m2", "m3", "m4")
+    assert why_dependent(model, "z1", "z2", given=everything) == ("z1", "e", "z2")
+    assert d_separated(model, "z1", "z2", given=(*everything, "e"))
+    assert d_separated(beam_over_cells(BeamWorld(n_cells=4), 2).model, "z1", "z2", given=everything)
+
+
+def test_draws_come_from_the_forward_model():
+    world = same_sensor(0.5, n_cells=4)
+    ranges = draw_ranges(world, [0, 0, 1, 0], 20_000, np.random.default_rng(0))
+    missing = np.mean([z is None for z in ranges])
+    assert missing == pytest.approx(0.95**3 * 0.2, abs=0.01)
+    seen = np.array([z for z in ranges if z is not None])
+    assert np.mean(abs(seen - 2) < 1) == pytest.approx(0.87, abs=0.05)
+
+
+@pytest.mark.parametrize("z", [99.0, -50.0, np.nan])
+def test_a_range_that_nothing_can_give_is_refused(z):
+    with pytest.raises(ArgumentError, match=r"^z:"):
+        range_state(BeamWorld(), z)

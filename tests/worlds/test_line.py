@@ -1,0 +1,124 @@
+"""Bayes on a line: filterpy, lecture 01 and brute force are the messages on the chain."""
+
+import itertools
+
+import numpy as np
+import pytest
+from filterpy import discrete_bayes
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyagrum_oracle import assert_oracle_agrees
+from worlds.lecture_01_line import bayes_on_a_line, filtered, most_likely_path, smoothed
+
+from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, sum_product, why_dependent
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
+
+MOVED = np.array([0.1, 0.8, 0.1])
+P_POLE = np.where(np.isin(np.arange(10), [2, 3, 7]), 0.8, 0.1)
+READINGS = st.lists(st.integers(0, 1), min_size=1, max_size=6)
+
+
+def likelihood(says):
+    return P_POLE if says else 1 - P_POLE
+
+
+def recursion(readings, update, predict):
+    """Update, then predict and update with each further reading."""
+    belief, history = np.full(10, 0.1), []
+    for t, says in enumerate(readings):
+        prior = predict(belief) if t else belief
+        belief = update(likelihood(says), prior)
+        history.append(belief)
+    return np.array(history)
+
+
+def lecture_cell(tag):
+    """The code of a tagged cell of lecture 01."""
+    cells = read_percent(NOTEBOOKS / "src" / "01_bayes.py").cells
+    return next(cell.source for cell in cells if tag in cell.metadata.get("tags", []))
+
+
+@settings(deadline=None, max_examples=30)
+@given(READINGS)
+def test_forward_messages_are_filterpys_recursion(readings):
+    expected = recursion(
+        readings, discrete_bayes.update, lambda belief: discrete_bayes.predict(belief, offset=1, kernel=MOVED)
+    )
+    np.testing.assert_allclose(filtered(bayes_on_a_line(len(readings)), readings), expected, atol=1e-12)
+
+
+def test_forward_messages_are_lecture_01s_recursion():
+    lecture = {"np": np, "discrete_bayes": discrete_bayes, "POLES": [2, 3, 7], "N_CELLS": 10, "P_POLE": P_POLE}
+    exec(lecture_cell("update"), lecture)
+    exec(lecture_cell("predict"), lecture)
+    readings = [1, 1, 0, 0, 0, 1, 0, 1]
+    expected = recursion(readings, lecture["update"], lambda belief: lecture["predict"](belief, MOVED))
+    np.testing.assert_allclose(filtered(bayes_on_a_line(8), readings), expected, atol=1e-12)
+
+
+def test_by_hand_pole_then_pole():
+    """Lecture 01: 0.8 / 3.1 beside a pole, then 0.55 in cell 3."""
+    first, second = filtered(bayes_on_a_line(2), [1, 1])
+    assert first[3] == pytest.approx(0.8 / 3.1)
+    assert second[3] == pytest.approx(0.55, abs=0.005)
+
+
+@settings(deadline=None, max_examples=30)
+@given(READINGS)
+def test_backward_messages_smooth(readings):
+    stage = bayes_on_a_line(len(readings))
+    known = dict(zip(stage.observed, readings, strict=True))
+    for t, belief in enumerate(smoothed(stage, readings)):
+        np.testing.assert_allclose(belief, eliminate(stage.model, f"n{t}", known).normalised().table, atol=1e-12)
+
+
+def test_smoothing_by_the_definition():
+    stage = bayes_on_a_line(3)
+    wanted = [
+        enumerate_marginals(stage.model, f"n{t}", {"z0": 1, "z1": 1, "z2": 0}).normalised().table for t in range(3)
+    ]
+    np.testing.assert_allclose(smoothed(stage, [1, 1, 0]), wanted, atol=1e-12)
+
+
+def test_a_backward_message_is_the_likelihood_of_later_readings():
+    """By hand: P(z1 = pole | n0) = sum over d of moved[d] P(pole | n0 + d)."""
+    stage = bayes_on_a_line(2)
+    backward = sum_product(stage.model, {"z0": 0, "z1": 1}).messages["P(n1 | n0)", "n0"]
+    later = sum(m * np.roll(P_POLE, -d) for d, m in enumerate(MOVED))
+    np.testing.assert_allclose(backward, later / later.sum(), atol=1e-12)
+
+
+@pytest.mark.parametrize("readings", list(itertools.product((0, 1), repeat=3)))
+def test_the_most_likely_path_is_the_best_of_all(readings):
+    stage = bayes_on_a_line(3, n_cells=5, poles=(1, 2))
+    known = dict(zip(stage.observed, readings, strict=True))
+    weights = {
+        path: stage.model.weight({f"n{t}": n for t, n in enumerate(path)} | known)
+        for path in itertools.product(range(5), repeat=3)
+    }
+    assert weights[tuple(most_likely_path(stage, readings))] == pytest.approx(max(weights.values()))
+
+
+def test_the_best_path_is_not_the_path_of_best_places():
+    """Nothing, pole, nothing, pole: the best places one by one are 6, 7, 1, 2, and nobody gets from 7 to 1."""
+    stage, readings = bayes_on_a_line(4), [0, 1, 0, 1]
+    known = dict(zip(stage.observed, readings, strict=True))
+    one_by_one = smoothed(stage, readings).argmax(axis=1).tolist()
+    path = most_likely_path(stage, readings)
+    weights = [stage.model.weight({f"n{t}": n for t, n in enumerate(places)} | known) for places in (one_by_one, path)]
+    assert weights[0] == 0 < weights[1]
+
+
+def test_the_present_place_screens_the_past_off():
+    model = bayes_on_a_line(4).model
+    assert d_separated(model, ("n0", "z0"), ("n2", "z3"), given="n1")
+    assert why_dependent(model, "z0", "z2", given="z1") == ("z0", "n0", "n1", "n2", "z2")
+
+
+def test_pyagrum_agrees():
+    assert_oracle_agrees(bayes_on_a_line(6).model, {"z0": 1, "z1": 0, "z3": 1, "z4": 1})
+
+
+def test_a_kernel_longer_than_the_ring_goes_round_it():
+    stage = bayes_on_a_line(2, n_cells=2, poles=(0,), moved=(0.5, 0.2, 0.3))
+    np.testing.assert_allclose(eliminate(stage.model, "n1", {"n0": 0}).normalised().table, [0.8, 0.2])
