@@ -46,7 +46,7 @@ def keep_result(
     table : callable
         Turns the result into text to print.
     goes_on : bool
-        Whether `compute` goes on from the file, and so refuses that of something else.
+        Whether `compute` resumes from the file, and so checks it itself.
     force : bool, optional
         Whether to replace the file of something else, see `check_ours`.
     """

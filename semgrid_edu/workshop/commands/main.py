@@ -24,7 +24,7 @@ Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that wa
 Force = Annotated[bool, typer.Option("--force", help="Replace files that this command hasn't written, too.")]
 
 PICTURES = (".png", ".pdf", ".svg")
-"""Formats of pictures that say who made them."""
+"""Formats of pictures whose metadata can hold the command."""
 
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
@@ -188,7 +188,7 @@ def evaluate(
 
 
 def run() -> None:
-    """Run the command line; a mistake in the input, or a disk that refuses, ends in one line, not in a traceback."""
+    """Run the command line; a mistake in the input, or a failing disk, ends in one line, not in a traceback."""
     # Idle OpenMP threads spin, which keeps busy cores from the threads that have work: on two busy cores a frame took
     # 1.2 s instead of 0.07 s. OpenMP reads this once, when a command loads torch or numba, so it must be set before.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")

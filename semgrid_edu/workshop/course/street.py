@@ -37,7 +37,7 @@ COMPARED = (3.0, 40.0)
 def street_results(drive: FrameSequence | None, stop: int) -> tuple[tuple[FrameResult, ...], GridSpec]:
     """Run the pipeline on a drive's first frames, with the network that knows simulated streets only.
 
-    This is done once in a process. Whoever grades many submissions shares it among them, so its grids can't be written.
+    This is done once in a process. All submissions that a process grades share it, so its grids are read-only.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def street_results(drive: FrameSequence | None, stop: int) -> tuple[tuple[FrameR
 
 
 def semantic_truths(drive: FrameSequence, beliefs: Sequence[NDArray], spec: GridSpec) -> NDArray[np.uint8]:
-    """Return the class of each cell in which the labels name one of the classes that stand or lie in a street.
+    """Return the class of each cell to which the labels give a semantic class.
 
     Parameters
     ----------
@@ -84,15 +84,15 @@ def semantic_truths(drive: FrameSequence, beliefs: Sequence[NDArray], spec: Grid
 
 
 def street_pieces(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int64]:
-    """Return the piece of street in which each cell of each frame lies, counted from 0, (F, H, W).
+    """Return the piece of street of each cell of each frame, counted from 0, (F, H, W).
 
     Frames of one drive show the same things again, so neither frames nor cells are independent. Pieces of the street
-    are the most that a single drive has; what stands on the border of two of them is in both.
+    are the best that a single drive has; an object on the border of two pieces is in both.
 
     Parameters
     ----------
     frames : sequence of Frame
-        Frames of a drive, whose poses say where the grid lies.
+        Frames of a drive, whose poses place the grid.
     spec : GridSpec
         The grid.
     """
@@ -124,7 +124,7 @@ def piece_confusions(truths: NDArray, called: NDArray, pieces: NDArray) -> NDArr
 def best_table(truths: NDArray, beliefs: Sequence[NDArray]) -> NDArray[np.int64]:
     """Return the map of a table that knows only the most probable occupancy state of a cell, (F, H, W).
 
-    For each state it says the class that is most frequent among these very cells: no other table of states is right in
+    For each state it takes the class that is most frequent in these very cells: no other table of states is right in
     more of them.
 
     Parameters
@@ -141,7 +141,7 @@ def best_table(truths: NDArray, beliefs: Sequence[NDArray]) -> NDArray[np.int64]
 
 
 def standing_points(frame: Frame) -> NDArray[np.float64]:
-    """Return the returns from things that stand up, (n, 3), metres in the LIDAR frame; moving cars are among them.
+    """Return the returns from upright things, (n, 3), metres in the LIDAR frame; moving cars are among them.
 
     Parameters
     ----------

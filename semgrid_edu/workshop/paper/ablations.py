@@ -37,7 +37,7 @@ NOTES = {"semantic": "", "all": " The truth of a cell without a semantic class i
 """On which cells rows are compared, in order, and what has to be known of them."""
 
 CONFIDENCE = {"true": "", "lidar": ", by labels made with the LIDAR"}
-"""By which labels confidence is compared with accuracy, and how rows say so; networks learn from the second."""
+"""The labels against which confidence is checked, and the words for them in a row; networks learn from the second."""
 
 SECTIONS = _TABLES["sections"]
 """The lists of rows that are compared with the usual network, and what each shows."""
@@ -118,7 +118,7 @@ def _band(band: str, usual: Sequence[ScoreRun], counted: RunCounts) -> dict:
 
 
 def _calibration(method: str, usual: Sequence[ScoreRun], counted: RunCounts, truth: str) -> dict:
-    """Return how well a method's probabilities mean what they say by some labels, seed by seed."""
+    """Return how well calibrated a method's probabilities are, seed by seed."""
     diagrams = [run.reliability(counted, method, truth) for run in usual]
     return {
         "what": method + CONFIDENCE[truth],

@@ -1,6 +1,6 @@
-"""What the paper's claims (`claims.toml`) say as statements about numbers, each with its number (section 4).
+"""The paper's claims (`claims.toml`) as statements about numbers, each with its number (section 4).
 
-Unless a statement says otherwise, scores are those of the networks of Table 1 without the CRF. A claim may be judged
+By default, scores are those of the networks of Table 1 without the CRF. A claim may be judged
 several times, by what networks learned from and by what they are scored against: its readings.
 """
 
@@ -47,7 +47,7 @@ class Statement(NamedTuple):
     limit : float
         What it is compared with, in the same unit.
     above : bool
-        Whether the claim says that it is above the limit; else below.
+        Whether it is claimed to be above the limit; else below.
     p : float or None
         The one-sided p-value against the statement, see `EstimatedMean.p_value`; None where there is no interval.
     judged : bool
@@ -63,7 +63,7 @@ class Statement(NamedTuple):
 
     @property
     def confirmed(self) -> bool:
-        """Whether the interval lies entirely on the claimed side."""
+        """Whether the whole interval is on the claimed side."""
         low, high = self.value["low"], self.value["high"]
         if low is None or high is None:
             return False

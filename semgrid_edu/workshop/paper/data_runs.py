@@ -47,7 +47,7 @@ class DataRun(Run):
 class ArraysRun(Run):
     """Make the arrays of a split, which networks learn from and are scored on: images, occupancy grids, truth.
 
-    The occupancy filter runs over all frames of the split; `n_labelled` of them have a truth. The arrays themselves lie
+    The occupancy filter runs over all frames of the split; `n_labelled` of them have a truth. The arrays themselves are
     in the cache of the data set.
 
     Parameters
@@ -73,7 +73,7 @@ class ArraysRun(Run):
     kind = "arrays"
     size = property(
         lambda self: f"-{self.preset}" * (self.preset != "compact") + "-fine" * self.fine
-    )  # as names say it
+    )  # the part of the name
     tag = property(lambda self: f"{self.data.tag}-{self.split}-{self.truth}{self.size}")
     built = property(lambda self: self.preset + "-fine" * self.fine)  # what the time of a step depends on
     pace = property(lambda self: f"arrays {self.built}")

@@ -12,7 +12,7 @@ from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval, 
 SCORE_COLOUR, SEED_COLOUR = "#1f4e79", "#d95f02"
 """The colours of interval and mean, and of single seeds."""
 _SEED_DROP = 0.24
-"""How far the seeds lie below the interval, rows."""
+"""How far below the interval the seeds are drawn, rows."""
 
 
 def forest_plot(

@@ -1,4 +1,4 @@
-"""Runs that look at a network otherwise: cars on their tops, its time, and grids for the figures (sections 3.4, 4)."""
+"""Other runs of a trained network: overturned cars, its speed, and grids for the figures (sections 3.4, 4)."""
 
 import time
 from collections.abc import Iterator
@@ -32,10 +32,10 @@ from semgrid_edu.workshop.scoring.grids import learned_log_g
 from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval
 
 OVERTURNED = "overturned cars"
-"""The method: the network's own grid, of which only the cells of overturned cars are counted."""
+"""The method: the network's grid, counted in the cells of overturned cars alone."""
 
 UPRIGHT, UPRIGHT_RANGE = "upright cars", (10.0, 22.0)
-"""The same for upright cars on the same frames, at the distances at which the overturned ones lie, metres."""
+"""The same for upright cars on the same frames, at the distances of the overturned ones, metres."""
 
 TIMES, ROUNDS, FRAMES_EACH, TRAINING_ROUNDS = "times.json", 12, 3, 6
 """The file with the times, how often two networks take turns, for how many frames each time, and how often in training.
@@ -83,7 +83,7 @@ class OverturnedRun(NetworkRun):
 
 
 def cars_by_pose(objects: list[dict]) -> dict[str, list[dict]]:
-    """Return the cars that lie on their tops, and the upright ones in `UPRIGHT_RANGE`, by method.
+    """Return the overturned cars, and the upright ones in `UPRIGHT_RANGE`, by method.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def cars_by_pose(objects: list[dict]) -> dict[str, list[dict]]:
 
 
 def boxes_on(spec: GridSpec, objects: list[dict], margin: float = 0.25) -> NDArray[np.bool_]:
-    """Return which cells lie in the boxes of road users, (H, W).
+    """Return which cells are in the boxes of road users, (H, W).
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Results computed again from the counts that are kept beside them, and compared with what is written (section 4).
+"""Results recomputed from the counts kept beside them, and compared with what is written (section 4).
 
 All numbers, words and times are compared; the versions of the libraries aren't, nor are the pictures, which are drawn
-from the same numbers. Numbers may differ by a billionth of their size, because libraries and machines add up in their
-own order.
+from the same numbers. Numbers may differ by a billionth of their size, because libraries and machines add up in
+different orders.
 """
 
 import json
@@ -19,13 +19,13 @@ from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.scales import scale_named
 
 NOT_COMPARED = "versions"
-"""The part of a result that says by which libraries it was computed."""
+"""The part of a result with the versions of the libraries."""
 
 TOLERANCE = 1e-9
 """By how much a number may differ, as a share of its size."""
 
 NOTHING = "nothing"
-"""What stands in the place of a part that is missing."""
+"""Shown for a part that is missing."""
 
 
 def check_results(folder: Path, echo: Callable[[str], None]) -> bool:
@@ -55,7 +55,7 @@ def check_results(folder: Path, echo: Callable[[str], None]) -> bool:
 
 
 def differences_in(folder: Path, name: str) -> Iterator[str]:
-    """Yield what is written about an experiment otherwise than its counts have it, one line each.
+    """Yield the places where what is written about an experiment differs from its counts, one line each.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def differences(written: object, computed: object, place: str) -> Iterator[str]:
 
 
 def _named(part: object, number: int) -> str:
-    """Return what an entry of a list is called: what it says that it is, else its number."""
+    """Return the name of an entry of a list: its "what", else its number."""
     return str(part["what"]) if isinstance(part, dict) and "what" in part else str(number)
 
 

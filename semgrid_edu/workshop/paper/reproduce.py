@@ -111,7 +111,7 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
 
 
 def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_only: bool) -> str:
-    """Do what `reproduce` says, in a folder of runs that no other process writes to."""
+    """Plan, run and write, in a folder of runs that no other process writes to."""
     plan = request.plan()
     estimated = estimate(plan, root)
     minutes = sum(estimated.values()) / (request.workers or usable_cores()) / 60

@@ -177,7 +177,7 @@ def estimate(plan: Sequence[Run], root: str | Path) -> dict[Run, float]:
     plan : sequence of Run
         From `with_needs`.
     root : path-like
-        The folder of all runs. Runs that have ended there tell how long a step takes.
+        The folder of all runs. Runs that have ended there give the time of a step.
 
     Raises
     ------

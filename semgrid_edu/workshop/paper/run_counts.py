@@ -1,7 +1,7 @@
-"""What reports read from runs, and keep beside their results, so that every number can be computed again (section 4).
+"""The counts that reports read from runs, kept beside the results so that every number can be recomputed (section 4).
 
-A report gets all that it knows about its runs from `RunCounts`: from the folders of the runs when they have just
-ended, or later from the one file that was kept of it. So there is one way to compute a number, with runs or without.
+A report reads its runs only through `RunCounts`: from the folders of the runs when they have just ended, or later from
+the one file that was kept. So a number is computed in one way, with the runs or without them.
 """
 
 import json
@@ -139,7 +139,7 @@ class RunCounts:
 def _smallest(array: NDArray) -> NDArray:
     """Return whole numbers of the smallest type that holds them; other arrays as they are.
 
-    The first index runs fastest in memory. So the counts of two classes in all drives stand side by side, which takes
+    The first index runs fastest in memory. So the counts of two classes in all drives are neighbours, which takes
     a seventh less space when compressed.
     """
     if array.dtype.kind not in "iu" or not array.size:

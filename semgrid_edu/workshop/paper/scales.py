@@ -28,7 +28,7 @@ class Scale:
     synthia_routes : str
         More routes to learn from and to test on, for the claims.
     overturned : str
-        Drives with a car that lies on its top.
+        Drives with an overturned car.
     preset : str
         "compact" or "paper": networks, images and grid, see `architecture`.
     fine_cells : bool

@@ -177,7 +177,7 @@ class ScoreRun(CountingRun, NetworkRun):
     crf : bool
         Whether the CRF refines the grids as well, with default parameters and with searched ones if there are any.
     calibration : CalibrationError
-        What the network believes wrongly about where the camera stands.
+        Error in the calibration that the network is given.
     """
 
     crf: bool = True
@@ -220,7 +220,7 @@ class BaselineRun(CountingRun, NetworkRun):
     Parameters
     ----------
     calibration : CalibrationError
-        What geometry believes wrongly about where the camera stands.
+        Error in the calibration that geometry is given.
     dense : bool
         Whether geometry has the true depth of every pixel in place of the LIDAR's returns.
     """

@@ -32,7 +32,7 @@ TIMED_STEPS = 2
 
 
 class TrainingRun(Run):
-    """A run that trains a network on `arrays`, one step per iteration, as `architecture` and `params` say."""
+    """A run that trains a network on `arrays`, one step per iteration, described by `architecture` and `params`."""
 
     is_training = True
     steps = property(lambda self: self.iterations)
@@ -122,13 +122,13 @@ class ImageStageRun(TrainingRun):
 
     @property
     def label(self) -> str:
-        """What the names of the runs after it say of it: data set, network, number of frames."""
+        """Its part in the names of later runs: data set, network, number of frames."""
         fewer = "" if self.n_frames is None else f"-{self.n_frames}frames"
         return f"{self.arrays.data.tag}-{self.segmenter}{self.arrays.size}{fewer}"
 
     @property
     def architecture(self) -> Architecture:
-        """The whole network, of which the image network learns."""
+        """The whole network; this run trains its image network."""
         usual = architecture(self.segmenter, self.arrays.preset)
         return replace(usual, label_set=self.arrays.data.recipe.label_set, grid=self.arrays.grid)
 
@@ -183,7 +183,7 @@ class GridStageRun(TrainingRun):
 
     @property
     def tag(self) -> str:
-        """What it learns from, and how."""
+        """Data, labels, variant, steps and seed."""
         first = self.image_stage
         label = f"{first.label}-{self.arrays.truth}{self.variant.name}"
         return f"{label}-{first.iterations}+{self.iterations}-seed{self.seed}"

@@ -1,4 +1,4 @@
-"""In what a network can differ from the paper's, and what it can be told wrongly: the ablations' rows (section 4)."""
+"""How a network can differ from the paper's, and errors in its calibration: the rows of the ablations (section 4)."""
 
 from dataclasses import dataclass, replace
 
@@ -21,7 +21,7 @@ class CalibrationError:
     yaw : float
         Degrees that it is believed to look further to the left.
     height : float
-        Metres that it is believed to stand higher.
+        Metres that it is believed to be higher.
     """
 
     pitch: float = 0.0
@@ -43,7 +43,7 @@ class CalibrationError:
             The true one.
         """
         # The camera's axes: x right, y down, z ahead. To believe that it looks down and left is to see the world
-        # turned up and right, and to believe that it stands higher is to see the world lower, at larger y.
+        # turned up and right, and to believe that it is higher is to see the world lower, at larger y.
         turn = Rotation.from_euler("xy", [self.pitch, self.yaw], degrees=True).as_matrix()
         moved = rigid_transform(turn, np.array([0.0, self.height, 0.0]))
         return replace(camera, T_camera_from_lidar=moved @ camera.T_camera_from_lidar)
@@ -55,7 +55,7 @@ EXACT = CalibrationError()
 
 @dataclass(frozen=True)
 class Variant:
-    """In what a network can differ from the paper's, for the ablations.
+    """How a network can differ from the paper's, for the ablations.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Variant:
         return "".join(f"-{part}" for part, as_usual in parts if not as_usual)
 
     def applied_to(self, described: Architecture) -> Architecture:
-        """Return an architecture changed as this variant says.
+        """Return an architecture with this variant's changes.
 
         Parameters
         ----------

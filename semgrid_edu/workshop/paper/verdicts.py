@@ -1,15 +1,15 @@
 """Verdicts on the paper's claims, by a rule that is written down before the numbers are (section 4).
 
 A claim is split into statements about numbers, each of the form "this is above (or below) that limit". Each number has
-a 95 % interval over drives and seeds, and a one-sided p-value against its statement: how often a number would lie so
-far on the wrong side if the true value lay at the limit. Then the claim is
+a 95 % interval over drives and seeds, and a one-sided p-value against its statement: how often a number would be so
+far on the wrong side if the true value were the limit. Then the claim is
 
-- **reproduced**, when every interval lies entirely on the claimed side of its limit;
-- **not reproduced**, when at least one number lies on the other side by more than chance explains. A claim with many
-  statements has many chances to fail by chance. So the p-values are corrected as Holm does: of m statements that may
-  still be true, the one with the smallest p-value is given up when that is at most 2.5 % / m, then the next of m - 1.
-  A claim all of whose statements are true is called not reproduced in at most 2.5 % of cases, as one statement's 95 %
-  interval would have it;
+- **reproduced**, when every interval is entirely on the claimed side of its limit;
+- **not reproduced**, when at least one number is on the other side by more than chance explains. A claim with many
+  statements has many chances to fail by chance. So the p-values are corrected by Holm's method: of m statements that
+  may still be true, the one with the smallest p-value is rejected when that is at most 2.5 % / m, then the next of
+  m - 1. A claim whose statements are all true is called not reproduced in at most 2.5 % of cases, as by one statement's
+  95 % interval;
 - **cannot tell** otherwise. Also whenever there are fewer than three seeds or ten drives: then the numbers are too few
   for an interval to be believed, and none is printed.
 
@@ -68,15 +68,15 @@ def holm(p_values: Sequence[float | None], error_rate: float = ERROR_RATE) -> li
 
 
 def which_hold(statements: Sequence[Statement]) -> list[bool | None]:
-    """Return of each statement True when its interval confirms it, False when Holm's rule gives it up, else None.
+    """Return for each statement True when its interval confirms it, False when Holm's method rejects it, else None.
 
     Parameters
     ----------
     statements : sequence of Statement
-        All statements of a claim. Those that aren't judged are neither counted nor given up.
+        All statements of a claim. Those that aren't judged are neither counted nor rejected.
     """
-    given_up = iter(holm([one.p for one in statements if one.judged]))
-    return [False if one.judged and next(given_up) else True if one.confirmed else None for one in statements]
+    rejected = iter(holm([one.p for one in statements if one.judged]))
+    return [False if one.judged and next(rejected) else True if one.confirmed else None for one in statements]
 
 
 def verdict(statements: Sequence[Statement], seeds: int, drives: int, expectation: bool = False) -> str:
@@ -85,7 +85,7 @@ def verdict(statements: Sequence[Statement], seeds: int, drives: int, expectatio
     Parameters
     ----------
     statements : sequence of Statement
-        All that it says.
+        All its statements.
     seeds, drives : int
         How many of them the numbers rest on.
     expectation : bool

@@ -22,10 +22,10 @@ Methods that share work, such as a network with and without the CRF, come from o
 
 
 def distance_bands(spec: GridSpec, edges: Sequence[float]) -> NDArray[np.int64]:
-    """Return the number of the band of distance that each cell lies in, (H, W).
+    """Return the number of each cell's band of distance, (H, W).
 
-    The distance is the horizontal one from the LIDAR to the cell's centre. What lies before the first edge is in the
-    first band, what lies beyond the last one in the last.
+    The distance is the horizontal one from the LIDAR to the cell's centre. Cells before the first edge are in
+    the first band, cells beyond the last edge in the last.
 
     Parameters
     ----------

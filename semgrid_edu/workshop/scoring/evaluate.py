@@ -41,7 +41,7 @@ def evaluate(
         A data set with the splits "train" and "test", such as data/minikitti.
     weights : path-like
         A network that learned from the training split. If `image_stage.safetensors`, the network after the first stage
-        of training, lies in the same folder, its image labels are carried to the grid as well: that network has
+        of training, is in the same folder, its image labels are carried to the grid as well: that network has
         learned from images alone, not yet from grids.
     refine : callable, optional
         Refines the network's grids, as in `Stages`, and is named in the row "network + ..."; the CRF when left out.
@@ -151,7 +151,7 @@ def intervals(confusions: FrameConfusions, label_set: LabelSet) -> Intervals:
     confusions : FrameConfusions
         Confusion matrices of the frames of two drives or more, by method.
     label_set : LabelSet
-        The classes, of which it says which are semantic.
+        The classes; it knows which are semantic.
     """
 
     def ends(by_drive: NDArray, metric: Metric) -> list[float | None]:
@@ -169,7 +169,7 @@ def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
     confusions : dict of str to (C, C) int
         Confusion matrix of each method.
     label_set : LabelSet
-        The classes, of which it says which are semantic.
+        The classes; it knows which are semantic.
     """
     return {
         method: every_metric(lambda matrix, metric: metric(matrix), label_set, confusion)
@@ -185,7 +185,7 @@ def scores_table(result: Scores, ends: Intervals | None = None) -> str:
     result : Scores
         What `scores` returns.
     ends : Intervals, optional
-        What `intervals` returns of the same methods, to stand in brackets; none when left out.
+        What `intervals` returns of the same methods, shown in brackets; none when left out.
     """
     head = [f"{name}{cells}" for cells in ("", ", semantic cells") for name in METRICS]
     places = [(cells, name) for cells in ("all", "semantic") for name in METRICS]

@@ -22,7 +22,7 @@ from semgrid_edu.occupancy import N_STATES, State
 from semgrid_edu.planes import plane_pixels
 
 NOT_SEEN = -1
-"""What `ground_pixels` says of a cell whose ground lies outside the image."""
+"""The pixel of a cell whose ground is outside the image."""
 
 Labeller = Callable[[Sample], NDArray]
 """A function that labels the pixels of a frame: sample -> classes (h, w), 255 where unlabelled."""
@@ -50,7 +50,7 @@ def ground_pixels(spec: GridSpec, camera: Camera) -> NDArray[np.int64]:
 def inverse_perspective(labels: NDArray, places: NDArray, occupancy: NDArray, observed_only: bool = False) -> NDArray:
     """Carry image labels to the grid as if all that the camera sees were flat ground: inverse perspective mapping.
 
-    No depth is used, so whatever stands above the ground is smeared away from the camera, over all cells that it hides.
+    No depth is used, so whatever rises above the ground is smeared away from the camera, over all cells that it hides.
 
     Parameters
     ----------
@@ -67,12 +67,12 @@ def inverse_perspective(labels: NDArray, places: NDArray, occupancy: NDArray, ob
     -------
     (H, W) uint8
         The class of its pixel in each cell that the image shows; by occupancy state one of the four unknown classes in
-        the others, and where the pixel is unlabelled or sky, which doesn't lie on the ground.
+        the others, and where the pixel is unlabelled or sky, which isn't on the ground.
 
     Raises
     ------
     ArgumentError
-        When a pixel lies outside the labels, or the shapes of `places` and `occupancy` disagree.
+        When a pixel is outside the labels, or the shapes of `places` and `occupancy` disagree.
     """
     labels, unknown = np.asarray(labels), unknown_classes(occupancy)
     if places.shape != unknown.shape:
@@ -149,7 +149,7 @@ def naive_bayes(counts: NDArray) -> NDArray[np.int64]:
     """Return the most probable class for each label l of the ground and each state s, (C + 1, 4).
 
     It is the class c with the largest P(c) P(l | c) P(s | c). Laplace's one is added to each count of a label or state
-    with a class. Without it a class that never came with a label would be impossible, whatever the state says.
+    with a class. Without it a class that never came with a label would be impossible in every state.
 
     Parameters
     ----------

@@ -129,7 +129,7 @@ def baseline_grids(
     callable
         k -> classes (H, W) of frame k: "majority class" of each cell; "occupancy alone", the majority class of each
         cell and state; and for "true" image labels and those of each image network what `carried_grids` makes of them,
-        and what their flat ground and the occupancy state tell together (`WAYS`).
+        and what their flat ground and the occupancy state predict together (`WAYS`).
     """
     truths, returns = training.arrays["truth"], returns or frames.returns
     majority, by_state = majority_class(truths), majority_by_state(truths, training.arrays["occupancy"])
@@ -209,7 +209,7 @@ def majority_class(truths: NDArray) -> NDArray[np.uint8]:
 
 
 def majority_by_state(truths: NDArray, occupancy: NDArray) -> NDArray[np.uint8]:
-    """Return the most frequent class of each cell for each occupancy state: what occupancy says without an image.
+    """Return the most frequent class of each cell for each occupancy state: what occupancy predicts without an image.
 
     Parameters
     ----------

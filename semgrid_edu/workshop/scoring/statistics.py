@@ -61,9 +61,9 @@ class EstimatedMean(NamedTuple):
         return float((t * variances).sum() / np.sqrt(variances.sum())) if variances.any() else 0.0
 
     def p_value(self, limit: float, above: bool) -> float:
-        """Return the one-sided p-value of a claim that the true value lies on one side of a limit.
+        """Return the one-sided p-value of a claim that the true value is on one side of a limit.
 
-        It is small when the mean lies far on the other side. An interval of level 1 - 2 p ends exactly at the limit
+        It is small when the mean is far on the other side. An interval of level 1 - 2 p ends exactly at the limit
         then, so the p-value and the intervals never contradict each other.
 
         Parameters
@@ -71,7 +71,7 @@ class EstimatedMean(NamedTuple):
         limit : float
             The limit, in the unit of the mean.
         above : bool
-            Whether the claim says that the true value is above it; else below.
+            Whether the true value is claimed to be above it; else below.
         """
         beyond = (limit - self.mean) if above else (self.mean - limit)
         if not any(self.variances):
@@ -106,7 +106,7 @@ def drive_interval(confusions: ArrayLike, metric: Metric, level: float = 0.95) -
     how seeds differ; then the interval is for this one network on very many drives.
 
     **How it is made.** Frames of one drive look alike, so drives are resampled, not frames: each drive is left out
-    once, and what that changes tells how much the drives differ (the jackknife). The mean score has two variances. V_s,
+    once, and the changes show how much the drives differ (the jackknife). The mean score has two variances. V_s,
     from the choice of seeds, is the variance of the seeds' scores divided by S. V_d, from the choice of drives, is that
     of the drives' parts of the mean score, divided by V; what a drive does to one seed and not to the others is
     subtracted, since V_s holds it already. The half-width is that of Cochran and Cox (Experimental Designs),
@@ -117,8 +117,8 @@ def drive_interval(confusions: ArrayLike, metric: Metric, level: float = 0.95) -
     20 drives and 3 seeds, from drives that differ while seeds don't to the reverse, 95 % intervals of the three metrics
     of section 4.2 held the true value in 92 to 97.5 % of 2000 cases (`benchmarks/interval_coverage.py`).
 
-    **What it can't say.** It doesn't say how the method does on another kind of street, or after training on other
-    data, because neither varies here. It isn't for the score of the next single network, which lies further from the
+    **Its limits.** It doesn't cover how the method does on another kind of street, or after training on other
+    data, because neither varies here. It isn't for the score of the next single network, which is further from the
     mean than the mean of many would. And where a class occurs in few of the drives, its recall rests on these few, and
     so does the mean over classes. With a class in one of twenty drives, 95 % intervals of class accuracy held the true
     value in only 63 % of the cases. An interval may also reach below 0 or above 1: then there are too few drives or
@@ -191,12 +191,12 @@ def paired_interval(a: ArrayLike, b: ArrayLike, metric: Metric, level: float = 0
 
 
 def _checked(name: str, confusions: ArrayLike) -> NDArray:
-    """Return the matrices as an array, or say why there can't be an interval."""
+    """Return the matrices as an array, or raise if there can't be an interval."""
     matrices = np.asarray(confusions)
     if matrices.ndim != 4 or matrices.shape[2] != matrices.shape[3] or not len(matrices):
         raise ArgumentError(name, "confusion matrices (S, V, C, C) of S seeds on V drives", f"shape {matrices.shape}")
     if matrices.shape[1] < 2:
-        expected = "two drives or more, because one says nothing about how drives differ"
+        expected = "two drives or more, because one doesn't show how drives differ"
         raise ArgumentError(name, expected, matrices.shape[1])
     return matrices
 
