@@ -15,33 +15,30 @@ import numpy as np
 def filters_and_simulator() -> None:
     """Track two frames of the shipped drive, remember one, and simulate two others."""
     from semgrid_edu.datasets.samples import sample_drive
-    from semgrid_edu.fast import track_drive
+    from semgrid_edu.fast import ClassMemory, track_drive
     from semgrid_edu.grid import GridSpec
     from semgrid_edu.labels import KITTI_14
-    from semgrid_edu.memory import ClassMap
     from semgrid_edu.occupancy import PlanarMotion
     from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
 
     spec, drive = GridSpec(0, 32, -8, 8, 1.0), sample_drive()
     *_, belief = track_drive([drive[0], drive[1]], spec)
     even = np.full((len(KITTI_14), *spec.shape), 1 / len(KITTI_14), np.float32)
-    ClassMap(spec, KITTI_14.n_semantic).step(even, belief, PlanarMotion(), 0.1)
+    ClassMemory(spec).advance(even, belief, PlanarMotion(), 0.1)
     with tempfile.TemporaryDirectory() as folder:
         recipe = DatasetRecipe("small", "KITTI-14", (Route("test", 2, False),))
         make_from_recipe(recipe, Path(folder), seed=0, workers=1)
 
 
 def refinement() -> None:
-    """Refine a small map by both ways to filter messages."""
+    """Refine a small map."""
     from semgrid_edu.crf import CrfParams
     from semgrid_edu.fast import mean_field
-    from semgrid_edu.fast.crf.windowed import WindowedGaussian
 
     rng = np.random.default_rng(0)
     unary = rng.random((14, 8, 6), np.float32)
     occupancy = np.moveaxis(rng.dirichlet(np.ones(4), (8, 6)), 2, 0).astype(np.float32).copy()
     mean_field(unary, occupancy, CrfParams())
-    WindowedGaussian.build(occupancy, CrfParams())(np.zeros((48, 14), np.float32))
 
 
 PARTS = {part.__name__: part for part in (filters_and_simulator, refinement)}

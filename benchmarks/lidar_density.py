@@ -13,7 +13,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
@@ -22,6 +21,7 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture
 from semgrid_edu.training import TrainingParams
+from semgrid_edu.training.devices import open_fabric
 from semgrid_edu.workshop.scoring.score_with_interval import compared, on_cells, shown
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E_AHEAD
 
@@ -59,7 +59,7 @@ def thin_data_set(folder: Path, out: Path) -> Path:
 def learned(way, start: Path, parts: list[list], folder: Path, seed: int) -> Path:
     """Return the weights that a network learns in this way from parts of frames."""
     if not (folder / WEIGHTS).exists():
-        study._train(way, [start], Mixture(parts), folder, seed, torch.device("cpu"))
+        study._train(way, [start], Mixture(parts), folder, seed, open_fabric("cpu"))
     return folder / WEIGHTS
 
 

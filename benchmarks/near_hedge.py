@@ -14,8 +14,9 @@ from unittest import mock
 
 import numpy as np
 
+from semgrid_edu.fast import Cmcdot
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import Cmcdot, CmcdotParams, SensorModel, State
+from semgrid_edu.occupancy import CmcdotParams, SensorModel, State
 from semgrid_edu.plotting.grids import velocity_arrows
 from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.street import plan

@@ -63,10 +63,9 @@ def test_an_environment_that_could_not_be_made_is_made_again(clone, monkeypatch)
 SLOW_TO_COMPILE = {
     "semgrid_edu.fast.occupancy.particles": "_fly",
     "semgrid_edu.fast.crf.mean_field": "_update",
-    "semgrid_edu.fast.crf.windowed": "_window_sums",
     "semgrid_edu.workshop.simulation.sensors.shading": "_shade",
 }
-"""A function each of the filter, the two ways of the CRF and the simulator, by its module."""
+"""A function each of the filter, the CRF and the simulator, by its module."""
 
 
 def test_what_takes_long_to_compile_is_called_when_the_environment_is_made(monkeypatch):

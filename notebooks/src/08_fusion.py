@@ -62,7 +62,7 @@ from semgrid_edu.plotting.grids import draw_map
 from semgrid_edu.plotting.images import draw_image
 from semgrid_edu.training import TrainingParams
 from semgrid_edu.training.batches import Batch, grid_logits
-from semgrid_edu.training.devices import keep_freed_memory
+from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.training.loss import class_frequencies, class_weights, median_frequency_weights
 from semgrid_edu.workshop.scoring import score_with_interval
 from worlds.lecture_00_ledger import ledger, ledger_table

@@ -41,11 +41,10 @@ from semgrid_edu.crf import enclosing_simplices, mean_field_naive, mean_field_up
 from semgrid_edu.crf.lattice import elevation, peak
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.fast import mean_field
 from semgrid_edu.graphical import d_separated, draw
 
 # %% jupyter={"source_hidden": true}
-from semgrid_edu.fast import track_drive
+from semgrid_edu.fast import mean_field, track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
@@ -58,7 +57,7 @@ from worlds.lecture_11_lattice import draw_lattice_frame, draw_triangles, lattic
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 drive, spec = sample_drive(), GridSpec.compact()
 net = load_net(sample_weights(), drive.camera)
-stages = Stages.of(net)
+stages = Stages.fast(net)
 frames = [drive[k] for k in range(len(drive))]
 occupancies = [belief.probability for belief in track_drive(frames, spec)][::2]
 
@@ -789,6 +788,7 @@ def enlarged(array, shape):
     return np.ascontiguousarray(array[np.ix_(*index)])
 
 
+mean_field_accurate(*piece(4, 4), params)  # compiles it
 sizes, grids = [(20, 15), (40, 30), (60, 40)], [(40, 30), (80, 60), (142, 62), (355, 155), (502, 219)]
 naive_times = [seconds(lambda s=s: mean_field_naive(*piece(*s), params), 3) for s in sizes]
 inputs = [(enlarged(unary, (14, *g)), enlarged(o, (4, *g))) for g in grids]

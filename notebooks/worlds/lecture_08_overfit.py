@@ -16,8 +16,9 @@ import typer
 
 from semgrid_edu.datasets.samples import sample_drive, sample_frames
 from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.fast import build_net
 from semgrid_edu.metrics import confusion_matrix, pixel_accuracy
-from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, build_net, unit_image
+from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, unit_image
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train

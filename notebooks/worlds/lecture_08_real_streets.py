@@ -7,10 +7,9 @@ time shows the same side again. Neither says how a network does in other streets
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import torch
 import typer
 from numpy.typing import NDArray
 
@@ -19,14 +18,15 @@ from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
+from semgrid_edu.fast import build_net, load_net
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, build_net, load_net, with_mean_scores
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, with_mean_scores
 from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import check_writable, sha256, table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
-from semgrid_edu.training.devices import choose_device
+from semgrid_edu.training.devices import open_fabric
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, reliability_of_sums
 from semgrid_edu.workshop.scoring.grids import NETWORK, majority_by_state, network_grids
@@ -38,6 +38,9 @@ from semgrid_edu.workshop.scoring.score_with_interval import (
     score_with_interval,
     shown,
 )
+
+if TYPE_CHECKING:
+    from lightning_fabric import Fabric
 
 
 class WayToTrain(NamedTuple):
@@ -126,7 +129,7 @@ def compare_real(
     DataError
         When there is no such scene, it lacks a camera or labels, or a file is damaged.
     """
-    computer = choose_device(device)
+    fabric = open_fabric(device)
     drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
     runs = Path(runs) / scene
     check_writable(runs / "run")
@@ -139,7 +142,7 @@ def compare_real(
         for name in TABLE["later"] if split == LATER else WAYS:
             counted = []
             for k in seeds if WAYS[name].params else seeds[:1]:
-                files = _networks(name, rounds, streets, runs / split, seeds, k, computer)
+                files = _networks(name, rounds, streets, runs / split, seeds, k, fabric)
                 weights |= {run: sha256(file) for run, file in files.items()}
                 counted.append(_joined(_count(name, *one) for one in zip(files.values(), tests, strict=True)))
             found[split] |= {method: _scores_of([one[method] for one in counted], table) for method in counted[0]}
@@ -194,7 +197,7 @@ class _Subset(TrainingSet):
 
 
 def _networks(
-    name: str, rounds: list[Round], streets: list[TrainingSet], split: Path, seeds: range, k: int, on: torch.device
+    name: str, rounds: list[Round], streets: list[TrainingSet], split: Path, seeds: range, k: int, fabric: "Fabric"
 ) -> dict[str, Path]:
     """Return the files of the weights that are learned in each round with seed k, by the names of their runs."""
     way, files = WAYS[name], {}
@@ -204,17 +207,17 @@ def _networks(
         folder = split.with_name(f"{split.name} {r}, {name}, {k}")
         if way.params and not (folder / WEIGHTS).exists():
             mixture = Mixture([[_Subset(*part) for part in training], *([streets] if way.with_simulated else [])])
-            _train(way, starts, mixture, folder, k, on)
+            _train(way, starts, mixture, folder, k, fabric)
         files[folder.name] = folder / WEIGHTS if way.params else starts[0]
     return files
 
 
-def _train(way: WayToTrain, starts: list[Path], mixture: Mixture, folder: Path, seed: int, on: torch.device) -> None:
+def _train(way: WayToTrain, starts: list[Path], mixture: Mixture, folder: Path, seed: int, fabric: "Fabric") -> None:
     """Train a network, or go on where an interrupted run was."""
     nets = [load_net(start, mixture.camera) for start in starts]
     net = with_mean_scores(nets or [build_net(way.architecture, mixture.camera, seed)])
     params = replace(way.params, batch_size=min(way.params.batch_size, *map(len, mixture.parts)))
-    train(net, mixture, folder, params, seed, resume=True, device=on)
+    train(net, mixture, folder, params, seed, resume=True, fabric=fabric)
 
 
 def _count(name: str, weights: Path, test: list[Part]) -> Counted:

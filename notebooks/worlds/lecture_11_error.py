@@ -106,7 +106,7 @@ def sample_problem(spec: GridSpec, seed: int = 0) -> CrfProblem:
     trained = load_net(sample_weights(), drive.camera)
     net = build_net(replace(trained.need_architecture(), grid=spec), drive.camera)
     net.load_state_dict(trained.state_dict())
-    stages = Stages.of(net.eval(), seed=seed)
+    stages = Stages.fast(net.eval(), seed=seed)
     *_, belief = stages.track((drive[k] for k in range(FRAME + 1)), spec)
     o = belief.probability
     image = network_image(drive[FRAME], trained.need_architecture().image_size).numpy()

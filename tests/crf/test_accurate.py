@@ -8,10 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 from scipy.special import softmax
-from worlds.lecture_11_accurate import mean_field_accurate
+from worlds.lecture_11_accurate import RADIUS, WindowedGaussian, mean_field_accurate
 
 from semgrid_edu.crf import CrfParams, gram_matrix, mean_field_naive, unary_from_probability
-from semgrid_edu.fast.crf.windowed import RADIUS, WindowedGaussian
 
 BOTH = pytest.mark.parametrize("normalization", ["symmetric", "none"])
 

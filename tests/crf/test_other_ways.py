@@ -10,6 +10,7 @@ from scipy.special import softmax
 from sklearn.kernel_approximation import Nystroem
 from worlds import lecture_11_coupling as coupling_study
 from worlds import lecture_11_error as error_study
+from worlds.lecture_10_crf import all_free, coupled, two_classes
 from worlds.lecture_11_coupling import random_crf
 from worlds.lecture_11_error import CROP, N_CROPS, CrfProblem, crops
 from worlds.lecture_11_other_ways import LowRankGaussian, mean_field_low_rank, potts_messages, visit_labellings
@@ -27,7 +28,6 @@ from semgrid_edu.crf import (
 )
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import loopy_max_product, sum_product
-from semgrid_edu.stage_models.crf import all_free, coupled, two_classes
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 

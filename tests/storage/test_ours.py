@@ -9,7 +9,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, SensorModel
 from semgrid_edu.storage.files import check_ours, write_json
 from semgrid_edu.training import TrainingParams
-from semgrid_edu.workshop.demo.run import CompileBar
+from semgrid_edu.workshop.demo.compile_bar import CompileBar
 
 MARK = '"command": "semgrid-edu evaluate '
 

@@ -41,7 +41,7 @@ from semgrid_edu.pipeline import network_image
 from semgrid_edu.planes import plane_heights, plane_pixels
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.batches import Batch, draw_batch, grid_logits
-from semgrid_edu.training.devices import keep_freed_memory
+from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.training.log import read_log
 from semgrid_edu.training.loss import class_weights
 

@@ -12,13 +12,15 @@ from torch.utils.data import Subset
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
+from semgrid_edu.fast import build_net, load_net
+from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.labels import LABEL_SETS
-from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_net, load_net
+from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.tensors import read_tensors
 from semgrid_edu.training import Objective, TrainingParams, train
 from semgrid_edu.training.batches import Batch
-from semgrid_edu.training.devices import choose_device
+from semgrid_edu.training.devices import open_fabric
 from semgrid_edu.training.loop import learn
 from semgrid_edu.workshop.paper.data_runs import ArraysRun
 from semgrid_edu.workshop.paper.loop import few_threads
@@ -52,10 +54,11 @@ class TrainingRun(Run):
 
     def work(self, root: Path, device: str) -> None:
         """Train, from a checkpoint if there is one. Parameters are those of `Run.work`."""
+        keep_freed_memory()
         folder, frames = self.folder(root), self.arrays.frames(root)
         if not (folder / WEIGHTS).exists():
             net = self.net(root, frames.camera)
-            train(net, self.chosen(frames), folder, self.params, self.seed, True, choose_device(device))
+            train(net, self.chosen(frames), folder, self.params, self.seed, True, open_fabric(device))
 
     def has_ended(self, root: str | Path) -> bool:
         """Return whether the network is there. Parameters are those of `Run.folder`."""
@@ -84,12 +87,13 @@ def seconds_per_step(described: Architecture, params: TrainingParams, stage: str
     labels, truth = (torch.zeros((n, *part), dtype=torch.uint8) for part in (size, shape))
     batch = Batch(Sample(image, labels, occupancy, truth), mirrored=False)
     optimiser = torch.optim.SGD(net.parameters(), lr=1e-6, momentum=params.momentum)
-    objective = Objective(net, stage, torch.ones(len(LABEL_SETS[described.label_set])))
+    fabric = open_fabric("cpu")
+    objective = fabric.setup_module(Objective(net, stage, torch.ones(len(LABEL_SETS[described.label_set]))))
     with few_threads():
-        learn(objective, optimiser, batch, torch.device("cpu"))
+        learn(fabric, objective, optimiser, batch)
         began = time.perf_counter()
         for _ in range(TIMED_STEPS):
-            learn(objective, optimiser, batch, torch.device("cpu"))
+            learn(fabric, objective, optimiser, batch)
     return (time.perf_counter() - began) / TIMED_STEPS
 
 

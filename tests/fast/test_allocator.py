@@ -6,7 +6,7 @@ import pytest
 CODE = """
 import resource
 import numpy as np
-from semgrid_edu.training.devices import keep_freed_memory
+from semgrid_edu.fast.allocator import keep_freed_memory
 
 
 def pages_touched_anew(buffers):

@@ -1,68 +1,25 @@
-"""What grading must do with every exercise; one subclass an exercise, with its catalogue of answers.
+"""What grading must do with every exercise, one class an exercise, with its catalogue of answers.
 
 nbgrader grades three students of each exercise. The whole catalogue is graded in a warm session (`warm`), which must
 give these three the same points and messages.
 """
 
 import re
-from dataclasses import dataclass
 from unittest import mock
 
 import pytest
 from answers_in_disguise import HONEST, POINTLESS, disguise, spoil
+from entries import Entry, entries_of, exercises, kind, pack, source_of
 from nbgrader_scores import autograde, tasks
 from submissions import reference_answers, submission
 from warm import grade_warm, warm_processes
 
 from semgrid_edu.workshop.course.nbgrader import preprocessors
 from semgrid_edu.workshop.course.nbgrader.preprocessors import prepare, prepared_folder
-from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 
 TIMEOUT = {"answer": 30, "endless loop": 1}
 """Seconds for a cell: enough for any answer on a busy machine; what each call of an endless loop costs."""
-
-ENDLESS = ("before timeout", "does not come to an end")
-"""What a visible test and a hidden one say of an endless loop."""
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One answer to one task, and what it must lose."""
-
-    title: str
-    task: str
-    code: str
-    loses: float = 0
-    says: str = ""
-
-    @property
-    def kind(self) -> str:
-        """Whether the answer ends, as `TIMEOUT` names it."""
-        return "endless loop" if any(words in self.says for words in ENDLESS) else "answer"
-
-
-def mistake(title: str, *, task: str, loses: float, says: str, code: str) -> Entry:
-    """Catalogue a real mistake: the points it must lose, and words that must be in its message."""
-    return Entry(title, task, code, loses, says)
-
-
-def right(title: str, *, task: str, code: str) -> Entry:
-    """Catalogue another right way, which must earn full marks."""
-    return Entry(title, task, code)
-
-
-def pack(entries) -> list[dict[str, Entry]]:
-    """Share entries out to students: each answers every task with at most one entry, so that few runs try them all."""
-    students: list[dict[str, Entry]] = []
-    for entry in entries:
-        free = next(
-            (student for student in students if entry.task not in student and kind(student) == entry.kind), None
-        )
-        if free is None:
-            students.append(free := {})
-        free[entry.task] = entry
-    return students
 
 
 def coded(source, answers):
@@ -70,21 +27,16 @@ def coded(source, answers):
     return [answers[task] for task, names in tasks(source).items() if names != (task,)]
 
 
-def kind(student: dict[str, Entry]) -> str:
-    """The kind of all of a student's entries."""
-    return next(iter(student.values())).kind
-
-
-class GraderChecks:
+class Checks:
     """The reference earns all, the stub nothing, and each entry loses what it should; tasks don't touch each other."""
 
     exercise: str
-    entries: tuple[Entry, ...]
+    entries: list[Entry]
 
     @pytest.fixture(scope="class")
     @classmethod
     def source(cls):
-        return NOTEBOOKS / "src" / "exercises" / f"{cls.exercise}.py"
+        return source_of(cls.exercise)
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -97,7 +49,7 @@ class GraderChecks:
     def students(cls, reference):
         """Answers to each task, by student: the reference, the stub, and all entries packed."""
         packed = pack(cls.entries)
-        codes = [{task: entry.code for task, entry in answers.items()} for answers in packed]
+        codes = [{task: entry.code(reference) for task, entry in answers.items()} for answers in packed]
         return {"reference": reference, "stub": {}} | {f"student-{n}": reference | own for n, own in enumerate(codes)}
 
     @pytest.fixture(scope="class")
@@ -209,16 +161,25 @@ class GraderChecks:
         assert {task: message for task, (score, points, message) in scores.items() if score < points} == {}
 
     def test_catalogue_is_complete(self, source):
-        """For each task of code two other right ways, a mistake for its visible and one for its hidden tests."""
-        coded = [task for task, names in tasks(source).items() if names != (task,)]
-        for task in coded:
-            ways = [entry for entry in self.entries if entry.task == task]
-            assert sum(not entry.loses for entry in ways) >= 2, f"{task}: two other right ways"
-            hints = [entry.says for entry in ways if entry.loses]
-            assert any("on inputs you haven't seen" not in hint for hint in hints), (
-                f"{task}: one that visible tests find"
-            )
-            assert any("on inputs you haven't seen" in hint for hint in hints), (
-                f"{task}: one that only hidden tests find"
-            )
+        """Each task of code has another right way, a mistake for its visible tests and one for its hidden ones."""
+        ways = {task: [] for task, names in tasks(source).items() if names != (task,)}
+        for entry in self.entries:
+            ways[entry.task].append(entry)
+        for task, entries in ways.items():
+            hidden = ["on inputs you haven't seen" in entry.says for entry in entries if entry.loses]
+            assert 1 <= len(entries) - len(hidden) <= 2, f"{task}: one or two other right ways"
+            assert {False, True} == {*hidden}, f"{task}: a mistake that visible tests find, and one for hidden ones"
+            assert len(hidden) <= 4, f"{task}: at most four mistakes"
         assert any("before timeout" in entry.says for entry in self.entries), "an endless loop"
+
+
+for exercise in exercises():
+    globals()[f"Test_{exercise}"] = type(
+        f"Test_{exercise}", (Checks,), {"exercise": exercise, "entries": entries_of(exercise)}
+    )
+
+
+def test_the_reference_jackknife_is_not_needed_to_pass_task_4():
+    """A right answer to task 4 of exercise 12 that builds on task 3 is graded beside a wrong answer to task 3."""
+    beside = [own for own in pack(entries_of("12_experiments")) if "jackknife that is wrong" in own["paired"].title]
+    assert [own["towns"].loses > 0 for own in beside] == [True]
