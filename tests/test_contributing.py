@@ -20,8 +20,8 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import SEGMENTERS
 from semgrid_edu.occupancy import CmcdotParams, Evidence, State
 from semgrid_edu.workshop.commands.main import app
-from semgrid_edu.workshop.paper.reports import ablations, reproduce
-from semgrid_edu.workshop.paper.runs.variants import Variant
+from semgrid_edu.workshop.paper import ablations, reproduce
+from semgrid_edu.workshop.paper.variants import Variant
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
