@@ -4,7 +4,7 @@
 stands here.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import tee
 from typing import NamedTuple
 
@@ -35,11 +35,14 @@ class ArrayRecipe(NamedTuple):
         Height and width of the resized images, pixels.
     params : CmcdotParams
         Parameters of the occupancy filter.
+    track : callable
+        Runs the filter over a drive: `track_drive`, or its fast twin.
     """
 
     spec: GridSpec
     image_size: tuple[int, int]
     params: CmcdotParams
+    track: Callable = track_drive
 
 
 def drive_arrays(drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRecipe) -> list[dict[str, NDArray]]:
@@ -61,7 +64,7 @@ def drive_arrays(drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRec
         (H, W) uint8, and "return_pixels" and "return_cells" from `seen_returns`.
     """
     frames, scans = tee(drive[k] for k in range(max(labelled) + 1))
-    beliefs = track_drive(scans, recipe.spec, recipe.params, SEED)
+    beliefs = recipe.track(scans, recipe.spec, recipe.params, SEED)
     arrays = {
         k: _frame_arrays(drive, k, frame, belief.probability, recipe)
         for k, (frame, belief) in enumerate(zip(frames, beliefs, strict=True))
