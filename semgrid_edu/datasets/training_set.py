@@ -176,7 +176,7 @@ class Mixture(Sequence[Sample]):
     Parameters
     ----------
     data_sets : sequence of sequence of TrainingSet
-        For each data set the frames of each of its cameras, as `sets_by_camera` returns them.
+        For each data set the frames of each of its cameras, as `TrainingSet.by_camera` returns them.
 
     Attributes
     ----------
