@@ -2,7 +2,6 @@
 
 import ast
 import re
-from collections import defaultdict
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -52,25 +51,9 @@ def is_module(name: str) -> bool:
     return place.with_suffix(".py").is_file() or (place / "__init__.py").is_file()
 
 
-def folder_of(name: str) -> str:
-    """The folder of a module; a folder is its own, and so is a module of the top."""
-    is_folder = (PACKAGE.joinpath(*name.split(".")) / "__init__.py").is_file()
-    return name if is_folder else name.rpartition(".")[0] or name
-
-
 def storey(name: str) -> str:
     first = name.split(".")[0]
     return {"fast": "fast", "workshop": "workshop", "__main__": "workshop"}.get(first, "book")
-
-
-def imports_between_folders() -> dict[str, set[str]]:
-    """Which folders the modules of each folder import from, without what `__init__` collects from its own."""
-    graph = defaultdict(set)
-    for path in MODULES:
-        if dotted(path) != ASSEMBLES_EITHER:
-            here = folder_of(dotted(path))
-            graph[here] |= {folder_of(name) for name in imported(path)} - {here}
-    return graph
 
 
 def test_the_map_names_every_room_once():
@@ -114,10 +97,6 @@ def test_a_room_imports_only_from_what_stands_above_it():
         if order.get(room_of(name), len(order)) > order.get(room_of(dotted(path)), len(order))
     ]
     assert back == []
-
-
-def test_no_folder_imports_in_a_circle():
-    TopologicalSorter(imports_between_folders()).prepare()  # raises CycleError, which names the circle
 
 
 def test_no_module_imports_in_a_circle():
