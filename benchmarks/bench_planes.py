@@ -21,10 +21,10 @@ from torch import Tensor
 from torch.func import functional_call
 
 from semgrid_edu.camera import Camera
+from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks.fusion import PlaneConvolution
 from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels
-from semgrid_edu.training.devices import keep_freed_memory
 
 N_CLASSES, N_REDUCED, ROUNDS = 14, 16, 15
 KITTI_SIZE = (375, 1242)

@@ -4,15 +4,15 @@
 
 A fusion network learns from either on the scores of the first stage of `segnet_compact`, and is scored on the labelled
 returns of PandaSet's scene 002; then it learns from four of the scene's cameras and is scored on the two others, as in
-`reproduce real-streets`. A run that has ended isn't repeated.
+`worlds.lecture_08_real_streets`. A run that has ended isn't repeated.
 """
 
 import argparse
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
@@ -23,7 +23,10 @@ from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture
 from semgrid_edu.training import TrainingParams
 from semgrid_edu.workshop.scoring.score_with_interval import compared, on_cells, shown
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E_AHEAD
-from semgrid_edu.workshop.studies.training import real_streets as study
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "notebooks"))
+
+from worlds import lecture_08_real_streets as study
 
 FIFTH = 5
 """A thinned scan keeps one of so many columns."""
@@ -55,7 +58,7 @@ def thin_data_set(folder: Path, out: Path) -> Path:
 def learned(way, start: Path, parts: list[list], folder: Path, seed: int) -> Path:
     """Return the weights that a network learns in this way from parts of frames."""
     if not (folder / WEIGHTS).exists():
-        study._train(way, [start], Mixture(parts), folder, seed, torch.device("cpu"))
+        study._train(way, [start], Mixture(parts), folder, seed, "cpu")
     return folder / WEIGHTS
 
 

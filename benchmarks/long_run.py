@@ -18,9 +18,10 @@ from time import process_time
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import ClassMemory, Cmcdot
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.memory import ClassMap, MemoryParams
-from semgrid_edu.occupancy import Belief, Cmcdot, CmcdotParams, PlanarMotion
+from semgrid_edu.memory import MemoryParams
+from semgrid_edu.occupancy import Belief, CmcdotParams, PlanarMotion
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
 
@@ -103,7 +104,7 @@ def long_run(
     if min(steps, every) < 1:
         raise ArgumentError("steps, every", "at least one", f"{steps}, {every}")
     tracker, rng, digest = Cmcdot(spec, params, seed), np.random.default_rng(seed), hashlib.sha256()
-    classes = ClassMap(spec, 2, MemoryParams(movable=(1,)))
+    classes = ClassMemory(spec, MemoryParams(movable=(1,)))
     time, before, worst_sum, lowest, worst_class_sum, spent = 0.0, pose_at(0.0), 0.0, 1.0, 0.0, 0.0
     done = 0
     for step in range(1, steps + 1):
@@ -118,7 +119,7 @@ def long_run(
         worst_sum = np.maximum(worst_sum, np.abs(belief.probability.sum(axis=0, dtype=np.float64) - 1).max())
         lowest = np.minimum(lowest, belief.probability.min())
         began = process_time()
-        remembered = classes.step(seen_ahead(belief, spec), belief, motion, dt)
+        remembered = classes.advance(seen_ahead(belief, spec), belief, motion, dt)
         spent += process_time() - began
         worst_class_sum = np.maximum(worst_class_sum, np.abs(remembered.sum(axis=0, dtype=np.float64) - 1).max())
         _add(digest, belief, remembered)

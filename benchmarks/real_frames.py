@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from semgrid_edu import plotting
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import real_weights
+from semgrid_edu.fast import load_net
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import confusion_matrix
-from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import FrameResult, Stages, run_pipeline
 from semgrid_edu.plotting.colours import colour_patches
 from semgrid_edu.plotting.images import blend_labels, draw_image

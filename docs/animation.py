@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from semgrid_edu.datasets.samples import real_drive, real_weights
+from semgrid_edu.fast import load_net
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import FrameResult, Stages, run_pipeline
 from semgrid_edu.plotting import occupancy_colours
 from semgrid_edu.plotting.animations import animate

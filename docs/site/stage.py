@@ -42,7 +42,7 @@ SECTIONS = ("lectures", "companions", "exercises", "graphs", "glossary", "result
 """The pages of the site's bar."""
 MODULES = (
     *("answers", "camera", "crf", "datasets", "errors", "frame", "graphical", "grid", "labels", "memory", "metrics"),
-    *("networks", "occupancy", "pipeline", "planes", "plotting", "storage", "story", "training"),
+    *("networks", "occupancy", "pipeline", "planes", "plotting", "storage", "training"),
 )
 """The modules and rooms of the book, each a page of the reference."""
 LINK = re.compile(r"```.*?```|`[^`\n]*`|(!?\[(?:[^\[\]]|\[[^\]]*\])*\])\(([^()\s#:]+)(#[^()\s]*)?\)", re.DOTALL)

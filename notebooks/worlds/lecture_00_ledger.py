@@ -168,7 +168,7 @@ STAGES = (
         "The whole system, from world to semantic grid",
         lecture_00_system.whole_system,
         lecture_00_system.CUT,
-        "tests/worlds/test_system.py::test_who_knows_more_loses_less",
+        "tests/worlds/test_system.py::test_o_is_the_exact_filter_of_each_cell",
         "00_tour#system-graph",
     ),
     Stage(

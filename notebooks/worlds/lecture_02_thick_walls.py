@@ -182,8 +182,8 @@ def _pose_error(world: BeamWorld) -> NDArray[np.float64]:
 
 def _shifted(world: BeamWorld) -> NDArray[np.float64]:
     """Return P(z | r, e): 1 for z = r + e, otherwise 0; the last state of r and of z is "none"."""
-    ranges = np.arange(world.n_ranges)[:, None] * BINS_PER_CELL + _offsets(world)
-    table = np.zeros((world.n_ranges + 1, len(_offsets(world)), len(range_bins(world)) + 1))
+    ranges = np.arange(world.n_cells)[:, None] * BINS_PER_CELL + _offsets(world)
+    table = np.zeros((world.n_cells + 1, len(_offsets(world)), len(range_bins(world)) + 1))
     table[:-1] = np.eye(table.shape[2])[ranges - _offsets(world)[0]]
     table[-1, :, -1] = 1
     return table

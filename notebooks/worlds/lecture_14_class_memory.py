@@ -102,15 +102,13 @@ def readings(named: Sequence[int], stopped: Sequence[int]) -> dict[str, int]:
     return observed | {f"l{t}": int(value) for t, value in enumerate(stopped)}
 
 
-def exact_classes(
-    world: MemoryWorld, named: Sequence[int], stopped: Sequence[int], smooth: bool = False
-) -> NDArray[np.float64]:
-    """Return P(class at each frame | frames up to it), or given all frames with `smooth`, by elimination; (T, 4)."""
+def exact_classes(world: MemoryWorld, named: Sequence[int], stopped: Sequence[int]) -> NDArray[np.float64]:
+    """Return P(class at each frame | frames up to it) by elimination, (T, 4)."""
     model = class_over_time(world).model
     known = readings(named, stopped)
     beliefs = []
     for t in range(world.steps):
-        given = known if smooth else {name: known[name] for k in range(t + 1) for name in (f"z{k}", f"l{k}")}
+        given = {name: known[name] for k in range(t + 1) for name in (f"z{k}", f"l{k}")}
         beliefs.append(eliminate(model, f"m{t}", given).normalised().table @ CLASS_OF)
     return np.array(beliefs)
 

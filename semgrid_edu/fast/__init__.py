@@ -30,8 +30,10 @@ _WHERE: dict[str, str] = {
     # planes and memory
     "ClassMemory": "memory",
     "PlaneSampler": "planes",
+    "build_net": "networks",
     "carry_classes": "memory",
     "learn_classes": "memory",
+    "load_net": "networks",
     "look_at": "memory",
     "recall_classes": "memory",
     "remember_drive": "memory",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu import memory as book
 from semgrid_edu.errors import check_shape
+from semgrid_edu.fast.occupancy.planar_motion import look_up
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.memory import Look, MemoryParams, MemoryState, View
 from semgrid_edu.memory.state import FAINT, MOVES, check_look, something_there
@@ -230,6 +231,7 @@ class ClassMemory(book.ClassMemory):
     """A memory of classes with compiled steps. Parameters are those of `ClassMemory` in `semgrid_edu.memory`."""
 
     look_at = staticmethod(look_at)
+    look_up = staticmethod(look_up)
     carry = staticmethod(carry_classes)
     recall = staticmethod(recall_classes)
     learn = staticmethod(learn_classes)

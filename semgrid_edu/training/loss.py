@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -15,6 +16,9 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.training.batches import Batch, grid_logits, image_scores
+
+if TYPE_CHECKING:
+    from lightning_fabric import Fabric
 
 TRUTH = {"image": "labels", "grid": "truth"}
 """The field of `Sample` that each stage learns from."""
@@ -201,10 +205,34 @@ def cross_entropy_sums(scores: Tensor, truth: Tensor, alpha: Tensor) -> tuple[Te
     return losses, alpha[truth[truth != IGNORE]].sum()
 
 
+def process_loss(fabric: "Fabric", losses: Tensor, weights: Tensor) -> Tensor:
+    """Return this process's part of the loss, such that the mean over processes is the loss of the whole batch.
+
+    The mean over processes is what distributed training takes of the gradients. With one process the part is the loss
+    itself, losses / weights.
+
+    Parameters
+    ----------
+    fabric : lightning_fabric.Fabric
+        The processes.
+    losses : () float
+        Sum of the weighted losses in this process, nats.
+    weights : () float
+        Sum of the weights in this process.
+
+    Returns
+    -------
+    () float
+        0 when no process has any weight: such a batch teaches nothing, and 0/0 would stop the run.
+    """
+    total = fabric.all_reduce(weights.clone(), reduce_op="sum")
+    return fabric.world_size * losses / total.clamp_min(torch.finfo(total.dtype).tiny)
+
+
 class Objective(nn.Module):
     """The objective of one stage of training: the weighted cross-entropy of a batch, as its two sums.
 
-    It is a module because `DistributedDataParallel` works through the forward pass of a module.
+    It is a module because Fabric shares gradients among processes through the forward pass of a module.
 
     Parameters
     ----------
@@ -218,7 +246,9 @@ class Objective(nn.Module):
 
     def __init__(self, net: SemanticGridNet, stage: str, alpha: Tensor) -> None:
         super().__init__()
-        self.net, self.stage, self.alpha = net, stage, alpha
+        self.net = net
+        self.stage = stage
+        self.register_buffer("alpha", alpha)
 
     def forward(self, batch: Batch) -> tuple[Tensor, Tensor]:
         """Return the two sums whose quotient is the loss of a batch, see `cross_entropy_sums`.

@@ -66,6 +66,12 @@ class TrainingParams:
         """Number of steps of both stages together."""
         return self.image_iterations + self.grid_iterations
 
+    @property
+    def stages(self) -> list[str]:
+        """The stages that have steps: "image", "grid" or both."""
+        steps = {"image": self.image_iterations, "grid": self.grid_iterations}
+        return [stage for stage, number in steps.items() if number]
+
     def stage(self, iteration: int) -> tuple[str, float]:
         """Return the stage that an iteration belongs to, and the learning rate of its step.
 

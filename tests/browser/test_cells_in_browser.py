@@ -84,7 +84,7 @@ def stories(cells):
     """`cell_story` for each of the cells."""
     drive = sample_drive()
     net = load_net(sample_weights(), drive.camera)
-    results = list(run_pipeline(drive[: FRAME + 1], Stages.of(net, keep_steps=True)))
+    results = list(run_pipeline(drive[: FRAME + 1], Stages.fast(net, keep_steps=True)))
     return {name: cell_story(results[-1], cell, net, past=results[:-1]) for name, cell in cells.items()}
 
 

@@ -27,23 +27,6 @@ from semgrid_edu.workshop.course.nbgrader.gradebook import ungraded, write_grade
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, write_notebook
 
 
-@pytest.fixture(scope="module")
-def notebooks(tmp_path_factory):
-    return tiny_notebooks(tmp_path_factory.mktemp("notebooks"))
-
-
-@pytest.fixture(scope="module")
-def source(notebooks):
-    return notebooks / "src" / "exercises" / "00_tiny.py"
-
-
-@pytest.fixture(scope="module")
-def course(notebooks, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("courses") / "course"
-    build_course(folder, notebooks)
-    return folder
-
-
 def sources(notebook):
     return [(cell.cell_type, cell.source, dict(cell.metadata)) for cell in notebook.cells]
 
@@ -105,26 +88,6 @@ def test_a_written_answer_that_was_read_stays_read(course, source):
     assert "reader,00_tiny,3.0,3.0,0," in write_graded(course).read_text()
 
 
-def test_feedback_tells_nothing_of_the_hidden_inputs(course, source):
-    student = {"guesser": submission(source, {"twice": "def twice(x):\n    return 6"})}
-    message = autograde(course, "00_tiny", student)["guesser"]["twice-test"].message
-    assert "on inputs you haven't seen: wrong" in message
-    graded = (course / "autograded" / "guesser" / "00_tiny" / "00_tiny.ipynb").read_text()
-    assert "secret" not in graded
-    assert "98765" not in graded
-
-
-def test_tests_that_a_student_deletes_or_edits_come_back(course, source):
-    deleted, edited = (submission(source, {"twice": "def twice(x):\n    return 0"}) for _ in range(2))
-    deleted.cells = [c for c in deleted.cells if c.metadata.get("nbgrader", {}).get("grade_id") != "twice-test"]
-    for cell in edited.cells:
-        if cell.metadata.get("nbgrader", {}).get("grade_id") == "twice-test":
-            cell.source = "assert True"
-    scores = autograde(course, "00_tiny", {"deleter": deleted, "editor": edited})
-    assert scores["deleter"]["twice-test"].score == scores["editor"]["twice-test"].score == 0
-    assert "twice 3 is 6, got 0" in scores["deleter"]["twice-test"].message
-
-
 def test_notebook_that_nbgrader_cannot_read_is_an_error_not_a_zero(course):
     path = place(course, "submitted", "breaker", "00_tiny")
     write_text(path, "{")
@@ -160,9 +123,7 @@ CHANGED = ["nbgrader_config.py", "instructor/semgrid_instructor/tiny.py"]
 
 def test_what_the_instructor_changed_stays_and_is_named(tmp_path, notebooks):
     build_course(tmp_path / "course", notebooks)
-    settings, module = (
-        tmp_path / "course" / name for name in ("nbgrader_config.py", "instructor/semgrid_instructor/tiny.py")
-    )
+    settings, module = (tmp_path / "course" / name for name in CHANGED)
     mine = settings.read_text() + "c.ExecuteApart.timeout = 99\n"
     settings.write_text(mine)
     built = build_course(tmp_path / "course", notebooks)
@@ -175,10 +136,7 @@ def test_what_the_instructor_changed_stays_and_is_named(tmp_path, notebooks):
     assert build_course(tmp_path / "course", changed).kept == ["nbgrader_config.py"]
     assert module.read_text() == newer.read_text()
     module.write_text(original)
-    assert build_course(tmp_path / "course", changed).kept == [
-        "nbgrader_config.py",
-        "instructor/semgrid_instructor/tiny.py",
-    ]
+    assert build_course(tmp_path / "course", changed).kept == CHANGED
 
 
 RELATIVE = r"\]\((?!https?://)"

@@ -12,8 +12,8 @@ import pytest
 from nbconvert import HTMLExporter
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
 from nbgrader.utils import is_grade
-from submissions import reference_answers, submission
-from tiny_course import tiny_notebooks
+from submissions import submission
+from tiny_course import TINY
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_json
@@ -26,26 +26,7 @@ from semgrid_edu.workshop.course.nbgrader.gradebook import check_file
 from semgrid_edu.workshop.course.nbgrader.rubric import rubrics
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent, write_notebook
 
-TINY = "00_tiny"
 GUIDE = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")
-
-
-@pytest.fixture(scope="module")
-def notebooks(tmp_path_factory):
-    return tiny_notebooks(tmp_path_factory.mktemp("notebooks"))
-
-
-@pytest.fixture(scope="module")
-def course(notebooks, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("courses") / "course"
-    build_course(folder, notebooks)
-    return folder
-
-
-@pytest.fixture
-def right(notebooks):
-    source = notebooks / "src" / "exercises" / f"{TINY}.py"
-    return submission(source, reference_answers(source) | {"why": "Since 2 is 2."})
 
 
 def graded(course, student, notebook):

@@ -4,14 +4,13 @@ import tempfile
 
 import pytest
 from submissions import reference_answers, submission
-from tiny_course import tiny_notebooks
+from tiny_course import TINY, tiny_notebooks
 
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place
 from semgrid_edu.workshop.course.nbgrader.build import build_course
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
 
-TINY = "00_tiny"
 KILLS = "if twice(0) == 'kill': import os; os._exit(9)\n    "
 GROWS = "np.zeros(10**9, dtype=np.uint8)[:, None] == np.zeros((1, 9)) if twice(0) == 'grow' else 0\n    "
 

@@ -11,8 +11,7 @@ import pytest
 from nbconvert.writers import FilesWriter
 from nbgrader.api import Gradebook, InvalidEntry
 from sqlalchemy.exc import PendingRollbackError
-from submissions import reference_answers, submission
-from tiny_course import tiny_notebooks
+from tiny_course import TINY
 from typer.testing import CliRunner
 
 from semgrid_edu.errors import DataError
@@ -30,26 +29,7 @@ from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
-TINY = "00_tiny"
 DEAD = GradeSettings(container=("false",))
-
-
-@pytest.fixture(scope="module")
-def notebooks(tmp_path_factory):
-    return tiny_notebooks(tmp_path_factory.mktemp("notebooks"))
-
-
-@pytest.fixture(scope="module")
-def right(notebooks):
-    source = notebooks / "src" / "exercises" / f"{TINY}.py"
-    return submission(source, reference_answers(source) | {"why": "Since 2 is 2."})
-
-
-@pytest.fixture(scope="module")
-def course(notebooks, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("courses") / "course"
-    build_course(folder, notebooks)
-    return folder
 
 
 @pytest.fixture

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 
+TINY = "00_tiny"
+
 EXERCISE = """\
 # %% [markdown]
 # # A tiny exercise
@@ -47,7 +49,7 @@ def tiny_notebooks(folder: Path) -> Path:
     """Write the sources of the tiny course, and return its folder of notebooks."""
     exercises = folder / "src" / "exercises"
     exercises.mkdir(parents=True)
-    (exercises / "00_tiny.py").write_text(EXERCISE)
+    (exercises / f"{TINY}.py").write_text(EXERCISE)
     shutil.copytree(NOTEBOOKS / "instructor", folder / "instructor", ignore=shutil.ignore_patterns("__pycache__"))
     (folder / "instructor" / "semgrid_instructor" / "tiny.py").write_text(HIDDEN)
     return folder

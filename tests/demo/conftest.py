@@ -41,6 +41,14 @@ def last_labelled(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def drive(tmp_path_factory):
+    """A drive of three frames, the last two of which are labelled."""
+    root = tmp_path_factory.mktemp("drive")
+    write_tiny_drive(root, labelled=(1, 2))
+    return KittiRawDrive(root, DATE, "0001")
+
+
+@pytest.fixture(scope="session")
 def net(last_labelled, make_net):
     return make_net(last_labelled.camera)
 
@@ -48,7 +56,7 @@ def net(last_labelled, make_net):
 @pytest.fixture(scope="session")
 def told(last_labelled, net):
     """The results of all frames, with the filter's steps and with memory."""
-    return list(run_pipeline(last_labelled, Stages.of(net, keep_steps=True, memory=True)))
+    return list(run_pipeline(last_labelled, Stages.fast(net, keep_steps=True, memory=True)))
 
 
 @pytest.fixture(scope="session")

@@ -225,7 +225,7 @@ def test_the_page_of_the_shipped_drive_stays_below_12_and_a_half_megabytes():
     shipped = sample_drive()
     net = load_net(sample_weights(), shipped.camera)
     record = Record(SPEC, KITTI_14, net=net)
-    for result in run_pipeline(shipped[8:10], Stages.of(net, keep_steps=True)):
+    for result in run_pipeline(shipped[8:10], Stages.fast(net, keep_steps=True)):
         record.add(result)
     assert len(shipped) * max(len(json.dumps(vars(view))) for view in record.views) < 12.4e6
     assert _stories_every(len(shipped), SPEC) == 1

@@ -43,13 +43,6 @@ pytestmark = pytest.mark.usefixtures("few_stories")
 
 
 @pytest.fixture(scope="module")
-def drive(tmp_path_factory):
-    root = tmp_path_factory.mktemp("drive")
-    write_tiny_drive(root, labelled=(1, 2))
-    return KittiRawDrive(root, DATE, "0001")
-
-
-@pytest.fixture(scope="module")
 def weights(drive, tmp_path_factory):
     path = tmp_path_factory.mktemp("weights") / "net.safetensors"
     save_net(build_net(Architecture(), drive.camera, seed=3), path)

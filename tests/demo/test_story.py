@@ -13,9 +13,11 @@ from torch import nn
 from semgrid_edu.crf import CrfParams, damping, gram_matrix, mean_field_naive, pair_weights, unary_from_probability
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, build_net
-from semgrid_edu.occupancy import CmcdotParams, SensorModel, track_drive
+from semgrid_edu.occupancy import CmcdotParams, SensorModel, scan_evidence, update
+from semgrid_edu.occupancy.state import FilterState, Particles
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.workshop.demo import cell_story, draw_cell_story
 from semgrid_edu.workshop.demo.all_cells import frame_story
@@ -23,6 +25,7 @@ from semgrid_edu.workshop.demo.contributions import contributions
 from semgrid_edu.workshop.demo.evidence import VERDICTS, place_history, scan_maps
 from semgrid_edu.workshop.demo.neighbours import neighbour_pull
 
+PARAMS = CmcdotParams(n_particles=5000)
 SPEC = GridSpec.compact()
 SMALL_GRID = GridSpec(0, 16, -8, 8, 0.5)
 
@@ -38,8 +41,7 @@ def by_gradient(net, scores, o, cell, label) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_keeping_the_steps_changes_no_bit_and_each_sums_to_one(last_labelled):
-    params = CmcdotParams(n_particles=5000)
-    both = [list(track_drive(last_labelled, SPEC, params, keep_steps=keep)) for keep in (False, True)]
+    both = [list(track_drive(last_labelled, SPEC, PARAMS, keep_steps=keep)) for keep in (False, True)]
     for plain, kept in zip(*both, strict=True):
         for name in ("probability", "velocity", "velocity_covariance"):
             np.testing.assert_array_equal(getattr(plain, name), getattr(kept, name))
@@ -49,6 +51,15 @@ def test_keeping_the_steps_changes_no_bit_and_each_sums_to_one(last_labelled):
             assert states.shape == (4, *SPEC.shape)
             np.testing.assert_allclose(states.sum(axis=0), 1, atol=1e-5)
     np.testing.assert_array_equal(both[1][0].steps["move"][3], 1)  # nothing is known when the first frame begins
+
+
+def test_what_is_shown_is_the_prediction_updated_with_the_scan_in_these_cells(last_labelled):
+    beliefs = track_drive(last_labelled, SPEC, PARAMS, keep_steps=True)
+    for frame, belief in zip(last_labelled, beliefs, strict=True):
+        evidence = scan_evidence(frame.points_grid, SPEC, SensorModel())
+        predicted = FilterState(belief.steps["predict"], Particles.none(), np.zeros(SPEC.shape))
+        updated = update(predicted, SPEC, evidence, PARAMS)
+        np.testing.assert_allclose(belief.probability, updated.probability, atol=1e-5)
 
 
 def test_a_wall_by_hand():

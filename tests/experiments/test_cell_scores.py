@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
+from worlds.lecture_04_cell_scores import CellScores, Estimate, hit_cell_groups
+from worlds.lecture_04_scenes import CellTruth, KnownScene, SceneHistory, pool_truth
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, PlanarMotion, State
 from semgrid_edu.workshop.simulation.things.materials import Kind
-from semgrid_edu.workshop.studies.filter.cell_scores import CellScores, Estimate, hit_cell_groups
-from semgrid_edu.workshop.studies.filter.scenes import CellTruth, KnownScene, SceneHistory, pool_truth
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(0, 1, 0, 5, 1)

@@ -5,7 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from worlds.lecture_04_scenes import labelled_frame
+from worlds.lecture_14_counts import (
+    GROUPS,
+    GainCounts,
+    count_cells,
+    frames_in_view,
+    memory_tables,
+)
+from worlds.lecture_14_gain import FIRST, LAST, real_blocks
 
 import semgrid_edu
 from semgrid_edu.datasets.samples import sample_drive
@@ -14,20 +22,9 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.memory import View
 from semgrid_edu.occupancy import Belief
-from semgrid_edu.workshop.commands.main import app
+from semgrid_edu.workshop.course.street import frames_since_seen
 from semgrid_edu.workshop.scoring.statistics import MIN_DRIVES
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
-from semgrid_edu.workshop.studies.filter import memory_gain
-from semgrid_edu.workshop.studies.filter.memory_counts import (
-    GROUPS,
-    GainCounts,
-    count_cells,
-    frames_in_view,
-    frames_since_seen,
-    memory_tables,
-)
-from semgrid_edu.workshop.studies.filter.memory_gain import FIRST, LAST, real_blocks
-from semgrid_edu.workshop.studies.filter.scenes import labelled_frame
 
 SPEC = GridSpec(0, 71, -15.5, 15.5, 1.0)
 COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "memory.json"
@@ -125,20 +122,11 @@ def test_a_simulated_frame_has_its_image():
     assert taken.labels.visible.any()
 
 
-def test_the_command_keeps_the_result_and_prints_its_tables(monkeypatch, tmp_path):
-    result = json.loads(COMMITTED.read_text())
-    monkeypatch.setattr(memory_gain, "measure_memory", lambda *asked: result)
-    arguments = ["reproduce", "memory", "--pandaset", str(tmp_path), "--out", str(tmp_path / "memory.json")]
-    shown = CliRunner().invoke(app, arguments)
-    assert shown.exit_code == 0, shown.output
-    assert memory_tables(result) in shown.output
-    assert json.loads((tmp_path / "memory.json").read_text()) == result
-
-
 def test_the_committed_result_is_whole():
     result = json.loads(COMMITTED.read_text())
     assert result["drives"] >= MIN_DRIVES
     for groups in result["scores"].values():
         assert all(groups[name]["cells"] for name in GROUPS)
+    assert all(street in memory_tables(result) for street in result["scores"])
     worth = result["worth"]
     assert worth["best"] == [float(min(worth["log loss"], key=lambda w: worth["log loss"][w][k])) for k in range(5)]

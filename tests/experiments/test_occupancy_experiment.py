@@ -1,26 +1,23 @@
 """The comparison of occupancy filters on simulated drives, and what CMCDOT's defaults have to do there."""
 
 import json
-from functools import partial
 from pathlib import Path
 
 import pytest
+from worlds.lecture_04_cell_scores import CellScores, Estimate
+from worlds.lecture_04_filters import GRIDS, LIDARS, METHODS, compare_filters, occupancy_table, occupancy_tables
+from worlds.lecture_04_scenes import known_scenes
 
 import semgrid_edu
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Cmcdot
-from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
 from semgrid_edu.workshop.simulation.street.trajectories import STAND, ActorPace, Trajectory
-from semgrid_edu.workshop.simulation.things.cars import car_size
+from semgrid_edu.workshop.simulation.things.cars_and_people import car_size
 from semgrid_edu.workshop.simulation.things.materials import Kind
-from semgrid_edu.workshop.studies.filter.cell_scores import CellScores, Estimate
-from semgrid_edu.workshop.studies.filter.occupancy import GRIDS, LIDARS, METHODS, compare_filters, occupancy_table
-from semgrid_edu.workshop.studies.filter.scenes import known_scenes
 
 COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "occupancy.json"
 WALKERS = "walking pedestrians, to 25 m"
@@ -71,24 +68,10 @@ def test_the_committed_comparison_says_the_same_of_all_its_drives(lidar, grid):
         assert hits[name]["dynamic"] <= 0.03
 
 
-def test_the_command_writes_what_compare_returns_and_prints_it_as_a_table(tmp_path, monkeypatch, capsys):
-    out = tmp_path / "occupancy.json"
-    monkeypatch.setattr(
-        "semgrid_edu.workshop.studies.filter.occupancy.compare_filters", partial(compare_filters, frames=2)
-    )
-    arguments = ["reproduce", "occupancy", "--seed", "1", "--drives", "1", "--grid", "compact", "--out", str(out)]
-    monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments])
-    with pytest.raises(SystemExit, match="0"):
-        run()
-    written = json.loads(out.read_text())
-    again = compare_filters(seed=1, drives=1, grids=("compact",), frames=2)
-    assert written["scores"] == again["scores"]
-    assert (
-        written["command"] == again["command"] == "semgrid-edu reproduce occupancy --seed 1 --drives 1 --grid compact"
-    )
-    printed = capsys.readouterr().out
-    assert occupancy_table(written, "HDL-64E", "compact") in printed
-    assert occupancy_table(written, "coarse", "compact") in printed
+def test_a_comparison_has_scores_for_each_lidar_grid_and_filter():
+    result = compare_filters(seed=1, drives=1, grids=("compact",), frames=2)
+    assert {(lidar, *grids) for lidar, grids in result["scores"].items()} == {(lidar, "compact") for lidar in LIDARS}
+    assert occupancy_table(result, "coarse", "compact") in occupancy_tables(result)
 
 
 def test_a_table_has_one_column_a_method():
@@ -96,18 +79,3 @@ def test_a_table_has_one_column_a_method():
     assert [cell.strip() for cell in lines[0].split("|")[2:-1]] == list(METHODS)
     assert {line.count("|") for line in lines} == {2 + len(METHODS)}
     assert len({len(line) for line in lines}) == 1
-
-
-def test_an_unknown_grid_is_refused(monkeypatch):
-    monkeypatch.setattr("sys.argv", ["semgrid-edu", "reproduce", "occupancy", "--grid", "huge"])
-    with pytest.raises(SystemExit, match="semgrid-edu: grid: expected paper or compact, found huge"):
-        run()
-
-
-@pytest.mark.parametrize(
-    ("bad", "name"),
-    [({"drives": 0}, "drives"), ({"frames": 0}, "frames"), ({"seed": -1}, "seed"), ({"grids": ()}, "grid")],
-)
-def test_nothing_to_do_is_refused_by_name(bad, name):
-    with pytest.raises(ArgumentError, match=name):
-        compare_filters(**bad)

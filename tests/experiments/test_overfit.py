@@ -1,19 +1,16 @@
 """Four frames learnt by heart: small networks do it in seconds, and the experiment reports what it did."""
 
-import json
 from dataclasses import replace
 
 import pytest
 import torch
 from sklearn.metrics import accuracy_score
 from tiny_streets import CAMERA, SMALL, tiny_streets
-from typer.testing import CliRunner
+from worlds import lecture_08_overfit as overfit
 
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import SEGMENTERS, build_net
 from semgrid_edu.training.batches import draw_batch
-from semgrid_edu.workshop.commands.main import app
-from semgrid_edu.workshop.studies.training import overfit
 
 
 @pytest.fixture(autouse=True)
@@ -65,17 +62,3 @@ def test_every_step_sees_the_frames_as_they_are(streets):
             sorted((street.image / 255).sum().item() for street in streets)
         )
     assert any(draw_batch(streets, 4, 0.0, k, 0).mirrored for k in range(8))
-
-
-def test_the_command_reports_every_network(tmp_path, monkeypatch):
-    monkeypatch.setattr(overfit, "PARAMS", replace(overfit.PARAMS, grid_iterations=1))
-    two = {name: SEGMENTERS[name] for name in ("segnet", "unet")}
-    monkeypatch.setattr(overfit, "SEGMENTERS", two)
-    result = CliRunner().invoke(app, ["reproduce", "overfit", "--seed", "3", "--out", str(tmp_path / "overfit.json")])
-    assert result.exit_code == 0, result.output
-    written = json.loads((tmp_path / "overfit.json").read_text())
-    assert list(written["networks"]) == list(two)
-    assert written["command"] == "semgrid-edu reproduce overfit --seed 3"
-    assert written["seed"] == 3
-    assert written["params"]["grid_iterations"] == 1
-    assert all(name in result.output for name in two)

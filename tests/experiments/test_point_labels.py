@@ -1,14 +1,13 @@
 """How wrong truth from labelled returns is: the counts add up, and carrying moving things is better than smearing."""
 
 import pytest
-
-from semgrid_edu.workshop.studies.ground_truth import point_labels
-from semgrid_edu.workshop.studies.ground_truth.counts import counts_of, truth_tables
+from worlds.lecture_09_counts import counts_of, truth_tables
+from worlds.lecture_09_point_labels import point_labels
 
 
 @pytest.fixture(scope="module")
 def result():
-    return point_labels.point_labels(drives=1, lidar="coarse")
+    return point_labels(drives=1, lidar="coarse")
 
 
 @pytest.fixture(scope="module")

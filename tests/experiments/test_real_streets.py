@@ -7,6 +7,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from tiny_pandaset import SCENE, write_tiny_pandaset
+from worlds import lecture_08_real_streets as real_streets
+from worlds.lecture_08_real_streets import (
+    LATER,
+    LEFT_OUT,
+    STATE_TABLE,
+    WayToTrain,
+    compare_real,
+    splits,
+)
 
 import semgrid_edu
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
@@ -18,15 +27,6 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture
 from semgrid_edu.training import TrainingParams
 from semgrid_edu.workshop.scoring.score_with_interval import shown
-from semgrid_edu.workshop.studies.training import real_streets
-from semgrid_edu.workshop.studies.training.real_streets import (
-    LATER,
-    LEFT_OUT,
-    STATE_TABLE,
-    WayToTrain,
-    compare_real,
-    splits,
-)
 
 CLONE = Path(semgrid_edu.__file__).parents[1]
 

@@ -1,25 +1,11 @@
-"""The policy laboratory: counts by hand, trials on the sample drive, and a run that is interrupted."""
+"""How wrong ways of making ground truth are: counts by hand, and trials on the sample drive."""
 
-import json
 import re
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
-
-from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.ground_truth import TruthPolicy
-from semgrid_edu.datasets.samples import sample_drive
-from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.frame import LABEL_GRID
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import KITTI_14
-from semgrid_edu.workshop.commands.main import app
-from semgrid_edu.workshop.flaws import NO_FLAWS
-from semgrid_edu.workshop.simulation.drive import SimulatedDrive
-from semgrid_edu.workshop.simulation.writer import write_calibration, write_drive
-from semgrid_edu.workshop.studies.ground_truth import laboratory
-from semgrid_edu.workshop.studies.ground_truth.counts import (
+from worlds import lecture_09_policies as policies
+from worlds.lecture_09_counts import (
     BAND_EDGES,
     COUNTED,
     TruthCounts,
@@ -27,8 +13,20 @@ from semgrid_edu.workshop.studies.ground_truth.counts import (
     counts_of,
     distance_table,
     policy_table,
+    truth_tables,
 )
-from semgrid_edu.workshop.studies.ground_truth.laboratory import TRIALS, Trial
+from worlds.lecture_09_policies import TRIALS, Trial
+
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.ground_truth import TruthPolicy
+from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.frame import LABEL_GRID
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.workshop.flaws import NO_FLAWS
+from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.writer import write_calibration, write_drive
 
 ROAD, WALK, CAR = (KITTI_14.index(name) for name in ("road", "sidewalk", "car"))
 FREE, HIDDEN = KITTI_14.index("unknown-free"), KITTI_14.index("unknown-unobserved")
@@ -91,7 +89,7 @@ def scored():
         "exact": Trial(flaws=NO_FLAWS),
         "wide": Trial(TruthPolicy(past=2, future=2, movers="carved")),
     }
-    return laboratory.score_frame(trials, sample_drive()[:6], 3, GridSpec.compact(), seed=4)
+    return policies.score_frame(trials, sample_drive()[:6], 3, GridSpec.compact(), seed=4)
 
 
 class TestSampleDrive:
@@ -112,12 +110,12 @@ class TestSampleDrive:
         assert scored["paper"].shares(axis=(0, 1))["iou"] < scored["exact"].shares(axis=(0, 1))["iou"]
 
     def test_the_same_seed_gives_the_same_counts(self, scored):
-        again = laboratory.score_frame({"paper": Trial()}, sample_drive()[:6], 3, GridSpec.compact(), seed=4)
+        again = policies.score_frame({"paper": Trial()}, sample_drive()[:6], 3, GridSpec.compact(), seed=4)
         np.testing.assert_array_equal(again["paper"].cells, scored["paper"].cells)
 
     def test_a_frame_that_has_no_labels_is_refused(self):
         with pytest.raises(ArgumentError, match="k: expected the number of a labelled frame"):
-            laboratory.score_frame({}, sample_drive()[:2], 2, GridSpec.compact())
+            policies.score_frame({}, sample_drive()[:2], 2, GridSpec.compact())
 
 
 def test_windows_of_scans_reach_as_far_as_the_simulated_drives_and_as_their_names_say():
@@ -125,11 +123,11 @@ def test_windows_of_scans_reach_as_far_as_the_simulated_drives_and_as_their_name
         said = re.search(r"(\d+) (scans before|before and after)", name)
         reach, after = (int(said[1]), said[2] == "before and after") if said else (0, False)
         assert (policy.past, policy.future) == (reach, reach * after)
-        assert reach in (0, laboratory.REACH)
+        assert reach in (0, policies.REACH)
 
 
 def test_a_simulated_frame_is_what_a_reader_finds_on_disk(tmp_path):
-    (frame,) = laboratory.simulated_drive(7, n_frames=1)
+    (frame,) = policies.simulated_drive(7, n_frames=1)
     drive = SimulatedDrive(7, 1)
     write_calibration(tmp_path, drive.rig)
     write_drive(tmp_path, "0001", drive, {0})
@@ -140,59 +138,23 @@ def test_a_simulated_frame_is_what_a_reader_finds_on_disk(tmp_path):
     np.testing.assert_allclose(frame.camera.T_camera_from_lidar, read.camera.T_camera_from_lidar, atol=1e-9)
 
 
-class TestRun:
-    @pytest.fixture
-    def asked(self, monkeypatch):
-        """The drives that are asked for, in place of simulating them."""
-        numbers = []
+def test_the_counts_of_all_drives_are_added_up(monkeypatch):
+    numbers = []
 
-        def score(trials, spec, number, lidar):
-            numbers.append(number)
-            return {name: TruthCounts(counts().cells * (number - 699)) for name in trials}
+    def score(trials, spec, number, lidar):
+        numbers.append(number)
+        return {name: TruthCounts(counts().cells * (number - 1699)) for name in trials}
 
-        monkeypatch.setattr(laboratory, "score_trials", score)
-        return numbers
-
-    def test_an_interrupted_run_goes_on_where_it_was(self, asked, tmp_path):
-        whole = laboratory.truth_policies(tmp_path / "whole.json", drives=4)
-        assert asked == [700, 701, 702, 703]
-        laboratory.truth_policies(tmp_path / "parts.json", drives=3)
-        again = laboratory.truth_policies(tmp_path / "parts.json", drives=4)
-        assert asked[4:] == [700, 701, 702, 703]
-        assert again | {"minutes": 0} == whole | {"minutes": 0}
-        paper = counts_of(whole, "one scan (the paper)")
-        np.testing.assert_array_equal(paper.cells, counts().cells * (1 + 2 + 3 + 4))
-
-    def test_a_log_of_other_choices_is_refused(self, asked, tmp_path):
-        laboratory.truth_policies(tmp_path / "truth.json", drives=1)
-        with pytest.raises(DataError, match="choose another file"):
-            laboratory.truth_policies(tmp_path / "truth.json", drives=1, seed=1)
-        assert asked == [700]
-
-    def test_the_command_keeps_the_result_and_prints_its_tables(self, asked, tmp_path):
-        out = tmp_path / "truth.json"
-        arguments = ["reproduce", "truth-policies", "--seed", "1", "--drives", "2", "--out", str(out)]
-        shown = CliRunner().invoke(app, arguments)
-        assert shown.exit_code == 0, shown.output
-        result = json.loads(out.read_text())
-        assert asked == [1700, 1701]
-        assert result["command"] == (
-            "semgrid-edu reproduce truth-policies --seed 1 --drives 2 --grid compact --lidar coarse"
-        )
-        assert {"date", "minutes", "versions", "seed"} <= result.keys()
-        for table in (policy_table(result), class_table(result, "one scan (the paper)")):
-            assert table in shown.output
-        found = {row.split("|")[1].strip(): row.split("|")[2].strip() for row in policy_table(result).splitlines()[2:]}
-        assert found == dict.fromkeys(TRIALS, "66.7")
-        assert "| 10-20 m  |  66.7 |     33.3 |    0.0 |" in distance_table(result, "one scan (the paper)")
-
-    @pytest.mark.parametrize("wrong", [{"drives": 0}, {"grid": "huge"}, {"lidar": "radar"}, {"seed": -1}], ids=str)
-    def test_what_cannot_be_run_is_refused(self, asked, tmp_path, wrong):
-        with pytest.raises(ArgumentError, match=next(iter(wrong))):
-            laboratory.truth_policies(tmp_path / "truth.json", **wrong)
-        assert asked == []
-
-    def test_an_unknown_trial_is_refused(self, asked, tmp_path):
-        result = laboratory.truth_policies(tmp_path / "truth.json", drives=1)
-        with pytest.raises(ArgumentError, match="name"):
-            counts_of(result, "none")
+    monkeypatch.setattr(policies, "score_trials", score)
+    result = policies.truth_policies(seed=1, drives=4)
+    assert numbers == [1700, 1701, 1702, 1703]
+    paper = "one scan (the paper)"
+    np.testing.assert_array_equal(counts_of(result, paper).cells, counts().cells * (1 + 2 + 3 + 4))
+    assert list(result["drives"]) == ["1700", "1701", "1702", "1703"]
+    assert policy_table(result) in truth_tables(result)
+    assert class_table(result, paper) in truth_tables(result)
+    found = {row.split("|")[1].strip(): row.split("|")[2].strip() for row in policy_table(result).splitlines()[2:]}
+    assert found == dict.fromkeys(TRIALS, "66.7")
+    assert "| 10-20 m  |  66.7 |     33.3 |    0.0 |" in distance_table(result, paper)
+    with pytest.raises(ArgumentError, match="name"):
+        counts_of(result, "none")

@@ -18,8 +18,6 @@ from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.course.nbgrader import build, preprocessors
 from semgrid_edu.workshop.course.nbgrader.preprocessors import prepared_folder
 
-pytest.register_assert_rewrite("grader_checks")
-
 
 @pytest.fixture(scope="session", autouse=True)
 def exercises_read_once():

@@ -6,9 +6,9 @@ import sys
 from dataclasses import replace
 
 import pytest
-import test_grader_01_bayes as catalogue
 import test_sound as sound
 from class_of import NAME, POINTS, REFERENCE, SETTINGS, handed_in, inside
+from entries import entries_of
 
 from semgrid_edu.workshop.course.nbgrader.autograde import place
 from semgrid_edu.workshop.course.nbgrader.build import course_api
@@ -22,7 +22,7 @@ PATIENT = replace(SETTINGS, timeout=30)
 
 def with_entries(entries):
     """Return a notebook in which catalogued answers stand in place of the reference, and what it should earn."""
-    answers = REFERENCE | {entry.task: entry.code for entry in entries}
+    answers = REFERENCE | {entry.task: entry.code(REFERENCE) for entry in entries}
     return handed_in(answers), 15 - sum(entry.loses for entry in entries)
 
 
@@ -31,7 +31,7 @@ def students_of_each_kind():
 
     More of each kind are `test_fair`, `test_sound` and the catalogue.
     """
-    entries, tasks = catalogue.TestBayes.entries, list(POINTS)
+    entries, tasks = entries_of(NAME), list(POINTS)
     rights = {task: [e for e in entries if e.task == task and not e.loses] for task in tasks}
     wrongs = {task: [e for e in entries if e.task == task and e.loses and "timeout" not in e.says] for task in tasks}
     found = {"right-0": (handed_in(), 15), "untouched-0": (handed_in({}), 0)}

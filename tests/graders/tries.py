@@ -124,6 +124,9 @@ for path in [*glob.glob("/proc/self/*"), *glob.glob("/proc/1/*"), *glob.glob("/d
 }
 
 STOPS = {
+    "exit": "exit()",
+    "quit": "quit()",
+    "memory": "bytearray(10**11)",
     "a wait": "import signal; signal.pause()",
     "many threads": "import threading as t; [t.Thread(target=t.Event().wait, args=(9,)).start() for _ in range(999)]; 1 / 0",
     "forks in threads": "import os, threading; [threading.Thread(target=os.fork).start() for _ in range(5)]; 1 / 0",

@@ -5,7 +5,6 @@ from safetensors.torch import load_file, save_file
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.networks import SEGMENTERS, build_segmenter, load_imagenet
-from semgrid_edu.networks.weights import imagenet_tensors
 
 WIDTHS = (2, 3, 4, 5, 5)
 TINY = {
@@ -45,7 +44,7 @@ def _change(path, **tensors):
 
 def test_all_of_vgg16_but_its_last_layer_is_loaded_into_fcn():
     with torch.device("meta"):
-        tensors = imagenet_tensors(build_segmenter("fcn", 14, preset="paper"))
+        tensors = build_segmenter("fcn", 14, preset="paper").imagenet_tensors()
     expected = [*(f"features.{n}" for n in VGG16), "classifier.0", "classifier.3"]
     assert set(tensors) == {f"{name}.{part}" for name in expected for part in ("weight", "bias")}
     assert sum(t.numel() for t in tensors.values()) == 138_357_544 - 4_097_000
@@ -53,14 +52,14 @@ def test_all_of_vgg16_but_its_last_layer_is_loaded_into_fcn():
 
 def test_thirteen_convolutions_are_loaded_into_segnet():
     with torch.device("meta"):
-        tensors = imagenet_tensors(build_segmenter("segnet", 14, preset="paper"))
+        tensors = build_segmenter("segnet", 14, preset="paper").imagenet_tensors()
     assert set(tensors) == {f"features.{n}.{part}" for n in VGG16 for part in ("weight", "bias")}
     assert sum(t.numel() for t in tensors.values()) == 14_714_688
 
 
 def test_parameters_and_statistics_of_resnet101_are_loaded_into_deeplab():
     with torch.device("meta"):
-        tensors = imagenet_tensors(build_segmenter("deeplab", 14, preset="paper"))
+        tensors = build_segmenter("deeplab", 14, preset="paper").imagenet_tensors()
     statistics = [name for name in tensors if "running" in name]
     assert len(statistics) == 2 * 104
     assert sum(t.numel() for name, t in tensors.items() if name not in statistics) == 44_549_160 - 2_049_000
@@ -88,7 +87,7 @@ def test_fcns_hidden_layers_compute_what_vggs_did(tiny, vgg_file):
 
 def test_deeplab_gets_statistics_as_well(tiny, tmp_path):
     rng = torch.Generator().manual_seed(0)
-    other = {name: torch.rand(t.shape, generator=rng) for name, t in imagenet_tensors(tiny("deeplab")).items()}
+    other = {name: torch.rand(t.shape, generator=rng) for name, t in tiny("deeplab").imagenet_tensors().items()}
     save_file({**other, "fc.weight": torch.zeros(10, 64)}, tmp_path / "resnet101.safetensors")
     net, fresh = tiny("deeplab"), tiny("deeplab")
     load_imagenet(net, tmp_path / "resnet101.safetensors")
@@ -121,12 +120,12 @@ PUBLISHED = [name for name, network in SEGMENTERS.items() if network.IMAGENET]
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_weights_of_another_network_or_preset_are_refused(name, vgg_file):
+def test_weights_of_another_network_or_preset_are_rejected(name, vgg_file):
     with pytest.raises(DataError, match=r"vgg16.safetensors: expected \(.*\) for .*, found"):
         load_imagenet(build_segmenter(name, 3), vgg_file)
 
 
-def test_a_pickle_is_refused(tiny, tmp_path):
+def test_a_pickle_is_rejected(tiny, tmp_path):
     path = tmp_path / "vgg16.pth"
     torch.save({"features.0.weight": torch.zeros(2, 3, 3, 3)}, path)
     with pytest.raises(DataError, match=r"vgg16.pth: expected a safetensors file"):

@@ -175,8 +175,8 @@ def test_the_seed_alone_decides_the_first_weights_of_the_whole_net(camera):
         assert not torch.equal(weights[0], weights[2])
 
 
-def test_the_image_is_as_the_network_sees_it_and_so_is_the_camera(camera):
-    """A camera of 375 x 1242 pixels, an image scaled to 24 x 80: planes are sampled where the scaled camera looks."""
+def test_planes_are_sampled_where_the_scaled_camera_looks(camera):
+    """A camera of 375 x 1242 pixels, and an image scaled to 24 x 80."""
     net = build_net(Architecture(image_size=(24, 80), heights=(0.0, 1.0)), camera)
     pixels, visible = plane_pixels(GridSpec.compact(), [0.0, 1.0], camera)
     columns = torch.arange(80.0).expand(1, 1, 24, 80)

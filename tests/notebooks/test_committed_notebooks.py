@@ -35,8 +35,8 @@ def test_every_lecture_has_its_exercise_and_every_exercise_its_notebook():
 
 
 def test_every_exercise_has_its_catalogue():
-    graders = {path.stem for path in (NOTEBOOKS.parent / "tests" / "graders").glob("test_grader_*.py")}
-    assert graders == {f"test_grader_{source.stem}" for source in exercise_sources()}
+    catalogues = {path.stem for path in (NOTEBOOKS.parent / "tests" / "graders" / "catalogue").glob("*.toml")}
+    assert catalogues == {source.stem for source in exercise_sources()}
 
 
 def test_no_notebook_without_a_source():

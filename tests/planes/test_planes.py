@@ -1,6 +1,7 @@
+"""Equations (1) and (2): by hand, by other libraries, and by both samplers."""
+
 import subprocess
 import sys
-from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -11,10 +12,13 @@ from hypothesis import strategies as st
 from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
+from semgrid_edu import fast, planes
 from semgrid_edu.camera import Camera, rigid_transform
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.planes import PlaneOperator, PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
+from semgrid_edu.planes import plane_heights, plane_pixels, sample_planes_naive
+
+BOTH = pytest.mark.parametrize("sampler_class", [planes.PlaneSampler, fast.PlaneSampler], ids=["book", "fast"])
 
 # Grid axes (x ahead, y left, z up) to camera axes (z ahead, x right, y down), one metre above the ground.
 LOOKING_AHEAD = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
@@ -25,8 +29,8 @@ def _camera(size=(101, 201), focal=100.0):
     return Camera(K, LOOKING_AHEAD, size, lidar_height=1.0)
 
 
-def _random_points(rng, size, shape=(2, 3, 4)):
-    """Pixels anywhere in an image of that size, its borders included, and about a quarter of them not visible."""
+def random_points(rng, size, shape=(2, 3, 4)):
+    """Pixels anywhere in an image of that size, its borders included; about a quarter of them aren't visible."""
     last = np.array(size)[::-1] - 1
     pixels = rng.uniform(0, 1, (*shape, 2)) * last
     pixels[0, 0, :3] = [[0, 0], last, [last[0], 0]]
@@ -35,7 +39,7 @@ def _random_points(rng, size, shape=(2, 3, 4)):
     return pixels, visible
 
 
-def test_planes_stand_on_the_ground_at_equal_distances():
+def test_planes_are_at_equal_distances_from_the_ground_up():
     heights = plane_heights()
     assert len(heights) == 20
     assert heights[0] == 0
@@ -53,7 +57,7 @@ def test_equation_1_by_hand():
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.floats(-0.6, 0.6), min_size=3, max_size=3), st.lists(st.floats(-1, 1), min_size=3, max_size=3))
 def test_equation_1_for_a_camera_that_rolls_pitches_and_yaws(angles, place):
-    """Without 4x4 matrices: turn what leads from the camera to each point, divide by the depth."""
+    """Without 4x4 matrices: rotate the vector from the camera to each point, divide by the depth."""
     turn = Rotation.from_matrix(LOOKING_AHEAD[:3, :3]) * Rotation.from_euler("xyz", angles)
     eye = np.array([0.0, 0.0, 1.7]) + place  # in the grid frame
     T_camera_from_grid = rigid_transform(turn.as_matrix(), -turn.apply(eye))
@@ -92,15 +96,15 @@ def test_the_image_border_is_the_centre_of_its_last_pixels(y, height):
         assert plane_pixels(spec, [up], _camera())[1].item() is inside
 
 
+@BOTH
 @pytest.mark.parametrize("ahead", [1e-9, 0.0, -0.0, -1e-9, -2.0])
-def test_points_beside_the_lens_are_not_visible(ahead):
+def test_points_beside_the_lens_are_not_visible(sampler_class, ahead):
     # Two cells, their centres half a metre left and right of the lens, and hardly ahead of it.
     spec = GridSpec(x_min=ahead - 0.5, x_max=ahead + 0.5, y_min=-1.0, y_max=1.0, cell=1.0)
     pixels, visible = plane_pixels(spec, [0.0, 1.0, 2.0], _camera())
     assert not visible.any()
     assert np.isnan(pixels).all() == (ahead <= 0)
-    scores = torch.ones(1, 1, *_camera().size)
-    assert (PlaneSampler(pixels, visible, _camera().size)(scores) == 0).all()
+    assert (sampler_class(pixels, visible, _camera().size)(torch.ones(1, 3, *_camera().size)) == 0).all()
 
 
 def test_equation_2_by_hand():
@@ -111,7 +115,7 @@ def test_equation_2_by_hand():
     np.testing.assert_allclose(sample_planes_naive(scores, pixels, visible).ravel(), list(cases.values()))
 
 
-def test_the_literal_twin_takes_lists_and_tensors_too():
+def test_the_naive_function_takes_lists_and_tensors_too():
     scores, points, visible = [[[0.0, 1.0], [2.0, 3.0]]], [[[[0.5, 0.5]]]], [[[True]]]
     assert sample_planes_naive(scores, points, visible).item() == 1.5
     assert sample_planes_naive(*map(torch.tensor, (scores, points, visible))).item() == 1.5
@@ -127,58 +131,64 @@ def test_each_kernel_weight_by_hand():
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 6), st.integers(1, 7), st.integers(1, 4), st.integers(1, 3))
-def test_fast_and_literal_twins_agree(seed, h, w, n_classes, batch):
+def test_both_samplers_compute_equation_2(seed, h, w, n_classes, batch):
     rng = np.random.default_rng(seed)
-    pixels, visible = _random_points(rng, (h, w))
-    scores = rng.normal(size=(batch, n_classes, h, w))
-    fast = PlaneSampler(pixels, visible, (h, w))(torch.from_numpy(scores).float()).numpy()
-    literal = np.stack([sample_planes_naive(image, pixels, visible) for image in scores])
-    assert fast.dtype == np.float32
-    np.testing.assert_allclose(fast, literal, atol=2e-6)
-    assert (fast[:, :, ~visible] == 0).all()
+    pixels, visible = random_points(rng, (h, w))
+    scores = rng.normal(size=(batch, n_classes, h, w)).astype(np.float32)
+    naive = np.stack([sample_planes_naive(image, pixels, visible) for image in scores])
+    book = planes.PlaneSampler(pixels, visible, (h, w))
+    for sampler in (book, book.as_kind(fast.PlaneSampler)):
+        found = sampler(torch.from_numpy(scores)).numpy()
+        assert found.dtype == np.float32
+        np.testing.assert_allclose(found, naive, atol=2e-6)
+        assert (found[:, :, ~visible] == 0).all()
 
 
 def _near(last):
-    """Where rounding could reach for a pixel that isn't there: on, between and a hair beside centres of pixels."""
+    """Where rounding could reach for a pixel that doesn't exist: on, between and a hair beside centres of pixels."""
     on = np.arange(2 * last + 1) / 2
     beside = np.concatenate([np.nextafter(on, -1), np.nextafter(on, last + 1)])
     return st.sampled_from(np.clip(np.concatenate([on, beside]), 0, last).tolist())
 
 
+@BOTH
 @settings(max_examples=50, deadline=None)
-@given(st.data(), st.integers(1, 4), st.integers(1, 5))
-def test_twins_and_their_gradients_agree_on_and_beside_pixels_up_to_the_border(data, h, w):
+@given(data=st.data(), h=st.integers(1, 4), w=st.integers(1, 5))
+def test_values_and_gradients_on_and_beside_pixels_up_to_the_border(sampler_class, data, h, w):
     drawn = data.draw(st.lists(st.tuples(_near(w - 1), _near(h - 1)), min_size=6, max_size=6))
     pixels, visible = np.array(drawn).reshape(1, 2, 3, 2), np.ones((1, 2, 3), dtype=bool)
     rng = np.random.default_rng(0)
     scores = torch.from_numpy(rng.normal(size=(1, 2, h, w))).requires_grad_()
-    fast = PlaneSampler(pixels, visible, (h, w)).double()(scores)
-    np.testing.assert_allclose(fast[0].detach(), sample_planes_naive(scores[0].detach(), pixels, visible), atol=1e-6)
+    found = sampler_class(pixels, visible, (h, w)).double()(scores)
+    np.testing.assert_allclose(found[0].detach(), sample_planes_naive(scores[0].detach(), pixels, visible), atol=1e-6)
     # dp/ds is the kernel: a point gives each pixel its gradient times k(u - m) k(v - n).
-    grad, literal = rng.normal(size=(2, 1, 2, 3)), np.zeros((2, h, w))
+    grad, expected = rng.normal(size=(2, 1, 2, 3)), np.zeros((2, h, w))
     for c, i, row, col, n, m in np.ndindex(2, 1, 2, 3, h, w):
         u, v = pixels[i, row, col]
-        literal[c, n, m] += grad[c, i, row, col] * max(0, 1 - abs(u - m)) * max(0, 1 - abs(v - n))
-    fast.backward(torch.from_numpy(grad)[None])
-    np.testing.assert_allclose(scores.grad[0], literal, atol=1e-6)
+        expected[c, n, m] += grad[c, i, row, col] * max(0, 1 - abs(u - m)) * max(0, 1 - abs(v - n))
+    found.backward(torch.from_numpy(grad)[None])
+    np.testing.assert_allclose(scores.grad[0], expected, atol=1e-6)
 
 
-def test_sampling_is_exact_to_a_thousandth_of_a_pixel():
-    # On the ramps s = u and s = v the value read is the pixel read from: an offset shows as it is.
+@BOTH
+def test_sampling_is_exact_to_a_thousandth_of_a_pixel(sampler_class):
+    # On the ramps s = u and s = v the sampled value is the pixel itself, so any offset shows.
     rng = np.random.default_rng(0)
     h, w = 96, 320
-    pixels, visible = _random_points(rng, (h, w), shape=(4, 20, 30))
+    pixels, visible = random_points(rng, (h, w), shape=(4, 20, 30))
     v, u = np.mgrid[:h, :w].astype(np.float32)
-    read = PlaneSampler(pixels, visible, (h, w))(torch.from_numpy(np.stack([u, v]))[None])[0].numpy()
-    np.testing.assert_allclose(read[:, visible].T, pixels[visible], atol=1e-3)
+    sampled = sampler_class(pixels, visible, (h, w))(torch.from_numpy(np.stack([u, v]))[None])[0].numpy()
+    np.testing.assert_allclose(sampled[:, visible].T, pixels[visible], atol=1e-3)
 
 
+@BOTH
 @pytest.mark.parametrize("size", [(96, 320), (7, 5)])
-def test_sampling_agrees_with_scipy_and_torch(size):
+def test_sampling_agrees_with_scipy_and_grid_sample(sampler_class, size):
+    """Two independent oracles. (The book's sampler uses grid_sample, too, but all planes one by one.)"""
     rng = np.random.default_rng(1)
-    pixels, visible = _random_points(rng, size, shape=(3, 8, 9))
+    pixels, visible = random_points(rng, size, shape=(3, 8, 9))
     scores = rng.normal(size=(2, *size)).astype(np.float32)
-    ours = PlaneSampler(pixels, visible, size)(torch.from_numpy(scores)[None])[0].numpy()
+    ours = sampler_class(pixels, visible, size)(torch.from_numpy(scores)[None])[0].numpy()
     by_scipy = [map_coordinates(image, pixels[visible].T[::-1], order=1) for image in scores]
     np.testing.assert_allclose(ours[:, visible], by_scipy, atol=1e-4)
     grid = torch.from_numpy(2 * pixels[visible] / (size[1] - 1, size[0] - 1) - 1).float()
@@ -186,161 +196,99 @@ def test_sampling_agrees_with_scipy_and_torch(size):
     np.testing.assert_allclose(ours[:, visible], by_torch, atol=1e-4)
 
 
-def test_the_gradient_is_exact():
+@BOTH
+def test_the_gradient_is_exact(sampler_class):
     rng = np.random.default_rng(2)
-    pixels, visible = _random_points(rng, (4, 5))
-    sampler = PlaneSampler(pixels, visible, (4, 5)).double()
+    sampler = sampler_class(*random_points(rng, (4, 5)), (4, 5)).double()
     scores = torch.from_numpy(rng.normal(size=(2, 3, 4, 5))).requires_grad_()
     assert torch.autograd.gradcheck(sampler, scores)
-    assert torch.autograd.gradgradcheck(sampler, scores)
 
 
-def test_the_backward_pass_is_the_adjoint():
+@BOTH
+def test_the_backward_pass_is_the_adjoint(sampler_class):
     # <A x, y> = <x, A^T y> for every x and y.
     rng = np.random.default_rng(3)
-    pixels, visible = _random_points(rng, (30, 40), shape=(5, 20, 10))
+    pixels, visible = random_points(rng, (30, 40), shape=(5, 20, 10))
     x = torch.from_numpy(rng.normal(size=(2, 3, 30, 40))).requires_grad_()
-    planes = PlaneSampler(pixels, visible, (30, 40)).double()(x)
-    y = torch.from_numpy(rng.normal(size=planes.shape))
-    planes.backward(y)
-    torch.testing.assert_close((planes * y).sum(), (x * x.grad).sum())
+    p = sampler_class(pixels, visible, (30, 40)).double()(x)
+    y = torch.from_numpy(rng.normal(size=p.shape))
+    p.backward(y)
+    torch.testing.assert_close((p * y).sum(), (x * x.grad).sum())
 
 
-def _sampler_and_scores():
-    rng = np.random.default_rng(5)
-    sampler = PlaneSampler(*_random_points(rng, (30, 40), shape=(5, 20, 10)), (30, 40))
-    return sampler, torch.from_numpy(rng.normal(size=(2, 3, 30, 40))).float()
+@BOTH
+def test_images_of_a_batch_dont_touch(sampler_class):
+    sampler = sampler_class(*random_points(np.random.default_rng(6), (30, 40)), (30, 40))
+    scores = torch.randn(3, 2, 30, 40, generator=torch.Generator().manual_seed(0))
+    assert torch.equal(sampler(scores), torch.cat([sampler(image[None]) for image in scores]))
 
 
-def test_layout_in_memory_doesnt_matter():
-    sampler, scores = _sampler_and_scores()
-    expected = sampler(scores)
-    wider = torch.zeros(4, 3, 60, 80)
-    wider[::2, :, ::2, ::2] = scores
-    for same in (
-        scores.contiguous(memory_format=torch.channels_last),
-        scores.transpose(2, 3).contiguous().transpose(2, 3),
-        wider[::2, :, ::2, ::2],
-    ):
-        assert torch.equal(sampler(same), expected)
-    assert expected.permute(0, 3, 4, 2, 1).is_contiguous()
-    one_for_all = scores[:, :1, :1, :1].expand(-1, 3, 30, 40)
-    torch.testing.assert_close(sampler(one_for_all), sampler(one_for_all.clone()), rtol=0, atol=0)
-    upstream = torch.ones(()).expand(expected.shape)  # as .sum().backward() hands it on
-    gradients = [torch.autograd.functional.vjp(sampler, scores, g)[1] for g in (upstream, upstream.clone())]
-    assert torch.equal(*gradients)
-
-
-def test_the_type_of_the_scores_is_kept():
-    sampler, scores = _sampler_and_scores()
+@BOTH
+def test_the_type_of_the_scores_is_kept(sampler_class):
+    sampler = sampler_class(*random_points(np.random.default_rng(5), (30, 40)), (30, 40))
+    scores = torch.randn(2, 3, 30, 40, generator=torch.Generator().manual_seed(0))
     exact = sampler(scores.double())
     assert exact.dtype == torch.float64
     torch.testing.assert_close(sampler(scores).double(), exact, rtol=0, atol=1e-6)
 
 
-def test_mixed_precision_runs_forward_and_backward():
-    sampler, scores = _sampler_and_scores()
+@BOTH
+def test_mixed_precision_runs_forward_and_backward(sampler_class):
+    sampler = sampler_class(*random_points(np.random.default_rng(5), (30, 40)), (30, 40))
+    scores = torch.randn(2, 3, 30, 40, generator=torch.Generator().manual_seed(0))
     conv = torch.nn.Conv2d(3, 3, 1)
     expected = sampler(conv(scores))
     with torch.autocast("cpu", dtype=torch.bfloat16):
-        planes = sampler(conv(scores))
-    assert planes.dtype == torch.bfloat16
-    planes.float().square().sum().backward()
+        p = sampler(conv(scores))
+    assert p.dtype == torch.bfloat16
+    p.float().square().sum().backward()
     assert torch.isfinite(conv.weight.grad).all()
     # bfloat16 keeps eight bits.
-    torch.testing.assert_close(planes.float(), expected, rtol=0, atol=0.05)
+    torch.testing.assert_close(p.float(), expected, rtol=0, atol=0.05)
 
 
-def test_threads_dont_change_a_bit():
-    sampler, scores = _sampler_and_scores()
-    threads, results = torch.get_num_threads(), []
-    try:
-        for n in (1, 2):
-            torch.set_num_threads(n)
-            results.append((sampler(scores), *torch.autograd.functional.vjp(sampler, scores, sampler(scores))))
-    finally:
-        torch.set_num_threads(threads)
-    for one, two in zip(*results, strict=True):
-        assert torch.equal(one, two)
-
-
-def test_a_sampler_holds_no_weights():
-    sampler = PlaneSampler(*_random_points(np.random.default_rng(4), (4, 5)), (4, 5))
-    assert not list(sampler.parameters())
-    assert not sampler.state_dict()
-
-
-def _tensors(operator):
-    return [*operator.matrix, *operator.transpose]
-
-
-def _operator():
-    return PlaneOperator.build(*_random_points(np.random.default_rng(6), (30, 40), shape=(5, 20, 10)), (30, 40))
-
-
-def test_samplers_around_one_operator_share_its_memory():
-    operator = _operator()
-    one, other = (PlaneSampler.from_operator(operator) for _ in range(2))
-    copied = deepcopy(one)
-    for sampler in (one, other, copied):
-        assert [part.data_ptr() for part in _tensors(sampler.operator)] == [
-            part.data_ptr() for part in _tensors(operator)
-        ]
-    assert operator.nbytes == sum(part.numel() * part.element_size() for part in _tensors(operator))
-
-
+@BOTH
 @pytest.mark.parametrize("n_images", [1, 3])
-def test_a_sampler_follows_its_module_to_another_type_and_leaves_the_others(n_images):
-    """As on the way to a GPU: PyTorch moves a module by handing each of its tensors to a function."""
-    operator = _operator()
-    scores = torch.randn(n_images, 2, 30, 40, generator=torch.Generator().manual_seed(0))
-    one, other = (PlaneSampler.from_operator(operator) for _ in range(2))
-    before = one(scores)
-    torch.nn.Sequential(one).double()
-    assert one(scores.double()).dtype == torch.float64
-    torch.testing.assert_close(one(scores.double()).float(), before)
-    assert {part.dtype for part in _tensors(one.operator)} == {torch.float64, torch.int32}
-    assert {part.dtype for part in _tensors(operator)} == {torch.float32, torch.int32}
-    assert torch.equal(other(scores), before)
-
-
-def test_a_sampler_follows_its_module_to_another_device():
-    sampler = PlaneSampler.from_operator(_operator())
-    sampler(torch.zeros(2, 1, 30, 40))
-    sampler.to("meta")
-    assert {part.device.type for part in _tensors(sampler.operator)} == {"meta"}
-    for n_images in (1, 2):
-        assert sampler(torch.zeros(n_images, 1, 30, 40, device="meta")).shape == (n_images, 1, 5, 20, 10)
-
-
-def test_batches_of_one_size_build_their_operator_once(monkeypatch):
-    sampler, built, original = PlaneSampler.from_operator(_operator()), [], PlaneOperator.block_diagonal
-    monkeypatch.setattr(PlaneOperator, "block_diagonal", lambda operator, n: built.append(n) or original(operator, n))
-    for n_images in (3, 3, 1, 3, 2, 2):
-        scores = torch.randn(n_images, 2, 30, 40, generator=torch.Generator().manual_seed(n_images))
-        alone = torch.cat([sampler(image[None]) for image in scores])
-        assert torch.equal(sampler(scores), alone)
-    assert built == [3, 2]
-
-
-@pytest.mark.parametrize("n_images", [1, 3])
-def test_a_sampler_used_for_inference_learns_as_well(n_images):
+def test_a_sampler_made_for_inference_learns_as_well(sampler_class, n_images):
     with torch.inference_mode():
-        sampler = PlaneSampler.from_operator(_operator())
+        sampler = sampler_class(*random_points(np.random.default_rng(6), (30, 40)), (30, 40))
         sampler(torch.ones(n_images, 1, 30, 40))
     scores = torch.ones(n_images, 1, 30, 40, requires_grad=True)
-    planes = sampler(scores)
-    planes.sum().backward()
-    torch.testing.assert_close(scores.grad.sum(), planes.sum())
+    p = sampler(scores)
+    p.sum().backward()
+    torch.testing.assert_close(scores.grad.sum(), p.sum())
 
 
-def test_nothing_visible_gives_zero():
-    sampler = PlaneSampler(np.full((1, 2, 2, 2), np.nan), np.zeros((1, 2, 2), dtype=bool), (4, 5))
+@BOTH
+def test_a_sampler_holds_no_weights_and_follows_its_module_to_another_device(sampler_class):
+    sampler = sampler_class(*random_points(np.random.default_rng(4), (4, 5)), (4, 5))
+    assert not list(sampler.parameters())
+    assert not sampler.state_dict()
+    sampler(torch.zeros(2, 1, 4, 5))
+    torch.nn.Sequential(sampler).to("meta")
+    for n_images in (1, 2):
+        assert sampler(torch.zeros(n_images, 1, 4, 5, device="meta")).shape == (n_images, 1, 2, 3, 4)
+
+
+def test_a_sampler_becomes_one_of_the_other_class_and_back():
+    book = planes.PlaneSampler(*random_points(np.random.default_rng(4), (4, 5)), (4, 5))
+    quick = book.as_kind(fast.PlaneSampler)
+    assert type(quick) is fast.PlaneSampler
+    assert quick.as_kind(fast.PlaneSampler) is quick
+    back = quick.as_kind(planes.PlaneSampler)
+    assert type(back) is planes.PlaneSampler
+    np.testing.assert_array_equal(back.pixels, book.pixels)
+
+
+@BOTH
+def test_nothing_visible_gives_zero(sampler_class):
+    sampler = sampler_class(np.full((1, 2, 2, 2), np.nan), np.zeros((1, 2, 2), dtype=bool), (4, 5))
     assert (sampler(torch.ones(1, 3, 4, 5)) == 0).all()
 
 
-def test_a_drawn_world_lands_in_its_cells():
-    """Paint the ground's y coordinate in an image by a ray through each pixel: plane 0 must read it back."""
+@BOTH
+def test_a_drawn_world_lands_in_its_cells(sampler_class):
+    """Paint the ground's y coordinate in an image by a ray through each pixel: plane 0 must sample it."""
     camera = _camera(size=(101, 201))
     v, u = np.mgrid[51:101, :201].astype(float)
     depth = 100.0 / (v - 50)  # where the ray meets the ground, 1 m below
@@ -349,28 +297,29 @@ def test_a_drawn_world_lands_in_its_cells():
     spec = GridSpec(x_min=2.0, x_max=5.0, y_min=-1.5, y_max=1.5, cell=0.5)
     pixels, visible = plane_pixels(spec, [0.0], camera)
     scores = torch.from_numpy(left).float()[None, None]
-    planes = PlaneSampler(pixels, visible, camera.size)(scores)[0, 0, 0]
-    np.testing.assert_allclose(planes, spec.centers()[..., 1], atol=0.01)
+    p = sampler_class(pixels, visible, camera.size)(scores)[0, 0, 0]
+    np.testing.assert_allclose(p, spec.centers()[..., 1], atol=0.01)
 
 
-def test_wrong_inputs_are_named():
+@BOTH
+def test_wrong_inputs_of_samplers_are_named(sampler_class):
     points, visible = np.zeros((1, 2, 2, 2)), np.ones((1, 2, 2), dtype=bool)
-    with pytest.raises(ArgumentError, match="visible: expected bool"):
-        PlaneSampler(points, visible.astype(int), (4, 5))
-    with pytest.raises(ArgumentError, match="not empty"):
-        PlaneSampler(points[:0], visible[:0], (4, 5))
-    with pytest.raises(ArgumentError, match=r"pixels: expected shape \(1, 2, 2, 2\)"):
-        PlaneSampler(points[..., 0], visible, (4, 5))
-    with pytest.raises(ArgumentError, match="visible points in an image"):
-        PlaneSampler(points + 4.5, visible, (4, 5))
-    with pytest.raises(ArgumentError, match="visible points in an image"):
-        PlaneSampler(points * np.nan, visible, (4, 5))
+    for bad, message in (
+        ((points, visible.astype(int)), "visible: expected bool"),
+        ((points[:0], visible[:0]), "not empty"),
+        ((points[..., 0], visible), r"pixels: expected shape \(1, 2, 2, 2\)"),
+        ((points + 4.5, visible), "visible points in an image"),
+        ((points * np.nan, visible), "visible points in an image"),
+    ):
+        with pytest.raises(ArgumentError, match=message):
+            sampler_class(*bad, (4, 5))
     with pytest.raises(ArgumentError, match=r"scores: expected shape \(B, C, 4, 5\), found \(1, 3, 5, 4\)"):
-        PlaneSampler(points, visible, (4, 5))(torch.zeros(1, 3, 5, 4))
-    with pytest.raises(ArgumentError, match="heights"):
-        plane_pixels(GridSpec.compact(), [np.nan], _camera())
-    for heights in ([[0.0]], [np.inf], []):
-        with pytest.raises(ArgumentError, match="heights"):
+        sampler_class(points, visible, (4, 5))(torch.zeros(1, 3, 5, 4))
+
+
+def test_wrong_heights_are_named():
+    for heights in ([np.nan], [[0.0]], [np.inf], []):
+        with pytest.raises(ArgumentError, match="heights: expected one or more finite metres"):
             plane_pixels(GridSpec.compact(), heights, _camera())
     with pytest.raises(ArgumentError, match="n_planes"):
         plane_heights(0)

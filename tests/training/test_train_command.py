@@ -8,7 +8,6 @@ import torch
 from typer.testing import CliRunner
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets import index as dataset_index
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError, DataError
@@ -17,8 +16,9 @@ from semgrid_edu.networks import SEGMENTERS, Architecture, build_net, load_net, 
 from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
-from semgrid_edu.training import run as experiment
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
+from semgrid_edu.workshop import training_run as experiment
+from semgrid_edu.workshop.commands import dataset_doubts
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.flaws import TruthFlaws
 
@@ -60,7 +60,7 @@ def one_camera(*arguments, **named):
 @pytest.fixture(autouse=True)
 def data_without_doubts(monkeypatch):
     """The data set isn't on disk, so nothing can be asked of it."""
-    monkeypatch.setattr(dataset_index, "dataset_doubts", lambda *_: [])
+    monkeypatch.setattr(dataset_doubts, "dataset_doubts", lambda *_: [])
 
 
 class _Net:
@@ -71,20 +71,8 @@ def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
     monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
     data, out = tmp_path / "minikitti", tmp_path / "compact"
     write_text(data / "dataset.json", "{}")
-    arguments = [
-        "train",
-        "--data",
-        str(data),
-        "--out",
-        str(out),
-        "--segmenter",
-        "fcn",
-        "--seed",
-        "3",
-        "--iterations",
-        "1",
-    ]
-    result = CliRunner().invoke(app, arguments)
+    options = ["--segmenter", "fcn", "--seed", "3", "--iterations", "1"]
+    result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options])
     assert result.exit_code == 0, result.output
     names = {"weights.safetensors", "image_stage.safetensors", "log.csv", "provenance.json"}
     assert {path.name for path in out.iterdir()} == names
@@ -155,9 +143,9 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     assert result.exit_code == 0, result.output
     assert given["net"] == experiment.architecture("segnet", "paper")
     assert given["imagenet"] == (_Net.segmenter, imagenet)
-    net, dataset, folder, params, seed, resume, device = given["train"]
+    net, dataset, folder, params, seed, resume, fabric = given["train"]
     assert dataset.truth == LidarTruth(POLICIES[truth], TruthFlaws())
-    assert (net, folder, seed, resume, device) == (_Net, out, 2, True, torch.device("cpu"))
+    assert (net, folder, seed, resume, fabric.device) == (_Net, out, 2, True, torch.device("cpu"))
     assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
     provenance = json.loads((out / "provenance.json").read_text())
     written = "--segmenter segnet --preset paper --imagenet vgg16.safetensors --seed 2 --iterations 7 --two-stage"

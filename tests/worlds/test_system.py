@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from pyagrum_oracle import assert_oracle_agrees
 from worlds.lecture_00_street import CLASS_OF, CONTENTS, PARAMS, STREET, SystemWorld
-from worlds.lecture_00_system import class_and_sensors, same_belief, street, system_gain, whole_system
+from worlds.lecture_00_system import class_and_sensors, forgotten_class, same_belief, street, whole_system
 from worlds.lecture_02_cell import exact_cell, read_scans
 
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, why_dependent
 
 ROAD, SIDEWALK, PARKED, MOVING, BUILDING = range(len(CONTENTS))
-WORLDS = [SystemWorld(), SystemWorld(1), SystemWorld(3), SystemWorld(dt=0.1, pixel_right=0.95, range_error=0.2)]
 
 
 def test_a_beam_over_two_cells_by_hand():
@@ -89,66 +88,28 @@ def test_near_and_far_are_coupled_by_what_both_cause():
     assert why_dependent(model, "near0", "far0", given="i0") == ("near0", "i0", "far0")
 
 
-def test_g_is_the_best_label_from_o_and_p():
-    """Summed over everything, g is right as often as the score says."""
-    world = SystemWorld()
-    right = system_gain(world).cell_by_cell.right
-    for name, labels, expected in zip(("near1", "far1"), np.divmod(np.arange(16), 4), right, strict=True):
-        joint = CLASS_OF.T @ eliminate(whole_system(world).model, (name, "g1")).table
-        assert joint[labels, np.arange(16)].sum() == pytest.approx(expected, abs=1e-9)
-
-
-@pytest.mark.parametrize("world", WORLDS)
-def test_who_knows_more_loses_less(world):
-    gain = system_gain(world)
-    ladder = [gain.image, gain.cell_by_cell, gain.neighbours, gain.scans, gain.joint]
-    for less, more in itertools.pairwise(ladder):
-        assert (more.log_loss <= less.log_loss + 1e-12).all()
-        assert (more.right >= less.right - 1e-12).all()
-    assert (gain.multiplied.log_loss >= gain.cell_by_cell.log_loss - 1e-12).all()
-
-
-def test_the_numbers_of_the_docstring():
-    gain = system_gain()
-    for score, log_loss in (
-        (gain.image, [1.008, 0.938]),
-        (gain.multiplied, [1.201, 1.059]),
-        (gain.cell_by_cell, [0.743, 0.720]),
-        (gain.joint, [0.682, 0.618]),
-    ):
-        np.testing.assert_allclose(score.log_loss, log_loss, atol=0.0006)
-    np.testing.assert_allclose(gain.cell_by_cell.right, [0.699, 0.726], atol=0.0006)
-    np.testing.assert_allclose(gain.joint.right, [0.713, 0.760], atol=0.0006)
-    np.testing.assert_allclose(gain.neighbours.log_loss, gain.scans.log_loss, atol=1e-12)
-    assert len(set(same_belief(SystemWorld().occupancy()[1]))) == 9
-
-
-def test_the_prices_of_the_cut_edges():
-    """What the earlier image adds is what classes that aren't carried on cost; o in both cells tells all scans."""
-    gain = system_gain()
-    np.testing.assert_allclose(gain.scans.log_loss - gain.joint.log_loss, [0.05, 0.10], atol=0.005)
-    np.testing.assert_allclose(gain.neighbours.log_loss, gain.scans.log_loss, atol=1e-12)
-    assert (
-        gain.neighbours.log_loss - gain.joint.log_loss > 0.8 * (gain.cell_by_cell.log_loss - gain.joint.log_loss)
-    ).all()
-
-
-def test_one_instant_leaves_nothing_to_gain_beyond_the_neighbour():
-    gain = system_gain(SystemWorld(1))
-    np.testing.assert_allclose(gain.joint.log_loss, gain.neighbours.log_loss, atol=1e-12)
-
-
-def test_images_that_say_nothing_gain_nothing():
-    """The network guesses among four classes."""
-    gain = system_gain(SystemWorld(pixel_right=0.25))
-    np.testing.assert_allclose(gain.joint.log_loss, gain.scans.log_loss, atol=1e-9)
-
-
-def test_a_blind_camera_leaves_the_image_at_the_prior():
-    log_loss = system_gain(SystemWorld(1, pixel_right=0.25)).image.log_loss
-    prior = STREET @ CLASS_OF
-    np.testing.assert_allclose(log_loss, -(prior * np.log(prior)).sum())
-
-
 def test_pyagrum_agrees():
     assert_oracle_agrees(whole_system().model, {"l0": 0, "l1": 1, "i0": 2, "i1": 3})
+
+
+def test_g_is_right_as_often_as_the_best_label_from_p_and_the_cells_column_of_o():
+    """Summed over everything: for each column of o and each class of p, the most probable class of the cell."""
+    world = SystemWorld()
+    model, o = whole_system(world).model, world.occupancy()[1]
+    for cell, (name, labels) in enumerate(zip(("near1", "far1"), np.divmod(np.arange(16), 4), strict=True)):
+        right = (CLASS_OF.T @ eliminate(model, (name, "g1")).table)[labels, np.arange(16)].sum()
+        joint = np.tensordot(CLASS_OF, eliminate(model, (name, "o1", "p1")).table, axes=(0, 0))
+        columns = np.eye(9)[same_belief(o[:, cell])]
+        assert right == pytest.approx(np.einsum("kop,og->kgp", joint, columns).max(axis=0).sum(), abs=1e-9)
+
+
+def test_a_forgotten_image_costs_the_entropy_that_it_would_have_removed():
+    """-log P(class of the far cell | readings), summed over all streets and readings by the joint distribution."""
+    joint = class_and_sensors(SystemWorld(), 1)[1]
+    told = joint.reshape(4, 9, 4, 4)
+    for found, known in zip(forgotten_class()[:2], (told, told.sum(axis=2, keepdims=True)), strict=True):
+        assert found == pytest.approx(-(known * np.log(known / known.sum(axis=0))).sum(), abs=1e-9)
+
+
+def test_o_in_both_cells_tells_all_sequences_of_scans_apart():
+    assert len(set(same_belief(SystemWorld().occupancy()[1]))) == 9

@@ -2,20 +2,21 @@
 
 import re
 from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from importlib.util import find_spec
 from itertools import tee
 from pathlib import Path
 from typing import NamedTuple
 
-from numba.core.event import Listener, install_listener
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import load_net
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
-from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import FrameResult, Stages, run_pipeline
 from semgrid_edu.storage.files import check_ours, write_text
 from semgrid_edu.storage.reading import read_json
@@ -96,27 +97,6 @@ class ChosenFrames(NamedTuple):
         return f" ({rate}frames {self.run[0]} to {self.run[-1]}; it has {n_frames})"
 
 
-class CompileBar(Listener):
-    """A bar that counts the functions that numba compiles in the first run, which takes half a minute."""
-
-    bar: tqdm | None = None
-
-    def on_start(self, event: object) -> None:
-        """Show the bar.
-
-        Parameters
-        ----------
-        event : numba.core.event.Event
-            The start or the end of a compilation.
-        """
-        if self.bar is None:
-            self.bar = tqdm(desc="compiling, only the first time", unit=" functions")
-
-    def on_end(self, event: object) -> None:
-        """Count a function. Parameters are those of `CompileBar.on_start`."""
-        self.bar.update()
-
-
 CARD = "card.json"
 """A model card beside weights; its "other_streets" says how well the network does on other real streets."""
 
@@ -152,8 +132,8 @@ def write_demo(
     out : path-like
         The folder to write index.html and overview.png to; made when missing.
     stages : path-like, optional
-        A Python file with a student's stages, as `load_stages` reads it. The page then shows a second run with these
-        stages beside the package's.
+        A Python file with a student's stages, see `load_stages`. The page then shows a second run with these stages
+        beside the package's.
     frames : str, optional
         Which frames to run over and to show, such as "40:120:2", see `ChosenFrames.of`.
     switch : str
@@ -179,20 +159,24 @@ def write_demo(
     StageError
         When a stage of the file raises an error, or returns what the next one can't use.
     """
-    chosen, net, known = ChosenFrames.of(len(drive), frames), load_net(weights, drive.camera), _said_by_card(weights)
+    chosen = ChosenFrames.of(len(drive), frames)
+    net = load_net(weights, drive.camera)
+    known = _said_by_card(weights)
     page, picture = _check_page(out, force)
     if drive[chosen.run[0]].image is None:
         raise DataError(drive.folder, f"images of {getattr(drive, 'view', 'its camera')}", "none")
     mine = load_stages(stages) if stages is not None else Stages()
     memory = memory or mine.remember is not None
-    own, yours, comparison = Stages.fast(net, keep_steps=True, memory=memory), (), None
+    runs = [Stages.fast(net, keep_steps=True, memory=memory)]
+    comparison = None
     if stages is not None:
-        yours, comparison = (mine.over(own),), Comparison(Path(stages).name, mine.given, memory)
-    label_set = LABEL_SETS[net.architecture.label_set]
-    stories = _stories_every(len(chosen.shown), net.architecture.grid)
-    record = Record(net.architecture.grid, label_set, chosen.shown, comparison, net, stories, memory)
-    results = run_side_by_side((drive[k] for k in chosen.run), own, *yours)
-    with install_listener("numba:compile", CompileBar()):
+        runs.append(mine.over(runs[0]))
+        comparison = Comparison(Path(stages).name, mine.given, memory)
+    spec = net.architecture.grid
+    stories = _stories_every(len(chosen.shown), spec)
+    record = Record(spec, LABEL_SETS[net.architecture.label_set], chosen.shown, comparison, net, stories, memory)
+    results = run_side_by_side((drive[k] for k in chosen.run), *runs)
+    with _compile_bar():
         broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
     words = {"expected": known or ("" if record.labelled else POOR), "credit": drive.credit}
     save_overview(record, picture, " ".join(filter(None, words.values())))
@@ -251,6 +235,15 @@ def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tupl
     """
     streams = tee(frames, len(several))
     yield from zip(*(run_pipeline(*one) for one in zip(streams, several, strict=True)), strict=True)
+
+
+def _compile_bar() -> AbstractContextManager:
+    """Return a context that shows what numba compiles; without numba the book's stages run instead."""
+    if find_spec("numba") is None:
+        return nullcontext()
+    from semgrid_edu.workshop.demo.compile_bar import counting_compiled
+
+    return counting_compiled()
 
 
 def _check_page(out: str | Path, force: bool | None) -> tuple[Path, Path]:

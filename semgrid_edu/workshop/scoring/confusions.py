@@ -1,4 +1,4 @@
-"""Confusion matrices frame by frame: what all scores, intervals and comparisons are computed from (section 4.2)."""
+"""Confusion matrices frame by frame, from which all scores and intervals are computed (section 4.2)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,23 +12,23 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 
 DRIVES = "drives"
-"""The name that the drives have in a file of confusion matrices, so that no method can have it."""
+"""The name of the drives in a file of confusion matrices; no method may have it."""
 
 BANDS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, np.inf)
-"""Limits of the bands of distance from the LIDAR by which cells are counted, metres."""
+"""Cells are counted in bands of distance from the LIDAR with these limits, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrameConfusions:
-    """How often each true class is called each class, frame by frame.
+    """Confusion matrices frame by frame: how often cells of each true class are called each class.
 
     Parameters
     ----------
     drives : tuple of str
         The drive of each of the F frames, such as "2026_01_01 0143".
     counts : dict of str to (F, C, C) int64
-        The number of labelled cells of each frame, one row per true class, one column per called class: by method, or
-        by method, truth and band of distance, as `count_grids` names them.
+        The number of labelled cells of each frame, one row per true class, one column per called class. The keys are
+        methods, or from `count_grids` method, truth and band of distance.
     """
 
     drives: tuple[str, ...]
@@ -42,7 +42,7 @@ class FrameConfusions:
         method : str
             Such as "network".
         truth : str
-            The labels that it is compared with, "true" or "lidar".
+            The labels to compare with, "true" or "lidar".
         band : str, optional
             One of `distance_band_names`; all distances when left out.
         """
@@ -70,7 +70,7 @@ def band_names(edges: Sequence[float]) -> list[str]:
     Parameters
     ----------
     edges : sequence of B + 1 float
-        Where they begin and end, metres; the last one may be infinite.
+        Their limits, metres; the last one may be infinite.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def confusion_key(method: str, truth: str, band: str) -> str:
     Parameters
     ----------
     method, truth, band : str
-        What is counted, as `FrameConfusions.of` takes it.
+        As for `FrameConfusions.of`.
     """
     return f"{method}, {truth} labels, {band}"
 
@@ -161,7 +161,7 @@ def load_confusions(path: str | Path) -> FrameConfusions:
     Raises
     ------
     DataError
-        When the file is missing or damaged, or holds something else.
+        When the file is missing or damaged, or contains something else.
     """
     return checked_confusions(path, read_arrays(path))
 

@@ -18,21 +18,21 @@ Grids = Callable[[int], Mapping[str, NDArray]]
 """A function k -> the grids of frame k by the name of the method that made them: classes (H, W) int, or a distribution
 (C, H, W) float over the classes, whose calibration is counted as well.
 
-Methods that share work, such as a network with and without the CRF, come from one such function."""
+Methods that share work, such as a network with and without the CRF, are made by one function."""
 
 
 def distance_bands(spec: GridSpec, edges: Sequence[float]) -> NDArray[np.int64]:
-    """Return the number of the band of distance that each cell lies in, (H, W).
+    """Return the number of each cell's band of distance, (H, W).
 
-    The distance is the horizontal one from the LIDAR to the cell's centre. What lies before the first edge is in the
-    first band, what lies beyond the last one in the last.
+    The distance is the horizontal one from the LIDAR to the cell's centre. Cells nearer than the first limit belong to
+    the first band, cells beyond the last limit to the last band.
 
     Parameters
     ----------
     spec : GridSpec
         The grid.
     edges : sequence of B + 1 float
-        Where the bands begin and end, metres, from near to far.
+        The limits of the bands, metres, from near to far.
     """
     return np.digitize(spec.distances(), edges[1:-1])
 
@@ -48,8 +48,7 @@ class GridCounts(NamedTuple):
         By method, truth and band of distance.
     reliability : dict of str to (3, B) float
         For each method that gave a distribution, by bin of confidence: the number of cells, the sum of their
-        confidence, and how many are right. By the true labels under the method's name, by others under that of
-        `reliability_key`.
+        confidence, and how many are right. The keys are those of `reliability_key`.
     """
 
     methods: tuple[str, ...]
@@ -58,7 +57,7 @@ class GridCounts(NamedTuple):
 
 
 def reliability_key(method: str, truth: str) -> str:
-    """Return the key under which `GridCounts.reliability` holds a method's counts against some labels.
+    """Return the key of `GridCounts.reliability` for a method and some labels.
 
     Parameters
     ----------
@@ -71,7 +70,7 @@ def reliability_key(method: str, truth: str) -> str:
 
 
 def reliability_sums(probability: NDArray, truth: NDArray) -> NDArray[np.float64]:
-    """Return by bin of confidence the number of cells, the sum of their confidence, and how many are right, (3, B).
+    """Return for each bin of confidence its cells, the sum of their confidence, and how many are right: (3, B).
 
     Parameters
     ----------
@@ -88,7 +87,7 @@ def reliability_of_sums(sums: NDArray) -> Reliability:
     Parameters
     ----------
     sums : (3, B) float
-        As in `GridCounts.reliability`, perhaps added over several.
+        From `GridCounts.reliability`, or the sum of several.
     """
     cells, confidence, right = sums
     divisor = np.maximum(cells, 1)  # an empty bin has weight 0
@@ -103,7 +102,7 @@ def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:
     grids : callable
         Makes the grids of a frame, such as `network_grids(net, frames)` or `lambda k: {"majority class": majority}`.
     frames : TrainingSet
-        The frames: their "truth", which is that of the LIDAR when it differs from the "true" one, and their drives.
+        The frames, with their drives. Their "truth" is made with the LIDAR if it differs from the "true" one.
 
     Raises
     ------
@@ -130,12 +129,12 @@ def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:
 
 
 def truths_of_frames(frames: TrainingSet) -> dict[str, NDArray]:
-    """Return what grids are compared with, (N, H, W) by name: what networks learn from first, then "true".
+    """Return the labels to compare with by name, (N, H, W): first those that networks learn from, then "true".
 
     Parameters
     ----------
     frames : TrainingSet
-        The frames. When they are labelled with the LIDAR, these labels are called "lidar".
+        The frames. Labels that are made with the LIDAR are called "lidar".
     """
     truth, true = frames.arrays["truth"], frames.arrays["true"]
     return {"true": true} if truth is true else {"lidar": truth, "true": true}

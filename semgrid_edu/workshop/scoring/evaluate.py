@@ -8,9 +8,10 @@ from torch import nn
 
 from semgrid_edu.datasets.training_arrays import SEED
 from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.fast import load_net
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet, load_net
+from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet
 from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import made_by
@@ -21,7 +22,7 @@ from semgrid_edu.workshop.scoring.score_with_interval import every_metric, markd
 from semgrid_edu.workshop.scoring.statistics import Metric
 
 Scores = dict[str, dict[str, dict[str, float]]]
-"""Values of the metrics, 0..1: by method, by cells ("all" or "semantic"), by metric."""
+"""The metrics, 0..1: by method, by cells ("all" or "semantic"), by metric."""
 
 Intervals = dict[str, dict[str, dict[str, list[float | None]]]]
 """The same with [low, value, high] of a 95 % interval in place of the value."""
@@ -41,17 +42,17 @@ def evaluate(
         A data set with the splits "train" and "test", such as data/minikitti.
     weights : path-like
         A network that learned from the training split. If `image_stage.safetensors`, the network after the first stage
-        of training, lies in the same folder, its image labels are carried to the grid as well: that network has
-        learned from images alone, not yet from grids.
+        of training, is in the same folder, its image labels are carried to the grid as well: that network has learned
+        from images only, not yet from grids.
     refine : callable, optional
         Refines the network's grids, as in `Stages`, and is named in the row "network + ..."; the CRF when left out.
     confusions_file : path-like, optional
-        Takes the confusion matrices of each frame by method, truth and distance, see `save_confusions`.
+        The file for the confusion matrices of each frame by method, truth and distance, see `save_confusions`.
 
     Returns
     -------
     dict
-        What `scores_of_counts` returns, and what it was computed from; it can be written as JSON.
+        The result of `scores_of_counts` and its inputs; it can be written as JSON.
 
     Raises
     ------
@@ -80,7 +81,7 @@ def evaluate(
 
 
 def _command(data: str, weights: str, refine: Refine | None) -> str:
-    """Return the command, or the call where no command can name the refinement."""
+    """Return the command, or the Python call if no command can name the refinement."""
     if refine is None:
         return f"semgrid-edu evaluate --data {data} --weights {weights}"
     return f'evaluate("{data}", "{weights}", refine={_name(refine)})'
@@ -97,7 +98,7 @@ def count_methods(
     segmenters: Mapping[str, nn.Module],
     refine: Refine | None = None,
 ) -> GridCounts:
-    """Count the grids of a network, refined or not, and of the baselines, on any frames that can be trained on.
+    """Count the grids of a network, refined or not, and of the baselines, on the frames of a data set.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ def count_methods(
     training, test : TrainingSet
         The frames that the baselines learn from, and those to score.
     segmenters : mapping of str to Module
-        Image networks by name, i -> s, whose labels geometry carries to the grid, see `carried_grids`.
+        Image networks by name, i -> s, whose labels are carried to the grid, see `carried_grids`.
     refine : callable, optional
         Refines the network's grids, as in `evaluate`.
     """
@@ -144,14 +145,14 @@ def scores_of_counts(counted: GridCounts, test: TrainingSet) -> dict[str, object
 
 
 def intervals(confusions: FrameConfusions, label_set: LabelSet) -> Intervals:
-    """Return the confidence intervals of all scores, each for this one network, or baseline, on new drives.
+    """Return the confidence intervals of all scores, each for this single network or baseline on new drives.
 
     Parameters
     ----------
     confusions : FrameConfusions
         Confusion matrices of the frames of two drives or more, by method.
     label_set : LabelSet
-        The classes, of which it says which are semantic.
+        The classes, and which of them are semantic.
     """
 
     def ends(by_drive: NDArray, metric: Metric) -> list[float | None]:
@@ -169,7 +170,7 @@ def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
     confusions : dict of str to (C, C) int
         Confusion matrix of each method.
     label_set : LabelSet
-        The classes, of which it says which are semantic.
+        The classes, and which of them are semantic.
     """
     return {
         method: every_metric(lambda matrix, metric: metric(matrix), label_set, confusion)
@@ -185,7 +186,7 @@ def scores_table(result: Scores, ends: Intervals | None = None) -> str:
     result : Scores
         What `scores` returns.
     ends : Intervals, optional
-        What `intervals` returns of the same methods, to stand in brackets; none when left out.
+        What `intervals` returns for the same methods, shown in brackets; none by default.
     """
     head = [f"{name}{cells}" for cells in ("", ", semantic cells") for name in METRICS]
     places = [(cells, name) for cells in ("all", "semantic") for name in METRICS]

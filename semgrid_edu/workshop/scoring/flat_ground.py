@@ -1,10 +1,10 @@
 """Image labels looked up where flat ground would be, and the baselines that a network must beat (section 4.2).
 
-These know two things of a cell. One is the image label at the pixel that would see the cell's ground, were the ground
-flat; cells whose ground the image doesn't show, or whose pixel has no label, have a value of their own. The other is
-the cell's most probable occupancy state. How often each class goes with both is counted over all cells of the training
-frames. Then the class is looked up in a table of both, or found by naive Bayes, as if the two were independent given
-the class.
+The baselines know two things about a cell. One is the image label at the pixel that would see the cell's ground if the
+ground were flat; cells whose ground the image doesn't show, or whose pixel has no label, get a separate value.
+The other is the cell's most probable occupancy state. How often each class occurs with both is counted over all cells
+of the training frames. Then the class is looked up in a table, or found by naive Bayes, as if label and state were
+independent given the class.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,7 +22,7 @@ from semgrid_edu.occupancy import N_STATES, State
 from semgrid_edu.planes import plane_pixels
 
 NOT_SEEN = -1
-"""What `ground_pixels` says of a cell whose ground lies outside the image."""
+"""The number that `ground_pixels` returns for a cell whose ground is outside the image."""
 
 Labeller = Callable[[Sample], NDArray]
 """A function that labels the pixels of a frame: sample -> classes (h, w), 255 where unlabelled."""
@@ -48,9 +48,9 @@ def ground_pixels(spec: GridSpec, camera: Camera) -> NDArray[np.int64]:
 
 
 def inverse_perspective(labels: NDArray, places: NDArray, occupancy: NDArray, observed_only: bool = False) -> NDArray:
-    """Carry image labels to the grid as if all that the camera sees were flat ground: inverse perspective mapping.
+    """Carry image labels to the grid as if everything in the image were flat ground: inverse perspective mapping.
 
-    No depth is used, so whatever stands above the ground is smeared away from the camera, over all cells that it hides.
+    No depth is used, so things above the ground are smeared away from the camera, over all cells that they hide.
 
     Parameters
     ----------
@@ -66,13 +66,13 @@ def inverse_perspective(labels: NDArray, places: NDArray, occupancy: NDArray, ob
     Returns
     -------
     (H, W) uint8
-        The class of its pixel in each cell that the image shows; by occupancy state one of the four unknown classes in
-        the others, and where the pixel is unlabelled or sky, which doesn't lie on the ground.
+        The class of its pixel in each cell that the image shows. In other cells, and where the pixel is unlabelled or
+        sky, one of the four unknown classes, by occupancy state.
 
     Raises
     ------
     ArgumentError
-        When a pixel lies outside the labels, or the shapes of `places` and `occupancy` disagree.
+        When a pixel is outside the labels, or the shapes of `places` and `occupancy` disagree.
     """
     labels, unknown = np.asarray(labels), unknown_classes(occupancy)
     if places.shape != unknown.shape:
@@ -128,7 +128,7 @@ def count_labels_and_states(frames: TrainingSet, labeller: Labeller, places: NDA
 def joint_table(counts: NDArray) -> NDArray[np.int64]:
     """Return the most frequent class for each label of the ground and each state, (C + 1, 4).
 
-    Nothing is smoothed: where a label and a state never came together, the state alone decides.
+    Nothing is smoothed: if a label and a state never occurred together, the state alone decides.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def joint_table(counts: NDArray) -> NDArray[np.int64]:
 
     Examples
     --------
-    One label or none, two states, and two classes; the label never came with the second state:
+    One label or none, two states, and two classes; the label never occurred with the second state:
 
     >>> joint_table(np.array([[[3, 1], [0, 0]], [[1, 2], [0, 4]]])).tolist()
     [[0, 1], [1, 1]]
@@ -148,8 +148,9 @@ def joint_table(counts: NDArray) -> NDArray[np.int64]:
 def naive_bayes(counts: NDArray) -> NDArray[np.int64]:
     """Return the most probable class for each label l of the ground and each state s, (C + 1, 4).
 
-    It is the class c with the largest P(c) P(l | c) P(s | c). Laplace's one is added to each count of a label or state
-    with a class. Without it a class that never came with a label would be impossible, whatever the state says.
+    It is the class c with the largest P(c) P(l | c) P(s | c). One is added to each count of a label or state with
+    a class (Laplace smoothing). Otherwise a class that never occurred with a label would be impossible, whatever the
+    state is.
 
     Parameters
     ----------
@@ -164,11 +165,11 @@ def naive_bayes(counts: NDArray) -> NDArray[np.int64]:
 
 
 WAYS = {"table": joint_table, "naive Bayes": naive_bayes}
-"""How the class is found from the two, by name."""
+"""The ways to find the class from label and state, by name."""
 
 
 def label_and_state(way: str, labels: str) -> str:
-    """Return the name of the grids that come from labels of the ground and occupancy states.
+    """Return the name of the grids that are made from labels of the ground and occupancy states.
 
     Parameters
     ----------
@@ -188,10 +189,10 @@ def fitted_tables(
     Parameters
     ----------
     frames : TrainingSet
-        The frames to learn from. Their truth is what the networks learn from, be it true or made with the LIDAR, so
-        that a baseline knows neither more nor less than a network of what will be compared.
+        The frames to learn from. Their truth is what the networks learn from, true or made with the LIDAR, so that a
+        baseline knows exactly as much as a network.
     labellers : mapping of str to callable
-        What labels the images, by name.
+        The functions that label the images, by name.
     places : (H, W) int
         The pixel that sees each cell's ground, from `ground_pixels`.
     """

@@ -1,4 +1,4 @@
-"""The grids that are compared: a network's own, refined or not, and those of every baseline, by name (section 4)."""
+"""The grids that are compared: a network's, refined or not, and those of every baseline, by name (section 4)."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -30,7 +30,7 @@ Refine = Callable[[NDArray, NDArray], NDArray]
 """A stage (log_g (C, H, W), o (4, H, W)) -> g (C, H, W), as `semgrid_edu.pipeline.Stages` describes it."""
 
 NETWORK = "network"
-"""The network's own grid; refined, its name is followed by " + " and the name of the refinement."""
+"""The network's grid. Refined, it is called "network + " and the name of the refinement."""
 
 MAJORITY, OCCUPANCY_ALONE = "majority class", "occupancy alone"
 """The most frequent class of each cell, and of each cell and occupancy state."""
@@ -114,28 +114,31 @@ def baseline_grids(
     Parameters
     ----------
     training : TrainingSet
-        The frames that baselines learn from, by the labels of cells that networks learn from.
+        The frames that baselines learn from, with the same labels as networks.
     frames : TrainingSet
         The frames to score.
     segmenters : mapping of str to Module
         Image networks by name, i -> s. Their labels are carried to the grid as the true image labels are.
     camera : Camera, optional
-        The calibration that geometry believes in; that of the frames when left out.
+        The calibration that geometry uses; by default that of the frames.
     returns : callable, optional
-        k -> pixels and cells of the LIDAR returns of frame k by that calibration; those of the frames when left out.
+        k -> pixels and cells of the LIDAR returns of frame k by that calibration; by default those of the frames.
 
     Returns
     -------
     callable
         k -> classes (H, W) of frame k: "majority class" of each cell; "occupancy alone", the majority class of each
         cell and state; and for "true" image labels and those of each image network what `carried_grids` makes of them,
-        and what their flat ground and the occupancy state tell together (`WAYS`).
+        and what their flat ground and the occupancy state give together (`WAYS`).
     """
-    truths, returns = training.arrays["truth"], returns or frames.returns
-    majority, by_state = majority_class(truths), majority_by_state(truths, training.arrays["occupancy"])
+    truths = training.arrays["truth"]
+    returns = returns or frames.returns
+    majority = majority_class(truths)
+    by_state = majority_by_state(truths, training.arrays["occupancy"])
     labellers = _labellers(segmenters)
     tables = fitted_tables(training, labellers, ground_pixels(training.spec, training.camera))
-    ground, n_classes = ground_pixels(frames.spec, camera or frames.camera), len(frames.label_set)
+    ground = ground_pixels(frames.spec, camera or frames.camera)
+    n_classes = len(frames.label_set)
 
     def grids(k: int) -> dict[str, NDArray]:
         sample = frames[k]
@@ -153,7 +156,7 @@ def baseline_grids(
 
 
 def _labellers(segmenters: Mapping[str, nn.Module]) -> dict[str, Labeller]:
-    """Return what labels images, by name: the true labels, and the networks."""
+    """Return the functions that label images, by name: the true labels, and the networks."""
     networks = {name: partial(best_labels, segmenter) for name, segmenter in segmenters.items()}
     return {"true": lambda sample: sample.labels.numpy(), **networks}
 
@@ -161,7 +164,7 @@ def _labellers(segmenters: Mapping[str, nn.Module]) -> dict[str, Labeller]:
 def carried_grids(
     name: str, labels: NDArray, occupancy: NDArray, returns: tuple[NDArray, NDArray], ground: NDArray, cell: float
 ) -> dict[str, NDArray[np.uint8]]:
-    """Carry image labels to the grid in every way that learns nothing. Cells without a label take an unknown class.
+    """Carry image labels to the grid in every way without learning. Cells without a label take an unknown class.
 
     Parameters
     ----------
@@ -194,9 +197,9 @@ def carried_grids(
 
 
 def majority_class(truths: NDArray) -> NDArray[np.uint8]:
-    """Return the most frequent class of each cell, (H, W): what one knows without looking.
+    """Return the most frequent class of each cell, (H, W): the best guess without any input.
 
-    Of equally frequent classes it is the first. A cell that was never labelled takes the most frequent class of all.
+    Among equally frequent classes it is the first. A cell that was never labelled takes the most frequent class of all.
 
     Parameters
     ----------
@@ -209,7 +212,7 @@ def majority_class(truths: NDArray) -> NDArray[np.uint8]:
 
 
 def majority_by_state(truths: NDArray, occupancy: NDArray) -> NDArray[np.uint8]:
-    """Return the most frequent class of each cell for each occupancy state: what occupancy says without an image.
+    """Return the most frequent class of each cell for each occupancy state: the best guess without an image.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ def score_with_interval(confusions: NDArray, metric: Metric) -> ScoreWithInterva
 
 
 def compared(a: NDArray, b: NDArray, metric: Metric) -> ScoreWithInterval:
-    """Return the score of a minus that of b, on the same seeds and drives.
+    """Return the score of a minus the score of b, on the same seeds and drives.
 
     Parameters
     ----------
@@ -48,8 +48,10 @@ def compared(a: NDArray, b: NDArray, metric: Metric) -> ScoreWithInterval:
 
 
 def _with_interval(seeds: list[float], n_drives: int, interval: Callable[[], Interval]) -> ScoreWithInterval:
-    """Add the interval to a score; its ends are None with few drives, or if a class occurs in one drive alone."""
-    low, mean, high = None, float(np.mean(seeds)), None
+    """Add the interval to a score; its ends are None with few drives, or if a class occurs in only one drive."""
+    low = None
+    mean = float(np.mean(seeds))
+    high = None
     if n_drives >= MIN_DRIVES:
         with suppress(ArgumentError):
             low, mean, high = interval()
@@ -91,7 +93,7 @@ def every_metric(
     label_set : LabelSet
         The classes.
     *confusions : (..., C, C) int
-        What `score` takes before the metric.
+        The matrices that `score` takes before the metric.
 
     Returns
     -------
@@ -122,7 +124,7 @@ def shown(value: ScoreWithInterval, digits: int = 1) -> str:
 
 
 def shown_seeds(value: ScoreWithInterval, digits: int = 1) -> str:
-    """Return every seed's value as text, per cent; of more than five seeds the lowest and the highest.
+    """Return every seed's value as text, per cent; with more than five seeds the lowest and the highest.
 
     Parameters are those of `shown`.
     """

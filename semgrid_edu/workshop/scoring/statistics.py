@@ -14,7 +14,7 @@ Metric = Callable[[NDArray], float]
 
 
 MIN_DRIVES = 10
-"""With fewer drives no table shows an interval and no claim has a verdict: too few to know how drives vary."""
+"""With fewer drives, which can't show how drives vary, no table has an interval and no claim a verdict."""
 
 
 class Interval(NamedTuple):
@@ -32,14 +32,14 @@ class Interval(NamedTuple):
 
 
 class EstimatedMean(NamedTuple):
-    """A mean over seeds and drives, and how well it is known: what intervals and p-values are computed from.
+    """A mean over seeds and drives, and its precision, from which intervals and p-values are computed.
 
     Parameters
     ----------
     mean : float
         The mean score, or the mean difference of two.
     variances : (float, float)
-        V_s and V_d: the parts of the mean's variance that the choice of seeds and that of drives add.
+        V_s and V_d: the parts of the mean's variance that come from the choice of seeds and of drives.
     sizes : (int, int)
         S and V, the numbers of seeds and of drives.
     """
@@ -54,24 +54,25 @@ class EstimatedMean(NamedTuple):
         Parameters
         ----------
         level : float
-            How often such intervals should hold the true value, between 0 and 1.
+            How often such intervals should contain the true value, between 0 and 1.
         """
-        variances, freedom = np.array(self.variances), [max(n - 1, 1) for n in self.sizes]
+        variances = np.array(self.variances)
+        freedom = [max(n - 1, 1) for n in self.sizes]
         t = stats.t.ppf((1 + level) / 2, freedom)
         return float((t * variances).sum() / np.sqrt(variances.sum())) if variances.any() else 0.0
 
     def p_value(self, limit: float, above: bool) -> float:
-        """Return the one-sided p-value of a claim that the true value lies on one side of a limit.
+        """Return the one-sided p-value of a claim that the true value is on one side of a limit.
 
-        It is small when the mean lies far on the other side. An interval of level 1 - 2 p ends exactly at the limit
-        then, so the p-value and the intervals never contradict each other.
+        It is small if the mean is far on the other side. The interval of level 1 - 2 p ends exactly at the limit, so
+        p-value and intervals never contradict each other.
 
         Parameters
         ----------
         limit : float
             The limit, in the unit of the mean.
         above : bool
-            Whether the claim says that the true value is above it; else below.
+            Whether the claim says that the true value is above the limit; otherwise below.
         """
         beyond = (limit - self.mean) if above else (self.mean - limit)
         if not any(self.variances):
@@ -106,23 +107,22 @@ def drive_interval(confusions: ArrayLike, metric: Metric, level: float = 0.95) -
     how seeds differ; then the interval is for this one network on very many drives.
 
     **How it is made.** Frames of one drive look alike, so drives are resampled, not frames: each drive is left out
-    once, and what that changes tells how much the drives differ (the jackknife). The mean score has two variances. V_s,
+    once, and the change shows how much the drives differ (the jackknife). The mean score has two variances. V_s,
     from the choice of seeds, is the variance of the seeds' scores divided by S. V_d, from the choice of drives, is that
-    of the drives' parts of the mean score, divided by V; what a drive does to one seed and not to the others is
-    subtracted, since V_s holds it already. The half-width is that of Cochran and Cox (Experimental Designs),
+    of the drives' parts of the mean score, divided by V; the effect of a drive on one seed alone is subtracted, since
+    V_s includes it already. The half-width is that of Cochran and Cox (Experimental Designs),
 
         (t_{S-1} V_s + t_{V-1} V_d) / sqrt(V_s + V_d),
 
     with quantiles t of Student's distribution: t_2 is 4.3, so three seeds that differ cost width. In simulations with
     20 drives and 3 seeds, from drives that differ while seeds don't to the reverse, 95 % intervals of the three metrics
-    of section 4.2 held the true value in 92 to 97.5 % of 2000 cases (`benchmarks/interval_coverage.py`).
+    of section 4.2 contained the true value in 92 to 97.5 % of 2000 cases (`benchmarks/interval_coverage.py`).
 
     **What it can't say.** It doesn't say how the method does on another kind of street, or after training on other
-    data, because neither varies here. It isn't for the score of the next single network, which lies further from the
-    mean than the mean of many would. And where a class occurs in few of the drives, its recall rests on these few, and
-    so does the mean over classes. With a class in one of twenty drives, 95 % intervals of class accuracy held the true
-    value in only 63 % of the cases. An interval may also reach below 0 or above 1: then there are too few drives or
-    seeds to say much.
+    data, because neither varies here. It isn't for the score of the next single network, which varies more than the
+    mean of many. If a class occurs in few of the drives, its recall depends on these few, and so does the mean over
+    classes: with a class in one of twenty drives, 95 % intervals of class accuracy contained the true value in only
+    63 % of the cases. An interval may also reach below 0 or above 1: then there are too few drives or seeds.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def drive_interval(confusions: ArrayLike, metric: Metric, level: float = 0.95) -
     metric : callable
         Takes a confusion matrix (C, C), row: truth, and returns a number.
     level : float
-        How often such intervals should hold the true value, between 0 and 1.
+        How often such intervals should contain the true value, between 0 and 1.
 
     Returns
     -------
@@ -161,7 +161,7 @@ def paired_interval(a: ArrayLike, b: ArrayLike, metric: Metric, level: float = 0
     """Return by how much method a beats method b, and a confidence interval for it.
 
     Both are scored on the same drives, and seed s of a belongs to seed s of b. A drive that is hard for both lowers
-    both scores, and drops out of the difference. So this interval can be much narrower than those of the two scores,
+    both scores, and cancels in the difference. So this interval can be much narrower than those of the two scores,
     and two methods can differ clearly although their own intervals overlap.
 
     The interval is for the mean, over new seeds and very many new drives, of metric(a) - metric(b). It is made as in
@@ -170,17 +170,17 @@ def paired_interval(a: ArrayLike, b: ArrayLike, metric: Metric, level: float = 0
     Parameters
     ----------
     a, b : (S, V, C, C) int
-        Confusion matrices of the two methods on the same drives, as `drive_interval` takes them. A method that no seed
-        changes, such as a baseline without training, may come as (1, V, C, C).
+        Confusion matrices of the two methods on the same drives, as `drive_interval` takes them. A method that doesn't
+        depend on the seed, such as a baseline without training, may have the shape (1, V, C, C).
     metric : callable
         Takes a confusion matrix (C, C), row: truth, and returns a number.
     level : float
-        How often such intervals should hold the true value, between 0 and 1.
+        How often such intervals should contain the true value, between 0 and 1.
 
     Returns
     -------
     low, mean, high : float
-        Of the difference; above zero where a is better.
+        Of the difference; above zero if a is better.
 
     Raises
     ------
@@ -191,12 +191,12 @@ def paired_interval(a: ArrayLike, b: ArrayLike, metric: Metric, level: float = 0
 
 
 def _checked(name: str, confusions: ArrayLike) -> NDArray:
-    """Return the matrices as an array, or say why there can't be an interval."""
+    """Return the matrices as an array, or raise an error that says why there can't be an interval."""
     matrices = np.asarray(confusions)
     if matrices.ndim != 4 or matrices.shape[2] != matrices.shape[3] or not len(matrices):
         raise ArgumentError(name, "confusion matrices (S, V, C, C) of S seeds on V drives", f"shape {matrices.shape}")
     if matrices.shape[1] < 2:
-        expected = "two drives or more, because one says nothing about how drives differ"
+        expected = "two drives or more, because one doesn't show how drives differ"
         raise ArgumentError(name, expected, matrices.shape[1])
     return matrices
 
@@ -224,7 +224,7 @@ def _interval(estimate: EstimatedMean, level: float) -> Interval:
 
 
 def _variances(scores: NDArray, without: NDArray) -> tuple[float, float]:
-    """Return V_s and V_d, the parts of the mean score's variance that seeds and drives add."""
+    """Return V_s and V_d, the parts of the mean score's variance that come from seeds and from drives."""
     n_seeds, n_drives = without.shape
     parts = (n_drives - 1) * (without.mean(axis=1, keepdims=True) - without)  # of each drive in each seed's score
     of_drives = parts.mean(axis=0).var(ddof=1) / n_drives
