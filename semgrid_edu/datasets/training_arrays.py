@@ -1,7 +1,7 @@
 """The arrays that a network learns from: images with fewer pixels, occupancy, and the truth of each cell (section 4.1).
 
-`cached_arrays` keeps them until the code of this module, or of what it imports, changes. So only what makes arrays
-stands here.
+`cached_arrays` keeps them until the code of this module, or of what it imports, changes. So this module holds only what
+makes arrays.
 """
 
 from collections.abc import Callable, Sequence

@@ -69,7 +69,7 @@ class TrainingSet(Dataset[Sample]):
         Parameters of the occupancy filter; the package's own when left out.
     truth : LidarTruth, optional
         How to make the truth from image labels and LIDAR, as one must with real data. When left out, the truth is what
-        the data set says of its cells (`LabelledDrive.truth`).
+        that of the data set (`LabelledDrive.truth`).
 
     Attributes
     ----------
@@ -169,7 +169,7 @@ class TrainingSet(Dataset[Sample]):
 
 
 class Mixture(Sequence[Sample]):
-    """Training sets that take turns in training, such as simulated and real ones; each has a camera of its own.
+    """Training sets that take turns in training, such as simulated and real ones, each with its own camera.
 
     Each step takes its frames from the next data set, however many frames each has, and from its next camera.
 

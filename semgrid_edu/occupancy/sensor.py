@@ -42,7 +42,7 @@ class SensorModel:
         from below that obstacle, from between a car's wheels. The default is the length of a car.
     vehicle : (float, float, float, float)
         Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres. Unless the points are
-        marked (`Frame.own`), an obstacle inside it is the vehicle's own bonnet or mirror. The default is
+        marked (`Frame.vehicle_returns`), an obstacle inside it is the vehicle's own bonnet or mirror. The default is
         the outline of KITTI's estate car, whose LIDAR sees the end of its bonnet 2.5 m ahead.
     edge : float
         Up to how far outside the outline an obstacle whose reflectance is 0 counts as the vehicle's own, metres. A
@@ -179,7 +179,7 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.floating]:
     ----------
     points : (N, 3+) float
         Returns: x forward, y left, z above the ground on which the vehicle stands (m), in its grid frame, then
-        reflectance and which are the vehicle's own (`Frame.own`), where these are known; N may be 0.
+        reflectance and which are the vehicle's own (`Frame.vehicle_returns`), where these are known; N may be 0.
     sensor : SensorModel
         The sensor, with the outline of its vehicle, and how the ground is found.
 

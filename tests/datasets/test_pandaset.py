@@ -104,7 +104,7 @@ def test_the_vehicles_own_returns_are_those_on_its_roof_whichever_way_the_grid_l
     columns = dict(zip("xyz", points.T, strict=True)) | {"i": np.zeros(len(points)), "t": np.full(len(points), 100.0)}
     write_table(copy / SCENE / "lidar/00.pkl.gz", columns | {"d": np.append(scan.lidars, [0, 0])})
     frame = PandasetScene(copy, SCENE, camera)[0]
-    assert np.flatnonzero(frame.own).tolist() == [len(frame.points) - 2]
+    assert np.flatnonzero(frame.vehicle_returns).tolist() == [len(frame.points) - 2]
     evidence = scan_evidence(frame.points_grid, SPEC, SensorModel())
     assert class_at(evidence.occupied > evidence.free, *beside)
     assert not np.isin(roof[2] - GROUND, prepare_scan(frame.points_grid, SensorModel(ground=None))[:, 2])
