@@ -10,13 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from semgrid_edu.datasets.frames import LabelledDrive
 from semgrid_edu.datasets.grid_truth import truth_to_learn
 from semgrid_edu.datasets.project_lidar import seen_returns
 from semgrid_edu.errors import DataError
-from semgrid_edu.frame import Frame
+from semgrid_edu.frame import Frame, resize_image
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, track_drive
 
@@ -89,20 +88,3 @@ def _frame_arrays(
         "return_pixels": pixels,
         "return_cells": cells,
     }
-
-
-def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Average an image over larger pixels; its calibration becomes `camera.resized(size)`.
-
-    Parameters
-    ----------
-    image : (h, w, 3) uint8
-        RGB.
-    size : (int, int)
-        The new height and width, pixels.
-
-    Returns
-    -------
-    (*size, 3) uint8
-    """
-    return np.asarray(Image.fromarray(image).resize(size[::-1], Image.Resampling.BOX))

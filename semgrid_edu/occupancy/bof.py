@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState, origins, whole_cells
-from semgrid_edu.occupancy.cellwise import mix, ratio, strike_out
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.local_belief import local_belief, observe
 from semgrid_edu.occupancy.particles import slow_down
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll, shift
-from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
-from semgrid_edu.occupancy.steps import update
+from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State, ratio
+from semgrid_edu.occupancy.steps import mix, strike_out, update
 from semgrid_edu.occupancy.walls import Walls, free_beside_static, strike_out_wakes
 from semgrid_edu.occupancy.world import transition_matrix
 
