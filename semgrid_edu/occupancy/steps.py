@@ -74,10 +74,8 @@ def predict(
         The cells, (H, W).
     world : WorldModel
         Rates of change, how things stop, how they accelerate, and which arrivals to doubt beside walls.
-    dt : float
-        Time since the previous instant, seconds, not negative.
-    rng : numpy.random.Generator
-        Source of the particles' accelerations.
+    dt, rng : float, numpy.random.Generator
+        Time since the previous instant, seconds, not negative; source of the particles' accelerations.
     driven : float
         How far the vehicle has driven along the x axis since the previous instant, metres; negative backwards.
     """
