@@ -177,7 +177,7 @@ def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDAr
     a = np.where(hidden, np.minimum(left, CERTAIN), 0)
     s = posterior[STATIC]
     static = (1 - a) * s / (1 - a * s)
-    return np.stack([posterior[FREE] + s - static, static, posterior[DYNAMIC], posterior[UNKNOWN]])
+    return np.stack([posterior[FREE] + (s - static), static, posterior[DYNAMIC], posterior[UNKNOWN]])
 
 
 def free_beside_static(mixed: NDArray) -> NDArray[np.floating]:
