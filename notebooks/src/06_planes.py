@@ -28,10 +28,10 @@ from ipywidgets import FloatSlider, interact
 from matplotlib.colors import LogNorm
 from scipy import ndimage
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import fast, plotting
 from semgrid_edu.camera import transform_points
 from semgrid_edu.datasets.frames import resize_labels
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec

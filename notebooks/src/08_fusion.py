@@ -33,6 +33,7 @@ from IPython.display import Markdown
 from ipywidgets import FloatSlider, interact
 from scipy.spatial.transform import Rotation
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.camera import rigid_transform
 from semgrid_edu.datasets.grid_truth import grid_truth
@@ -45,7 +46,6 @@ from semgrid_edu.datasets.samples import (
     sample_image_stage,
     sample_weights,
 )
-from semgrid_edu.datasets.training_arrays import resize_image
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.datasets.training_set import Sample

@@ -41,12 +41,13 @@ from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.pipeline import run_pipeline
 
 # %% jupyter={"source_hidden": true}
-from semgrid_edu.workshop.studies.filter.memory_counts import frames_since_seen
+from worlds.lecture_14_counts import frames_since_seen
 from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_00_street import CLASSES, CLASS_OF, STREET
 from worlds.lecture_14_class_memory import (
     MemoryWorld, class_over_time, exact_classes, factored_classes, frames_worth, memory_price,
 )  # fmt: skip
+from semgrid_edu.workshop.course.street import frames_since_seen
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 spec, S = GridSpec.compact(), KITTI_14.n_semantic
@@ -316,7 +317,7 @@ assert rates[10] > 5 * rates[1] ** 10  # far more than if it fell like r^k
 #
 # Therefore the package doesn't take its exponent from the formula. On fresh simulated streets, whose true labels are
 # known everywhere, we let a memory run with each of six exponents and look which one knows the classes in view best,
-# by distance ([memory.json](../docs/results/memory.json), made by `semgrid-edu reproduce memory`):
+# by distance ([memory.json](../docs/results/memory.json), made by `worlds/lecture_14_gain.py`):
 
 # %% jupyter={"source_hidden": true}
 worth = measured["worth"]

@@ -21,9 +21,9 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import sample_drive
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.fast import PlaneSampler
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.planes import plane_heights, plane_pixels, sample_planes_naive

@@ -27,10 +27,10 @@ import torch
 import torch.nn.functional as F
 from scipy.ndimage import binary_opening
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import build_segmenter, load_net

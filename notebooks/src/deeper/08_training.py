@@ -289,7 +289,7 @@ assert right > 0.8
 
 # %% [markdown]
 # With 400 steps, from random weights on and every cell counting alike, all four image networks learn such frames
-# (`semgrid-edu reproduce overfit`):
+# (`worlds/lecture_08_overfit.py`):
 
 # %% jupyter={"source_hidden": true}
 by_network = json.loads(Path("../../docs/results/overfit.json").read_text(encoding="utf-8"))["networks"]
