@@ -200,7 +200,8 @@ def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, str
 @cache  # by the text: whatever changes in a file is seen, and what doesn't is parsed once
 def _tree_and_imports(text: str) -> tuple[str, list[tuple[str, str, str]]]:
     """Return a module's syntax tree, printed, and from where it imports which names, and what it calls them."""
-    tree, imports = _without_docstrings(ast.parse(text)), []
+    tree = _without_docstrings(ast.parse(text))
+    imports = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             imports += [(*alias.name.rpartition(".")[::2], "") for alias in node.names]

@@ -183,7 +183,8 @@ def _open_png(content: bytes) -> Image.Image:
 
 def _sixteen_bits(content: bytes) -> NDArray[np.uint16]:
     """Decode three channels of 16 bits, of which Pillow keeps 8: the upper ones, or the lower ones if asked."""
-    upper, lower = _open_png(content), _open_png(content)
+    upper = _open_png(content)
+    lower = _open_png(content)
     lower.tile = [(*lower.tile[0][:3], "RGB;16L")]
     return np.array(upper).astype(np.uint16) << 8 | np.array(lower)
 
@@ -216,11 +217,13 @@ def resumable_json(
     DataError
         When the file is something else, or another experiment made it.
     """
-    path, none = Path(log), [] if listed else {}
+    path = Path(log)
+    none = [] if listed else {}
     if not path.exists():
         return none
     content = read_json(path)
-    found, parts = {name: content.get(name) for name in identity}, content.get(key)
+    found = {name: content.get(name) for name in identity}
+    parts = content.get(key)
     sound = isinstance(parts, type(none)) and all(isinstance(p, kind) for p in (parts if listed else parts.values()))
     if not sound or not identity.keys() <= content.keys():
         raise DataError(path, "a result of this experiment, or no file", f"something else: {repr(content)[:200]}")
