@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.errors import ArgumentError
@@ -149,3 +150,20 @@ def blocks(fine: NDArray, spec: GridSpec) -> NDArray:
     if not coarsening or (height * factor, width * factor) != LABEL_GRID.shape:
         raise ArgumentError("spec", f"a coarsening of {LABEL_GRID}", spec)
     return fine.reshape(height, factor, width, factor).swapaxes(1, 2).reshape(height, width, -1)
+
+
+def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Average an image over larger pixels; its calibration becomes `camera.resized(size)`.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+        RGB.
+    size : (int, int)
+        The new height and width, pixels.
+
+    Returns
+    -------
+    (*size, 3) uint8
+    """
+    return np.asarray(Image.fromarray(image).resize(size[::-1], Image.Resampling.BOX))

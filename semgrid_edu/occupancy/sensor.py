@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count, types_named
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence, check_points
-from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.polar import beyond_reach, fill_gaps, polar_profile, reach
+from semgrid_edu.occupancy.polar import GroundParams, beyond_reach, fill_gaps, height_above_ground, polar_profile, reach
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,14 @@ from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, c
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import keep_result, reproduce
+from semgrid_edu.workshop.simulation import MissingExtraError
 
 app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was interrupted, if there is one.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that this command hasn't written, too.")]
 
 PICTURES = (".png", ".pdf", ".svg")
-"""Formats of pictures that say who made them."""
+"""Formats of pictures whose metadata can hold the command."""
 
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
@@ -187,7 +188,7 @@ def evaluate(
 
 
 def run() -> None:
-    """Run the command line; a mistake in the input, or a disk that refuses, ends in one line, not in a traceback."""
+    """Run the command line; a mistake in the input, or a failing disk, ends in one line, not in a traceback."""
     # Idle OpenMP threads spin, which keeps busy cores from the threads that have work: on two busy cores a frame took
     # 1.2 s instead of 0.07 s. OpenMP reads this once, when a command loads torch or numba, so it must be set before.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -198,7 +199,7 @@ def run() -> None:
         if told := keep_compiled_functions():
             typer.echo(f"semgrid-edu: {told}", err=True)
         app(prog_name="semgrid-edu")
-    except (ArgumentError, DataError, OSError, RuntimeError) as error:
+    except (ArgumentError, DataError, MissingExtraError, OSError, RuntimeError) as error:
         if isinstance(error, RuntimeError) and "Symlink loop" not in str(error):
             raise
         where = f"{error.filename}: " if getattr(error, "filename", None) else ""

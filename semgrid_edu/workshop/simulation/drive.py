@@ -8,18 +8,16 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
-from semgrid_edu.workshop.simulation.sensors.gps import Geodesy
 from semgrid_edu.workshop.simulation.sensors.lidar import labelled_scan
 from semgrid_edu.workshop.simulation.sensors.raycast import Instant, PorousMesh, RayMesh
-from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.sensors.rig import Geodesy, Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
-from semgrid_edu.workshop.simulation.street.ego import Ego
 from semgrid_edu.workshop.simulation.street.footprints import footprint_table
 from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes, draw_plan
 from semgrid_edu.workshop.simulation.street.road_users import fill_street
 from semgrid_edu.workshop.simulation.street.scenery import build_scenery
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
-from semgrid_edu.workshop.simulation.street.trajectories import ActorPace
+from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Ego
 
 PERIOD = 0.1
 """Seconds between frames: KITTI's LIDAR turns ten times a second."""
@@ -56,7 +54,7 @@ class SimulatedFrame:
 
 
 class SimulatedDrive:
-    """A drive through a world of its own, the same for the same seed.
+    """A drive through a world drawn for it; the same seed gives the same drive.
 
     Parameters
     ----------
@@ -65,7 +63,7 @@ class SimulatedDrive:
     n_frames : int
         Number of frames, `PERIOD` apart.
     wishes : Wishes
-        What isn't left to chance.
+        The fixed parts of the street; the rest is drawn.
     rig : Rig, optional
         The sensors on the recording car; when left out, the sensors of the simulated data sets.
 
@@ -76,7 +74,7 @@ class SimulatedDrive:
     ego : Ego
         How the recording car moves.
     moving, parked : list of Actor
-        The road users; a pedestrian who stands still is among those that move.
+        The road users; a pedestrian standing still is among those that move.
     """
 
     def __init__(
@@ -134,7 +132,7 @@ class SimulatedDrive:
         return {actor.instance: rotation @ actor.trajectory.velocity(road, t) for actor in self.moving}
 
     def objects(self, t: float) -> list[dict]:
-        """Return the cars, pedestrians and bicycles whose centres lie in `LABEL_GRID`, from `Actor.described`.
+        """Return the cars, pedestrians and bicycles whose centres are in `LABEL_GRID`, from `Actor.described`.
 
         Parameters are those of `SimulatedDrive.pose`.
         """
@@ -144,7 +142,7 @@ class SimulatedDrive:
         return [actor.described(road, t, T) for actor, held in zip(actors, inside, strict=True) if held]
 
     def footprints(self, t: float) -> NDArray[np.float64]:
-        """Return the footprints of all that stands or moves at one instant, (K, 9), as from `footprint_table`.
+        """Return the footprints of everything, standing or moving, at one instant, (K, 9), as from `footprint_table`.
 
         Parameters are those of `SimulatedDrive.pose`.
         """
@@ -217,7 +215,7 @@ class SimulatedDrive:
         return Frame(None, points, self.rig.camera, self.pose(nearest), t)
 
     def labelled_scan(self, index: int) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Take the scan of `SimulatedDrive.scan`, and say what each return hit, as PandaSet's annotators do.
+        """Take the scan of `SimulatedDrive.scan`, with what each return hit, as PandaSet's annotators label it.
 
         Parameters are those of `SimulatedDrive.scan`.
 
@@ -231,7 +229,7 @@ class SimulatedDrive:
         return self._labelled_scan(index * PERIOD, self._noise(index, 1))
 
     def _labelled_scan(self, t: float, rng: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Take the scan during which the LIDAR looks ahead at time t, and say what each return hit."""
+        """Take the scan during which the LIDAR looks ahead at time t, with what each return hit."""
         world, pose = (lambda after: self.instant(t + after)), (lambda after: self.pose(t + after))
         return labelled_scan(world, pose, self.rig.lidar, self.plan.road, rng)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from semgrid_edu.workshop.simulation.street.builder import Builder
 from semgrid_edu.workshop.simulation.street.footprints import Footprint
-from semgrid_edu.workshop.simulation.things import furniture
+from semgrid_edu.workshop.simulation.things import roadside
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, box, tube
 
@@ -34,7 +34,7 @@ def stand_lamps(builder: Builder, sign: int) -> None:
     if rng.random() < 0.25:
         return
     side, step = builder.road.side(sign), rng.uniform(22, 34)
-    shape = furniture.lamp(float(rng.choice([5.5, 7.5])))
+    shape = roadside.lamp(float(rng.choice([5.5, 7.5])))
     for s in np.arange(extent.start + rng.uniform(0, step), extent.end, step):
         builder.try_post(shape, s, sign * (side.edge + 0.6), np.pi if sign > 0 else 0.0, Kind.POLE, 0.11)
 
@@ -45,7 +45,7 @@ def stand_signs(builder: Builder, sign: int) -> None:
     d, yaw = sign * (builder.road.side(sign).edge + 0.75), 0.0 if sign < 0 else np.pi
     for s in np.arange(extent.start, extent.end, 16.0):
         if rng.random() < 0.45:
-            shape = furniture.sign(str(rng.choice(list(_SIGNS), p=list(_SIGNS.values()))))
+            shape = roadside.sign(str(rng.choice(list(_SIGNS), p=list(_SIGNS.values()))))
             builder.try_post(shape, s + rng.uniform(0, 12), d, yaw + rng.normal(0, 0.08), Kind.SIGN, 0.08)
 
 
@@ -63,10 +63,10 @@ def stand_signals(builder: Builder) -> None:
     lights, green = rng.random() < 0.55, bool(rng.random() < 0.5)
     back = road.side_half + road.corner + 0.4
     for sign, yaw in ((-1, 0.0), (1, np.pi)):
-        shape = furniture.traffic_light(green) if lights else furniture.sign("priority")
+        shape = roadside.traffic_light(green) if lights else roadside.sign("priority")
         builder.try_post(shape, road.junction + sign * back, sign * (road.side(sign).edge + 0.5), yaw, Kind.SIGN, 0.09)
     for sign in filter(road.leaves, (1, -1)):
-        shape = furniture.traffic_light(not green) if lights else furniture.sign("stop")
+        shape = roadside.traffic_light(not green) if lights else roadside.sign("stop")
         s, d = road.junction + sign * (road.side_half + 0.5), sign * (road.side(sign).edge + road.corner + 0.5)
         builder.try_post(shape, s, d, -sign * np.pi / 2, Kind.SIGN, 0.09)
 
@@ -105,8 +105,8 @@ def _stand(builder: Builder, piece: Piece, kind: Kind, half: float, top: float, 
 
 def _stand_fence(builder: Builder, piece: Piece, style: str, opacity: float) -> None:
     """Put a piece of wire mesh or a pane into the world, in its frame, unless its place is taken."""
-    frame, sheet = furniture.sheet_fence(style, piece[3])
-    if _stand(builder, piece, Kind.FENCE, _THIN_HALF, furniture.SHEETS[style].height, sheet, opacity):
+    frame, sheet = roadside.sheet_fence(style, piece[3])
+    if _stand(builder, piece, Kind.FENCE, _THIN_HALF, roadside.SHEETS[style].height, sheet, opacity):
         builder.add(frame, *piece[:3])
 
 
@@ -141,7 +141,7 @@ def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
     for piece in _pieces(s0, s1, d + np.sign(d) * thickness / 2, 0.6, 1.0, rng):
         if rng.random() > 0.04:
             wide, high = thickness * rng.uniform(0.8, 1.1), height * rng.uniform(0.9, 1.1)
-            body = furniture.porous_hedge(piece[3], wide, high)
+            body = roadside.porous_hedge(piece[3], wide, high)
             _stand(builder, piece, Kind.PLANT, wide / 2, high, body, opacity * rng.uniform(0.7, 1.4))
 
 
@@ -161,7 +161,7 @@ def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
     rng = builder.rng
     opacity, height, long = rng.uniform(3.0, 6.0), rng.uniform(1.3, 1.9), rng.uniform(2.5, 4.0)
     for s in np.arange(s0, s1, rng.uniform(2.8, 4.0)):
-        body = furniture.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
+        body = roadside.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
         piece = (s, d + np.sign(d) * 1.6, np.sign(d) * np.pi / 2, long)
         _stand(builder, piece, Kind.PLANT, 0.35, height, body, opacity)
 
@@ -179,7 +179,7 @@ def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Stand bare posts in a regular row. Parameters are those of `wire_mesh`."""
     rng = builder.rng
     step, height, radius = rng.uniform(1.4, 2.6), rng.uniform(1.0, 1.8), rng.uniform(0.04, 0.09)
-    post = furniture.bollard(height, radius)
+    post = roadside.bollard(height, radius)
     for s in np.arange(s0, s1, step):
         builder.try_post(post, s, d, 0.0, Kind.POLE, max(radius, _THIN_HALF))
 

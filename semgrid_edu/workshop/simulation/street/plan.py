@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from semgrid_edu.storage.files import table_beside
+from semgrid_edu.workshop.simulation.street.ground import Extent
 from semgrid_edu.workshop.simulation.street.layout import Road, Side
 from semgrid_edu.workshop.simulation.street.light import Light
-from semgrid_edu.workshop.simulation.street.terrain import Extent
-from semgrid_edu.workshop.simulation.things.furniture import FENCES
+from semgrid_edu.workshop.simulation.things.roadside import FENCES
 
 BORDERS = (*FENCES, "hedge", "none")
 """What may run along the gardens of a suburb."""
@@ -82,7 +82,7 @@ class Plan:
     styles : (str, str)
         Left and right side, members of `STYLES`, or `YARD`.
     borders : (str, str)
-        What runs along the gardens of a suburb, left and right: a fence of `furniture.FENCES`, "hedge" or "none"; along
+        What runs along the gardens of a suburb, left and right: a fence of `roadside.FENCES`, "hedge" or "none"; along
         a yard one of `YARD_BORDERS`.
     parking : (bool, bool)
         Whether there are parking bays left and right.

@@ -8,7 +8,7 @@ import numpy as np
 from semgrid_edu.workshop.simulation.street.layout import Side
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
 from semgrid_edu.workshop.simulation.street.trajectories import STAND, ActorPace, Departure, Trajectory
-from semgrid_edu.workshop.simulation.things.cars import car_size
+from semgrid_edu.workshop.simulation.things.cars_and_people import car_size
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from semgrid_edu.workshop.simulation.street import borders
 from semgrid_edu.workshop.simulation.street.builder import Builder
+from semgrid_edu.workshop.simulation.street.ground import ground_mesh
 from semgrid_edu.workshop.simulation.street.plan import YARD, Plan
-from semgrid_edu.workshop.simulation.street.terrain import ground_mesh
-from semgrid_edu.workshop.simulation.things import furniture, plants
+from semgrid_edu.workshop.simulation.things import roadside
 from semgrid_edu.workshop.simulation.things.buildings import House, build_house
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 
@@ -51,9 +51,9 @@ def _meets_side_road(builder: Builder, s0: float, s1: float, sign: int, margin: 
 def _tree(builder: Builder, s: float, d: float, species: str | None = None) -> None:
     """Plant a tree; far ones have fewer leaves."""
     rng, plan = builder.rng, builder.plan
-    species = species or str(rng.choice(plants.TREES, p=[0.5, 0.15, 0.2, 0.15]))
+    species = species or str(rng.choice(roadside.TREES, p=[0.5, 0.15, 0.2, 0.15]))
     far = abs(d) > 35 or s > plan.extent.end - 120
-    shape = plants.tree(species, int(rng.integers(3)), 350 if far else 1500)
+    shape = roadside.tree(species, int(rng.integers(3)), 350 if far else 1500)
     scale, season = rng.uniform(0.75, 1.25), (1, 1, 1) if species == "conifer" else plan.foliage
     tint = np.asarray(season) * rng.uniform(0.75, 1.25) * (1 + rng.normal(0, 0.08, 3))
     tinted = shape.tinted(np.where((shape.material == Material.LEAF)[:, None], tint, 1.0))
@@ -68,7 +68,7 @@ def _bush(builder: Builder, s: float, d: float) -> None:
     rng = builder.rng
     scale = rng.uniform(0.6, 1.3)
     if foot := builder.spot(s, d, Kind.PLANT, 0.95 * scale, 1.2 * scale, top=1.3 * scale):
-        shape = plants.bush(int(rng.integers(3))).tinted(np.asarray(builder.plan.foliage) * rng.uniform(0.7, 1.3))
+        shape = roadside.bush(int(rng.integers(3))).tinted(np.asarray(builder.plan.foliage) * rng.uniform(0.7, 1.3))
         builder.add(shape, s, d, rng.uniform(0, 6.28), foot, scale)
 
 
@@ -106,7 +106,7 @@ def _house_row(builder: Builder, sign: int, town: bool) -> None:
             front = side.edge + line + setback + rng.uniform(0, 1.0) * (not town)
             _house(builder, house, s + house.width / 2, sign * front, _facing(sign))
         if not town:
-            border = str(rng.choice([*furniture.FENCES, "hedge"])) if rng.random() < 0.15 else border
+            border = str(rng.choice([*roadside.FENCES, "hedge"])) if rng.random() < 0.15 else border
             _border(builder, s, end, sign, side.edge + line + 0.35, border)
             _garden(builder, s, end, sign, side.edge + line + 1.2, setback)
         elif gap > 2 and rng.random() < 0.6:
@@ -140,9 +140,9 @@ def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, st
         if at_gate or _meets_side_road(builder, s, s + step, sign, margin) or not builder.free(foot, -0.05):
             continue
         if hedge:
-            piece = plants.hedge(int(rng.integers(3))).placed((0.5, 0, 0)).tinted(rng.uniform(0.85, 1.15))
+            piece = roadside.hedge(int(rng.integers(3))).placed((0.5, 0, 0)).tinted(rng.uniform(0.85, 1.15))
         else:
-            piece = furniture.fence(style, step)
+            piece = roadside.fence(style, step)
         builder.add(piece, s, sign * offset, 0.0, foot)
 
 
@@ -160,7 +160,7 @@ def _park(builder: Builder, sign: int) -> None:
     """Cover one side with trees and bushes on its bank, perhaps a fence along it."""
     rng, extent, line = builder.rng, builder.plan.extent, builder.road.side(sign).line
     if rng.random() < 0.65:
-        style = str(rng.choice(furniture.FENCES, p=[0.2, 0.25, 0.4, 0.15]))
+        style = str(rng.choice(roadside.FENCES, p=[0.2, 0.25, 0.4, 0.15]))
         _border(builder, extent.start, extent.start + 150, sign, line + rng.uniform(0.8, 2.5), style)
     for s in np.arange(extent.start, extent.end, 5.5):
         for _ in range(2):

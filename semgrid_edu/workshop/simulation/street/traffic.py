@@ -11,9 +11,17 @@ from semgrid_edu.workshop.simulation.street.builder import OVERHEAD, Builder
 from semgrid_edu.workshop.simulation.street.ground import on_wheels
 from semgrid_edu.workshop.simulation.street.layout import Road
 from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Trajectory
-from semgrid_edu.workshop.simulation.things.cars import BODIES, PAINTS, car, car_size
+from semgrid_edu.workshop.simulation.things.cars_and_people import (
+    BODIES,
+    PAINTS,
+    Person,
+    bicycle,
+    car,
+    car_size,
+    rider,
+    walker,
+)
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.people import Person, bicycle, rider, walker
 from semgrid_edu.workshop.simulation.things.shapes import Shape
 
 Size = tuple[float, float, float]
