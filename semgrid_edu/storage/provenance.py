@@ -135,22 +135,6 @@ def _checksums(folder: Path) -> dict[str, str]:
     }
 
 
-def short_path(weights: str | Path) -> str:
-    """Return the last two parts of a path to weights: the folder, which names the network, and the file.
-
-    Parameters
-    ----------
-    weights : path-like
-        The file.
-
-    Returns
-    -------
-    str
-        Such as "segnet_compact/weights.safetensors".
-    """
-    return "/".join(Path(weights).resolve().parts[-2:])
-
-
 def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
     """Hash the code of modules and of all that they import from the package, without comments and docstrings.
 
