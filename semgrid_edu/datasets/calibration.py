@@ -57,7 +57,8 @@ def camera_from(
     DataError
         When `Camera` raises an error, or the principal point is outside the image.
     """
-    (height, width), principal_point = size, np.asarray(K)[:2, 2]
+    height, width = size
+    principal_point = np.asarray(K)[:2, 2]
     # `Camera` itself allows that, because an image may be cropped from a larger one.
     if not ((principal_point >= -0.5) & (principal_point <= (width - 0.5, height - 0.5))).all():
         expected = f"in K a principal point within the image of {width} x {height} pixels"
@@ -257,7 +258,8 @@ def read_benchmark_calibration(path: Path) -> BenchmarkCalibration:
     entries = _benchmark_entries(path)
     K, T_camera_from_rectified = projection(path, entries, "P2")
     if "Tr" in entries:
-        T_camera0_from_lidar, T_lidar_from_imu = _rigid(path, entries, "Tr"), None
+        T_camera0_from_lidar = _rigid(path, entries, "Tr")
+        T_lidar_from_imu = None
     else:
         R = check_rotation(path, entry_of(path, entries, "R_rect", (3, 3)), "R_rect")
         T_camera0_from_lidar = rigid_transform(R, np.zeros(3)) @ _rigid(path, entries, "Tr_velo_cam")

@@ -117,7 +117,9 @@ def _carried(
     scan: LabelledScan, places: dict[str, NDArray[np.float64]], own: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
     """Return the returns of a scan; moving objects are put where `places` has them."""
-    points, kept, boxes = scan.points.copy(), np.ones(len(scan.points), bool), scan.cuboids
+    points = scan.points.copy()
+    kept = np.ones(len(scan.points), bool)
+    boxes = scan.cuboids
     movable = np.flatnonzero(scan.movable)
     holder = boxes.holding(points[movable], scan.lidars[movable])
     kept[movable[holder < 0]] = own

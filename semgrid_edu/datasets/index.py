@@ -198,7 +198,8 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
     DataError
         When there is no such scene, its returns have no labels, or there is a dataset.json already.
     """
-    path, splits = Path(folder) / INDEX_FILE, {"train": [], "test": []}
+    path = Path(folder) / INDEX_FILE
+    splits = {"train": [], "test": []}
     if path.exists():
         raise DataError(path, "no data set yet", "one that would be lost")
     there = [camera for camera in CAMERAS if (Path(root) / scene / "camera" / camera).is_dir()] or CAMERAS

@@ -159,7 +159,8 @@ class KittiRawDrive(FrameSequence):
             yield partial(self._time, k)
             if self.view in self._sensors:
                 yield partial(read_png, self.file(self.view, k, ".png"), "RGB", size)
-            labels, name = self.folder / "labels", f"{k:010d}.png"
+            labels = self.folder / "labels"
+            name = f"{k:010d}.png"
             for kind in KINDS if is_labelled(labels, name) else ():
                 yield partial(read_label, labels, kind, name, size)
 
@@ -255,7 +256,8 @@ def _existing(root: Path, date: str, drive: str) -> tuple[Path, Path]:
 
 def _instead(root: Path, parent: Path, what: str, pattern: str) -> str:
     """List the dates or drives that exist, and name the layout that the whole folder seems to have."""
-    there, layout = sorted(path.name for path in parent.glob(pattern) if path.is_dir()), what_is(root)
+    there = sorted(path.name for path in parent.glob(pattern) if path.is_dir())
+    layout = what_is(root)
     names = f"only the {what} {', '.join(there)}" if there else f"no {what}"
     return names + (f"; {root} looks like {layout}" if layout else "")
 

@@ -80,16 +80,19 @@ class PandasetScene(FrameSequence):
     >>> truth = scene.truth(4, GridSpec.compact(), before=9, after=9)     # doctest: +SKIP
     """
 
-    label_set, credit = KITTI_14, files.CREDIT
+    label_set = KITTI_14
+    credit = files.CREDIT
 
     def __init__(self, root: str | Path, scene: str, camera: str = CAMERAS[0]) -> None:
         if camera not in CAMERAS:
             raise ArgumentError("camera", f"one of {', '.join(CAMERAS)}", repr(camera))
-        self.folder, self.view = Path(root) / scene, Path(root) / scene / "camera" / camera
+        self.folder = Path(root) / scene
+        self.view = Path(root) / scene / "camera" / camera
         if not self.folder.is_dir():
             there = sorted(path.parent.name for path in Path(root).glob("*/lidar"))
             raise DataError(self.folder, "a scene", f"only {', '.join(there)}" if there else "no scene beside it")
-        self.name, self._opened = f"{scene} {camera}", (root, scene, camera)
+        self.name = f"{scene} {camera}"
+        self._opened = (root, scene, camera)
         self.numbers = frame_numbers(self.view, "images", ".jpg", digits=2)
         self._scan = lru_cache(_WINDOW)(partial(files.read_pandaset_scan, self.folder))
 
@@ -191,7 +194,9 @@ class PandasetScene(FrameSequence):
 
     def without_labels(self, k: int) -> Frame:
         """Read a frame without its labels. Parameters are those of `FrameSequence.without_labels`."""
-        scan, camera, T_world_from_lidar = self._scan(self.numbers[k]), self._camera(k), self._T_world_from_lidar(k)
+        scan = self._scan(self.numbers[k])
+        camera = self._camera(k)
+        T_world_from_lidar = self._T_world_from_lidar(k)
         turning = scan.lidars == files.TURNING
         points = transform_points(invert_rigid(T_world_from_lidar), scan.points[turning])
         points = np.column_stack([points, scan.reflectance[turning]]).astype(np.float32)
@@ -212,8 +217,10 @@ class PandasetScene(FrameSequence):
     def _cloud(self, k: int, before: int = 0, after: int = 0) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return the returns of a window of scans in the LIDAR frame of frame k, and their classes."""
         check_whole(before=before, after=after)
-        number, scans = self.numbers[k], frame_numbers(self.folder / "lidar", "scans", ".pkl.gz", digits=2)
-        earlier, later = [n for n in scans if n < number], [n for n in scans if n > number]
+        number = self.numbers[k]
+        scans = frame_numbers(self.folder / "lidar", "scans", ".pkl.gz", digits=2)
+        earlier = [n for n in scans if n < number]
+        later = [n for n in scans if n > number]
         others = earlier[max(len(earlier) - before, 0) :] + later[:after]
         now, *rest = (self._labelled_scan(n) for n in (number, *others))
         points, classes = put_together(now, rest)
@@ -245,7 +252,9 @@ class PandasetScene(FrameSequence):
 
     def _T_world_from_lidar(self, k: int) -> NDArray[np.float64]:
         """Return the pose of the Pandar64 at the instant of the image, turned to where the camera looks."""
-        number, poses, times = self.numbers[k], self._poses, self._times
+        number = self.numbers[k]
+        poses = self._poses
+        times = self._times
         places = poses[:, :3, :3] @ files.LIDAR_IN_POSE + poses[:, :3, 3]
         velocity = np.gradient(places, times, axis=0)[number]
         ahead = self._camera_poses[number][:3, 2]
@@ -280,7 +289,9 @@ def _painted(
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Return class and depth of the closest return on each pixel that the camera sees."""
     seen = unhidden(points, _standing(classes), camera)
-    points, classes, blank = points[seen], classes[seen], nothing_known(KITTI_14, camera.size)
+    points = points[seen]
+    classes = classes[seen]
+    blank = nothing_known(KITTI_14, camera.size)
     returns, uv = closest_returns(Frame(None, points, camera, np.eye(4), 0.0))
     u, v = uv.T
     blank.image[v, u] = classes[returns]

@@ -131,7 +131,8 @@ def read_pandaset_scan(scene: Path, number: int) -> PandasetScan:
     path = scene / "lidar" / f"{number:02d}.pkl.gz"
     table = _table(path, ("x", "y", "z", "i", "d"))
     points = np.column_stack([table[axis] for axis in "xyz"])
-    reflectance, lidars = (table["i"] / 255).astype(np.float32), table["d"]
+    reflectance = (table["i"] / 255).astype(np.float32)
+    lidars = table["d"]
     if not ((reflectance >= 0) & (reflectance <= 1)).all():
         raise DataError(path, "i from 0 to 255", f"{table['i'].min():g} to {table['i'].max():g}")
     if not semseg_folder(scene).is_dir():
@@ -207,7 +208,8 @@ def read_intrinsics(path: Path) -> NDArray[np.float64]:
 
 def _table(path: Path, numbers: Sequence[str], others: Sequence[str] = ()) -> dict[str, NDArray]:
     """Read a table that has to have some columns, of finite numbers and of other things."""
-    table, columns = read_pickled_table(path), [*numbers, *others]
+    table = read_pickled_table(path)
+    columns = [*numbers, *others]
     if not set(columns) <= set(table):
         raise DataError(path, f"the columns {', '.join(columns)}", ", ".join(table)[:200])
     for name in numbers:
@@ -224,7 +226,8 @@ def _read_cuboids(path: Path) -> Cuboids:
     places, sizes = np.split(np.column_stack([table[column] for column in columns]).astype(np.float64), 2, axis=1)
     turns = Rotation.from_rotvec(np.outer(table["yaw"], [0, 0, 1])).as_matrix()
     T = np.array([rigid_transform(*pose) for pose in zip(turns, places, strict=True)]).reshape(-1, 4, 4)
-    lidars, sibling = table["cuboids.sensor_id"], table["cuboids.sibling_id"]
+    lidars = table["cuboids.sensor_id"]
+    sibling = table["cuboids.sibling_id"]
     names = np.where((lidars > TURNING) & (sibling != "-"), sibling, table["uuid"])
     stationary = table["stationary"].tolist()
     _check_objects(path, names, stationary, sizes)

@@ -85,7 +85,8 @@ def cells_in_view(camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
     spec : GridSpec
         The grid, (H, W) cells.
     """
-    centers, in_view = spec.centers(), np.zeros(spec.shape, np.bool_)
+    centers = spec.centers()
+    in_view = np.zeros(spec.shape, np.bool_)
     for height in plane_heights():
         points = np.insert(centers[~in_view], 2, height, axis=1)  # not again where a lower point is in the image
         in_view[~in_view] = project(transform_points(camera.T_camera_from_grid, points), camera)[1]

@@ -115,7 +115,8 @@ class SemanticKittiSequence(FrameSequence):
     label_set = KITTI_14
 
     def __init__(self, root: str | Path, sequence: str) -> None:
-        self.folder, self.name = Path(root) / "sequences" / sequence, sequence
+        self.folder = Path(root) / "sequences" / sequence
+        self.name = sequence
         self._length = 1 + max(frame_numbers(self.folder / "velodyne", "scans", ".bin"))
 
     def __len__(self) -> int:
@@ -186,7 +187,8 @@ class SemanticKittiSequence(FrameSequence):
 
     def _labelled_points(self, j: int, k: int) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return scan j in the grid frame of frame k, and its classes, without what has moved between them."""
-        points, classes = self.scan(j)[:, :3].astype(np.float64), self.classes(j)
+        points = self.scan(j)[:, :3].astype(np.float64)
+        classes = self.classes(j)
         if j != k:
             T_lidar_k_from_lidar_j = invert_rigid(self._poses[k]) @ self._poses[j]
             points = transform_points(T_lidar_k_from_lidar_j, points)
@@ -243,7 +245,8 @@ class SemanticKittiSequence(FrameSequence):
     @cached_property
     def _poses(self) -> list[NDArray[np.float64]]:
         """T_world_from_lidar of each frame; the world is the LIDAR at the first one."""
-        path, T_camera0_from_lidar = self.folder / "poses.txt", self._calibration.T_camera0_from_lidar
+        path = self.folder / "poses.txt"
+        T_camera0_from_lidar = self._calibration.T_camera0_from_lidar
         poses = [parse_pose(path, line, f"line {n}") for n, line in enumerate(self._lines(path), 1)]
         return [invert_rigid(T_camera0_from_lidar) @ T @ T_camera0_from_lidar for T in poses]
 

@@ -113,7 +113,8 @@ class TrainingSet(Dataset[Sample]):
     ) -> None:
         index = dataset if isinstance(dataset, DatasetIndex) else load_index(dataset)
         recipe = ArrayRecipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams(), self.track)
-        self.spec, self.label_set = recipe.spec, index.label_set
+        self.spec = recipe.spec
+        self.label_set = index.label_set
         drives = index.drives(split)
         self.camera = _shared_camera(drives).resized(recipe.image_size)
         self.drives = tuple(drive.name for drive, numbers in drives for _ in numbers)
@@ -196,7 +197,8 @@ class Mixture(Sequence[Sample]):
     def __init__(self, data_sets: Sequence[Sequence[TrainingSet]]) -> None:
         if not data_sets or not all(data_sets):
             raise ArgumentError("data_sets", "at least one data set, each of at least one camera", "none")
-        self._data_sets, self.parts = data_sets, tuple(part for parts in data_sets for part in parts)
+        self._data_sets = data_sets
+        self.parts = tuple(part for parts in data_sets for part in parts)
         self.label_set, self.camera = self.parts[0].label_set, self.parts[0].camera
         for part in self.parts:
             if part.label_set != self.label_set:

@@ -135,22 +135,6 @@ def _checksums(folder: Path) -> dict[str, str]:
     }
 
 
-def short_path(weights: str | Path) -> str:
-    """Return the last two parts of a path to weights: the folder, which names the network, and the file.
-
-    Parameters
-    ----------
-    weights : path-like
-        The file.
-
-    Returns
-    -------
-    str
-        Such as "segnet_compact/weights.safetensors".
-    """
-    return "/".join(Path(weights).resolve().parts[-2:])
-
-
 def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
     """Hash the code of modules and of all that they import from the package, without comments and docstrings.
 
@@ -200,7 +184,8 @@ def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, str
 @cache  # by the text: whatever changes in a file is seen, and what doesn't is parsed once
 def _tree_and_imports(text: str) -> tuple[str, list[tuple[str, str, str]]]:
     """Return a module's syntax tree, printed, and from where it imports which names, and what it calls them."""
-    tree, imports = _without_docstrings(ast.parse(text)), []
+    tree = _without_docstrings(ast.parse(text))
+    imports = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             imports += [(*alias.name.rpartition(".")[::2], "") for alias in node.names]

@@ -183,47 +183,7 @@ def _open_png(content: bytes) -> Image.Image:
 
 def _sixteen_bits(content: bytes) -> NDArray[np.uint16]:
     """Decode three channels of 16 bits, of which Pillow keeps 8: the upper ones, or the lower ones if asked."""
-    upper, lower = _open_png(content), _open_png(content)
+    upper = _open_png(content)
+    lower = _open_png(content)
     lower.tile = [(*lower.tile[0][:3], "RGB;16L")]
     return np.array(upper).astype(np.uint16) << 8 | np.array(lower)
-
-
-def resumable_json(
-    log: str | Path, identity: dict[str, object], key: str, kind: type = dict, listed: bool = False
-) -> Any:
-    """Return the finished parts of a result that an experiment writes while it runs, to resume from.
-
-    Parameters
-    ----------
-    log : path-like
-        The file of a result, finished or not; it may be missing.
-    identity : dict
-        What distinguishes the experiment, such as its seed, in types of JSON. It must be equal in the file.
-    key : str
-        Name of the parts in the file.
-    kind : type
-        The type of every part.
-    listed : bool
-        Whether the parts are in a list; by default they have names.
-
-    Returns
-    -------
-    dict of str to `kind`, or list of `kind`
-        The parts; none when there is no file.
-
-    Raises
-    ------
-    DataError
-        When the file is something else, or another experiment made it.
-    """
-    path, none = Path(log), [] if listed else {}
-    if not path.exists():
-        return none
-    content = read_json(path)
-    found, parts = {name: content.get(name) for name in identity}, content.get(key)
-    sound = isinstance(parts, type(none)) and all(isinstance(p, kind) for p in (parts if listed else parts.values()))
-    if not sound or not identity.keys() <= content.keys():
-        raise DataError(path, "a result of this experiment, or no file", f"something else: {repr(content)[:200]}")
-    if found != identity:
-        raise DataError(path, f"a result of {identity}", f"{found}: choose another file")
-    return parts

@@ -99,7 +99,8 @@ def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
     """
     header, tensors = read_tensors(path)
     try:
-        found, iteration = parse_json(path, header["run"]), int(header["iteration"])
+        found = parse_json(path, header["run"])
+        iteration = int(header["iteration"])
         if iteration < 0:
             raise ValueError(f"step {iteration}")
     except (KeyError, TypeError, ValueError) as error:

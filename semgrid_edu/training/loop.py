@@ -193,7 +193,8 @@ def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: Trai
             raise ArgumentError("dataset", f"at least one batch of {params.batch_size} frames", f"{len(part)} frames")
     if params.batch_size % n_processes:
         raise ArgumentError("batch_size", f"a multiple of {n_processes}, the number of processes", params.batch_size)
-    size, shape = net.sampler.image_size, net.sampler.planes_shape[1:]
+    size = net.sampler.image_size
+    shape = net.sampler.planes_shape[1:]
     expected = Sample((3, *size), size, (N_STATES, *shape), shape)
     for k, sample in enumerate(dataset):
         for name, part, want in zip(Sample._fields, sample, expected, strict=True):

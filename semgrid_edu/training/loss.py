@@ -200,7 +200,8 @@ def cross_entropy_sums(scores: Tensor, truth: Tensor, alpha: Tensor) -> tuple[Te
         sum_j alpha[c_j]; it has no gradient.
     """
     scores = scores.to(torch.promote_types(scores.dtype, torch.float32))  # mixed precision sums in float32
-    alpha, truth = alpha.to(scores), truth.long()
+    alpha = alpha.to(scores)
+    truth = truth.long()
     losses = F.cross_entropy(scores, truth, weight=alpha, ignore_index=IGNORE, reduction="sum")
     return losses, alpha[truth[truth != IGNORE]].sum()
 

@@ -87,7 +87,9 @@ class TrainingParams:
             The rate, which falls to zero along half a cosine in each stage.
         """
         if iteration < self.image_iterations:
-            stage, done = "image", iteration / self.image_iterations
+            stage = "image"
+            done = iteration / self.image_iterations
         else:
-            stage, done = "grid", (iteration - self.image_iterations) / self.grid_iterations
+            stage = "grid"
+            done = (iteration - self.image_iterations) / self.grid_iterations
         return stage, self.learning_rate * (1 + math.cos(math.pi * done)) / 2

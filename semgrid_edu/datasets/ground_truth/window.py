@@ -82,7 +82,8 @@ def gather_returns(
     """
     moments = [*before, Moment(frame, None), *after]
     frames = [moment.frame for moment in moments]
-    now, own = len(before), policy.labels == "own"
+    now = len(before)
+    own = policy.labels == "own"
     scans = []
     for k in range(max(now - policy.past, 0), min(now + policy.future + 1, len(moments))):
         points = _scan(frames, k, policy.deskew)
