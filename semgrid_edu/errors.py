@@ -4,8 +4,10 @@ import math
 from collections.abc import Callable
 from dataclasses import fields
 from functools import wraps
+from importlib import import_module
 from numbers import Integral, Real
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -163,3 +165,42 @@ def positive_count(number: float) -> bool:
         Any number.
     """
     return isinstance(number, Integral) and number >= 1
+
+
+EXTRAS = {
+    "numba": "fast",
+    "trimesh": "simulation",
+    "embreex": "simulation",
+    "lightning_fabric": "training",
+    "joblib": "training",
+    "pandas": "pandaset",
+    "pooch": "download",
+    "requests": "download",
+}
+"""Libraries that the core runs without, and the optional extra that each belongs to."""
+
+
+class MissingExtraError(ImportError):
+    """A library of an optional extra isn't installed; the message names the extra."""
+
+
+def needed(name: str) -> ModuleType:
+    """Import a module of an optional extra.
+
+    Parameters
+    ----------
+    name : str
+        The module, such as "trimesh.creation".
+
+    Raises
+    ------
+    MissingExtraError
+        When its library isn't installed.
+    """
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRAS:
+            raise
+        extra = EXTRAS[error.name]
+        raise MissingExtraError(f"{error.name} isn't installed: pip install 'semgrid_edu[{extra}]'") from error

@@ -13,8 +13,8 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 MODULES = [path for path in FILES if path.name not in ("__init__.py", "__main__.py")]
 ASSEMBLES_EITHER = "stages.stages"
 """The one module of the book that may name `fast`: it assembles the stages from the book's parts or from twins."""
-LOADS_BY_NAME = {"__init__.py", "fast/__init__.py"}
-"""Modules that load others by name: the two tables of public names."""
+LOADS_BY_NAME = {"__init__.py", "errors.py"}
+"""Modules that load others by name: the table of public names, and what asks for an optional extra."""
 
 
 def dotted(path: Path) -> str:

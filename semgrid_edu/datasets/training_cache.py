@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
@@ -16,7 +15,7 @@ from semgrid_edu.datasets.frames import LabelledDrive
 from semgrid_edu.datasets.index import DatasetIndex
 from semgrid_edu.datasets.label_policies import LidarTruth, drive_labels
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, needed
 from semgrid_edu.storage.files import atomic_path, cache_folder, check_writable
 from semgrid_edu.storage.provenance import code_hash
 from semgrid_edu.storage.tensors import read_arrays
@@ -124,8 +123,9 @@ def in_each_drive(make: Callable[..., list], jobs: Sequence[tuple], what: str) -
     list
         The entries of all frames, drive by drive.
     """
+    joblib = needed("joblib")
     workers = min(WORKERS, len(jobs))
-    results = Parallel(n_jobs=workers, return_as="generator")(delayed(make)(*job) for job in jobs)
+    results = joblib.Parallel(n_jobs=workers, return_as="generator")(joblib.delayed(make)(*job) for job in jobs)
     return [frame for frames in tqdm(results, desc=what, total=len(jobs), unit="drive") for frame in frames]
 
 

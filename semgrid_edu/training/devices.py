@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import torch
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, needed
 
 if TYPE_CHECKING:
     from lightning_fabric import Fabric
@@ -67,7 +67,7 @@ def open_fabric(device: str = "auto") -> "Fabric":
     lightning_fabric.Fabric
         What `train` takes.
     """
-    from lightning_fabric import Fabric  # here, because it takes seconds to import
+    Fabric = needed("lightning_fabric").Fabric  # here, because it takes seconds to import
 
     processes = int(os.environ.get("WORLD_SIZE", 1))
     on_this_machine = int(os.environ.get("LOCAL_WORLD_SIZE", 1))

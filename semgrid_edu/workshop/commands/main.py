@@ -10,14 +10,13 @@ import typer
 from typer.core import TyperCommand
 
 from semgrid_edu import __version__
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, MissingExtraError
 from semgrid_edu.fast.numba_cache import keep_compiled_functions
 from semgrid_edu.storage.files import CACHE_VARIABLE
 from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import keep_result, reproduce
-from semgrid_edu.workshop.simulation import MissingExtraError
 
 app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was interrupted, if there is one.")]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation import needed
+from semgrid_edu.errors import needed
 from semgrid_edu.workshop.simulation.things.materials import Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, merge
 
