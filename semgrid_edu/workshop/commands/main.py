@@ -17,7 +17,7 @@ from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, c
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import keep_result, reproduce
-from semgrid_edu.workshop.simulation import MissingExtraError
+from semgrid_edu.workshop.simulation.things.libraries import MissingExtraError
 
 app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was interrupted, if there is one.")]

@@ -4,8 +4,6 @@ Shapes come from trimesh and rays are cast by embreex, the optional extra `simul
 written is read without them.
 """
 
-from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,10 +12,6 @@ if TYPE_CHECKING:  # the readers of a written drive don't build streets
     from semgrid_edu.workshop.simulation.drive import SimulatedDrive
     from semgrid_edu.workshop.simulation.sensors.rig import Rig
     from semgrid_edu.workshop.simulation.street.plan import Wishes
-
-
-class MissingExtraError(ImportError):
-    """The simulator was asked for a street, and one of its libraries isn't installed."""
 
 
 def simulate(
@@ -56,24 +50,3 @@ def simulate(
     if isinstance(street, str):
         return named_streets.named_street(street, seed, n_frames, rig or named_streets.KITTI_RIG)
     return drive.SimulatedDrive(seed, n_frames, street or ANY, rig)
-
-
-def needed(name: str) -> ModuleType:
-    """Import a library of the extra `simulation`.
-
-    Parameters
-    ----------
-    name : str
-        The module, such as "trimesh.creation".
-
-    Raises
-    ------
-    MissingExtraError
-        When it isn't installed.
-    """
-    try:
-        return import_module(name)
-    except ImportError as error:
-        library = name.partition(".")[0]
-        message = f"the simulator needs {library}: pip install 'semgrid_edu[simulation]'"
-        raise MissingExtraError(message) from error

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.workshop.simulation import needed
+from semgrid_edu.workshop.simulation.things.libraries import needed
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 
 UP = np.array([0.0, 0.0, 1.0])
