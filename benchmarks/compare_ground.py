@@ -16,7 +16,7 @@ from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, transform_points
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.fast import height_above_ground
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.ground import GroundParams
+from semgrid_edu.occupancy.polar import GroundParams
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Lidar, Rig

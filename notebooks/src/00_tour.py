@@ -32,12 +32,12 @@ from IPython.display import Markdown
 from ipywidgets import IntSlider, interact
 from scipy import ndimage
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, project
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.graphical import d_separated, why_dependent
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14

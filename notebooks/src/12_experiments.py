@@ -44,7 +44,7 @@ from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.index import load_index
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.fast import track_drive
+from semgrid_edu.fast import build_net, load_net, track_drive
 from semgrid_edu.workshop.scoring.score_with_interval import compared, shown, shown_seeds
 from semgrid_edu.workshop.paper.published import NETWORKS
 from semgrid_edu.workshop.paper.pictures import accuracy_picture
@@ -55,7 +55,6 @@ from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_inter
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import METRICS, class_accuracy, confusion_matrix, pixel_accuracy
-from semgrid_edu.networks import build_net, load_net
 from semgrid_edu.pipeline import network_image
 from semgrid_edu.workshop.paper.forest import draw_score, forest_plot
 

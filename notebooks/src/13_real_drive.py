@@ -69,10 +69,10 @@ from semgrid_edu.crf import expected_calibration_error, reliability
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_image_stage, sample_weights
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
 from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.fast import load_net
 from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.pipeline import run_pipeline
 from semgrid_edu.training import TrainingParams

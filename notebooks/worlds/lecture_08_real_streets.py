@@ -17,8 +17,8 @@ from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
-from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
-from semgrid_edu.fast import build_net, load_net
+from semgrid_edu.datasets.training_set import Mixture
+from semgrid_edu.fast import TrainingSet, build_net, load_net
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, with_mean_scores
@@ -133,7 +133,7 @@ def compare_real(
     drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
     runs = Path(runs) / scene
     check_writable(runs / "run")
-    streets = sets_by_camera(simulated, "train")
+    streets = TrainingSet.by_camera(simulated, "train")
     views = {camera: _frames(drive, runs) for camera, drive in drives.items()}
     found, weights, seeds = {}, {}, range(seed, seed + TABLE["seeds"])
     for split, rounds in splits(views).items():

@@ -13,8 +13,7 @@ from scipy.special import entr, softmax
 
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets.samples import sample_frames
-from semgrid_edu.datasets.training_arrays import resize_image
-from semgrid_edu.frame import Frame
+from semgrid_edu.frame import Frame, resize_image
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import total_variation
 from semgrid_edu.workshop.course.street import STANDING

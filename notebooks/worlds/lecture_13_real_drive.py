@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage, sample_weights
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.errors import DataError
-from semgrid_edu.frame import Frame
+from semgrid_edu.frame import Frame, resize_image
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import Belief, State

@@ -46,7 +46,7 @@ class PandasetScene(FrameSequence):
     There is a frame for each image of the camera on disk; `numbers` has their numbers in the published scene. Frames
     have KITTI's form: x ahead is the direction in which the camera looks, along the ground, and the LIDAR is the
     Pandar64 at the instant of the image, which is when it looks that way. Only its returns are in `Frame.points`; the
-    labels use both LIDARs. The vehicle sways, so each frame has a camera of its own. The world is PandaSet's.
+    labels use both LIDARs. The vehicle sways, so each frame has its own camera. The world is PandaSet's.
 
     In a `Frame`, `labels` are those of its own scan: the class and the depth of the pixels on which a return falls that
     the camera sees, the class of the cells with a return, and which of these cells the camera sees. `truth`, `visible`
@@ -98,7 +98,7 @@ class PandasetScene(FrameSequence):
         return len(self.numbers)
 
     def __reduce__(self) -> tuple:
-        """Open the scene anew in another process, which reads scans of its own."""
+        """Pickle the arguments: another process opens the scene again and reads the scans itself."""
         return type(self), self._opened
 
     @cached_property
@@ -126,8 +126,8 @@ class PandasetScene(FrameSequence):
     def truth(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.uint8]:
         """Return the class of each cell in which there is a labelled return, seen by the camera or not.
 
-        What stands outvotes the ground below it (`birdseye_votes`). Returns of moving things in other scans are put
-        where the things are at this frame, by their cuboids.
+        Objects outvote the ground below them (`birdseye_votes`). Returns of moving objects in other scans are moved
+        with their cuboids to where the objects are at this frame.
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class PandasetScene(FrameSequence):
     def image_labels(self, k: int, size: tuple[int, int], before: int = 0, after: int = 0) -> NDArray[np.uint8]:
         """Return the class of each pixel of the resized image: that of the closest return on it that the camera sees.
 
-        Labels of single pixels can't be resized like an image, so the returns are projected anew for each size.
+        Labels of single pixels can't be resized like an image, so the returns are projected again for each size.
         Parameters not named here are those of `LabelledDrive.image_labels`.
 
         Parameters
@@ -197,8 +197,8 @@ class PandasetScene(FrameSequence):
         points = np.column_stack([points, scan.reflectance[turning]]).astype(np.float32)
         image = read_jpeg(self.view / f"{self.numbers[k]:02d}.jpg", IMAGE_SIZE)[ROWS]
         start, now = self._camera_times[[self.numbers[0], self.numbers[k]]]
-        own = files.on_the_roof(scan.points[turning], self._poses[self.numbers[k]])
-        return Frame(image, points, camera, T_world_from_lidar, float(now - start), own=own)
+        on_vehicle = files.on_the_roof(scan.points[turning], self._poses[self.numbers[k]])
+        return Frame(image, points, camera, T_world_from_lidar, float(now - start), vehicle_returns=on_vehicle)
 
     def _labels(self, k: int, camera: Camera) -> FrameLabels | None:
         if self._scan(self.numbers[k]).labelled is None:

@@ -58,7 +58,7 @@ As in the rest of the package, poles are signage, whoever rides a bicycle belong
 KITTI-14 has no classes for larger vehicles and for motorcycles, so they become cars and bicycles."""
 
 FIRST_MOVING = 252
-"""From this number on, a class is of things that move."""
+"""Classes with this number or a higher one are of moving objects."""
 
 
 def read_point_labels(path: Path, n_points: int) -> NDArray[np.int64]:
@@ -148,7 +148,7 @@ class SemanticKittiSequence(FrameSequence):
         return SEMANTIC_KITTI_CLASSES.classes(self._label_file(k), self._numbers(k))
 
     def moving(self, k: int) -> NDArray[np.bool_]:
-        """Read which returns of one scan come from things that move.
+        """Read which returns of one scan come from moving objects.
 
         Parameters and errors are those of `SemanticKittiSequence.scan`.
 
@@ -161,7 +161,7 @@ class SemanticKittiSequence(FrameSequence):
     def truth(self, k: int, spec: GridSpec, before: int = 0, after: int = 0) -> NDArray[np.uint8]:
         """Return the bird's-eye truth of one frame, from its own scan or accumulated over several by their poses.
 
-        Of the other scans only what stands still is used: what moves was elsewhere then. Scans that the sequence
+        Of the other scans only static points are used: what moves was elsewhere then. Scans that the sequence
         doesn't have are left out. To fill the rest of the grid as the paper does, take
         `np.where(truth == IGNORE, unknown_classes(belief.probability), truth)`.
 

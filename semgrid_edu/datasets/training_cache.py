@@ -65,7 +65,8 @@ def cached_arrays(
     """
     drives = index.drives(split)
     folder = cache_folder(index.folder or index.root)
-    decided_by = [repr(recipe), *_code_and_files(index, drives, recipe)]
+    filter_module = recipe.track.__module__
+    decided_by = [repr(recipe._replace(track=filter_module)), *_code_and_files(index, drives, recipe)]
 
     def make_arrays() -> dict[str, NDArray]:
         jobs = [(drive, frames, recipe) for drive, frames in drives]
@@ -133,7 +134,8 @@ def _code_and_files(
 ) -> list[str]:
     """Describe the code that makes the arrays, and the drives' files by name, size and time of the last change."""
     readers = {type(drive) for drive, _ in drives}  # these, and the sensor model, may be outside of the package
-    modules = [Path(training_arrays.__file__), *map(_file_of, {*readers, type(recipe.params.sensor)})]
+    parts_of_others = {*readers, type(recipe.params.sensor), recipe.track}
+    modules = [Path(training_arrays.__file__), *map(_file_of, parts_of_others)]
     parts = [code_hash(modules)]
     for drive, labelled in drives:
         found = {os.path.relpath(path, index.root): path.stat() for path in drive.files()}
@@ -142,8 +144,8 @@ def _code_and_files(
     return parts
 
 
-def _file_of(part: type) -> Path:
-    """Return the file that defines a class."""
+def _file_of(part: type | Callable) -> Path:
+    """Return the file that defines a class or a function."""
     try:
         return Path(inspect.getfile(part))
     except (TypeError, OSError):

@@ -30,6 +30,7 @@ _WHERE: dict[str, str] = {
     # planes and memory
     "ClassMemory": "memory",
     "PlaneSampler": "planes",
+    "TrainingSet": "training_set",
     "build_net": "networks",
     "carry_classes": "memory",
     "learn_classes": "memory",

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import check_fields, not_negative, types_named
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.cellwise import CERTAIN, ratio
 from semgrid_edu.occupancy.particles import at_cells, cells_of, weight_in_cells
-from semgrid_edu.occupancy.state import OUTSIDE, Particles, State
+from semgrid_edu.occupancy.state import CERTAIN, OUTSIDE, Particles, State, ratio
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 

@@ -119,11 +119,11 @@ def class_weights(dataset: Sequence[Sample], stage: str, n_classes: int, limit: 
 
 
 def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike) -> float:
-    """Compute the loss of section 4.1 literally: cross-entropy, weighted by class, of the labelled pixels or cells.
+    """Compute the loss of section 4.1: cross-entropy of the labelled pixels or cells, weighted by class.
 
     L = sum_j alpha[c_j] (-log g_j[c_j]) / sum_j alpha[c_j], where j runs over the labelled cells, c_j is the true class
-    of cell j, and g_j the soft-max of its scores. It is a weighted mean of -log g, in which the cells of a rare class
-    have more weight.
+    of cell j, and g_j the soft-max of its scores. It is a weighted mean of -log g, in which rare classes have more
+    weight.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike
     Raises
     ------
     ArgumentError
-        When the shapes don't agree, or `truth` holds something else than classes and 255.
+        When the shapes don't agree, or `truth` holds anything but classes and 255.
 
     Examples
     --------
@@ -163,7 +163,7 @@ def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike
 
 
 def _check_loss_inputs(scores: NDArray, truth: NDArray, alpha: NDArray) -> None:
-    """Refuse scores (B, C, ...), truth (B, ...) and weights (C,) that don't fit each other."""
+    """Check that scores (B, C, ...), truth (B, ...) and weights (C,) fit each other."""
     if scores.ndim < 2 or truth.shape != scores.shape[:1] + scores.shape[2:]:
         found = f"scores of shape {scores.shape}, truth of shape {truth.shape}"
         raise ArgumentError("truth", "shape (B, ...) for scores of shape (B, C, ...)", found)
@@ -180,8 +180,8 @@ def _check_loss_inputs(scores: NDArray, truth: NDArray, alpha: NDArray) -> None:
 def cross_entropy_sums(scores: Tensor, truth: Tensor, alpha: Tensor) -> tuple[Tensor, Tensor]:
     """Return numerator and denominator of `weighted_cross_entropy`, fast and differentiable (section 4.1).
 
-    They are returned separately because a batch can be shared among processes: its loss is the quotient of the sums
-    over all of them.
+    They are separate because several processes can share a batch: its loss is the quotient of the sums over all of
+    them.
 
     Parameters
     ----------

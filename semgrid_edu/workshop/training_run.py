@@ -9,9 +9,9 @@ from pathlib import Path
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
-from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
+from semgrid_edu.datasets.training_set import Mixture
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.fast import build_net, load_net
+from semgrid_edu.fast import TrainingSet, build_net, load_net
 from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, SemanticGridNet, build_segmenter, load_imagenet
@@ -219,7 +219,7 @@ def _check_starts(
 def _open(folders: Sequence[str | Path], description: Architecture, truth: LidarTruth | None) -> TrainingSet | Mixture:
     """Open the frames to learn from: those of one camera, or a mixture."""
     chosen = {"spec": description.grid, "image_size": description.image_size, "truth": truth}
-    mixture = Mixture([sets_by_camera(folder, "train", **chosen) for folder in folders])
+    mixture = Mixture([TrainingSet.by_camera(folder, "train", **chosen) for folder in folders])
     return mixture.parts[0] if len(mixture.parts) == 1 else mixture
 
 

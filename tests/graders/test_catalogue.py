@@ -1,7 +1,7 @@
-"""What grading must do with every exercise, one class an exercise, with its catalogue of answers.
+"""Every exercise is graded with its catalogue of answers (`entries`); one test class per exercise.
 
-nbgrader grades three students of each exercise. The whole catalogue is graded in a warm session (`warm`), which must
-give these three the same points and messages.
+The catalogue is graded in a warm session (`warm`), because nbgrader would need minutes. nbgrader grades three of the
+students, and must give them the same points and messages.
 """
 
 import re
@@ -19,16 +19,16 @@ from semgrid_edu.workshop.course.nbgrader.preprocessors import prepare, prepared
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 
 TIMEOUT = {"answer": 30, "endless loop": 1}
-"""Seconds for a cell: enough for any answer on a busy machine; what each call of an endless loop costs."""
+"""Seconds that a cell may take: plenty for an answer on a busy machine, little for a loop that uses all of it."""
 
 
 def coded(source, answers):
-    """The texts of the answers that are code."""
+    """Return the answers that are code."""
     return [answers[task] for task, names in tasks(source).items() if names != (task,)]
 
 
 class Checks:
-    """The reference earns all, the stub nothing, and each entry loses what it should; tasks don't touch each other."""
+    """The reference gets full marks, the stub none, and each entry loses its points in its own task only."""
 
     exercise: str
     entries: list[Entry]
@@ -47,7 +47,7 @@ class Checks:
     @pytest.fixture(scope="class")
     @classmethod
     def students(cls, reference):
-        """Answers to each task, by student: the reference, the stub, and all entries packed."""
+        """Each student's answers by task: the reference, the stub, and the entries, several to a student."""
         packed = pack(cls.entries)
         codes = [{task: entry.code(reference) for task, entry in answers.items()} for answers in packed]
         return {"reference": reference, "stub": {}} | {f"student-{n}": reference | own for n, own in enumerate(codes)}
@@ -60,17 +60,17 @@ class Checks:
     @pytest.fixture(scope="class")
     @classmethod
     def start(cls, nursery, source, course):
-        """A function that returns a warm process."""
+        """A function that starts a warm process."""
         with warm_processes(nursery, source, prepared_folder(course, cls.exercise)) as start:
             yield start
 
     @pytest.fixture(scope="class")
     @classmethod
     def graded(cls, source, students, start):
-        """Every student's (score, points, message) by student and task, from one warm session.
+        """(score, points, message) of each student and task, from one warm session.
 
-        Before them all comes a student who spoils what tests call her functions with: nobody may miss it. Of a packed
-        student the tests of the entries alone are run; of one who leaves a task to the reference, all.
+        Two students come first whose functions overwrite their arguments, which must not affect anyone after them. To
+        save time, only the tests of a student's entries run, but for one student, for whom all run.
         """
         spoilt = {code: spoil(code) for code in coded(source, students["reference"])}
         greedy = {task: spoilt.get(code, code) for task, code in students["reference"].items()}
@@ -87,7 +87,7 @@ class Checks:
 
     @classmethod
     def incomplete(cls):
-        """The first packed student without an endless loop who leaves a task to the reference."""
+        """Return the first student with entries who has the reference's answer to some task, and no endless loop."""
         everything = {entry.task for entry in cls.entries}
         packed = enumerate(pack(cls.entries))
         return next(f"student-{n}" for n, own in packed if own.keys() < everything and kind(own) == "answer")
@@ -95,11 +95,10 @@ class Checks:
     @pytest.fixture(scope="class")
     @classmethod
     def graded_by_nbgrader(cls, source, students, course, start):
-        """The same of the first packed student, the reference and the stub, graded by nbgrader.
+        """The same for the first student with entries, the reference and the stub, graded by nbgrader.
 
-        `start` comes first, because nbgrader then needn't compile again what the warm session has compiled. The
-        reference passes once in processes of its own, as in a class (`prepare`). What nbgrader makes of answers is seen
-        in forked ones; `test_warm` compares the two.
+        `prepare` runs the reference in fresh processes, as in a class; it uses what `start` has compiled. nbgrader then
+        gets forked processes, since `test_warm` shows that they give the same results.
         """
         notebooks = {name: submission(source, students[name]) for name in ("student-0", "reference", "stub")}
         prepare(course, cls.exercise, Limits().memory)
@@ -109,7 +108,7 @@ class Checks:
 
     @staticmethod
     def by_task(source, cells):
-        """Add up test cells; a written answer waits for a person and is left out once it has been given."""
+        """Add up the test cells of each task, except for written answers that wait for a person."""
         return {
             task: (
                 sum(cells[name].score for name in names),
@@ -179,7 +178,7 @@ for exercise in exercises():
     )
 
 
-def test_the_reference_jackknife_is_not_needed_to_pass_task_4():
+def test_a_wrong_jackknife_costs_nothing_in_task_4():
     """A right answer to task 4 of exercise 12 that builds on task 3 is graded beside a wrong answer to task 3."""
     beside = [own for own in pack(entries_of("12_experiments")) if "jackknife that is wrong" in own["paired"].title]
     assert [own["towns"].loses > 0 for own in beside] == [True]

@@ -19,9 +19,8 @@ from semgrid_edu.crf import (
     mean_field_sequential,
     pair_weights,
 )
-from semgrid_edu.pipeline import load_stages
-from semgrid_edu.stage_models.crf import all_free
 from semgrid_edu.workshop.course.notebooks.build import read_percent
+from semgrid_edu.workshop.demo.stages_file import load_stages
 
 SOURCE = source_of("10_crf")
 SETUP = next(cell.source for cell in read_percent(SOURCE).cells if "REACH, UPDATES" in cell.source)
@@ -71,7 +70,8 @@ def test_the_reference_is_a_stage_that_agrees_with_the_package(tmp_path):
     path.write_text(f"{SETUP}\n\n{answer}", encoding="utf-8")
     rng = np.random.default_rng(0)
     scores = gaussian_filter(rng.normal(size=(4, 24, 18)), (0, 2, 2)) * 12 + rng.normal(size=(4, 24, 18))
-    log_g, o = log_softmax(scores, axis=0), all_free((24, 18))
+    log_g, o = log_softmax(scores, axis=0), np.zeros((4, 24, 18))
+    o[0] = 1  # FREE
     refined = load_stages(path).refine(log_g, o)
     np.testing.assert_allclose(refined.sum(axis=0), 1)
     package = mean_field_naive(-log_g, o, CrfParams.for_cells(0.5))

@@ -25,7 +25,7 @@ from semgrid_edu.occupancy import (
     update,
 )
 from semgrid_edu.occupancy.bof import origins
-from semgrid_edu.occupancy.cellwise import CERTAIN
+from semgrid_edu.occupancy.state import CERTAIN
 from semgrid_edu.workshop.simulation import simulate
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State

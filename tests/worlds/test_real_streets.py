@@ -21,8 +21,8 @@ import semgrid_edu
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
 from semgrid_edu.datasets.pandaset import CAMERAS
 from semgrid_edu.datasets.samples import samples_dir
-from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import DataError
+from semgrid_edu.fast import TrainingSet
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture
 from semgrid_edu.training import TrainingParams
@@ -77,7 +77,7 @@ def small(monkeypatch, streets):
     """Two cameras, and three ways: one takes two steps, one of them with simulated frames; one fuses its scores."""
     once = WayToTrain(Architecture(), params=TrainingParams(1, 1), with_simulated=True)
     mean = WayToTrain(Architecture(), mean_of="once", params=TrainingParams(0, 1, end_to_end=False))
-    monkeypatch.setattr(real_streets, "sets_by_camera", lambda *_: [streets])
+    monkeypatch.setattr(real_streets.TrainingSet, "by_camera", lambda *_: [streets])
     monkeypatch.setattr(real_streets, "CAMERAS", ("front_camera", "left_camera"))
     monkeypatch.setattr(
         real_streets, "WAYS", {"as shipped": WayToTrain(Architecture(), "segnet"), "once": once, "mean": mean}

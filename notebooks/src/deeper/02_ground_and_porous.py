@@ -27,7 +27,7 @@ from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import LogOddsGrid, LogOddsParams, PlanarMotion, SensorModel, State, log_odds
 from semgrid_edu.occupancy import scan_evidence, update_log_odds
-from semgrid_edu.occupancy.ground import walk_sector
+from semgrid_edu.occupancy.polar import walk_sector
 from semgrid_edu.occupancy.polar import beyond_reach
 from semgrid_edu.plotting.colours import STATE_COLOURS, colour_legend
 from semgrid_edu.workshop.simulation import simulate

@@ -37,7 +37,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
     CmcdotParams, Evidence, FilterState, Particles, State, Walls, predict, update,
 )  # fmt: skip
-from semgrid_edu.occupancy.cellwise import strike_out
+from semgrid_edu.occupancy.steps import strike_out
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.occupancy.walls import strike_out_wakes
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent

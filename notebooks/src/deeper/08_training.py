@@ -35,8 +35,8 @@ from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy, semantic_cells
 
 # %% jupyter={"source_hidden": true}
-from semgrid_edu.fast import track_drive
-from semgrid_edu.networks import Architecture, build_net, load_net
+from semgrid_edu.fast import build_net, load_net, track_drive
+from semgrid_edu.networks import Architecture
 from semgrid_edu.pipeline import network_image
 from semgrid_edu.planes import plane_heights, plane_pixels
 from semgrid_edu.training import TrainingParams, train

@@ -25,10 +25,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_image_stage
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import load_net
 

@@ -1,4 +1,4 @@
-"""Scans before and after the labelled one, moved to its frame: what stands gets dense, what moves needs care (4).
+"""Scans before and after the labelled one, moved to its frame: denser where nothing moves, smeared where it does (4).
 
 A spinning scanner measures one direction after the other, for a tenth of a second, in which the vehicle moves on. A
 return that was measured t seconds after the camera took its image is given in the frame of the LIDAR as it stood at

@@ -6,8 +6,9 @@ import torch
 
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.training_arrays import SEED
-from semgrid_edu.datasets.training_set import FRAMES, Sample, TrainingSet
+from semgrid_edu.datasets.training_set import FRAMES, Sample
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import TrainingSet
 from semgrid_edu.storage.provenance import PROVENANCE, write_provenance
 from semgrid_edu.storage.tensors import write_tensors
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from semgrid_edu.datasets.index import INDEX_FILE
-from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.fast import TrainingSet
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.simulation.datasets import RECIPES, make_from_recipe, read_recipes

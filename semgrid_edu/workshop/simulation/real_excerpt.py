@@ -14,13 +14,11 @@ from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, lidar_from_grid
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.kitti_labels import WITH_GAPS
 from semgrid_edu.datasets.pandaset import PandasetScene
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.frame import LABEL_GRID
+from semgrid_edu.frame import LABEL_GRID, resize_image
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import SensorModel
-from semgrid_edu.occupancy.ground import height_above_ground
-from semgrid_edu.occupancy.polar import beams_of
+from semgrid_edu.occupancy.polar import beams_of, height_above_ground
 from semgrid_edu.storage.files import LOCK, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import write_provenance
 from semgrid_edu.workshop.simulation.sensors.rig import Geodesy, oxts_packet

@@ -287,14 +287,12 @@ class Instant:
 
 
 def turned(rays: NDArray, rotation: NDArray) -> NDArray:
-    """Turn rays, (N, 3), with the same bits on any number of cores, which a call of BLAS doesn't promise.
+    """Turn rays, with the same bits on any number of cores, which a call of BLAS doesn't promise.
 
     Parameters
     ----------
-    rays : (N, 3) float
-        Directions.
-    rotation : (3, 3) or (N, 3, 3) float
-        Rotation matrix, or one for each ray.
+    rays, rotation : (N, 3) float, (3, 3) or (N, 3, 3) float
+        Directions, and one rotation matrix or one for each ray.
     """
     x, y, z = rays.T[:, :, None]
     return x * rotation[..., 0] + y * rotation[..., 1] + z * rotation[..., 2]
