@@ -38,7 +38,8 @@ class Commands(TyperGroup):
             What was typed after the group's name.
         """
         name, command, rest = super().resolve_command(ctx, args)
-        Commands.asked, Commands.command = " ".join(["semgrid-edu", *ctx.command_path.split()[1:], str(name)]), command
+        Commands.asked = " ".join(["semgrid-edu", *ctx.command_path.split()[1:], str(name)])
+        Commands.command = command
         return name, command, rest
 
     def invoke(self, ctx: object) -> object:

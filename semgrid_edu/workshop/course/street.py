@@ -134,7 +134,8 @@ def best_table(truths: NDArray, beliefs: Sequence[NDArray]) -> NDArray[np.int64]
     beliefs : sequence of (4, H, W) float
         The occupancy grids.
     """
-    states, counts = np.stack(beliefs).argmax(axis=1), np.zeros((N_STATES, len(KITTI_14)), np.int64)
+    states = np.stack(beliefs).argmax(axis=1)
+    counts = np.zeros((N_STATES, len(KITTI_14)), np.int64)
     counted = truths != IGNORE
     np.add.at(counts, (states[counted], truths[counted]), 1)
     return counts.argmax(axis=1)[states]
@@ -148,7 +149,8 @@ def standing_points(frame: Frame) -> NDArray[np.float64]:
     frame : Frame
         Its scan and the LIDAR's height are used.
     """
-    height, distance = frame.points_grid[:, 2], np.hypot(*frame.points[:, :2].T)
+    height = frame.points_grid[:, 2]
+    distance = np.hypot(*frame.points[:, :2].T)
     chosen = (height > STANDING[0]) & (height < STANDING[1]) & (distance > COMPARED[0]) & (distance < COMPARED[1])
     return frame.points[chosen, :3].astype(np.float64)
 

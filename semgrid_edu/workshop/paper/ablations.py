@@ -58,8 +58,10 @@ def ablated_runs(scale: Scale, seeds: int) -> dict[str, dict[str, tuple[list[Sco
     dict
         By key of `SECTIONS` and by what the row is.
     """
-    every, n_frames = table1_runs(scale, seeds), max(scale.frames_to_train // FEW, 6)
-    usual, scored = every["segnet"], partial(scale.scored, scale.kitti, crf=False)
+    every = table1_runs(scale, seeds)
+    n_frames = max(scale.frames_to_train // FEW, 6)
+    usual = every["segnet"]
+    scored = partial(scale.scored, scale.kitti, crf=False)
     variants = {"usual": usual}
     variants |= {name: scored("segnet", seeds, variant=variant) for name, variant in VARIANTS.items()}
     variants |= {"learned from true labels": learned_from("true", usual, scale)}
@@ -77,7 +79,8 @@ def ablated_runs(scale: Scale, seeds: int) -> dict[str, dict[str, tuple[list[Sco
 
 def ablation_runs(scale: Scale, seeds: int) -> list[Run]:
     """Return all runs: the usual networks first, then what trains nothing. Parameters are those of `ablated_runs`."""
-    rows, usual = ablated_runs(scale, seeds), table1_runs(scale, seeds)["segnet"]
+    rows = ablated_runs(scale, seeds)
+    usual = table1_runs(scale, seeds)["segnet"]
     pairs = (pair for name in ("calibration", "variants", "frames") for pair in rows[name].values())
     return [*usual, *chain(*chain(*pairs))]
 

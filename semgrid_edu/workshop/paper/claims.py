@@ -1,7 +1,7 @@
 """The paper's claims (`claims.toml`) as statements about numbers, each with its number (section 4).
 
-By default, scores are those of the networks of Table 1 without the CRF. A claim may be judged
-several times, by what networks learned from and by what they are scored against: its readings.
+By default, scores are those of Table 1's networks without the CRF. A claim may have several readings: by what networks
+learned from, and by what they are scored against.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -224,8 +224,10 @@ def _right_of(classes: Sequence[int]) -> Metric:
 
 
 def _overturned_cars(one: Reading) -> list[Statement]:
-    lying, blind = one.counted(one.runs.overturned, OVERTURNED), one.counted(one.runs.overturned_blind, OVERTURNED)
-    upright, right = one.counted(one.runs.overturned, UPRIGHT), _right_of([KITTI_14.index("car")])
+    lying = one.counted(one.runs.overturned, OVERTURNED)
+    blind = one.counted(one.runs.overturned_blind, OVERTURNED)
+    upright = one.counted(one.runs.overturned, UPRIGHT)
+    right = _right_of([KITTI_14.index("car")])
     return [
         stated("called car: overturned cars - upright ones", right, lying, upright, limit=-STILL),
         stated("overturned cars called car: with occupancy grid - without", right, lying, blind),
@@ -235,7 +237,8 @@ def _overturned_cars(one: Reading) -> list[Statement]:
 
 
 def _road_and_sidewalk(one: Reading) -> list[Statement]:
-    network, alone = one.counted(one.usual), one.counted(one.runs.baselines, OCCUPANCY_ALONE)
+    network = one.counted(one.usual)
+    alone = one.counted(one.runs.baselines, OCCUPANCY_ALONE)
     shares = {"road": lambda matrix: _apart(matrix)[0], "sidewalk": lambda matrix: _apart(matrix)[1]}
     either = {f"{name} called {name}, of those called either": metric for name, metric in shares.items()}
     return [
@@ -252,16 +255,18 @@ def _apart(matrix: NDArray) -> NDArray[np.float64]:
 
 
 def _effect_of_reduction(one: Reading) -> list[Statement]:
-    pair, times = (one.counted(one.runs.usual_of_all_seeds), one.counted(one.runs.unreduced)), one.runs.times[0]
+    pair = (one.counted(one.runs.usual_of_all_seeds), one.counted(one.runs.unreduced))
+    times = one.runs.times[0]
     rounds = {"of a frame": times.rounds(one.known, FRAME), "of a training step": times.rounds(one.known, STEP)}
     saved = [Statement(f"share of the time {of} saved", time_saved(r), p=p_not_saved(r)) for of, r in rounds.items()]
     return [*_gains({": with reduction - without": pair}, limit=-MARGIN), *saved]
 
 
 def _geometry_and_learning(one: Reading) -> list[Statement]:
-    runs, method = one.runs, GEOMETRY
-    network, off = one.counted(one.usual), one.counted(runs.usual_off)
-    geometry, geometry_off = one.counted(runs.baselines, method), one.counted(runs.baselines_off, method)
+    runs, network = one.runs, one.counted(one.usual)
+    off = one.counted(runs.usual_off)
+    geometry = one.counted(runs.baselines, GEOMETRY)
+    geometry_off = one.counted(runs.baselines_off, GEOMETRY)
     true_labels, dense = (one.counted(some, TRUE_GEOMETRY) for some in (runs.baselines, runs.baselines_dense))
     pairs = {
         ", geometry: true image labels - the network's": (true_labels, geometry),

@@ -99,5 +99,6 @@ class ArraysRun(Run):
         DataError
             When the data set is missing or damaged.
         """
-        usual, truth = architecture("segnet", self.preset), chosen_truth(self.truth)
+        usual = architecture("segnet", self.preset)
+        truth = chosen_truth(self.truth)
         return TrainingSet(self.data.dataset_dir(root), self.split, self.grid, usual.image_size, truth=truth)

@@ -34,7 +34,8 @@ def deviations(scale: Scale, field: str, beside_gpu: list[str] | None = None) ->
     beside_gpu : list of str, optional
         The training runs that were done on the CPU when others were done on a GPU; None when all were done on the CPU.
     """
-    data, preset = getattr(scale, field), _TEXTS[scale.preset]
+    data = getattr(scale, field)
+    preset = _TEXTS[scale.preset]
     counts = frame_counts(data)
     numbers = {
         "data": data,

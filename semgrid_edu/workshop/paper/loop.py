@@ -159,7 +159,8 @@ def claim_folder(run: Run, root: str | Path) -> None:
     DataError
         When the folder was made by a run with other settings.
     """
-    path, settings = run.folder(root) / CLAIM, run.settings()
+    path = run.folder(root) / CLAIM
+    settings = run.settings()
     if not path.exists():
         write_json(path, settings)
         return

@@ -60,10 +60,13 @@ class OverturnedRun(NetworkRun):
 
     def work(self, root: Path, device: str) -> None:
         """Count. Parameters are those of `Run.work`."""
-        frames, counts = self.frames.frames(root), {OVERTURNED: [], UPRIGHT: []}
-        net, car = self.network.trained(root, frames.camera), KITTI_14.index("car")
+        frames = self.frames.frames(root)
+        counts = {OVERTURNED: [], UPRIGHT: []}
+        net = self.network.trained(root, frames.camera)
+        car = KITTI_14.index("car")
         for k, objects in enumerate(tqdm(self._objects(root), total=len(frames), unit="frame")):
-            called, cars = learned_log_g(net, frames[k]).argmax(axis=0), cars_by_pose(objects)
+            called = learned_log_g(net, frames[k]).argmax(axis=0)
+            cars = cars_by_pose(objects)
             for method, some in counts.items():
                 counted = boxes_on(frames.spec, cars[method]) & (frames.arrays["true"][k] == car)
                 some.append(confusion_matrix(np.where(counted, car, IGNORE), called, len(KITTI_14)))
@@ -217,7 +220,8 @@ class FigureRun(NetworkRun):
         """Make the grids. Parameters are those of `Run.work`."""
         frames = self.frames.frames(root)
         net = self.network.trained(root, frames.camera)
-        refine, numbers = Stages.of(net).refine, [int(share * len(frames)) for share in SHOWN]
+        refine = Stages.of(net).refine
+        numbers = [int(share * len(frames)) for share in SHOWN]
         log_g = [learned_log_g(net, frames[k]) for k in numbers]
         refined = [refine(g, frames.arrays["occupancy"][k]) for k, g in zip(numbers, log_g, strict=True)]
         kept = {name: frames.arrays[name][numbers] for name in ("image", "truth", "true")}

@@ -90,7 +90,8 @@ def figures_picture(result: dict, counted: RunCounts) -> Figure:
 
 def _draw(part: SubFigure, grids: dict[str, NDArray], label_set: LabelSet, columns: dict[str, str]) -> None:
     """Draw the rows of one figure."""
-    n_rows, shape = len(grids["frame"]), grids["true"].shape[1:]
+    n_rows = len(grids["frame"])
+    shape = grids["true"].shape[1:]
     spec = next(spec for spec in (GridSpec.compact(), GridSpec.paper()) if spec.shape == shape)
     axes = part.subplots(n_rows, 1 + len(columns), width_ratios=[2.2] + [1] * len(columns), squeeze=False)
     for row, line in enumerate(axes):
@@ -100,7 +101,8 @@ def _draw(part: SubFigure, grids: dict[str, NDArray], label_set: LabelSet, colum
         for ax, (name, title) in zip(line[1:], columns.items(), strict=True):
             grid_labels(spec, grids[name][row], label_set, ax=ax, legend=False)
             ax.set_title(title if row == 0 else "", fontsize="medium")
-            outer_left, lowest = ax is line[1], row == n_rows - 1  # only outer grids name their axes
+            outer_left = ax is line[1]
+            lowest = row == n_rows - 1  # only outer grids name their axes
             ax.tick_params(labelleft=outer_left, labelbottom=lowest)
             ax.set(xlabel=ax.get_xlabel() * lowest, ylabel=ax.get_ylabel() * outer_left)
     class_legend(axes[0, -1], label_set, grids["true"])

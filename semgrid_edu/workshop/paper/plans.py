@@ -158,7 +158,8 @@ def _trained_otherwise(scale: Scale, seeds: int, usual: list[ScoreRun], all_seed
 
 def _on_other_frames(scale: Scale, seeds: int, usual: list[ScoreRun]) -> SimpleNamespace:
     """Return the runs on other frames than those of Table 1."""
-    routes, lying = scale.arrays(scale.chroma_routes, "test", "lidar"), scale.arrays(scale.overturned, "test", "true")
+    routes = scale.arrays(scale.chroma_routes, "test", "lidar")
+    lying = scale.arrays(scale.overturned, "test", "true")
     blind = [scale.grid_stage(scale.kitti, "segnet", seed, variant=Variant(occupancy=False)) for seed in range(seeds)]
     return SimpleNamespace(
         new_routes=[ScoreRun(scale.grid_stage(scale.chroma, "segnet", seed), routes) for seed in range(seeds)],

@@ -65,7 +65,9 @@ def differences_in(folder: Path, name: str) -> Iterator[str]:
         A key of `EXPERIMENTS`.
     """
     scores, words, times, counts, _ = result_files(folder, name)
-    written, counted, experiment = read_json(scores), RunCounts(counts), EXPERIMENTS[name]
+    written = read_json(scores)
+    counted = RunCounts(counts)
+    experiment = EXPERIMENTS[name]
     size = written.get("scale"), written.get("seeds")
     if not isinstance(size[0], str) or type(size[1]) is not int or size[1] < 1:
         raise DataError(scores, "a result of `semgrid-edu reproduce` with its scale and seeds", f"{size}")

@@ -177,7 +177,8 @@ def write_result(name: str, experiment: Experiment, scale: Scale, seeds: int, ro
     str
         The Markdown.
     """
-    counted, (scores, words, times, counts, picture) = RunCounts(root), result_files(out, name)
+    counted = RunCounts(root)
+    scores, words, times, counts, picture = result_files(out, name)
     result = computed_result(name, experiment, scale, seeds, counted)
     text = result_markdown(result, experiment)
     figure = experiment.picture(result, counted) if experiment.picture else None

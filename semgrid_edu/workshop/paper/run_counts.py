@@ -46,7 +46,9 @@ class RunCounts:
     """
 
     def __init__(self, source: str | Path) -> None:
-        self.source, self.arrays, self.records = Path(source), {}, {}
+        self.source = Path(source)
+        self.arrays = {}
+        self.records = {}
         if not self.source.is_dir():
             self.arrays = read_arrays(self.source)
             if RECORDS not in self.arrays:

@@ -258,7 +258,8 @@ class BaselineRun(CountingRun, NetworkRun):
 
     def _believed_returns(self, root: Path, frames: TrainingSet) -> Callable[[int], tuple[NDArray, NDArray]]:
         """Return pixels and cells of each frame's returns, as the believed calibration has them."""
-        index, found = load_index(self.frames.data.dataset_dir(root)), []
+        index = load_index(self.frames.data.dataset_dir(root))
+        found = []
         for name, numbers in index.frames_by_drive(self.frames.split).items():
             drive = KittiRawDrive(index.root, *name, images=False)
             for frame in (drive[number] for number in numbers):

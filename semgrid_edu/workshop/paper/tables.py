@@ -268,7 +268,8 @@ def confusion_markdown(result: dict) -> str:
     result : dict
         From `confusion_result`.
     """
-    ours, baselines = result["ours"]["scores"], result.get("baselines", {})
+    ours = result["ours"]["scores"]
+    baselines = result.get("baselines", {})
     rows = {"": METRICS, "paper": map(per_cent, _metrics(result["paper"]["scores"])), "ours": score_cells(ours)}
     rows["every seed"] = map(shown_seeds, _metrics(ours))
     rows |= {name: score_cells(one["scores"]) for name, one in baselines.items()}

@@ -55,7 +55,8 @@ class TrainingRun(Run):
     def work(self, root: Path, device: str) -> None:
         """Train, from a checkpoint if there is one. Parameters are those of `Run.work`."""
         keep_freed_memory()
-        folder, frames = self.folder(root), self.arrays.frames(root)
+        folder = self.folder(root)
+        frames = self.arrays.frames(root)
         if not (folder / WEIGHTS).exists():
             net = self.net(root, frames.camera)
             train(net, self.chosen(frames), folder, self.params, self.seed, True, open_fabric(device))
@@ -82,8 +83,11 @@ def seconds_per_step(described: Architecture, params: TrainingParams, stage: str
         "image" or "grid".
     """
     net = build_net(described, Rig().camera).train()
-    size, shape, n = described.image_size, described.grid.shape, params.batch_size
-    image, occupancy = torch.full((n, 3, *size), 0.5), torch.full((n, N_STATES, *shape), 1 / N_STATES)
+    size = described.image_size
+    shape = described.grid.shape
+    n = params.batch_size
+    image = torch.full((n, 3, *size), 0.5)
+    occupancy = torch.full((n, N_STATES, *shape), 1 / N_STATES)
     labels, truth = (torch.zeros((n, *part), dtype=torch.uint8) for part in (size, shape))
     batch = Batch(Sample(image, labels, occupancy, truth), mirrored=False)
     optimiser = torch.optim.SGD(net.parameters(), lr=1e-6, momentum=params.momentum)

@@ -104,13 +104,15 @@ def truth_costs(scale: Scale, seeds: int, counted: RunCounts) -> dict:
         test frames and their "differences" from the usual networks; and for cells with a true semantic class, by class
         the intersection over union ("classes") and by distance the share that is right ("distances").
     """
-    runs, labels = taught_runs(scale, seeds), label_runs(scale)
+    runs = taught_runs(scale, seeds)
+    labels = label_runs(scale)
     return {"rows": [_row(truth, runs, labels[truth], counted) for truth in runs]}
 
 
 def _row(truth: str, runs: dict[str, list[ScoreRun]], labels: LabelsRun, counted: RunCounts) -> dict:
     """Return the row of one kind of labels."""
-    networks, usual = runs[truth], runs[USUAL_TRUTH]
+    networks = runs[truth]
+    usual = runs[USUAL_TRUTH]
     like_usual = labels.confusions(counted, LABELS, "lidar").total(LABELS)
 
     def part(metric: Metric, band: str | None = None) -> dict[str, ScoreWithInterval]:

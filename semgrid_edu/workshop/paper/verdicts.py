@@ -59,11 +59,13 @@ def holm(p_values: Sequence[float | None], error_rate: float = ERROR_RATE) -> li
     >>> holm([0.012, 0.5, 0.001, None], 0.05)
     [True, False, True, False]
     """
-    rejected, left = [False] * len(p_values), len(p_values)
+    rejected = [False] * len(p_values)
+    left = len(p_values)
     for p, number in sorted((p, number) for number, p in enumerate(p_values) if p is not None):
         if p > error_rate / left:
             break
-        rejected[number], left = True, left - 1
+        rejected[number] = True
+        left = left - 1
     return rejected
 
 
@@ -146,7 +148,8 @@ def judge_claims(scale: Scale, seeds: int, counted: RunCounts) -> dict:
 def _judged(number: int, runs: SimpleNamespace, counted: RunCounts, seeds: int, drives: int) -> dict:
     """Return all that is known about a claim."""
     row = CLAIMS[number]
-    expectation, readings = row.get("expectation", False), []
+    expectation = row.get("expectation", False)
+    readings = []
     for trained, labels in row["readings"]:
         found = STATEMENTS[number](Reading(runs, counted, trained, labels))
         listed = [one._asdict() | {"holds": hold} for one, hold in zip(found, which_hold(found), strict=True)]

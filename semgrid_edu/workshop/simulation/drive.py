@@ -81,7 +81,8 @@ class SimulatedDrive:
         self, seed: int | np.random.SeedSequence, n_frames: int, wishes: Wishes = ANY, rig: Rig | None = None
     ) -> None:
         rng = np.random.default_rng(seed)
-        self.n_frames, self.rig = n_frames, rig or Rig()
+        self.n_frames = n_frames
+        self.rig = rig or Rig()
         duration = (n_frames - 1) * PERIOD
         pace = ActorPace.random(rng, wishes.speed)
         self.plan = draw_plan(rng, pace.distance(duration), wishes)
@@ -91,7 +92,8 @@ class SimulatedDrive:
         builder = build_scenery(self.plan, rng)
         traffic = Traffic(builder, self.ego.trajectory, duration)
         (wishes.cast or fill_street)(traffic)
-        self.moving, self.parked = traffic.moving, traffic.parked
+        self.moving = traffic.moving
+        self.parked = traffic.parked
         self.static = RayMesh.of(*zip(*builder.solid, strict=True))
         self.porous = PorousMesh.of(*zip(*builder.porous, strict=True)) if builder.porous else None
         self.static_footprints = footprint_table(builder.footprints)
@@ -117,7 +119,8 @@ class SimulatedDrive:
 
     def instant(self, t: float) -> Instant:
         """Return the world at one instant, ready for rays. Parameters are those of `SimulatedDrive.pose`."""
-        road, eye = self.plan.road, self.pose(t)[:2, 3]
+        road = self.plan.road
+        eye = self.pose(t)[:2, 3]
         near = [a for a in self.moving if np.hypot(*(a.trajectory.pose(road, t)[0][:2] - eye)) < _VIEW]
         moving = RayMesh.of([a.shape(road, t) for a in near], [a.instance for a in near]) if near else None
         return Instant(self.static, moving, self.porous)
@@ -128,7 +131,8 @@ class SimulatedDrive:
         It is given along x and y of the grid frame at that instant, (2,), m/s. Parameters are those of
         `SimulatedDrive.pose`.
         """
-        rotation, road = self.T_grid_from_world(t)[:2, :2], self.plan.road
+        rotation = self.T_grid_from_world(t)[:2, :2]
+        road = self.plan.road
         return {actor.instance: rotation @ actor.trajectory.velocity(road, t) for actor in self.moving}
 
     def objects(self, t: float) -> list[dict]:
@@ -136,7 +140,9 @@ class SimulatedDrive:
 
         Parameters are those of `SimulatedDrive.pose`.
         """
-        road, T, actors = self.plan.road, self.T_grid_from_world(t), self.parked + self.moving
+        road = self.plan.road
+        T = self.T_grid_from_world(t)
+        actors = self.parked + self.moving
         centres = [transform_points(T, actor.middle(road, t)) for actor in actors]
         inside = LABEL_GRID.cells(np.reshape(centres, (-1, 3)))[2]
         return [actor.described(road, t, T) for actor, held in zip(actors, inside, strict=True) if held]
@@ -175,7 +181,9 @@ class SimulatedDrive:
         picture : Picture
             What the camera took at that instant.
         """
-        road, pose, footprints = self.plan.road, self.pose(t), self.footprints(t)
+        road = self.plan.road
+        pose = self.pose(t)
+        footprints = self.footprints(t)
         cells = world_cells(pose, self.rig)
         kinds, which = birdseye_kinds(cells, footprints, road)
         seen = visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera)
@@ -209,7 +217,8 @@ class SimulatedDrive:
         index : int
             Number of the frame.
         """
-        t, half = index * PERIOD, self.rig.packet_interval / 2
+        t = index * PERIOD
+        half = self.rig.packet_interval / 2
         points, _ = self._labelled_scan(t, self._noise(index, 1))
         nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
         return Frame(None, points, self.rig.camera, self.pose(nearest), t)

@@ -71,9 +71,11 @@ class _FixedRig(PandasetScene):
             return moved
 
         for k in range(n_frames):
-            frame, seen = self[k], self.visible(k, LABEL_GRID, SCANS, SCANS)
+            frame = self[k]
+            seen = self.visible(k, LABEL_GRID, SCANS, SCANS)
             labels = replace(frame.labels, birdseye=self.truth(k, LABEL_GRID, SCANS, SCANS), visible=seen)
-            image, points = resize_image(frame.image, IMAGE_SIZE), frame.points[needed_returns(frame.points_grid)]
+            image = resize_image(frame.image, IMAGE_SIZE)
+            points = frame.points[needed_returns(frame.points_grid)]
             oxts = oxts_packet(pose, times[k] - times[0], NOWHERE)
             yield WrittenFrame(datetime.fromtimestamp(times[k], UTC), image, points, oxts, labels)
 
@@ -95,8 +97,10 @@ def needed_returns(points: NDArray) -> NDArray[np.bool_]:
     (N,) bool
         True for the returns to keep.
     """
-    sensor, (x, y, z) = SensorModel(), points[:, :3].T.astype(np.float64)
-    far, height = np.hypot(x, y), height_above_ground(points, sensor.ground)
+    sensor = SensorModel()
+    x, y, z = points[:, :3].T.astype(np.float64)
+    far = np.hypot(x, y)
+    height = height_above_ground(points, sensor.ground)
     beyond = np.maximum(np.abs(x - LABEL_GRID.x_max / 2) - LABEL_GRID.x_max / 2, np.abs(y) - LABEL_GRID.y_max)
     kept = beyond < AROUND
     ahead = ~kept & (x > -BEHIND)
@@ -143,7 +147,8 @@ def write_real_excerpt(pandaset: str | Path, scene: str, n_frames: int, folder: 
     DataError
         When the folder holds something, the scene has no labels, or a file of it is missing or damaged.
     """
-    excerpt, folder = _FixedRig(Path(pandaset), scene), Path(folder)
+    excerpt = _FixedRig(Path(pandaset), scene)
+    folder = Path(folder)
     if not 2 <= n_frames <= len(excerpt):
         raise ArgumentError("n_frames", f"2 to {len(excerpt)} frames", n_frames)
     excerpt.visible(0, LABEL_GRID, 0, 0)  # raises for a scene without labels before anything is written
@@ -155,8 +160,10 @@ def write_real_excerpt(pandaset: str | Path, scene: str, n_frames: int, folder: 
 
 def _write(excerpt: _FixedRig, scene: str, n_frames: int, folder: Path) -> Path:
     """Write the drive, then what describes it."""
-    date, drive = f"{datetime.fromtimestamp(excerpt._camera_times[0], UTC):%Y_%m_%d}", scene.zfill(4)
-    K, T = excerpt.camera.K, excerpt.camera.T_camera_from_lidar
+    date = f"{datetime.fromtimestamp(excerpt._camera_times[0], UTC):%Y_%m_%d}"
+    drive = scene.zfill(4)
+    K = excerpt.camera.K
+    T = excerpt.camera.T_camera_from_lidar
     rig = SimpleNamespace(image_size=IMAGE_SIZE, R_rect=np.eye(3), T_camera0_from_lidar=T, T_lidar_from_imu=np.eye(4))
     rig.P_rect = lambda _: np.column_stack([K, np.zeros(3)])  # KITTI has four cameras, and this one is camera 2
     write_calibration(folder, rig, date)

@@ -86,7 +86,8 @@ def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
     date : str
         The day, which is the folder's name.
     """
-    day, time = Path(root) / date, "calib_time: 01-Jan-2026 09:00:00\n"
+    day = Path(root) / date
+    time = "calib_time: 01-Jan-2026 09:00:00\n"
     height, width = rig.image_size
     text = time + _row("corner_dist", (0.0995,))
     for index in range(4):
@@ -173,7 +174,9 @@ def _write_files(folder: Path, frames: Iterable[WrittenFrame], label_set: str) -
     """Write all files of a drive to its folder; return the number of frames, and which have labels."""
     for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
         (folder / name).mkdir(parents=True)
-    objects, times, labelled = {}, [], []
+    objects = {}
+    times = []
+    labelled = []
     for k, frame in enumerate(frames):
         name = f"{k:010d}"
         _save_png(folder / "image_02" / "data" / f"{name}.png", frame.image)
@@ -197,8 +200,10 @@ def _simulated_frames(
     """Take the frames of a simulated drive."""
     classes = class_of_kind(label_set)
     for k in range(simulated.n_frames):
-        frame, labels = simulated.frame(k, k in labelled), None
-        picture, truth = frame.picture, frame.truth
+        frame = simulated.frame(k, k in labelled)
+        labels = None
+        picture = frame.picture
+        truth = frame.truth
         if truth is not None:
             kinds = classes[picture.kind], picture.depth, classes[truth.kinds], truth.visible
             labels = FrameLabels(label_set, *kinds)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 MISS = np.float32(1e30)
 """Distance that a ray which meets nothing is given, metres."""
 _GRAZING = np.float32(1e-3)
-"""Smallest |cos| between a ray and the normal of a sheet that is told from a ray along the sheet."""
+"""Smallest |cos| between a ray and the normal of a sheet; a smaller one counts as this."""
 _STEP = np.float32(2e-3)
 """By how much a ray starts beyond the surface that it has passed, metres."""
 
@@ -40,7 +40,7 @@ class RayMesh:
 
     @classmethod
     def of(cls, shapes: Sequence[Shape], instances: Sequence[int]) -> "RayMesh":
-        """Put several shapes into one.
+        """Merge several shapes.
 
         Parameters
         ----------
@@ -277,10 +277,8 @@ class Instant:
 
         Parameters
         ----------
-        origins : (N, 3) float32
-            Where each ray starts, in the world, metres.
-        directions : (N, 3) float32
-            Unit vectors, in the world.
+        origins, directions : (N, 3) float32
+            Where the rays start in the world, metres, and unit vectors.
         """
         blocked = self.static.embree.run(origins, directions, query="OCCLUDED") >= 0
         if self.moving:

@@ -49,7 +49,8 @@ def ground_height(road: Road, s: float, d: float) -> float:
 
     All that stands, drives or walks takes its height from here, and so do the mesh and the truth.
     """
-    e, height = outside_asphalt(road, s, d), road_height(road, s, d)
+    e = outside_asphalt(road, s, d)
+    height = road_height(road, s, d)
     if e <= 0.0:
         return height
     side = road.left if d > 0 else road.right
@@ -129,9 +130,11 @@ def lane_mark(road: Road, s: float, d: float, blur: float) -> float:
     blur : float
         Width of the patch of ground around the place, metres; at least 1 cm is taken.
     """
-    blur, away = max(blur, 0.01), abs(s - road.junction) - road.side_half - road.corner
+    blur = max(blur, 0.01)
+    away = abs(s - road.junction) - road.side_half - road.corner
     lanes, edge = (road.lanes_left, road.left.edge) if d > 0 else (road.lanes_right, road.right.edge)
-    beyond, dash = abs(d) > edge, (s % 9.0) < 3.0
+    beyond = abs(d) > edge
+    dash = (s % 9.0) < 3.0
     if road.side_half > 0.0 and (away < 0.0 or beyond):
         middle = beyond and away < 0.0 and (abs(d) % 6.0) < 3.0 and abs(d) > 12.0
         return _stripe(s - road.junction, 0.06, blur) if middle else 0.0

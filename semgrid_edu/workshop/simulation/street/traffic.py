@@ -92,7 +92,8 @@ class Actor:
         (x, y, _), yaw = self.trajectory.pose(road, t)
         exponent = {Kind.CAR: footprints.ROUNDED, Kind.PEDESTRIAN: footprints.ROUND}.get(self.kind, footprints.SQUARE)
         length, width, height = self.size
-        half, top = (length / 2, width / 2), min(height, OVERHEAD)
+        half = (length / 2, width / 2)
+        top = min(height, OVERHEAD)
         return footprints.Footprint(x, y, *half, yaw, exponent, int(self.kind), self.instance, top)
 
     def middle(self, road: Road, t: float) -> NDArray[np.float64]:
@@ -159,8 +160,12 @@ class Traffic:
     """
 
     def __init__(self, builder: Builder, ego: Trajectory, duration: float) -> None:
-        self.builder, self.ego, self.duration = builder, ego, duration
-        self.plan, self.rng, self.road = builder.plan, builder.rng, builder.road
+        self.builder = builder
+        self.ego = ego
+        self.duration = duration
+        self.plan = builder.plan
+        self.rng = builder.rng
+        self.road = builder.road
         self.ends_at = ego.at(duration)[0]
         self.moving: list[Actor] = []
         self.parked: list[Actor] = []

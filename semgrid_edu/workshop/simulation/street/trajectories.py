@@ -45,7 +45,8 @@ class ActorPace:
         """
         drawn = 0.0 if rng.random() < 0.1 else float(rng.uniform(5, 14))
         mean = drawn if mean is None else mean
-        swing, phase = float(rng.uniform(0.0, 0.12)) * mean, float(rng.uniform(0, 6.28))
+        swing = float(rng.uniform(0.0, 0.12)) * mean
+        phase = float(rng.uniform(0, 6.28))
         return cls(mean, swing, 0.8, phase)
 
     def distance(self, t: float) -> float:
@@ -211,7 +212,8 @@ class Ego:
         drawn = road.lanes_right - 1 if rng.random() < 0.65 else 0
         lane = drawn if lane is None else lane
         d = -(lane + 0.5) * road.lane + float(rng.normal(0, 0.1))
-        sway, phase = float(rng.uniform(0.02, 0.1)), float(rng.uniform(0, 6.28))
+        sway = float(rng.uniform(0.02, 0.1))
+        phase = float(rng.uniform(0, 6.28))
         roll, pitch = (float(x) for x in np.radians(rng.uniform(*swing, 2)))
         return cls(road, Trajectory(0.0, d, 1.0, 0.0, pace), sway, roll, pitch, phase)
 

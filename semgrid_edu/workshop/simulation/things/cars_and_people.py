@@ -35,9 +35,11 @@ def car_size(body: str) -> tuple[float, float, float]:
 
 def _rings(body: SimpleNamespace) -> list[list[tuple[float, float, float]]]:
     """Return the eight corners of each cross-section, from the left sill over the top to the right sill."""
-    rings, rows = [], (body.x, body.sill, body.shoulder, body.top, body.half, body.half_top)
+    rings = []
+    rows = (body.x, body.sill, body.shoulder, body.top, body.half, body.half_top)
     for x, sill, shoulder, top, half, half_top in zip(*rows, strict=True):
-        w, t = half * body.width / 2, half_top * body.width / 2
+        w = half * body.width / 2
+        t = half_top * body.width / 2
         middle = 0.45 * sill + 0.55 * shoulder
         left = [(0.93 * w, sill), (w, middle), (0.97 * w, shoulder), (t, top)]
         rings.append([(x * body.length, y, z) for y, z in left] + [(x * body.length, -y, z) for y, z in left[::-1]])
@@ -78,7 +80,8 @@ def _wheels(body: SimpleNamespace) -> list[Shape]:
 
 def _boxes(body: SimpleNamespace, names: tuple[str, ...], side: int = 1) -> list[Shape]:
     """Put the boxes of some tables on a body; 1 for the left side, where it matters."""
-    parts, over = [], np.array([body.length, body.width / 2, 1.0])
+    parts = []
+    over = np.array([body.length, body.width / 2, 1.0])
     for row in itertools.chain.from_iterable(_TABLES[name] for name in names):
         section, factor = row.get("shoulder", (0, 0.0))
         at = over * [1, side, 1] * row["at"] + row.get("moved", 0.0) + [0, 0, factor * body.shoulder[section]]
@@ -96,7 +99,8 @@ def car(body: str) -> Shape:
     body : str
         One of `BODIES`.
     """
-    its, rear = _BODIES[body], ("van", "ends") if body == "van" else ("ends",)
+    its = _BODIES[body]
+    rear = ("van", "ends") if body == "van" else ("ends",)
     sides = _boxes(its, ("side",), -1) + _boxes(its, ("side",))
     return merge([*_loft(its), *_wheels(its), *sides, *_boxes(its, rear)])
 

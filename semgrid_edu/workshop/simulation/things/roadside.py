@@ -70,7 +70,8 @@ def sheet_fence(style: str, length: float) -> tuple[Shape, Shape]:
     frame, sheet : Shape
         The post at the origin with the rails, and what a part of the light passes.
     """
-    its, look = SHEETS[style], (SHEETS[style].colour, Material.METAL)
+    its = SHEETS[style]
+    look = (SHEETS[style].colour, Material.METAL)
     post = _fence_box((0, 0, its.post[0]), (0.06, 0.06, its.post[1]), *look)
     rails = [_fence_box((length / 2, 0, z), (length, wide, high), *look) for z, wide, high in its.rails]
     sheet = _fence_quads((0, 0, its.sheet[0]), (length, 0, 0), (0, 0, its.sheet[1]), its.colour, Material[its.material])
@@ -234,13 +235,15 @@ def tree(species: str, variant: int, n_leaves: int = 1500) -> Shape:
         Triangles of foliage; trees far away need fewer.
     """
     rng = np.random.default_rng([TREES.index(species), variant, 77])
-    its, size = _SPECIES[species], 0.24 * (1500 / n_leaves) ** 0.5
+    its = _SPECIES[species]
+    size = 0.24 * (1500 / n_leaves) ** 0.5
     trunk = _bark((0, 0, -0.8), (0, 0, 4.2), (its.trunk * 1.2, its.trunk * 0.6), its.bark, sides=9)
     if not its.crown:
         return merge([_cone(n_leaves, size, its.leaf, rng), trunk])
     centre = rng.uniform(-1, 1, (7, 3)) * its.crown + [0, 0, its.height]
     radii = rng.uniform(0.95, 1.55, (7, 1)) * [1, 1, 0.85]
-    foliage, fork = _crown(centre, radii, n_leaves, size, its.leaf, rng), (its.trunk * 0.5, its.trunk * 0.25)
+    foliage = _crown(centre, radii, n_leaves, size, its.leaf, rng)
+    fork = (its.trunk * 0.5, its.trunk * 0.25)
     forks = [_bark((0, 0, 2.4), (*rng.uniform(-1.2, 1.2, 2), 4.6), fork, its.bark, sides=5) for _ in range(3)]
     return merge([foliage, trunk, *forks])
 
