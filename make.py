@@ -62,8 +62,8 @@ def test() -> None:
         str(path.relative_to(CLONE)) for path in sorted([*folder.glob("*.ipynb"), *folder.glob("deeper/*.ipynb")])
     ]
     # Three processes for two cores: one waits for a kernel, a subprocess or the disk most of the time. The files that
-    # take minutes come first, so that no process ends long before the others.
-    pool = ("-n", "3", "--dist", "loadfile", "--no-loadscope-reorder", "-p", "no:cacheprovider")
+    # take minutes come first, so that no process ends long before the others. Graders are one class an exercise.
+    pool = ("-n", "3", "--dist", "loadscope", "--no-loadscope-reorder", "-p", "no:cacheprovider")
     nbval = ("--nbval", "--nbval-current-env", "--nbval-cell-timeout=300")
     files = (*notebooks, "tests", "semgrid_edu")
     _pytest(*pool, *nbval, "--doctest-modules", "--ignore=tests/browser", *files)
