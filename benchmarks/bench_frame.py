@@ -16,12 +16,12 @@ from bench_occupancy import stopwatches
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.fast import build_net
+from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, SemanticGridNet
 from semgrid_edu.occupancy.cmcdot import LIDAR_PERIOD
 from semgrid_edu.pipeline import network_image, run_pipeline
-from semgrid_edu.training.devices import keep_freed_memory
 
 PASSES = 3
 """Along the drive, after one to warm up."""

@@ -20,10 +20,10 @@ from torch.utils.flop_counter import FlopCounterMode
 from semgrid_edu.datasets.samples import sample_drive, sample_frames
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.fast import build_net
+from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.networks import SEGMENTERS, Architecture, SemanticGridNet, unit_image
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.batches import draw_batch, grid_logits, image_scores
-from semgrid_edu.training.devices import keep_freed_memory
 
 STEPS, WARM_UP, ROUNDS = 30, 3, 30
 """Of each stage; those before the times count; calls of inference."""

@@ -1,9 +1,9 @@
 """Equation (2) and the 1x1 reduction at the paper's scale, time and memory: `python benchmarks/bench_planes.py`.
 
 Twenty planes of 355 x 155 cells take the scores of 14 classes from an image of 375 x 1242 pixels, and a 1x1
-convolution leaves 16 of these 280. `PlaneSampler` and other ways to sample do so in turn, each followed by the same
-convolution, ours in the form that the package's network uses; the best of the rounds counts. Peak memory is that of a
-process of its own, above what it held before.
+convolution leaves 16 of these 280. `fast.PlaneSampler`, the book's `PlaneSampler` and other ways to sample take turns,
+each followed by the same convolution, ours in the form that the package's network uses; the best of the rounds counts.
+Peak memory is that of a separate process, above what it held before.
 """
 
 import os
@@ -20,17 +20,18 @@ from timing import best_times
 from torch import Tensor
 from torch.func import functional_call
 
+from semgrid_edu import fast, planes
 from semgrid_edu.camera import Camera
+from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks.fusion import PlaneConvolution
-from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels
-from semgrid_edu.training.devices import keep_freed_memory
+from semgrid_edu.planes import plane_heights, plane_pixels
 
 N_CLASSES, N_REDUCED, ROUNDS = 14, 16, 15
 KITTI_SIZE = (375, 1242)
-OURS = "PlaneSampler"
+OURS = "fast"
 CONVOLUTION = PlaneConvolution(N_CLASSES, N_REDUCED, (len(plane_heights()), 1, 1), bias=False)
-"""What `FusionNet` reduces the planes with; the benchmark hands it its own weight."""
+"""What `FusionNet` reduces the planes with; the benchmark passes it another weight."""
 Sampling = Callable[[Tensor], Tensor]
 """(1, C, h, w) -> (1, C, D, H, W)."""
 
@@ -63,9 +64,10 @@ def voxel_sampling(pixels: NDArray, visible: NDArray) -> Sampling:
 
 
 SAMPLINGS: dict[str, Callable[[NDArray, NDArray], Sampling]] = {
-    OURS: lambda pixels, visible: PlaneSampler(pixels, visible, KITTI_SIZE),
+    OURS: lambda pixels, visible: fast.PlaneSampler(pixels, visible, KITTI_SIZE),
     "F.grid_sample": flat_sampling,
     "voxels": voxel_sampling,
+    "book": lambda pixels, visible: planes.PlaneSampler(pixels, visible, KITTI_SIZE),
 }
 
 
@@ -105,7 +107,7 @@ def inputs() -> tuple[Tensor, Tensor]:
 
 
 def peak_memory(name: str, task: str) -> float:
-    """Return the megabytes that a task needs above what was there before, in a process of its own (Linux)."""
+    """Return the megabytes that a task needs above what was there before, in a separate process (Linux)."""
     # Freed buffers go back to the system at once, so that the peak counts only what is in use.
     environment = {**os.environ, "MALLOC_MMAP_THRESHOLD_": "65536"}
     command = [sys.executable, __file__, name, task]
@@ -116,14 +118,14 @@ def print_peak(name: str, task: str) -> None:
     """Do a task once and print what `peak_memory` returns."""
     sampling = SAMPLINGS[name](*plane_pixels(GridSpec.paper(), plane_heights(), kitti_camera()))
     run = tasks(name, sampling, *inputs())[task]
-    Path("/proc/self/clear_refs").write_text("5")  # from here on the peak is counted anew
+    Path("/proc/self/clear_refs").write_text("5")  # the peak is counted from here on
     before = resident_peak()
     run()
     print(resident_peak() - before)
 
 
 def resident_peak() -> float:
-    """Return the most memory that this process has held, megabytes; `getrusage` adds what its parent held."""
+    """Return the most memory that this process has held, megabytes. (`getrusage` would count its parent's, too.)"""
     status = dict(line.split(":") for line in Path("/proc/self/status").read_text().splitlines())
     return int(status["VmHWM"].split()[0]) * 1024 / 1e6
 
@@ -137,9 +139,9 @@ def print_row(label: str, values: list[float], unit: str) -> None:
 def main() -> None:
     keep_freed_memory()
     calibration = GridSpec.paper(), plane_heights(), kitti_camera()
-    build = best_times([lambda: PlaneSampler(*plane_pixels(*calibration), KITTI_SIZE)], 5)[0]
+    build = best_times([lambda: fast.PlaneSampler(*plane_pixels(*calibration), KITTI_SIZE)], 5)[0]
     pixels, visible = plane_pixels(*calibration)
-    operator = PlaneSampler(pixels, visible, KITTI_SIZE).operator.nbytes / 1e6
+    operator = fast.PlaneSampler(pixels, visible, KITTI_SIZE).operator.nbytes / 1e6
     grid = normalised(pixels, visible).nbytes / 1e6
     print(f"{len(visible)} planes, {visible.mean():.0%} visible")
     print(f"built from the calibration in {build:.0f} ms; {operator:.0f} MB (the grid of F.grid_sample: {grid:.0f} MB)")
@@ -155,7 +157,7 @@ def main() -> None:
 
 
 def check_agreement(ways: dict[str, dict[str, Callable[[], Tensor]]], scores: Tensor, weight: Tensor) -> None:
-    """Refuse to compare ways that don't compute the same."""
+    """Check that all ways compute the same."""
     expected = None
     for way in ways.values():
         found = [run() for run in way.values()] + [scores.grad, weight.grad]

@@ -16,12 +16,12 @@ from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, transform_points
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.fast import height_above_ground
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.ground import GroundParams
+from semgrid_edu.occupancy.polar import GroundParams
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Lidar, Rig
+from semgrid_edu.workshop.simulation.street.ground import ground_mesh
 from semgrid_edu.workshop.simulation.street.plan import Wishes
-from semgrid_edu.workshop.simulation.street.terrain import ground_mesh
 
 Scan = tuple[np.ndarray, np.ndarray]
 """Points (N, 3) in the grid frame, and their true heights above the ground (N,), NaN where unknown; metres."""

@@ -4,26 +4,30 @@
 
 A fusion network learns from either on the scores of the first stage of `segnet_compact`, and is scored on the labelled
 returns of PandaSet's scene 002; then it learns from four of the scene's cameras and is scored on the two others, as in
-`reproduce real-streets`. A run that has ended isn't repeated.
+`worlds.lecture_08_real_streets`. A run that has ended isn't repeated.
 """
 
 import argparse
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
-from semgrid_edu.datasets.training_set import Mixture, sets_by_camera
+from semgrid_edu.datasets.training_set import Mixture
+from semgrid_edu.fast import TrainingSet
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture
 from semgrid_edu.training import TrainingParams
 from semgrid_edu.workshop.scoring.score_with_interval import compared, on_cells, shown
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E_AHEAD
-from semgrid_edu.workshop.studies.training import real_streets as study
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "notebooks"))
+
+from worlds import lecture_08_real_streets as study
 
 FIFTH = 5
 """A thinned scan keeps one of so many columns."""
@@ -55,7 +59,7 @@ def thin_data_set(folder: Path, out: Path) -> Path:
 def learned(way, start: Path, parts: list[list], folder: Path, seed: int) -> Path:
     """Return the weights that a network learns in this way from parts of frames."""
     if not (folder / WEIGHTS).exists():
-        study._train(way, [start], Mixture(parts), folder, seed, torch.device("cpu"))
+        study._train(way, [start], Mixture(parts), folder, seed, "cpu")
     return folder / WEIGHTS
 
 
@@ -77,7 +81,7 @@ def report_difference(ours: list, theirs: list) -> None:
 
 def counts_of(kind: str, folder: Path, rounds: list, runs: Path) -> tuple[list, list]:
     """Return what networks of each seed got that learn from one kind of scans alone, and with real frames after it."""
-    streets, everything = sets_by_camera(folder, "train"), [part for _, test in rounds for part in test]
+    streets, everything = TrainingSet.by_camera(folder, "train"), [part for _, test in rounds for part in test]
     alone, then = [], []
     for seed in SEEDS:
         start = sample_weights("segnet").with_name(IMAGE_STAGE)

@@ -8,6 +8,8 @@ are in the vehicle's frame. They are told by `SensorModel.edge`; with an edge of
 """
 
 import argparse
+import sys
+from pathlib import Path
 from unittest import mock
 
 import numpy as np
@@ -16,10 +18,13 @@ from semgrid_edu.fast import Cmcdot
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, SensorModel, State
 from semgrid_edu.plotting.grids import velocity_arrows
-from semgrid_edu.workshop.simulation.named_streets import named_street
+from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.street import plan
-from semgrid_edu.workshop.studies.filter.scenes import known_scenes
-from semgrid_edu.workshop.studies.filter.streets import LEAST_DYNAMIC
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "notebooks"))
+
+from worlds.lecture_04_scenes import known_scenes
+from worlds.lecture_04_street_scores import LEAST_DYNAMIC
 
 SPLIT, FAST, PERIOD, FRAMES = 60, 6.0, 0.1, 30
 DRAWN = plan._side
@@ -34,7 +39,7 @@ def near_hedge(number: int):
         return side._replace(edge=wanted - 0.35 + arguments[2] / 2, strip=0.0, walk=0.0, bank_rise=0.0)
 
     with mock.patch.object(plan, "_side", narrow):
-        drive = named_street("hedge", number, FRAMES)
+        drive = simulate(number, FRAMES, "hedge")
         return drive, drive.plan.road.right.edge + 0.35 + drive.ego.trajectory.d
 
 

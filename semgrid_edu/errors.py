@@ -1,25 +1,27 @@
-"""Errors that name the file or argument, what was expected and what was found; checks of arguments that raise them."""
+"""Errors that name the file or argument, what was expected and what was found, and checks that raise them."""
 
 import math
 from collections.abc import Callable
 from dataclasses import fields
 from functools import wraps
+from importlib import import_module
 from numbers import Integral, Real
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 
 class ArgumentError(ValueError):
-    """A function was called with something it can't use.
+    """A function was called with an argument that it can't use.
 
     Parameters
     ----------
     name : str
         The argument that can't be used.
     expected, found : object
-        What the function takes, and what it got instead.
+        What the function takes, and what it got.
 
     Examples
     --------
@@ -32,12 +34,12 @@ class ArgumentError(ValueError):
         super().__init__(name, expected, found)  # not the sentence, so that the error can be pickled
 
     def __str__(self) -> str:
-        """Return all three in one sentence."""
+        """Return one sentence: where, what was expected and what was found."""
         return "{}: expected {}, found {}".format(*self.args)
 
 
 class DataError(ValueError):
-    """A file is missing, damaged or not what its place says it is.
+    """A file is missing, damaged or not what is expected in its place.
 
     Parameters
     ----------
@@ -52,24 +54,24 @@ class DataError(ValueError):
         self.path = Path(path)
 
     def __str__(self) -> str:
-        """Return all three in one sentence."""
+        """Return one sentence: where, what was expected and what was found."""
         return "{}: expected {}, found {}".format(*self.args)
 
 
 def check_whole(least: int = 0, **numbers: int) -> None:
-    """Refuse numbers that aren't whole, or too small.
+    """Check that numbers are whole and large enough.
 
     Parameters
     ----------
     least : int
-        The smallest that will do.
+        The smallest number allowed.
     **numbers : int
-        The numbers, by the names of the arguments that they were given as.
+        The numbers, by the names of their arguments.
 
     Raises
     ------
     ArgumentError
-        For the first such number.
+        For the first number that isn't.
     """
     for name, value in numbers.items():
         if not (isinstance(value, Integral) and value >= least):
@@ -77,7 +79,7 @@ def check_whole(least: int = 0, **numbers: int) -> None:
 
 
 def check_shape(name: str, values: ArrayLike, shape: tuple[int, ...]) -> None:
-    """Refuse an array that doesn't have the shape it should have.
+    """Check the shape of an array.
 
     Parameters
     ----------
@@ -86,26 +88,26 @@ def check_shape(name: str, values: ArrayLike, shape: tuple[int, ...]) -> None:
     values : array
         The array.
     shape : tuple of int
-        The shape it should have.
+        The shape that it should have.
 
     Raises
     ------
     ArgumentError
-        When it has another.
+        When it has another shape.
     """
     if np.shape(values) != shape:
         raise ArgumentError(name, f"shape {shape}", f"shape {np.shape(values)}")
 
 
 def check_fields(thing: object, expected: str, holds: Callable[[object], bool], *names: str) -> None:
-    """Refuse an object when a field has a value that it can't have.
+    """Check the values of an object's fields.
 
     Parameters
     ----------
     thing : object
         The object.
     expected : str
-        What its fields should be, for the error.
+        What the fields should be, for the error.
     holds : callable
         Tells whether a value is as expected.
     *names : str
@@ -114,7 +116,7 @@ def check_fields(thing: object, expected: str, holds: Callable[[object], bool], 
     Raises
     ------
     ArgumentError
-        For the first field with another value.
+        For the first field that isn't as expected.
     """
     for name in names:
         if not holds(getattr(thing, name)):
@@ -122,7 +124,7 @@ def check_fields(thing: object, expected: str, holds: Callable[[object], bool], 
 
 
 def types_named(check: Callable[[object], None]) -> Callable[[object], None]:
-    """Make the `__post_init__` of a dataclass name the field whose value is no number, or no sequence, but should be.
+    """Decorate the `__post_init__` of a dataclass: a value of the wrong type becomes an error that names its field.
 
     Parameters
     ----------
@@ -144,7 +146,7 @@ def types_named(check: Callable[[object], None]) -> Callable[[object], None]:
 
 
 def not_negative(number: float) -> bool:
-    """Tell whether a number is finite and at least 0.
+    """Return whether a number is finite and at least 0.
 
     Parameters
     ----------
@@ -155,7 +157,7 @@ def not_negative(number: float) -> bool:
 
 
 def positive_count(number: float) -> bool:
-    """Tell whether a number is whole and at least 1.
+    """Return whether a number is whole and at least 1.
 
     Parameters
     ----------
@@ -163,3 +165,42 @@ def positive_count(number: float) -> bool:
         Any number.
     """
     return isinstance(number, Integral) and number >= 1
+
+
+EXTRAS = {
+    "numba": "fast",
+    "trimesh": "simulation",
+    "embreex": "simulation",
+    "lightning_fabric": "training",
+    "joblib": "training",
+    "pandas": "pandaset",
+    "pooch": "download",
+    "requests": "download",
+}
+"""Libraries that the core runs without, and the optional extra that each belongs to."""
+
+
+class MissingExtraError(ImportError):
+    """A library of an optional extra isn't installed; the message names the extra."""
+
+
+def needed(name: str) -> ModuleType:
+    """Import a module of an optional extra.
+
+    Parameters
+    ----------
+    name : str
+        The module, such as "trimesh.creation".
+
+    Raises
+    ------
+    MissingExtraError
+        When its library isn't installed.
+    """
+    try:
+        return import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name not in EXTRAS:
+            raise
+        extra = EXTRAS[error.name]
+        raise MissingExtraError(f"{error.name} isn't installed: pip install 'semgrid_edu[{extra}]'") from error

@@ -1,9 +1,10 @@
-"""A frame: what the sensors of a vehicle give at one instant of a drive, and what is true then."""
+"""A frame: the data of a vehicle's sensors at one instant of a drive, and the true labels, if they are known."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.errors import ArgumentError
@@ -16,12 +17,12 @@ LABEL_GRID = GridSpec(x_min=0.0, x_max=71.0, y_min=-15.5, y_max=15.5, cell=0.1)
 
 @dataclass(frozen=True, eq=False)
 class FrameLabels:
-    """What is true at one instant, as a simulator or an annotator knows it.
+    """The truth at one instant, from a simulator or an annotator.
 
     Parameters
     ----------
     label_set : LabelSet
-        The classes that the numbers stand for.
+        The classes of the numbers in `image` and `birdseye`.
     image : (h, w) uint8
         The class of each pixel; 255 where unlabelled.
     depth : (h, w) float32
@@ -29,10 +30,10 @@ class FrameLabels:
     birdseye : (710, 310) uint8
         The class of each 0.1 m cell of `LABEL_GRID`, seen or not; 255 where unlabelled.
     visible : (710, 310) bool
-        Whether the camera sees what stands in the cell.
+        Whether the camera sees what is in the cell.
     undecided : (710, 310) bool, optional
-        For labels with gaps: whether the cell lies in view of the camera, which may see something there that nobody
-        labelled. None when all that the camera sees is labelled.
+        For labels with gaps: whether the cell is in view of the camera, which may see something unlabelled there. None
+        when everything that the camera sees is labelled.
     """
 
     label_set: LabelSet
@@ -45,8 +46,8 @@ class FrameLabels:
     def birdseye_on(self, spec: GridSpec) -> NDArray[np.uint8]:
         """Pool the bird's-eye labels to a coarser grid.
 
-        A cell takes the class that `LabelSet.most_voted` finds among its fine cells: what stands in it, even if that is
-        a thin pole in a single fine cell, or else the ground. It is 255 where no fine cell is labelled.
+        A cell takes the class that `LabelSet.most_voted` finds among its fine cells: an object, even if it is a thin
+        pole in a single fine cell, or else the ground. It is 255 where no fine cell is labelled.
 
         Parameters
         ----------
@@ -92,14 +93,14 @@ class Frame:
         Calibration of the image, known even where there is no image.
     T_world_from_lidar : (4, 4) float64
         Pose of the LIDAR, metres. The world is the frame of the IMU at the first oxts packet of the drive (a reading of
-        KITTI's GPS and IMU), unless the reader of a drive without oxts says otherwise.
+        KITTI's GPS and IMU); readers of drives without oxts document theirs.
     time : float
         Seconds since the first LIDAR scan of the drive.
     labels : FrameLabels or None
         The truth, where it is known.
-    own : (N,) bool or None
-        Which returns come from the vehicle itself. None where the reader doesn't know: then a filter takes those within
-        the vehicle's outline for its own (`SensorModel.vehicle`), which must lie along the grid.
+    vehicle_returns : (N,) bool or None
+        Which returns hit the vehicle itself. None where the reader doesn't know; a filter then uses the vehicle's
+        outline (`SensorModel.vehicle`), which is aligned with the grid.
     """
 
     image: NDArray[np.uint8] | None
@@ -108,10 +109,10 @@ class Frame:
     T_world_from_lidar: NDArray[np.float64]
     time: float
     labels: FrameLabels | None = None
-    own: NDArray[np.bool_] | None = None
+    vehicle_returns: NDArray[np.bool_] | None = None
 
     def need_image(self) -> NDArray[np.uint8]:
-        """Return the image, (h, w, 3) RGB, for callers that can't do without one."""
+        """Return the image, (h, w, 3) RGB, or raise an error when the frame has none."""
         if self.image is None:
             raise ArgumentError("frame", "a frame with a camera image", "a frame without one")
         return self.image
@@ -120,14 +121,16 @@ class Frame:
     def points_grid(self) -> NDArray[np.float32]:
         """(N, 4) float32: the returns in the grid frame, so that z is the height above flat ground.
 
-        (N, 5) where `own` is known, which is the last column.
+        (N, 5) where `vehicle_returns` is known: it is the last column.
         """
         points = self.points + np.array([0, 0, self.camera.lidar_height, 0], dtype=self.points.dtype)
-        return points if self.own is None else np.column_stack([points, self.own])
+        if self.vehicle_returns is None:
+            return points
+        return np.column_stack([points, self.vehicle_returns])
 
 
 def blocks(fine: NDArray, spec: GridSpec) -> NDArray:
-    """Return the fine cells that each cell of a coarser grid consists of.
+    """Return the values of the fine cells in each cell of a coarser grid.
 
     Parameters
     ----------
@@ -147,3 +150,20 @@ def blocks(fine: NDArray, spec: GridSpec) -> NDArray:
     if not coarsening or (height * factor, width * factor) != LABEL_GRID.shape:
         raise ArgumentError("spec", f"a coarsening of {LABEL_GRID}", spec)
     return fine.reshape(height, factor, width, factor).swapaxes(1, 2).reshape(height, width, -1)
+
+
+def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
+    """Average an image over larger pixels; its calibration becomes `camera.resized(size)`.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+        RGB.
+    size : (int, int)
+        The new height and width, pixels.
+
+    Returns
+    -------
+    (*size, 3) uint8
+    """
+    return np.asarray(Image.fromarray(image).resize(size[::-1], Image.Resampling.BOX))

@@ -24,10 +24,9 @@ class LabelSet:
     rgb : tuple of (int, int, int)
         The colour of each class: red, green and blue, 0..255.
     n_semantic : int
-        Number of semantic classes. They come first; the other classes say that it is unknown what a cell holds.
+        Number of semantic classes. They come first; the others are kinds of unknown.
     flat : tuple of str
-        Names of the classes that lie on the ground, so that something else can stand on them. `most_voted` prefers any
-        other class to these.
+        Names of the classes of the ground, on which an object can be. `most_voted` prefers any other class to these.
 
     Examples
     --------
@@ -72,8 +71,8 @@ class LabelSet:
     def most_voted(self, votes: NDArray, otherwise: ArrayLike) -> NDArray[np.uint8]:
         """Return the class that each cell takes when several were seen in it.
 
-        What stands in a cell outvotes the ground below it: one vote for a thin pole beats many for the road. Otherwise
-        the most frequent class wins; of equally frequent classes, the first.
+        An object outvotes the ground below it: one vote for a thin pole beats many for the road. Otherwise the most
+        frequent class wins; of equally frequent classes, the first.
 
         Parameters
         ----------
@@ -90,9 +89,9 @@ class LabelSet:
         >>> KITTI_14.most_voted(votes, otherwise=IGNORE)
         array([  0,   3, 255], dtype=uint8)
         """
-        standing = votes.copy()
-        standing[[self.index(name) for name in self.flat]] = 0
-        best = np.where(standing.any(axis=0), standing.argmax(axis=0), votes.argmax(axis=0))
+        object_votes = votes.copy()
+        object_votes[[self.index(name) for name in self.flat]] = 0
+        best = np.where(object_votes.any(axis=0), object_votes.argmax(axis=0), votes.argmax(axis=0))
         return np.where(votes.any(axis=0), best, otherwise).astype(np.uint8)
 
 
@@ -149,4 +148,4 @@ SYNTHIA_10 = LabelSet(
 """The ten classes of the paper's Table 3, in its order."""
 
 LABEL_SETS = {labels.name: labels for labels in (KITTI_14, SYNTHIA_10)}
-"""Every label set by its name, as data sets on disk refer to it."""
+"""Label sets by the name that data sets on disk use."""

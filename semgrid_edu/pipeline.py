@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from semgrid_edu.crf import CrfParams
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.frame import Frame
+from semgrid_edu.frame import Frame, resize_image
 from semgrid_edu.memory import MemoryParams, View
 from semgrid_edu.networks import SemanticGridNet, unit_image
 from semgrid_edu.occupancy import Belief, CmcdotParams

@@ -673,19 +673,7 @@ COURSE = (
 )
 
 EXPERIMENTS = (
-    Row(
-        "an unknown grid, occupancy",
-        "reproduce occupancy --grid tiny --out log.json",
-        "grid: expected paper or compact",
-    ),
     Row("an unknown device, runs", f"{TABLE1} --device abacus", "--device: expected"),
-    Row("too many processes", f"{TABLE1} --processes 1000", "Invalid value for '--processes'"),
-    Row("an unknown grid, streets", "reproduce streets --grid tiny --out log.json", "grid: expected paper or compact"),
-    Row("an unknown LIDAR", "reproduce truth-policies --lidar sonar --out log.json", "lidar: expected one of"),
-    Row("an unknown grid", "reproduce point-labels --grid huge --out log.json", "grid: expected"),
-    Row("an unknown LIDAR of labelled returns", "reproduce point-labels --lidar sonar", "lidar: expected one of"),
-    Row("no scene", "reproduce real-streets --pandaset NONE --simulated . --runs RUNS --out log.json", "NONE/002"),
-    Row("no scene to remember", "reproduce memory --pandaset NONE --out log.json", "NONE/002"),
     Row("a scene that isn't there", "data index OUT --pandaset TINY --scene 002", "TINY/002"),
     Row(
         "a network of another kind to start from",
@@ -698,14 +686,6 @@ EXPERIMENTS = (
         "none.safetensors: expected a safetensors file, found no such file",
     ),
     Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "tint: expected a share of at least 0"),
-    Row("no drives", "reproduce occupancy --drives 0", "Invalid value for '--drives'"),
-    Row("a result in a folder", "reproduce overfit --out TINY", "TINY: expected a file to write, found a folder"),
-    Row(
-        "a log that is a list, policies",
-        "reproduce truth-policies --out log.json",
-        "log.json: expected a JSON object",
-        text("log.json", "[]"),
-    ),
     Row("no results to check", "reproduce check TINY", "TINY: expected results such as table1.json, found none"),
     Row("no folder of results", "reproduce check NONE", "NONE: expected results such as table1.json, found none"),
     Row("results without counts", CHECK, "table1_counts.npz: expected a file, found nothing there", a_result()),
@@ -714,19 +694,6 @@ EXPERIMENTS = (
     Row("counts of no run", CHECK, "expected the record of a run", a_result({"records.json": np.array("{}")})),
     Row("counts with damaged records", CHECK, "expected a JSON object", a_result({"records.json": np.array("{")})),
     Row("a result without a scale", CHECK, "table1.json: expected a result of", a_result({"records.json": "{}"}, "{}")),
-    Row("no real drive", "reproduce real-drive --kitti NONE --out log.json", "NONE: expected a folder of dates"),
-    Row(
-        "boxes of cars that are numbers",
-        "reproduce real-drive --kitti TINY --out log.json",
-        "moving_cars_0013.json: expected boxes",
-        text("TINY/moving_cars_0013.json", '{"car": 5}'),
-    ),
-    Row(
-        "boxes of cars of two metres",
-        "reproduce real-drive --kitti TINY --out log.json",
-        "moving_cars_0013.json: expected boxes",
-        text("TINY/moving_cars_0013.json", '{"car": {"1": [2, 3]}}'),
-    ),
     Row("a cache in place of a file", f"--cache architecture.json {TRAIN}", "architecture.json", frames()),
     Row(
         "a result over the weights",
@@ -770,45 +737,11 @@ EXPERIMENTS = (
 
 # Results over what isn't ours, and what is refused before any work: every command that writes.
 
-SINGLE = {
-    "occupancy": "",
-    "streets": "",
-    "overfit": "",
-    "point-labels": "",
-    "real-streets": "--pandaset NONE --simulated TINY --runs RUNS",
-    "real-drive": "--kitti NONE",
-    "memory": "--pandaset NONE",
-}
-"""The lectures' experiments that write their result at the end, with what they need."""
-
-RESUMED = ("truth-policies",)
-"""Those that write while they run."""
-
-PAPERS = ("table1", "table2", "table3", "claims", "structure", "ablations", "truth-costs", "figures", "all")
-"""The experiments of the paper."""
+PAPERS = ("table1", "all")
+"""Of the paper's experiments, which are one command, the first and all."""
 
 NOTES = "notes.json"
 LOST = "expected a new file, or an earlier result of this command, found something else, which would be lost"
-STRANGER = {
-    "a JSON object": '{"my": "notes"}',
-    "a JSON list": "[1, 2]",
-    "a text": "my notes",
-    "the result of another command": '{"command": "semgrid-edu reproduce nothing --seed 0"}',
-}
-
-
-def results(name: str, options: str) -> tuple[Row, ...]:
-    """What stands in the place of a result and isn't one, for an experiment of the lectures."""
-    command = f"reproduce {name} {options} --out {NOTES}"
-    found = [
-        Row(f"{what} over which {name} would write", command, LOST, text(NOTES, it)) for what, it in STRANGER.items()
-    ]
-    return (
-        *found,
-        Row(f"a folder in place of the result of {name}", command, f"{NOTES}: .*found a folder", folder(NOTES)),
-        Row(f"a pipe in place of the result of {name}", command, f"{NOTES}: .*found a pipe or a device", pipe(NOTES)),
-        Row(f"a result of {name} below a file", f"{command.replace(NOTES, 'architecture.json/a.json')}", "File exists"),
-    )
 
 
 def of_paper(name: str) -> tuple[Row, ...]:
@@ -821,7 +754,6 @@ def of_paper(name: str) -> tuple[Row, ...]:
         Row(f"a folder in place of a file of {name}", command, "found a folder", in_out(f"{first}.json")),
         Row(f"no workers for {name}", f"{command} --workers 0", "--workers: expected at least one process"),
         Row(f"too many seeds for {name}", f"{command} --seeds 1001", "Invalid value for '--seeds'"),
-        Row(f"no processes for {name}", f"{command} --processes 0", "Invalid value for '--processes'"),
         Row(f"an unknown scale of {name}", f"{command} --scale none", "--scale: expected"),
     )
 
@@ -836,20 +768,7 @@ def page(name: str) -> Spoil:
 
 MANY = str(10**18)
 REFUSED_FIRST = (
-    *(row for name, options in SINGLE.items() for row in results(name, options)),
     *(row for name in PAPERS for row in of_paper(name)),
-    *(
-        Row(f"notes of one's own, {name}", f"reproduce {name} --out {NOTES}", "expected a result of", text(NOTES, "{}"))
-        for name in RESUMED
-    ),
-    *(
-        Row(f"a pipe, {name}", f"reproduce {name} --out {NOTES}", "found a pipe or a device", pipe(NOTES))
-        for name in RESUMED
-    ),
-    *(
-        Row(f"10^18 drives, {name}", f"reproduce {name} --drives {MANY} --out a.json", "Invalid value for '--drives'")
-        for name in ("occupancy", "streets", "point-labels", "truth-policies", "memory")
-    ),
     Row("a page of one's own", DEMO, f"index.html: {LOST} without --force", page("index.html")),
     Row("a picture of one's own", DEMO, "overview.png: expected a new file", page("overview.png")),
     Row("a folder called index.html", DEMO, "index.html: expected a file to write", in_out("index.html")),

@@ -2,13 +2,10 @@
 
 import gc
 import os
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "notebooks"))  # for `worlds`
 
 
 @pytest.hookimpl(wrapper=True)

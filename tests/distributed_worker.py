@@ -1,41 +1,49 @@
-"""What each of two processes does in test_distributed.py, started by torchrun: `distributed_worker.py TASK FOLDER`."""
+"""What each of two processes does in test_distributed.py, by torchrun: `distributed_worker.py FOLDER TASK...`."""
 
-import json
 import sys
 import warnings
 from pathlib import Path
 
 import torch
+from lightning_fabric import Fabric
 from tiny_streets import CAMERA, SMALL, tiny_streets
 from torch import nn
 
 from semgrid_edu.networks import build_net
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training import loop as training
-from semgrid_edu.training.devices import first_process_first, process_group, rank, shared_batch_norm, world_size
+from semgrid_edu.training.devices import open_fabric
+from semgrid_edu.training.loop import learn
 
-RUNS = {
-    "end-to-end": TrainingParams(image_iterations=3, grid_iterations=5, batch_size=4),
-    "two-stage": TrainingParams(image_iterations=3, grid_iterations=5, batch_size=4, end_to_end=False),
-}
+QUICK = TrainingParams(image_iterations=3, grid_iterations=5, batch_size=4)
 FRAMES = 5
 
 
-def noisy_streets():
-    """Streets where no two places look the same: else rounding alone decides which of them is a pool's maximum."""
+class Fit(nn.Module):
+    """The weighted squared errors of a linear map, as two sums like those of `Objective`."""
+
+    def __init__(self):
+        super().__init__()
+        self.w = nn.Parameter(torch.tensor([1.0, -2.0, 0.5], dtype=torch.float64))
+
+    def forward(self, batch):
+        x, y, weights = batch
+        return (weights * (x @ self.w - y) ** 2).sum(), weights.sum()
+
+
+def fitted(fabric: Fabric, batch):
+    """Losses and weights of a few steps."""
+    fit = Fit()
+    objective, optimiser = fabric.setup_module(fit), torch.optim.SGD(fit.parameters(), lr=0.1, momentum=0.9)
+    losses = [learn(fabric, objective, optimiser, batch) for _ in range(4)]
+    return torch.tensor([*losses, *fit.w.tolist()], dtype=torch.float64)
+
+
+def fit_batch():
+    """Eight examples, whose weights are unevenly distributed over the two halves."""
     generator = torch.Generator().manual_seed(0)
-    return [
-        street._replace(
-            image=torch.randint(60, 200, street.image.shape, generator=generator, dtype=torch.uint8),
-            occupancy=torch.rand(street.occupancy.shape, generator=generator, dtype=torch.float64).softmax(0),
-        )
-        for street in tiny_streets(FRAMES)
-    ]
-
-
-def precise_net(seed=0):
-    """In float32, a sum in another order turns a ReLU or a pool's choice here and there, and losses part at 1e-4."""
-    return build_net(SMALL, CAMERA, seed).double()
+    x, y = (torch.randn(shape, generator=generator, dtype=torch.float64) for shape in ((8, 3), (8,)))
+    return x, y, torch.tensor([5.0, 3, 4, 1, 0, 0.5, 0, 0.1], dtype=torch.float64)
 
 
 class Broken(list):
@@ -55,86 +63,55 @@ class Broken(list):
         return super().__getitem__(k)
 
 
-def exact_losses():
-    """Have the log keep every digit: returns where `train` will put its losses."""
-    losses, append_step = [], training.append_step
-
-    def append_and_keep(path, step):
-        losses.append(step.loss)
-        append_step(path, step)
-
-    training.append_step = append_and_keep
-    return losses
+def share(folder, fabric):
+    """A few steps, each process with half of the batch; and what only one process does first."""
+    half = slice(4 * fabric.global_rank, 4 * fabric.global_rank + 4)
+    torch.save(fitted(fabric, tuple(part[half] for part in fit_batch())), folder / f"fitted-{fabric.global_rank}.pt")
 
 
-def normalised(x, weight):
-    """A batch's normalisation, its running statistics, and the gradient of a weighted sum of its cubes."""
-    norm = nn.BatchNorm2d(3).requires_grad_(True)
-    with torch.no_grad():
-        norm.weight.copy_(torch.tensor([0.5, 1, 2]))
-        norm.bias.copy_(torch.tensor([-1.0, 0, 1]))
-    x = x.clone().requires_grad_(True)
-    with shared_batch_norm(norm):
-        y = norm(x)
-    (weight * y**3).sum().backward()
-    return {"y": y.detach(), "grad": x.grad, "mean": norm.running_mean, "var": norm.running_var}
-
-
-def batch():
-    generator = torch.Generator().manual_seed(0)
-    x, weight = (torch.randn(4, 3, 5, 7, generator=generator) for _ in range(2))
-    return 100 + 3 * x, weight
-
-
-def learn(folder):
-    """Train both ways; then once more, interrupted and resumed."""
-    losses, training.CHECKPOINT_EVERY = exact_losses(), 2
-    torch.set_default_dtype(torch.float64)
-    for name, params in RUNS.items():
-        train(precise_net(seed=rank()), noisy_streets(), folder / name, params)
-    params, reads = RUNS["end-to-end"], 3 * FRAMES + 5 * 4
+def learn_streets(folder, fabric):
+    """Train; then once more, interrupted and resumed."""
+    training.CHECKPOINT_EVERY = 2
+    streets = tiny_streets(FRAMES)
+    train(build_net(SMALL, CAMERA), streets, folder / "whole", QUICK, fabric=fabric)
+    train(
+        build_net(SMALL, CAMERA),
+        streets,
+        folder / "two-stage",
+        TrainingParams(1, 2, 4, end_to_end=False),
+        fabric=fabric,
+    )
     try:
-        train(precise_net(), Broken(noisy_streets(), reads), folder / "resumed", params)
+        train(build_net(SMALL, CAMERA), Broken(streets, 3 * FRAMES + 5 * 4), folder / "resumed", QUICK, fabric=fabric)
     except InterruptedError:
-        train(precise_net(seed=5), noisy_streets(), folder / "resumed", params, resume=True)
-    if rank() == 0:
-        (folder / "losses.json").write_text(json.dumps(losses))
+        train(build_net(SMALL, CAMERA, seed=5), streets, folder / "resumed", QUICK, resume=True, fabric=fabric)
 
 
-def share(folder):
-    """What the processes do together, in small."""
-    mine = slice(2 * rank(), 2 * rank() + 2)
-    torch.save(normalised(*(part[mine] for part in batch())), folder / f"normalised-{rank()}.pt")
-    with first_process_first():
-        (folder / f"order-{rank()}").write_text(str((folder / "order-0").exists()))
-
-
-def refuse(folder):
+def refuse(folder, fabric):
     """Mistakes that all processes must see, though the second alone makes one of them."""
     streets = tiny_streets()
     bad = [street._replace(occupancy=street.occupancy * torch.nan) for street in streets]
     for name, data, params in (
-        ("nan", bad if rank() == 1 else streets, TrainingParams(1, 2, batch_size=2)),
+        ("nan", bad if fabric.global_rank == 1 else streets, TrainingParams(1, 2, batch_size=2)),
         ("odd", streets, TrainingParams(1, 2, batch_size=3)),
     ):
         try:
-            train(build_net(SMALL, CAMERA), data, folder / name, params)
+            train(build_net(SMALL, CAMERA), data, folder / name, params, fabric=fabric)
         except ValueError as error:
-            (folder / f"{name}-{rank()}").write_text(str(error))
+            (folder / f"{name}-{fabric.global_rank}").write_text(str(error))
 
 
-def fail(folder):
+def fail(folder, fabric):
     """The second process alone meets an error, while the first waits for it."""
-    torch.set_default_dtype(torch.float32)
     streets = tiny_streets()
-    data = Broken(streets, 17) if rank() == 1 else streets
-    train(build_net(SMALL, CAMERA), data, folder / "fails", TrainingParams(10, 10, 2))
+    data = Broken(streets, 17) if fabric.global_rank == 1 else streets
+    train(build_net(SMALL, CAMERA), data, folder / "fails", TrainingParams(10, 10, 2), fabric=fabric)
 
 
 if __name__ == "__main__":
     warnings.simplefilter("error")
     torch.set_num_threads(1)
-    with process_group("cpu"):
-        assert world_size() == 2
-        for task in sys.argv[2:]:
-            globals()[task](Path(sys.argv[1]))
+    fabric = open_fabric("cpu")
+    assert fabric.world_size == 2
+    for task in sys.argv[2:]:
+        globals()[task](Path(sys.argv[1]), fabric)

@@ -18,7 +18,7 @@ from tiny_drive import DATE, write_tiny_drive
 import semgrid_edu.workshop.scoring.evaluate
 import semgrid_edu.workshop.training_run
 from semgrid_edu.datasets import KittiRawDrive, training_cache
-from semgrid_edu.datasets.training_set import TrainingSet
+from semgrid_edu.fast import TrainingSet
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.storage.files import CACHE_VARIABLE
 from semgrid_edu.training.log import Step

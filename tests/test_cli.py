@@ -12,13 +12,12 @@ import typer
 
 import semgrid_edu
 import semgrid_edu.datasets.index
-import semgrid_edu.workshop.paper.reports.reproduce
+import semgrid_edu.workshop.paper.reproduce
 import semgrid_edu.workshop.training_run
 from semgrid_edu.workshop import demo
 from semgrid_edu.workshop.commands.arguments import TOLD, tell
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.simulation import datasets
-from semgrid_edu.workshop.studies.training import overfit
 
 
 def test_one_doubt_too_many_is_told_as_such(capsys):
@@ -33,8 +32,7 @@ def test_one_doubt_too_many_is_told_as_such(capsys):
         (["demo", "--out", "FILE"], r"FILE: File exists"),
         (["demo", "--kitti", "FILE"], r"--kitti, --date, --drive: expected all three or none, found only --kitti"),
         (["data", "verify", "FILE"], r"FILE: expected folders of samples"),
-        (["reproduce", "occupancy", "--out", "FOLDER"], r"FOLDER: expected a file to write, found a folder"),
-        (["reproduce", "occupancy", "--out", "FILE/scores.json"], r"FILE: File exists"),
+        (["evaluate", "--data", ".", "--weights", ".", "--out", "FILE/scores.json"], r"FILE: File exists"),
         (["evaluate", "--data", ".", "--weights", ".", "--out", "FOLDER"], r"FOLDER: expected a file to write"),
     ],
 )
@@ -121,11 +119,10 @@ def test_the_demo_opens_its_page(monkeypatch, capsys, tmp_path):
     ("arguments", "module", "name", "told"),
     [
         ("demo --out OUT", demo, "write_both_streets", "begins again"),
-        ("reproduce overfit --out a.json", overfit, "overfit", "begins again"),
         ("data make sample OUT", datasets, "make_dataset", "goes on"),
         (
             "reproduce table1 --runs RUNS --out OUT",
-            semgrid_edu.workshop.paper.reports.reproduce,
+            semgrid_edu.workshop.paper.reproduce,
             "reproduce",
             "goes on",
         ),

@@ -20,8 +20,8 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import SEGMENTERS
 from semgrid_edu.occupancy import CmcdotParams, Evidence, State
 from semgrid_edu.workshop.commands.main import app
-from semgrid_edu.workshop.paper.reports import ablations, reproduce
-from semgrid_edu.workshop.paper.runs.variants import Variant
+from semgrid_edu.workshop.paper import ablations, reproduce
+from semgrid_edu.workshop.paper.variants import Variant
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -54,7 +54,7 @@ def written():
 
 def test_the_sensor_model_makes_what_it_hits_occupied_and_leaves_the_rest_unknown(written):
     frame = sample_drive()[0]
-    (belief,) = written["track"]([frame], GridSpec.compact())
+    (belief,) = track_drive([frame], GridSpec.compact(), CmcdotParams(sensor=written["HitsOnly"]()))
     hits = frame.points_grid[frame.points_grid[:, 2] > 0.3]
     rows, cols, inside = GridSpec.compact().cells(hits[:, :2])
     hit = np.zeros(GridSpec.compact().shape, bool)
@@ -158,7 +158,8 @@ def resolves(name):
 
 def test_the_resampling_tracks_a_drive(written):
     frames, spec = sample_drive()[:2], GridSpec.compact()
-    own, again = ([b.probability for b in written["track_by_independent_draws"](frames, spec)] for _ in range(2))
+    params = CmcdotParams(resampling=written["Multinomial"]())
+    own, again = ([belief.probability for belief in track_drive(frames, spec, params)] for _ in range(2))
     usual = [belief.probability for belief in track_drive(frames, spec)]
     assert np.array_equal(own, again)
     assert not np.array_equal(own, usual)

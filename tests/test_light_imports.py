@@ -23,5 +23,32 @@ def test_a_room_loads_neither_torch_nor_scipy_stats(room):
     assert loaded(f"import semgrid_edu.{room}") == set()
 
 
+EXTRAS = ("numba", "trimesh", "embreex", "lightning_fabric", "joblib", "pandas", "pooch", "requests")
+
+
+def test_the_core_runs_a_frame_without_any_optional_extra():
+    """A process in which none of them can be imported: the book runs, and what is missing is said once."""
+    script = f"""
+import sys, warnings
+sys.modules.update(dict.fromkeys({EXTRAS!r}))
+import semgrid_edu as sg
+drive = sg.sample_drive()
+net = sg.load_net(sg.sample_weights(), drive.camera)
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    results = list(sg.run_pipeline(drive[:2], net, sg.CmcdotParams(n_particles=1000)))
+print(len(results), [str(one.message) for one in told if "numba" in str(one.message)])
+try:
+    sg.fast.mean_field
+except ImportError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    ran, missing = done.stdout.splitlines()
+    assert ran.startswith("2 ['numba is missing, so the slower readable stages run: pip install")
+    assert ran.count("numba is missing") == 1
+    assert missing == "numba isn't installed: pip install 'semgrid_edu[fast]'"
+
+
 def test_what_is_loaded_is_found():
     assert loaded("import torch") >= {"torch"}

@@ -1,15 +1,12 @@
 """Runs that only write a file: processes that do them load little besides torch."""
 
 import hashlib
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import torch
-
-from semgrid_edu.workshop.scheduler.runs import Run
+from semgrid_edu.workshop.paper.run import Run
 
 
 @dataclass(frozen=True)
@@ -34,23 +31,6 @@ class Note(Run):
             raise RuntimeError(f"no {self.fails_without}")
         lines = [self.label, *((run.folder(root) / "line").read_text() for run in self.after)]
         (self.folder(root) / "line").write_text(hashlib.sha256("\n".join(lines).encode()).hexdigest())
-
-
-@dataclass(frozen=True)
-class SharedNote(Note):
-    """A note that several processes write together, line by line until its time is over."""
-
-    is_training = True
-
-    def work(self, root: Path, device: str) -> None:
-        if self.fails_without and not (root / self.fails_without).exists():
-            raise RuntimeError(f"no {self.fails_without}")
-        rank, processes, end = os.environ["RANK"], os.environ["WORLD_SIZE"], time.monotonic() + self.seconds_each
-        with (self.folder(root) / f"lines-{rank}").open("a") as file:
-            while not file.tell() or time.monotonic() < end:
-                file.write(f"{rank} of {processes}, {torch.get_num_threads()} thread\n")
-                file.flush()
-                time.sleep(0.05)
 
 
 def wait_for(condition: Callable[[], bool], seconds: float = 120) -> None:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from tiny_drive import DATE, write_tiny_drive
 
-from semgrid_edu.workshop.paper.runs import data_runs
-from semgrid_edu.workshop.paper.runs.data_runs import ArraysRun, DataRun
-from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun, ImageStageRun
-from semgrid_edu.workshop.paper.runs.variants import Variant
+from semgrid_edu.workshop.paper import data_runs
+from semgrid_edu.workshop.paper.data_runs import ArraysRun, DataRun
+from semgrid_edu.workshop.paper.training_runs import GridStageRun, ImageStageRun
+from semgrid_edu.workshop.paper.variants import Variant
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route
 
 TRAIN, TEST = (Route(split, 2, False) for split in ("train", "test"))

@@ -32,12 +32,12 @@ from IPython.display import Markdown
 from ipywidgets import IntSlider, interact
 from scipy import ndimage
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, project
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.graphical import d_separated, why_dependent
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -67,7 +67,7 @@ CAR, ROAD = KITTI_14.index("car"), KITTI_14.index("road")
 # %% jupyter={"source_hidden": true} alt="at the top a street with a column of dots rising beside parked cars at the right; below, bars for the four states of the cell step by step and frame by frame, bars for what image and occupancy add to the score of car, by class and by plane, and the probability of car before and after the CRF"
 street = real_drive()
 net = load_net(real_weights(), street.camera)
-real = list(run_pipeline(street, Stages.of(net, keep_steps=True)))
+real = list(run_pipeline(street, Stages.fast(net, keep_steps=True)))
 now, CELL = real[-1], (81, 36)
 story = cell_story(now, CELL, net, past=real[:-1])
 fig = draw_cell_story(story, now.frame.image // 8 * 8)  # fewer colours: a smaller file

@@ -41,7 +41,7 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import LogOddsGrid, LogOddsParams, PlanarMotion, SensorModel, State, log_odds, probability
 from semgrid_edu.occupancy import scan_evidence, smear_area, update_log_odds
 from semgrid_edu.plotting.colours import STATE_COLOURS, colour_legend
-from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
 from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_02_beam import BeamWorld, beam_beliefs, beam_over_cells, range_state
@@ -763,7 +763,7 @@ assert kept < 75
 # %% jupyter={"outputs_hidden": true, "source_hidden": true} tags=["nbval-ignore-output"]
 classes, others = class_of_kind(KITTI_14), []
 for seed in range(1, 6):
-    drive, found = SimulatedDrive(seed, n_frames=16), []
+    drive, found = simulate(seed, n_frames=16), []
     for k in range(0, 16, 3):
         evidence = scan_evidence(drive.scan(k).points_grid, spec, sensor)
         fine = blocks(classes[drive.birdseye(k / 10)[0]], spec)

@@ -39,7 +39,7 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.plotting.colours import HEADING_COLOURS, colour_patches
 from semgrid_edu.plotting.grids import draw_map
 from semgrid_edu.plotting.moving import wheel_colours
-from semgrid_edu.workshop.studies.filter.scenes import hit_cells
+from worlds.lecture_04_scenes import hit_cells
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.fast import Cmcdot, track_drive
@@ -57,6 +57,7 @@ from worlds.lecture_03_bof import bof_beliefs
 from worlds.lecture_03_row import Cell, exact_beliefs
 from worlds.lecture_04_cmcdot import LEFT_OR_RIGHT, particle_beliefs, sampling_error
 from worlds.lecture_04_cmcdot_graph import cmcdot_stage
+from worlds.lecture_04_scenes import hit_cells
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State

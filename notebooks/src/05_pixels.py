@@ -30,9 +30,9 @@ from ipywidgets import FloatSlider, interact
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec

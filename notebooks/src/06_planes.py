@@ -28,10 +28,10 @@ from ipywidgets import FloatSlider, interact
 from matplotlib.colors import LogNorm
 from scipy import ndimage
 
-from semgrid_edu import plotting
+from semgrid_edu.frame import resize_image
+from semgrid_edu import fast, plotting
 from semgrid_edu.camera import transform_points
 from semgrid_edu.datasets.frames import resize_labels
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
@@ -438,20 +438,21 @@ print(f"p_bar . (A s) = {p_bar @ (A @ s.ravel()):.3f},  (A^T p_bar) . s = {(A.T 
 # %% [markdown]
 # Forward, each row has at most four weights. Backward, a row of $A^T$ may have none or any number of them. The usual
 # backward pass *scatters*: each point adds its gradient to four pixels, and points that share a pixel must wait for
-# each other. With the transpose built once, each pixel *gathers* from its readers. The package's `PlaneSampler` is
-# that: two sparse matrices per calibration, one product per direction. It passes the same test:
+# each other. With the transpose built once, each pixel *gathers* from its readers. `fast.PlaneSampler` is that: two
+# sparse matrices per calibration, one product per direction. It passes the same test:
 
 # %% jupyter={"source_hidden": true}
 s_some = torch.from_numpy(rng.normal(size=(1, 3, *camera.size)).astype(np.float32)).requires_grad_()
-planes = sampler(s_some)
+gathering = fast.PlaneSampler(pixels, visible, camera.size)
+planes = gathering(s_some)
 p_some = torch.from_numpy(rng.normal(size=planes.shape).astype(np.float32))
 planes.backward(p_some)
 there, back = (p_some * planes).double().sum(), (s_some.grad * s_some).double().sum()
 torch.testing.assert_close(there, back, rtol=1e-4, atol=0.1)
-one = np.s_[:, ::20, ::20]  # the literal twin takes its time
+one = np.s_[:, ::20, ::20]  # point by point takes its time
 literal = sample_planes_naive(s_some[0].detach().numpy(), pixels[one], visible[one])
 np.testing.assert_allclose(planes[0].detach().numpy()[:, *one], literal, atol=1e-4)
-shares = sampler.operator.nbytes / 1e6, 4 * visible.size * np.prod(camera.size) / 1e9
+shares = gathering.operator.nbytes / 1e6, 4 * visible.size * np.prod(camera.size) / 1e9
 print("fast == literal; sparse, with its transpose, {:.0f} MB, as a full matrix {:.0f} GB".format(*shares))
 
 # %% [markdown]

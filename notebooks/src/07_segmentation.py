@@ -27,10 +27,10 @@ import torch.nn.functional as F
 from IPython.display import Markdown
 from ipywidgets import IntSlider, interact
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_image_stage, sample_weights
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.fast import track_drive
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.labels import IGNORE, KITTI_14

@@ -33,6 +33,7 @@ from IPython.display import Markdown
 from ipywidgets import FloatSlider, interact
 from scipy.spatial.transform import Rotation
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.camera import rigid_transform
 from semgrid_edu.datasets.grid_truth import grid_truth
@@ -45,16 +46,15 @@ from semgrid_edu.datasets.samples import (
     sample_image_stage,
     sample_weights,
 )
-from semgrid_edu.datasets.training_arrays import resize_image
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.fast import track_drive
+from semgrid_edu.fast import build_net, load_net, track_drive
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy, semantic_cells
-from semgrid_edu.networks import Architecture, FusionNet, build_net, load_net
+from semgrid_edu.networks import Architecture, FusionNet
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import network_image
 from semgrid_edu.planes import plane_heights, plane_pixels
@@ -62,7 +62,7 @@ from semgrid_edu.plotting.grids import draw_map
 from semgrid_edu.plotting.images import draw_image
 from semgrid_edu.training import TrainingParams
 from semgrid_edu.training.batches import Batch, grid_logits
-from semgrid_edu.training.devices import keep_freed_memory
+from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.training.loss import class_frequencies, class_weights, median_frequency_weights
 from semgrid_edu.workshop.scoring import score_with_interval
 from worlds.lecture_00_ledger import ledger, ledger_table

@@ -48,13 +48,13 @@ from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, d_separated, d
 from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.frame import Frame
-from semgrid_edu.workshop.studies.ground_truth.laboratory import simulated_drive
-from semgrid_edu.workshop.studies.ground_truth.counts import BAND_EDGES, TruthCounts, counts_of
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.occupancy import State
 from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_09_label import STATE_GIVEN_CONTENT, LabelWorld, lidar_label_stage, wrong_label
+from worlds.lecture_09_counts import BAND_EDGES, TruthCounts, counts_of
 from worlds.lecture_09_pictures import DIFFERENCES, difference_kinds, policy_errors, truth_difference, truth_errors
+from worlds.lecture_09_policies import simulated_drive
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 drive, spec = sample_drive(), GridSpec.compact()
@@ -675,7 +675,7 @@ assert kinds[ROAD, CAR] in np.sort(kinds.ravel())[-4:]
 # things are overlooked; and the scan is **skewed**, because the vehicle moves on while the scanner turns. The sizes
 # are assumptions, whose reasons stand in its documentation. The following numbers, and those of the policy laboratory below,
 # were measured on 20 other drives of the same simulator, with an HDL-64E that measures a column every 0.18° (the scanner of
-# the sample drive: 0.45°). They are read from the file that `semgrid-edu reproduce truth-policies` wrote.
+# the sample drive: 0.45°). They are read from the file that `worlds/lecture_09_policies.py` wrote.
 
 # %% tags=["laboratory"] jupyter={"source_hidden": true}
 result = json.loads(Path("../docs/results/truth_policies.json").read_text(encoding="utf-8"))

@@ -44,20 +44,19 @@ from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.index import load_index
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.fast import track_drive
+from semgrid_edu.fast import build_net, load_net, track_drive
 from semgrid_edu.workshop.scoring.score_with_interval import compared, shown, shown_seeds
-from semgrid_edu.workshop.paper.runs.paper import NETWORKS
-from semgrid_edu.workshop.paper.reports.pictures import accuracy_picture
-from semgrid_edu.workshop.paper.runs.variants import Variant
-from semgrid_edu.workshop.paper.reports.claims import stated
-from semgrid_edu.workshop.paper.reports.verdicts import holm, verdict
+from semgrid_edu.workshop.paper.published import NETWORKS
+from semgrid_edu.workshop.paper.pictures import accuracy_picture
+from semgrid_edu.workshop.paper.variants import Variant
+from semgrid_edu.workshop.paper.claims import stated
+from semgrid_edu.workshop.paper.verdicts import holm, verdict
 from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import METRICS, class_accuracy, confusion_matrix, pixel_accuracy
-from semgrid_edu.networks import build_net, load_net
 from semgrid_edu.pipeline import network_image
-from semgrid_edu.workshop.paper.reports.forest import draw_score, forest_plot
+from semgrid_edu.workshop.paper.forest import draw_score, forest_plot
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
@@ -325,7 +324,7 @@ for metric in METRICS.values():
 # The assertion says that this is the package's `drive_interval` for one seed. Notice the factor 3.18 from Student's
 # distribution with 3 degrees of freedom, in place of 1.96: four drives are few, and we don't know well how much drives
 # differ. The paper is such a case: the labels that it uses come from eight runs, so its Table 1 rests on about four. We
-# simulated as many frames in four long runs to learn from and four to test on (`semgrid-edu reproduce structure`):
+# simulated as many frames in four long runs to learn from and four to test on (`worlds/lecture_12_structure.py`):
 
 # %% jupyter={"source_hidden": true}
 for row in kept("structure")["rows"]:
@@ -678,7 +677,7 @@ plain, corrected = (chance <= 0.025).any(axis=1).mean(), np.mean([any(holm(row))
 print(f"claims of eight statements that chance sinks: uncorrected {plain:.0%}, by Holm {corrected:.1%}")
 
 # %% [markdown]
-# The package's rule ([verdicts.py](../semgrid_edu/workshop/paper/reports/verdicts.py)) is `holds` and `holm` together,
+# The package's rule ([verdicts.py](../semgrid_edu/workshop/paper/verdicts.py)) is `holds` and `holm` together,
 # for each of twelve claims. Four of them (8, 9, 10, 12) the paper only expects, without a measurement; their verdicts
 # are called *as expected* and *not as expected*. And most are read more than once: networks learn from LIDAR labels
 # or from true ones, and are scored against LIDAR labels, like the paper's, or against true ones. A "no" below is a

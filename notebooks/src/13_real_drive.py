@@ -69,10 +69,10 @@ from semgrid_edu.crf import expected_calibration_error, reliability
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_image_stage, sample_weights
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
 from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.fast import load_net
 from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.pipeline import run_pipeline
 from semgrid_edu.training import TrainingParams
@@ -80,19 +80,18 @@ from semgrid_edu.training.loop import train
 from semgrid_edu.workshop.scoring.statistics import paired_interval
 
 # %% jupyter={"source_hidden": true}
-from semgrid_edu.workshop.studies.new_drive.domain import mean_histograms, network_numbers, training_images
-from semgrid_edu.workshop.studies.new_drive.drive_checks import (
-    LANE, axes_errors, ground_plane, motion_between, overlay_error, sensor_delays, standing_points, time_gaps, wall_lean,
-    with_scan,
+from semgrid_edu.workshop.course.street import (
+    best_table, motion_between, piece_confusions, semantic_truths, standing_points, street_pieces,
 )  # fmt: skip
-from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, YAWS, camera_turned, drive_readings
-from semgrid_edu.workshop.studies.new_drive.own_street import (
-    best_table, piece_confusions, semantic_truths, street_pieces,
+from worlds.lecture_13_checks import (
+    LANE, axes_errors, ground_plane, overlay_error, sensor_delays, time_gaps, wall_lean, with_scan,
 )  # fmt: skip
-from semgrid_edu.workshop.studies.new_drive.report_card import (
+from worlds.lecture_13_domain import mean_histograms, network_numbers, training_images
+from worlds.lecture_13_faults import FAULTS, YAWS, camera_turned, drive_readings
+from worlds.lecture_13_report_card import (
     MARKS, border_verdict, check_lines, draw_report_card, map_lines, motion_verdict,
 )  # fmt: skip
-from semgrid_edu.workshop.studies.new_drive.scan_borders import depth_edges, edge_contrast
+from worlds.lecture_13_scan_borders import depth_edges, edge_contrast
 from worlds.lecture_00_ledger import ledger
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI

@@ -34,19 +34,20 @@ from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive,
 from semgrid_edu.graphical import d_separated, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.memory import ClassMemory, MemoryParams, View, carry_classes, learn_classes, look_at, remember_drive
+from semgrid_edu.memory import MemoryParams, MemoryState, View, carry_classes, learn_classes, look_at, remember_drive
 from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import PlanarMotion, State
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.pipeline import run_pipeline
 
 # %% jupyter={"source_hidden": true}
-from semgrid_edu.workshop.studies.filter.memory_counts import frames_since_seen
+from worlds.lecture_14_counts import frames_since_seen
 from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_00_street import CLASSES, CLASS_OF, STREET
 from worlds.lecture_14_class_memory import (
     MemoryWorld, class_over_time, exact_classes, factored_classes, frames_worth, memory_price,
 )  # fmt: skip
+from semgrid_edu.workshop.course.street import frames_since_seen
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 spec, S = GridSpec.compact(), KITTI_14.n_semantic
@@ -316,7 +317,7 @@ assert rates[10] > 5 * rates[1] ** 10  # far more than if it fell like r^k
 #
 # Therefore the package doesn't take its exponent from the formula. On fresh simulated streets, whose true labels are
 # known everywhere, we let a memory run with each of six exponents and look which one knows the classes in view best,
-# by distance ([memory.json](../docs/results/memory.json), made by `semgrid-edu reproduce memory`):
+# by distance ([memory.json](../docs/results/memory.json), made by `worlds/lecture_14_gain.py`):
 
 # %% jupyter={"source_hidden": true}
 worth = measured["worth"]
@@ -392,7 +393,7 @@ def learn_by_hand(mean, weight, p, w, most):
 
 here, o = GridSpec(0, 1, 0, 1, 1), np.eye(4, dtype=np.float32)[State.FREE].reshape(4, 1, 1)
 params = MemoryParams(worth=0.5, reach=1e9, most=1.0, movable=())
-memory, mean, weight = ClassMemory.empty(2, here), np.zeros(2), 0.0
+memory, mean, weight = MemoryState.empty(2, here), np.zeros(2), 0.0
 for p in ([0.8, 0.2], [0.5, 0.5], [0.3, 0.7]):
     mean, weight = learn_by_hand(mean, weight, p, w=0.5, most=1.0)
     look = look_at(np.array([*p, 0, 0, 0, 0], np.float32).reshape(6, 1, 1), o, here, params)
@@ -434,7 +435,7 @@ for p in ([0.8, 0.2], [0.5, 0.5], [0.3, 0.7]):
 # %% jupyter={"outputs_hidden": true}
 row, speed, dt = GridSpec(0, 5, 0, 0.5, 0.5), 2.0, 0.1
 x = row.centers()[..., 0]
-keeps_rest, rounds = (ClassMemory.empty(2, row) for _ in range(2))
+keeps_rest, rounds = (MemoryState.empty(2, row) for _ in range(2))
 for memory in (keeps_rest, rounds):
     memory.evidence[1, 1], memory.weight[1], memory.seen[1] = 1.0 * (x < 1.5), x < 1.5, x < 1.5
 velocity = np.stack([np.full(row.shape, speed), np.zeros(row.shape)]).astype(np.float32)

@@ -16,8 +16,8 @@ from semgrid_edu.workshop.simulation.named_streets import KITTI_RIG, named_stree
 from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import Kind
-from semgrid_edu.workshop.studies.filter.scenes import KnownScene, SceneHistory, true_cells
-from semgrid_edu.workshop.studies.filter.streets import StreetScores
+from worlds.lecture_04_scenes import KnownScene, SceneHistory, true_cells
+from worlds.lecture_04_street_scores import StreetScores
 
 BEFORE = CmcdotParams(walls=None, first_sight=(0.93, 0.067, 0.003))
 """The filter without the two rules against phantoms, with the probabilities of first sight that it had then."""
@@ -106,11 +106,10 @@ def run_filter(
 ) -> None:
     """Run CMCDOT over the scenes of a drive; `scores` takes the counts, and `seed` is that of the particles."""
     tracker = Cmcdot(scores.spec, suspect.params, seed=seed)
-    scores.latency.begin(drive.moving)
+    scores.begin_drive()
     with suspect.context():
         for scene in scenes:
             scores.add(scene, tracker.step(scene.frame.points_grid, scene.motion, PERIOD))
-    scores.latency.end()
 
 
 def measure_suspects(

@@ -13,7 +13,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.plotting.colours import class_legend, colour_legend
 from semgrid_edu.plotting.grids import draw_map, grid_labels
-from semgrid_edu.workshop.studies.ground_truth.counts import COUNTED, TruthCounts
+from worlds.lecture_09_counts import COUNTED, TruthCounts
 
 DIFFERENCES = {
     "no label in either": (240, 240, 240),

@@ -16,8 +16,7 @@ from scipy.stats import qmc
 from tqdm.auto import tqdm
 
 from semgrid_edu.crf import CrfParams, at_temperature, fit_temperature, unary_from_log_probability
-from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.fast import mean_field
+from semgrid_edu.fast import TrainingSet, mean_field
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
 from semgrid_edu.workshop.scoring.grids import learned_log_g

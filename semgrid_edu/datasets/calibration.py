@@ -1,4 +1,4 @@
-"""KITTI's calibration: the rectified camera 2 of equation (1), and where LIDAR and IMU stand.
+"""KITTI's calibration: the rectified camera 2 of equation (1), and the poses of LIDAR and IMU.
 
 Raw drives have three files; a sequence of the odometry and tracking benchmarks has one for all sensors.
 """
@@ -30,7 +30,7 @@ def read_camera(folder: Path, name: str = "image_02") -> Camera:
     folder : Path
         The folder of a date, which holds calib_cam_to_cam.txt and calib_velo_to_cam.txt.
     name : str
-        Name of the folder that its images lie in, "image_00" to "image_03".
+        Name of the folder of its images, "image_00" to "image_03".
     """
     K, T_camera_from_camera0, size = read_rectification(folder / "calib_cam_to_cam.txt", name)
     return Camera(K, T_camera_from_camera0 @ read_rigid(folder / "calib_velo_to_cam.txt"), size)
@@ -43,7 +43,7 @@ def camera_from(
     size: tuple[int, int],
     lidar_height: float = KITTI_LIDAR_HEIGHT,
 ) -> Camera:
-    """Return the camera that a calibration file describes, and name the file when there is no such camera.
+    """Return the camera that a calibration file describes; an error names the file.
 
     Parameters
     ----------
@@ -55,10 +55,11 @@ def camera_from(
     Raises
     ------
     DataError
-        When `Camera` refuses them, or the principal point lies outside the image.
+        When `Camera` raises an error, or the principal point is outside the image.
     """
-    (height, width), principal_point = size, np.asarray(K)[:2, 2]
-    # `Camera` itself allows it, because an image may be a part cut out of a larger one.
+    height, width = size
+    principal_point = np.asarray(K)[:2, 2]
+    # `Camera` itself allows that, because an image may be cropped from a larger one.
     if not ((principal_point >= -0.5) & (principal_point <= (width - 0.5, height - 0.5))).all():
         expected = f"in K a principal point within the image of {width} x {height} pixels"
         raise DataError(path, expected, principal_point.tolist())
@@ -72,14 +73,14 @@ def camera_from(
 def read_rectification(
     path: Path, name: str = "image_02"
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], tuple[int, int]]:
-    """Read what calib_cam_to_cam.txt says about a rectified camera.
+    """Read the calibration of a rectified camera from calib_cam_to_cam.txt.
 
     Parameters
     ----------
     path : Path
         The file.
     name : str
-        Name of the folder that its images lie in, "image_00" to "image_03".
+        Name of the folder of its images, "image_00" to "image_03".
 
     Returns
     -------
@@ -102,7 +103,7 @@ def read_rectification(
 
 
 def projection(path: Path, calibration: dict[str, str], key: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Take apart the projection matrix of a rectified camera, K [I | t].
+    """Decompose the projection matrix of a rectified camera, K [I | t].
 
     Parameters
     ----------
@@ -200,7 +201,7 @@ def _rotation(path: Path, calibration: dict[str, str], key: str) -> NDArray[np.f
 
 
 def check_rotation(path: Path, R: NDArray[np.float64], what: str) -> NDArray[np.float64]:
-    """Return a rotation matrix, refusing what bends, scales or mirrors.
+    """Check that a matrix is a rotation and return it.
 
     Parameters
     ----------
@@ -214,7 +215,7 @@ def check_rotation(path: Path, R: NDArray[np.float64], what: str) -> NDArray[np.
     Returns
     -------
     (3, 3) float64
-        `R` as it is.
+        `R` itself.
     """
     if np.abs(R @ R.T - np.eye(3)).max() > ROTATION_TOLERANCE or np.linalg.det(R) < 0:
         raise DataError(path, f"a rotation matrix for {what}", R.tolist())
@@ -222,7 +223,7 @@ def check_rotation(path: Path, R: NDArray[np.float64], what: str) -> NDArray[np.
 
 
 class BenchmarkCalibration(NamedTuple):
-    """What the file says of the left colour camera, and where the sensors stand.
+    """The calibration of the left colour camera, and the poses of the other sensors.
 
     Parameters
     ----------
@@ -257,7 +258,8 @@ def read_benchmark_calibration(path: Path) -> BenchmarkCalibration:
     entries = _benchmark_entries(path)
     K, T_camera_from_rectified = projection(path, entries, "P2")
     if "Tr" in entries:
-        T_camera0_from_lidar, T_lidar_from_imu = _rigid(path, entries, "Tr"), None
+        T_camera0_from_lidar = _rigid(path, entries, "Tr")
+        T_lidar_from_imu = None
     else:
         R = check_rotation(path, entry_of(path, entries, "R_rect", (3, 3)), "R_rect")
         T_camera0_from_lidar = rigid_transform(R, np.zeros(3)) @ _rigid(path, entries, "Tr_velo_cam")

@@ -12,14 +12,14 @@ from semgrid_edu.labels import IGNORE, LabelSet
 
 @dataclass(frozen=True)
 class ClassTable:
-    """Which class of a label set each number in another data set's files becomes.
+    """The class of a label set for each number in another data set's files.
 
     Parameters
     ----------
     label_set : LabelSet
         The classes to translate to.
     names : dict of int to (str or None)
-        The class of each number that the files may hold; None for what stays unlabelled.
+        The class of each number that may occur in the files; None for unlabelled.
 
     Examples
     --------
@@ -39,7 +39,7 @@ class ClassTable:
         path : Path
             Where the numbers come from, for the error.
         numbers : (...) int
-            What the file holds.
+            The numbers in the file.
 
         Returns
         -------
@@ -48,9 +48,9 @@ class ClassTable:
         """
         known = np.array(sorted(self.names))
         places = np.searchsorted(known, numbers).clip(max=len(known) - 1)
-        strange = numbers[known[places] != numbers]
-        if strange.size:
-            raise DataError(path, f"labels among {', '.join(map(str, known))}", f"{strange.flat[0]}")
+        unknown = numbers[known[places] != numbers]
+        if unknown.size:
+            raise DataError(path, f"labels among {', '.join(map(str, known))}", f"{unknown.flat[0]}")
         names = [self.names[number] for number in known]
         classes = np.array([IGNORE if name is None else self.label_set.index(name) for name in names], dtype=np.uint8)
         return classes[places]

@@ -1,4 +1,4 @@
-"""Labelled scans of several instants put together: what moves is carried with its cuboid, so that it doesn't smear."""
+"""Labelled scans of several instants merged: moving objects move with their cuboids, so that they don't smear."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,29 +10,29 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import invert_rigid, transform_points
 
 MARGIN = 0.1
-"""Metres by which a return may lie outside its thing's cuboid: cuboids are drawn by hand."""
+"""Metres by which a return may be outside of its object's cuboid: cuboids are drawn by hand."""
 
 ANY_LIDAR = -1
-"""In place of a LIDAR's number: the cuboid holds for all of them."""
+"""Instead of a LIDAR's number: the cuboid is valid for all of them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Cuboids:
-    """The things of one instant, each in a box.
+    """The objects at one instant, each in a box.
 
     Parameters
     ----------
     names : (B,) str
-        What tells a thing from the others, the same at all instants.
+        Identifies an object at all instants.
     T_world_from_box : (B, 4, 4) float64
         Pose of each box, whose frame has its origin in the middle of the box, metres.
     sizes : (B, 3) float
         Lengths of the edges along the box's own axes, metres.
     moving : (B,) bool
-        Whether the thing moves at any time.
+        Whether the object moves at any time.
     lidars : (B,) int
-        Number of the LIDAR whose returns the box holds, since two LIDARs see what moves in two places; `ANY_LIDAR` for
-        all.
+        Number of the LIDAR whose returns are in the box, since two LIDARs see a moving object in two places;
+        `ANY_LIDAR` for all.
     """
 
     names: NDArray
@@ -42,7 +42,7 @@ class Cuboids:
     lidars: NDArray[np.int64]
 
     def holding(self, points: NDArray, lidars: NDArray) -> NDArray[np.int64]:
-        """Return the number of the box that holds each point, (N,); -1 where none does.
+        """Return the number of the box that contains each point, (N,); -1 where none does.
 
         Parameters
         ----------
@@ -59,12 +59,12 @@ class Cuboids:
         return holder
 
     def poses(self) -> dict[str, NDArray[np.float64]]:
-        """Return T_world_from_box of each thing by its name; of its two boxes, the one of the lower LIDAR number."""
+        """Return T_world_from_box of each object by name; of its two boxes, that of the lower LIDAR number."""
         return {self.names[b]: self.T_world_from_box[b] for b in np.argsort(-self.lidars, kind="stable")}
 
 
 class LabelledScan(NamedTuple):
-    """The returns of one instant with their classes, and the things among them.
+    """The returns of one instant with their classes, and the objects among them.
 
     Parameters
     ----------
@@ -73,11 +73,11 @@ class LabelledScan(NamedTuple):
     classes : (N,) uint8
         Class of each return; 255 where unlabelled.
     movable : (N,) bool
-        Whether it comes from a thing that may move, such as a car, parked or not.
+        Whether it comes from an object that can move, such as a car, parked or not.
     lidars : (N,) int
         Number of the LIDAR of each return.
     cuboids : Cuboids
-        The things.
+        The objects.
     """
 
     points: NDArray[np.float64]
@@ -88,10 +88,10 @@ class LabelledScan(NamedTuple):
 
 
 def put_together(now: LabelledScan, others: Sequence[LabelledScan]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """Return the returns of several scans as they would lie at one instant.
+    """Merge the returns of several scans at one instant.
 
-    Returns from a moving thing go where its cuboid is at that instant. In the other scans they are left out if it has
-    none then. So are returns from a movable thing outside all cuboids, because nothing says whether it stood still.
+    Returns from a moving object go where its cuboid is at that instant. In the other scans they are left out if it has
+    none then, and so are returns from a movable object outside all cuboids, because it isn't known whether it moved.
 
     Parameters
     ----------
@@ -116,8 +116,10 @@ def put_together(now: LabelledScan, others: Sequence[LabelledScan]) -> tuple[NDA
 def _carried(
     scan: LabelledScan, places: dict[str, NDArray[np.float64]], own: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """Return the returns of a scan, those of moving things where the things are by `places`."""
-    points, kept, boxes = scan.points.copy(), np.ones(len(scan.points), bool), scan.cuboids
+    """Return the returns of a scan; moving objects are put where `places` has them."""
+    points = scan.points.copy()
+    kept = np.ones(len(scan.points), bool)
+    boxes = scan.cuboids
     movable = np.flatnonzero(scan.movable)
     holder = boxes.holding(points[movable], scan.lidars[movable])
     kept[movable[holder < 0]] = own

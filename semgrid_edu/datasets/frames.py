@@ -1,4 +1,4 @@
-"""What readers of drives have in common: what a labelled drive is, frames read on demand, KITTI's scans (section 4)."""
+"""What all readers of drives share: labelled drives, frames read on demand, KITTI's scans (section 4)."""
 
 import operator
 import re
@@ -24,14 +24,14 @@ LIDAR_RANGE = 250.0
 
 
 class LabelledDrive(Protocol):
-    """What training and scoring ask of a drive: frames, and the truth of some of them.
+    """What training and scoring need of a drive: frames, and the truth of some of them.
 
-    Derive a reader from `FrameSequence`, which has most of it.
+    Derive a reader from `FrameSequence`, which implements most of it.
 
     Attributes
     ----------
     name : str
-        Tells the drive from the others of its data set.
+        Identifies the drive in its data set.
     camera : Camera
         The calibration, the same for all frames.
     label_set : LabelSet
@@ -62,8 +62,8 @@ class LabelledDrive(Protocol):
     def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
         """Return the cells in view of the camera when the labels have gaps, (H, W); no cell when they have none.
 
-        In these cells a 255 of `truth` means that nobody labelled what the camera may see, so training leaves it out.
-        The other cells become unknown classes, even where a LIDAR saw more. Parameters are those of
+        In these cells 255 in `truth` means that what the camera may see is unlabelled, so training ignores it. The
+        other unlabelled cells become unknown classes, even where a LIDAR saw more. Parameters are those of
         `LabelledDrive.truth`.
         """
 
@@ -79,7 +79,7 @@ class LabelledDrive(Protocol):
         """
 
     def files(self) -> list[Path]:
-        """Return the files that the frames are read from: when one changes, what was made of the drive is stale."""
+        """Return the files that the frames are read from: when one changes, cached arrays of the drive are stale."""
 
 
 class FrameSequence(Sequence[Frame]):
@@ -87,7 +87,7 @@ class FrameSequence(Sequence[Frame]):
 
     `drive[k]` is frame k, `drive[-1]` the last one, `drive[2:5]` a list of three. A reader derives from this class and
     defines `__len__`, `_frame`, `name`, and `folder`, which holds the files of the drive; for a `LabelledDrive` also
-    `camera` and `label_set`. Where data are used under a licence that asks for it, `credit` names whose they are.
+    `camera` and `label_set`. If the licence of the data asks for attribution, `credit` is its text.
     """
 
     name: str
@@ -122,7 +122,7 @@ class FrameSequence(Sequence[Frame]):
         return (partial(self._frame, k) for k in range(len(self)))
 
     def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
-        """Return what the bird's-eye labels of a frame say of the cells that the camera sees.
+        """Return the bird's-eye labels of the cells that the camera sees.
 
         Parameters and result are those of `LabelledDrive.truth`.
         """
@@ -141,7 +141,7 @@ class FrameSequence(Sequence[Frame]):
         return resize_labels(labels.image, size, sparse=labels.undecided is not None)
 
     def _labels_of(self, k: int) -> FrameLabels:
-        """Return the labels of a frame that has some."""
+        """Return the labels of a frame, or raise an error when it has none."""
         labels = self[k].labels
         if labels is None:
             raise DataError(self.folder, f"labels of the frame {k}", "none")
@@ -183,27 +183,27 @@ def read_scan(path: Path) -> NDArray[np.float32]:
     if len(content) % 16:
         raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
     points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
-    strange = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
-    if strange.any():
-        first = strange.argmax()
+    impossible = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
+    if impossible.any():
+        first = impossible.argmax()
         expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
         raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
     return points
 
 
 def frame_numbers(folder: Path, what: str, suffix: str, digits: int = 6) -> tuple[int, ...]:
-    """Return the numbers of the files of a folder that are named by numbers, such as 000000.png, in ascending order.
+    """Return the numbers of files with names such as 000000.png, in ascending order.
 
     Parameters
     ----------
     folder : Path
         The folder with one file per frame; files of some frames may be missing.
     what : str
-        What the files are, such as "images", for the error.
+        What the files contain, such as "images", for the error.
     suffix : str
-        How their names end, such as ".png".
+        The end of their names, such as ".png".
     digits : int
-        How many digits a name has.
+        Number of digits in a name.
     """
     form = re.compile(rf"(\d{{{digits}}}){re.escape(suffix)}")
     numbers = sorted(int(match[1]) for path in folder.glob(f"*{suffix}") if (match := form.fullmatch(path.name)))
@@ -213,7 +213,7 @@ def frame_numbers(folder: Path, what: str, suffix: str, digits: int = 6) -> tupl
 
 
 def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int], sparse: bool = False) -> NDArray[np.uint8]:
-    """Give each larger pixel the class that covers most of it; between two equal shares the smaller number wins.
+    """Give each larger pixel the class that covers most of it; if two cover the same area, the smaller number.
 
     Parameters
     ----------
@@ -237,12 +237,12 @@ def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int], sparse: bool
 
 
 def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
-    """Return the class of each cell that the camera sees; where labels have gaps, that of each labelled cell.
+    """Return the class of each cell that the camera sees; if labels have gaps, the class of each labelled cell.
 
     Parameters
     ----------
     labels : FrameLabels
-        What is true of the frame.
+        The labels of a frame.
     spec : GridSpec
         The grid: the extent of `LABEL_GRID`, a multiple of its cell.
 
@@ -256,7 +256,7 @@ def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
 
 
 def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:
-    """Return labels that say nothing; a reader then replaces the fields that its data set knows.
+    """Return empty labels; a reader then replaces the fields that its data set knows.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabe
     Returns
     -------
     FrameLabels
-        Without a label, without a depth, and with nothing visible.
+        Unlabelled everywhere, without depth, and with nothing visible.
     """
     return FrameLabels(
         label_set=label_set,
@@ -280,7 +280,7 @@ def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabe
 
 
 def error_of(read: Callable[[], object]) -> str:
-    """Return the error that a reader raises as text.
+    """Return the text of the error that a reader raises.
 
     Parameters
     ----------
@@ -290,7 +290,7 @@ def error_of(read: Callable[[], object]) -> str:
     Returns
     -------
     str
-        Empty when it is sound.
+        Empty when there is none.
     """
     try:
         read()

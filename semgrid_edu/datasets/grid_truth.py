@@ -1,4 +1,4 @@
-"""The truth to learn from: what stands in the cells that the camera sees, and which cells are unknown (section 4)."""
+"""The truth to learn from: the class of cells that the camera sees, and unknown classes elsewhere (section 4)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,12 @@ from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10, UNKNOWN_OF_STATE, L
 def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
     """Return the true class of each cell, such as a network learns from.
 
-    A cell that the camera sees takes the class of what stands there; the others take theirs from `fill_unlabelled`.
+    A cell that the camera sees has the class of its label; `fill_unlabelled` decides about the others.
 
     Parameters
     ----------
     labels : FrameLabels
-        What is true of the frame, in classes of KITTI-14 or of SYNTHIA-10.
+        The labels of the frame, in classes of KITTI-14 or of SYNTHIA-10.
     belief_probability : (4, H, W) float
         Probability of FREE, STATIC, DYNAMIC and UNKNOWN in each cell.
     spec : GridSpec
@@ -27,7 +27,7 @@ def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec)
     Returns
     -------
     (H, W) uint8
-        A class of the label set in every cell, or 255 as `decided_truth` says.
+        A class of the label set in every cell, or 255, see `decided_truth`.
     """
     in_view = labels.undecided_on(spec)
     return decided_truth(visible_labels(labels, spec), in_view, belief_probability, labels.label_set)
@@ -36,14 +36,14 @@ def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec)
 def decided_truth(
     truth: NDArray[np.uint8], in_view: NDArray[np.bool_], belief_probability: NDArray, label_set: LabelSet
 ) -> NDArray[np.uint8]:
-    """Give unlabelled cells an unknown class, except where the camera may see something that nobody labelled.
+    """Give unlabelled cells an unknown class, except where the camera may see something unlabelled.
 
     Parameters not named here are those of `fill_unlabelled`.
 
     Parameters
     ----------
     in_view : (H, W) bool
-        The cells in view of the camera when the labels have gaps; no cell when all that it sees is labelled.
+        The cells in view of the camera when the labels have gaps; no cell when everything that it sees is labelled.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def decided_truth(
 
 
 def truth_to_learn(drive: LabelledDrive, k: int, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
-    """Return the class of each cell of a drive's frame; 255 where the camera may see something that nobody labelled.
+    """Return the class of each cell of a drive's frame; 255 where the camera may see something unlabelled.
 
     Parameters
     ----------

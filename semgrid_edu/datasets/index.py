@@ -31,7 +31,7 @@ class Reader(NamedTuple):
     open : callable
         (root, *name) -> `LabelledDrive`.
     keys : tuple of str
-        What a frame in dataset.json says, beside its number, to name its drive.
+        The keys in dataset.json that name the drive of a frame.
     """
 
     open: Callable[..., LabelledDrive]
@@ -63,14 +63,14 @@ class LabelledFrame(NamedTuple):
 
 @dataclass(frozen=True)
 class DatasetIndex:
-    """What a data set holds. `load_index` reads it from disk; any other sequence of drives can be listed in Python.
+    """The contents of a data set. `load_index` reads it from disk; any other drives can be listed in Python.
 
     Parameters
     ----------
     root : Path
         The folder that holds its drives.
     name : str
-        What it is called, such as "minikitti".
+        Name of the data set, such as "minikitti".
     label_set : LabelSet
         The classes of its labels.
     splits : dict of str to tuple of LabelledFrame
@@ -78,7 +78,7 @@ class DatasetIndex:
     reader : callable
         ``(root, *drive)`` -> `LabelledDrive`: opens a drive. Worker processes must be able to import it.
     folder : Path, optional
-        What is made of the drives goes to `cache/` in this folder; `root` when left out.
+        Cached arrays go to `cache/` in this folder; `root` when left out.
     """
 
     root: Path
@@ -121,14 +121,14 @@ class DatasetIndex:
         ArgumentError
             When there is no such split.
         DataError
-            When a drive is missing, is shorter than the index says, or has labels of another label set: the same
-            numbers would stand for other classes.
+            When a drive is missing, is shorter than in the index, or has labels of another label set: the same numbers
+            would mean other classes.
         """
         by_drive = self.frames_by_drive(split).items()
         return [(self._opened(drive, max(numbers)), numbers) for drive, numbers in by_drive]
 
     def _opened(self, name: tuple[str, ...], last: int) -> LabelledDrive:
-        """Open a drive and check that it is what the index says."""
+        """Open a drive and check its length and label set against the index."""
         drive = self.reader(self.root, *name)
         if last >= len(drive):
             expected = f"in {drive.name} the frame {last} that {INDEX_FILE} lists"
@@ -142,7 +142,7 @@ class DatasetIndex:
 def load_index(dataset_dir: str | Path) -> DatasetIndex:
     """Read the index of a data set, dataset.json.
 
-    Its drives lie in the same folder, or in the folder that it names as its "root".
+    The drives are in the same folder, or in the folder that is named there as "root".
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def load_index(dataset_dir: str | Path) -> DatasetIndex:
         raise DataError(path, "root: a folder that holds the drives", repr(drives)[:200])
     keys = READERS[reader].keys
     frames = {split: tuple(_frame(path, entry, keys) for entry in entries) for split, entries in splits.items()}
-    _refuse_leaks(path, frames)
+    _check_leaks(path, frames)
     return DatasetIndex(root / drives, name, LABEL_SETS[label_set], frames, READERS[reader].open, root)
 
 
@@ -184,7 +184,7 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
     scene : str
         Number of the scene, such as "002".
     test_cameras : sequence of str
-        The cameras whose frames are for testing; the others' are for training.
+        The cameras whose frames are for testing; the others are for training.
 
     Returns
     -------
@@ -198,7 +198,8 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
     DataError
         When there is no such scene, its returns have no labels, or there is a dataset.json already.
     """
-    path, splits = Path(folder) / INDEX_FILE, {"train": [], "test": []}
+    path = Path(folder) / INDEX_FILE
+    splits = {"train": [], "test": []}
     if path.exists():
         raise DataError(path, "no data set yet", "one that would be lost")
     there = [camera for camera in CAMERAS if (Path(root) / scene / "camera" / camera).is_dir()] or CAMERAS
@@ -233,8 +234,8 @@ def _frame(path: Path, entry: Any, keys: tuple[str, ...]) -> LabelledFrame:
     return LabelledFrame(tuple(drive), frame)
 
 
-def _refuse_leaks(path: Path, splits: dict[str, tuple[LabelledFrame, ...]]) -> None:
-    """Refuse a frame that comes twice and a drive in two splits: a network would be tested on what it learned."""
+def _check_leaks(path: Path, splits: dict[str, tuple[LabelledFrame, ...]]) -> None:
+    """Check that no frame is listed twice and no drive is in two splits: tests need frames that weren't learnt."""
     split_of: dict[tuple[str, ...], str] = {}
     for split, frames in splits.items():
         if len(set(frames)) != len(frames):

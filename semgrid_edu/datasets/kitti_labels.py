@@ -14,14 +14,14 @@ KINDS = ("image", "depth", "birdseye", "visible")
 """The four files of a labelled frame, each in a folder of this name."""
 
 WITH_GAPS = "with gaps"
-"""The second line of label_set.txt when not all that the camera sees is labelled, for example only LIDAR returns."""
+"""The second line of label_set.txt when part of the view is unlabelled, for example everything but LIDAR returns."""
 
 DEPTH_UNIT = 1 / 256
 """One step of a depth PNG, metres (KITTI's convention); 0 means none."""
 
 
 def read_labels(folder: Path, name: str, image_size: tuple[int, int]) -> FrameLabels | None:
-    """Read what is true at one frame.
+    """Read the labels of a frame.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def _metres(steps: NDArray[np.uint16]) -> NDArray[np.float32]:
 
 
 def _classes(path: Path, classes: NDArray[np.uint8], label_set: LabelSet) -> NDArray[np.uint8]:
-    """Return a map of classes, refusing numbers that name none."""
+    """Check that all numbers in a map are classes, and return it."""
     strange = classes[(classes >= len(label_set)) & (classes != IGNORE)]
     if strange.size:
         raise DataError(path, f"classes 0 to {len(label_set) - 1} or {IGNORE}", f"{strange[0]}")
@@ -124,7 +124,7 @@ def _classes(path: Path, classes: NDArray[np.uint8], label_set: LabelSet) -> NDA
 
 
 def _mask(path: Path, mask: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Turn 0 and 255 into false and true, refusing anything else."""
+    """Turn 0 and 255 into false and true; nothing else is allowed."""
     strange = mask[(mask != 0) & (mask != 255)]
     if strange.size:
         raise DataError(path, "a mask of 0 and 255", f"{strange[0]}")

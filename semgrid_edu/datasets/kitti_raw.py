@@ -32,7 +32,7 @@ VIEWS = ("image_02", "image_03")
 """The folders of the cameras that take colours."""
 
 SAME_INSTANT = np.timedelta64(500, "ms")
-"""How much the sensors' times of one frame may differ; at 10 Hz they should lie within 0.1 s."""
+"""How much the sensors' times of one frame may differ; at 10 Hz they should be within 0.1 s."""
 
 _FRAME_FILE = re.compile(r"(\d{10})\.(bin|png|txt)")
 
@@ -62,7 +62,7 @@ class KittiRawDrive(FrameSequence):
 
     `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last one, `drive[2:5]` a list of three. Some of KITTI's
     drives have gaps, such as 0009, which lacks the scans 177 to 180. A frame in a gap keeps its number, time and image;
-    it has no points, so that the filter predicts without being corrected. `gaps` lists these frames.
+    it has no points, so that the filter only predicts. `gaps` lists these frames.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class KittiRawDrive(FrameSequence):
     drive : str
         Number of the drive, such as "0013".
     images : bool
-        Whether to read the images. Without them, as if the drive had none, reading is quicker.
+        Whether to read the images. Without them reading is quicker.
     view : str
         The folder of the images: "image_02" for the left camera, "image_03" for the right one. Labels of simulated
         drives belong to the left one.
@@ -83,7 +83,7 @@ class KittiRawDrive(FrameSequence):
     ArgumentError
         When date or drive is empty, or there is no such view.
     DataError
-        When there is no such drive; the error says which there are. `drive[k]` raises it when a file that the frame
+        When there is no such drive; the error lists those that exist. `drive[k]` raises it when a file that the frame
         needs is missing or damaged.
 
     Examples
@@ -135,7 +135,7 @@ class KittiRawDrive(FrameSequence):
 
     @cached_property
     def gaps(self) -> tuple[int, ...]:
-        """Numbers of the frames without a scan that lie between frames with one."""
+        """Numbers of the frames without a scan between frames with one."""
         scans = [k for k in range(len(self)) if self.file("velodyne_points", k, ".bin").exists()]
         between = range(scans[0], scans[-1]) if scans else range(0)
         return tuple(sorted(set(between) - set(scans)))
@@ -146,7 +146,7 @@ class KittiRawDrive(FrameSequence):
         return read_camera(self.date_folder, self.view)
 
     def _readers(self) -> Iterator[Callable[[], object]]:
-        """Yield a reader for each file, so that no damaged file hides another."""
+        """Yield a reader for each file, so that no error hides another."""
         yield partial(read_rectification, self.date_folder / "calib_cam_to_cam.txt", self.view)
         yield partial(read_rigid, self.date_folder / "calib_velo_to_cam.txt")
         yield partial(read_rigid, self.date_folder / "calib_imu_to_velo.txt")
@@ -159,7 +159,8 @@ class KittiRawDrive(FrameSequence):
             yield partial(self._time, k)
             if self.view in self._sensors:
                 yield partial(read_png, self.file(self.view, k, ".png"), "RGB", size)
-            labels, name = self.folder / "labels", f"{k:010d}.png"
+            labels = self.folder / "labels"
+            name = f"{k:010d}.png"
             for kind in KINDS if is_labelled(labels, name) else ():
                 yield partial(read_label, labels, kind, name, size)
 
@@ -237,12 +238,12 @@ class KittiRawDrive(FrameSequence):
 
     @cached_property
     def _in_view(self) -> NDArray[np.bool_]:
-        """The cells of `LABEL_GRID` that lie in view of the camera, hidden or not."""
+        """The cells of `LABEL_GRID` in view of the camera, hidden or not."""
         return cells_in_view(self.camera, LABEL_GRID)
 
 
 def _existing(root: Path, date: str, drive: str) -> tuple[Path, Path]:
-    """Return the folders of the date and of the drive, or say what there is instead."""
+    """Return the folders of the date and of the drive; an error lists what exists instead."""
     folder = drive_folder(root, date, drive)
     if not root.is_dir():
         raise DataError(root, "a folder of dates", "no folder")
@@ -254,8 +255,9 @@ def _existing(root: Path, date: str, drive: str) -> tuple[Path, Path]:
 
 
 def _instead(root: Path, parent: Path, what: str, pattern: str) -> str:
-    """Say which dates or drives there are, and what the whole folder looks like."""
-    there, layout = sorted(path.name for path in parent.glob(pattern) if path.is_dir()), what_is(root)
+    """List the dates or drives that exist, and name the layout that the whole folder seems to have."""
+    there = sorted(path.name for path in parent.glob(pattern) if path.is_dir())
+    layout = what_is(root)
     names = f"only the {what} {', '.join(there)}" if there else f"no {what}"
     return names + (f"; {root} looks like {layout}" if layout else "")
 

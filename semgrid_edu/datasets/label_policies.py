@@ -16,7 +16,6 @@ from semgrid_edu.datasets.ground_truth import Moment, TruthPolicy, drive_truth
 from semgrid_edu.datasets.training_arrays import SEED, ArrayRecipe
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame
-from semgrid_edu.occupancy import track_drive
 
 ACCUMULATED = TruthPolicy(past=9, vote="majority")
 """The labelled scan and the nine before it (0.9 s), all labelled by the one labelled image, as in KITTI. Most cells
@@ -100,7 +99,7 @@ def drive_labels(
     """
     last = min(max(labelled) + truth.policy.future, len(drive) - 1)
     frames = [replace(drive[k], image=None) for k in range(last + 1)]
-    beliefs = list(track_drive(frames, recipe.spec, recipe.params, SEED))
+    beliefs = list(recipe.track(frames, recipe.spec, recipe.params, SEED))
     if truth.flaws:
         frames = truth.flaws.apply(frames, truth.seed, number)  # after the filter: it sees the true scans
     moments = [Moment(frame, belief) for frame, belief in zip(frames, beliefs, strict=True)]

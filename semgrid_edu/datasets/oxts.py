@@ -35,7 +35,7 @@ def read_timestamps(path: Path, n_frames: int) -> NDArray[np.datetime64]:
     Returns
     -------
     (n_frames,) datetime64[ns]
-        NaT for an empty line, by which KITTI marks a scan that was never recorded.
+        NaT for an empty line, with which KITTI marks a scan that was never recorded.
     """
     lines = read_text(path).splitlines()
     times = np.array([_parse(path, number, line) for number, line in enumerate(lines, 1)], dtype="datetime64[ns]")
@@ -88,7 +88,7 @@ def parse_packet(path: Path, text: str) -> NDArray[np.float64]:
     Returns
     -------
     (30,) float64
-        As `read_packet` says.
+        See `read_packet`.
     """
     packet = parse_numbers(path, text, "an oxts packet")
     if packet.size != PACKET_FIELDS:

@@ -46,7 +46,7 @@ class PandasetScene(FrameSequence):
     There is a frame for each image of the camera on disk; `numbers` has their numbers in the published scene. Frames
     have KITTI's form: x ahead is the direction in which the camera looks, along the ground, and the LIDAR is the
     Pandar64 at the instant of the image, which is when it looks that way. Only its returns are in `Frame.points`; the
-    labels use both LIDARs. The vehicle sways, so each frame has a camera of its own. The world is PandaSet's.
+    labels use both LIDARs. The vehicle sways, so each frame has its own camera. The world is PandaSet's.
 
     In a `Frame`, `labels` are those of its own scan: the class and the depth of the pixels on which a return falls that
     the camera sees, the class of the cells with a return, and which of these cells the camera sees. `truth`, `visible`
@@ -80,16 +80,19 @@ class PandasetScene(FrameSequence):
     >>> truth = scene.truth(4, GridSpec.compact(), before=9, after=9)     # doctest: +SKIP
     """
 
-    label_set, credit = KITTI_14, files.CREDIT
+    label_set = KITTI_14
+    credit = files.CREDIT
 
     def __init__(self, root: str | Path, scene: str, camera: str = CAMERAS[0]) -> None:
         if camera not in CAMERAS:
             raise ArgumentError("camera", f"one of {', '.join(CAMERAS)}", repr(camera))
-        self.folder, self.view = Path(root) / scene, Path(root) / scene / "camera" / camera
+        self.folder = Path(root) / scene
+        self.view = Path(root) / scene / "camera" / camera
         if not self.folder.is_dir():
             there = sorted(path.parent.name for path in Path(root).glob("*/lidar"))
             raise DataError(self.folder, "a scene", f"only {', '.join(there)}" if there else "no scene beside it")
-        self.name, self._opened = f"{scene} {camera}", (root, scene, camera)
+        self.name = f"{scene} {camera}"
+        self._opened = (root, scene, camera)
         self.numbers = frame_numbers(self.view, "images", ".jpg", digits=2)
         self._scan = lru_cache(_WINDOW)(partial(files.read_pandaset_scan, self.folder))
 
@@ -98,7 +101,7 @@ class PandasetScene(FrameSequence):
         return len(self.numbers)
 
     def __reduce__(self) -> tuple:
-        """Open the scene anew in another process, which reads scans of its own."""
+        """Pickle the arguments: another process opens the scene again and reads the scans itself."""
         return type(self), self._opened
 
     @cached_property
@@ -126,8 +129,8 @@ class PandasetScene(FrameSequence):
     def truth(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.uint8]:
         """Return the class of each cell in which there is a labelled return, seen by the camera or not.
 
-        What stands outvotes the ground below it (`birdseye_votes`). Returns of moving things in other scans are put
-        where the things are at this frame, by their cuboids.
+        Objects outvote the ground below them (`birdseye_votes`). Returns of moving objects in other scans are moved
+        with their cuboids to where the objects are at this frame.
 
         Parameters
         ----------
@@ -163,7 +166,7 @@ class PandasetScene(FrameSequence):
     def image_labels(self, k: int, size: tuple[int, int], before: int = 0, after: int = 0) -> NDArray[np.uint8]:
         """Return the class of each pixel of the resized image: that of the closest return on it that the camera sees.
 
-        Labels of single pixels can't be resized like an image, so the returns are projected anew for each size.
+        Labels of single pixels can't be resized like an image, so the returns are projected again for each size.
         Parameters not named here are those of `LabelledDrive.image_labels`.
 
         Parameters
@@ -191,14 +194,16 @@ class PandasetScene(FrameSequence):
 
     def without_labels(self, k: int) -> Frame:
         """Read a frame without its labels. Parameters are those of `FrameSequence.without_labels`."""
-        scan, camera, T_world_from_lidar = self._scan(self.numbers[k]), self._camera(k), self._T_world_from_lidar(k)
+        scan = self._scan(self.numbers[k])
+        camera = self._camera(k)
+        T_world_from_lidar = self._T_world_from_lidar(k)
         turning = scan.lidars == files.TURNING
         points = transform_points(invert_rigid(T_world_from_lidar), scan.points[turning])
         points = np.column_stack([points, scan.reflectance[turning]]).astype(np.float32)
         image = read_jpeg(self.view / f"{self.numbers[k]:02d}.jpg", IMAGE_SIZE)[ROWS]
         start, now = self._camera_times[[self.numbers[0], self.numbers[k]]]
-        own = files.on_the_roof(scan.points[turning], self._poses[self.numbers[k]])
-        return Frame(image, points, camera, T_world_from_lidar, float(now - start), own=own)
+        on_vehicle = files.on_the_roof(scan.points[turning], self._poses[self.numbers[k]])
+        return Frame(image, points, camera, T_world_from_lidar, float(now - start), vehicle_returns=on_vehicle)
 
     def _labels(self, k: int, camera: Camera) -> FrameLabels | None:
         if self._scan(self.numbers[k]).labelled is None:
@@ -212,8 +217,10 @@ class PandasetScene(FrameSequence):
     def _cloud(self, k: int, before: int = 0, after: int = 0) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return the returns of a window of scans in the LIDAR frame of frame k, and their classes."""
         check_whole(before=before, after=after)
-        number, scans = self.numbers[k], frame_numbers(self.folder / "lidar", "scans", ".pkl.gz", digits=2)
-        earlier, later = [n for n in scans if n < number], [n for n in scans if n > number]
+        number = self.numbers[k]
+        scans = frame_numbers(self.folder / "lidar", "scans", ".pkl.gz", digits=2)
+        earlier = [n for n in scans if n < number]
+        later = [n for n in scans if n > number]
         others = earlier[max(len(earlier) - before, 0) :] + later[:after]
         now, *rest = (self._labelled_scan(n) for n in (number, *others))
         points, classes = put_together(now, rest)
@@ -245,7 +252,9 @@ class PandasetScene(FrameSequence):
 
     def _T_world_from_lidar(self, k: int) -> NDArray[np.float64]:
         """Return the pose of the Pandar64 at the instant of the image, turned to where the camera looks."""
-        number, poses, times = self.numbers[k], self._poses, self._times
+        number = self.numbers[k]
+        poses = self._poses
+        times = self._times
         places = poses[:, :3, :3] @ files.LIDAR_IN_POSE + poses[:, :3, 3]
         velocity = np.gradient(places, times, axis=0)[number]
         ahead = self._camera_poses[number][:3, 2]
@@ -280,7 +289,9 @@ def _painted(
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """Return class and depth of the closest return on each pixel that the camera sees."""
     seen = unhidden(points, _standing(classes), camera)
-    points, classes, blank = points[seen], classes[seen], nothing_known(KITTI_14, camera.size)
+    points = points[seen]
+    classes = classes[seen]
+    blank = nothing_known(KITTI_14, camera.size)
     returns, uv = closest_returns(Frame(None, points, camera, np.eye(4), 0.0))
     u, v = uv.T
     blank.image[v, u] = classes[returns]

@@ -21,15 +21,15 @@ from semgrid_edu.storage.pickled_tables import read_pickled_table
 from semgrid_edu.storage.reading import read_json
 
 CREDIT = "PandaSet by Hesai and Scale AI, CC BY 4.0 (creativecommons.org/licenses/by/4.0), cut and reduced."
-"""What stands beside whatever shows data of PandaSet."""
+"""The credit to show with data of PandaSet."""
 
 TURNING = 0
 """The number d of the Pandar64, the only LIDAR that the occupancy filter gets."""
 
 LIDAR_IN_POSE = np.array([0.0, 0.79, 1.86])
-"""Where the Pandar64 stands in the frame of lidar/poses.json (x right, y ahead, z up), metres. Measured on scene 002 as
-the place from which the returns of each laser have one elevation; the published extrinsics of the cameras say the same
-within 2 cm. The poses themselves are of a point near the ground."""
+"""Position of the Pandar64 in the frame of lidar/poses.json (x right, y ahead, z up), metres. Measured on scene 002 as
+the point from which the returns of each laser have one elevation; the published extrinsics of the cameras agree within
+2 cm. The poses themselves are those of a point near the ground."""
 
 ROOF = (-0.9, -1.7), (0.9, 1.4)
 """Least and most metres to the right and ahead of the Pandar64 of returns from the vehicle itself: on scene 002 some
@@ -112,7 +112,7 @@ def on_the_roof(points: NDArray[np.float64], T_world_from_vehicle: NDArray[np.fl
     Returns
     -------
     (N,) bool
-        Whether each lies above `ROOF`.
+        Whether each is above `ROOF`.
     """
     from_lidar = (transform_points(invert_rigid(T_world_from_vehicle), points) - LIDAR_IN_POSE)[:, :2]
     return ((ROOF[0] < from_lidar) & (from_lidar < ROOF[1])).all(axis=1)
@@ -131,7 +131,8 @@ def read_pandaset_scan(scene: Path, number: int) -> PandasetScan:
     path = scene / "lidar" / f"{number:02d}.pkl.gz"
     table = _table(path, ("x", "y", "z", "i", "d"))
     points = np.column_stack([table[axis] for axis in "xyz"])
-    reflectance, lidars = (table["i"] / 255).astype(np.float32), table["d"]
+    reflectance = (table["i"] / 255).astype(np.float32)
+    lidars = table["d"]
     if not ((reflectance >= 0) & (reflectance <= 1)).all():
         raise DataError(path, "i from 0 to 255", f"{table['i'].min():g} to {table['i'].max():g}")
     if not semseg_folder(scene).is_dir():
@@ -207,7 +208,8 @@ def read_intrinsics(path: Path) -> NDArray[np.float64]:
 
 def _table(path: Path, numbers: Sequence[str], others: Sequence[str] = ()) -> dict[str, NDArray]:
     """Read a table that has to have some columns, of finite numbers and of other things."""
-    table, columns = read_pickled_table(path), [*numbers, *others]
+    table = read_pickled_table(path)
+    columns = [*numbers, *others]
     if not set(columns) <= set(table):
         raise DataError(path, f"the columns {', '.join(columns)}", ", ".join(table)[:200])
     for name in numbers:
@@ -224,18 +226,19 @@ def _read_cuboids(path: Path) -> Cuboids:
     places, sizes = np.split(np.column_stack([table[column] for column in columns]).astype(np.float64), 2, axis=1)
     turns = Rotation.from_rotvec(np.outer(table["yaw"], [0, 0, 1])).as_matrix()
     T = np.array([rigid_transform(*pose) for pose in zip(turns, places, strict=True)]).reshape(-1, 4, 4)
-    lidars, sibling = table["cuboids.sensor_id"], table["cuboids.sibling_id"]
+    lidars = table["cuboids.sensor_id"]
+    sibling = table["cuboids.sibling_id"]
     names = np.where((lidars > TURNING) & (sibling != "-"), sibling, table["uuid"])
     stationary = table["stationary"].tolist()
-    _check_things(path, names, stationary, sizes)
+    _check_objects(path, names, stationary, sizes)
     return Cuboids(names, T, sizes, ~np.array(stationary, bool), lidars)
 
 
-def _check_things(path: Path, names: NDArray, stationary: list, sizes: NDArray[np.float64]) -> None:
-    """Refuse names that are no text, what is neither moving nor not, and boxes that hold nothing."""
+def _check_objects(path: Path, names: NDArray, stationary: list, sizes: NDArray[np.float64]) -> None:
+    """Check that names are text, that `stationary` is boolean, and that sizes aren't negative."""
     if not all(isinstance(name, str) for name in names):
         raise DataError(path, "text in the columns uuid and cuboids.sibling_id", "others")
-    if not all(isinstance(stands, bool) for stands in stationary):
+    if not all(isinstance(value, bool) for value in stationary):
         raise DataError(path, "true or false in the column stationary", "others")
     if (sizes < 0).any():
         raise DataError(path, "dimensions from 0 m up", f"{sizes.min():g} m")

@@ -16,15 +16,14 @@ HIDING_ANGLE = 0.2
 HIDING_BLOCKS = (5, 3)
 """Rows and columns of blocks, `HIDING_ANGLE` wide, in which a standing point in the middle one hides what is behind it.
 
-There are more rows because the lasers lie farther apart than the returns of one laser."""
+There are more rows because the lasers are farther apart than the returns of one laser."""
 
 
 def closest_returns(frame: Frame) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Find the returns that the camera sees: the closest one at each pixel.
 
-    The LIDAR stands above the camera, so it looks over things that hide from the camera what is behind them. Such a
-    hidden return is left out when it shares its pixel with a return of what hides it, which is closer. With few returns
-    most share no pixel, and stay.
+    The LIDAR is above the camera, so it sees over objects that occlude the view of the camera. An occluded return is
+    dropped when it shares its pixel with a closer return. With few returns most share no pixel, and are kept.
 
     Parameters
     ----------
@@ -64,7 +63,7 @@ def seen_returns(
     Returns
     -------
     pixels : (N,) int32
-        Pixel in the resized image, row * width + column, of each return that is seen and lies in the grid.
+        Pixel in the resized image, row * width + column, of each return that is seen and is in the grid.
     cells : (N,) int32
         Cell of each of these returns, row * W + column.
     """
@@ -77,7 +76,7 @@ def seen_returns(
 
 
 def cells_in_view(camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
-    """Return the cells in view, (H, W): above its centre, a point of some plane lies in the image, hidden or not.
+    """Return the cells in view, (H, W): a point above its centre, in some plane, is in the image, hidden or not.
 
     Parameters
     ----------
@@ -86,7 +85,8 @@ def cells_in_view(camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
     spec : GridSpec
         The grid, (H, W) cells.
     """
-    centers, in_view = spec.centers(), np.zeros(spec.shape, np.bool_)
+    centers = spec.centers()
+    in_view = np.zeros(spec.shape, np.bool_)
     for height in plane_heights():
         points = np.insert(centers[~in_view], 2, height, axis=1)  # not again where a lower point is in the image
         in_view[~in_view] = project(transform_points(camera.T_camera_from_grid, points), camera)[1]
@@ -94,20 +94,20 @@ def cells_in_view(camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
 
 
 def unhidden(points: NDArray, hiding: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:
-    """Return which points the camera sees: in its image, and behind nothing that stands.
+    """Return which points the camera sees: those in its image that no object occludes.
 
-    The LIDAR stands elsewhere than the camera, and other scans were taken from other places. So some points lie behind
-    things that hide them from the camera, but most of these share no pixel with a point of what hides them, as
-    `closest_returns` would need. Therefore what stands is taken to have no gaps between its points: the image is
-    divided into blocks, and a point is hidden if a standing one is 0.5 m and 3 % closer in its block or in a block
-    around it (`HIDING_BLOCKS`). This also hides a narrow strip of what the camera sees just above a standing thing.
+    The LIDAR isn't where the camera is, and other scans were taken from other places. So some points are occluded,
+    but most of these share no pixel with a point of the occluding object, as `closest_returns` would need. Therefore
+    objects are assumed to have no gaps between their points: the image is divided into blocks, and a point is hidden
+    if a point of an object is 0.5 m and 3 % closer in its block or in a block around it (`HIDING_BLOCKS`). This also
+    hides a narrow strip of what the camera sees just above an object.
 
     Parameters
     ----------
     points : (N, 3) float
         LIDAR frame, metres.
     hiding : (N,) bool
-        Whether the point is of something that stands and can hide others: the ground hides nothing.
+        Whether the point belongs to an object, which can hide others: the ground hides nothing.
     camera : Camera
         The camera.
 
@@ -127,18 +127,18 @@ def unhidden(points: NDArray, hiding: NDArray[np.bool_], camera: Camera) -> NDAr
 
 
 CLEARANCE = 2.5
-"""Metres above the lowest point of a cell from which on a point hangs over what stands there: the top of a vehicle,
+"""Metres. A point this far above the lowest point of its cell overhangs it, as branches do: the height of a vehicle,
 up to which `SensorModel` counts returns as obstacles too."""
 
 
 def birdseye_votes(
     points_grid: NDArray, classes: NDArray[np.uint8], spec: GridSpec, label_set: LabelSet
 ) -> NDArray[np.uint8]:
-    """Let labelled points vote on the class of the cells that they lie in.
+    """Let labelled points vote on the class of their cells.
 
     Branches and signs that hang over a road don't make it vegetation or signage: points more than `CLEARANCE` above the
-    lowest labelled point in their cell have no vote. Among the others `LabelSet.most_voted` decides: what stands in a
-    cell outvotes the ground below it.
+    lowest labelled point in their cell have no vote. Among the others `LabelSet.most_voted` decides: an object
+    outvotes the ground below it.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def birdseye_votes(
     spec : GridSpec
         The grid, (H, W) cells.
     label_set : LabelSet
-        The classes that the numbers stand for.
+        The classes of the numbers.
 
     Returns
     -------

@@ -34,7 +34,7 @@ def real_drive() -> KittiRawDrive:
 
 
 def real_weights() -> Path:
-    """Return the weights that real drives use by default; `card.json` beside them says what is known of them."""
+    """Return the weights that real drives use by default; `card.json` beside them describes them."""
     return samples_dir() / "segnet_real" / "weights.safetensors"
 
 
@@ -72,14 +72,14 @@ def sample_image_stage(segmenter: str = "segnet") -> Path:
 
 
 def _trained(segmenter: str) -> Path:
-    """Return the folder of a trained compact network, or refuse a name that has none."""
+    """Return the folder of a trained compact network, or raise an error when there is none."""
     if segmenter not in (trained := trained_segmenters()):
         raise ArgumentError("segmenter", f"one of {', '.join(trained)}", repr(segmenter))
     return _trained_folder(segmenter)
 
 
 def _trained_folder(segmenter: str) -> Path:
-    """Return where the trained compact network with this image network is or would be shipped."""
+    """Return the folder for the trained compact network with this image network; it may be missing."""
     return samples_dir() / f"{segmenter}_compact"
 
 

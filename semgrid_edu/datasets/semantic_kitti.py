@@ -58,7 +58,7 @@ As in the rest of the package, poles are signage, whoever rides a bicycle belong
 KITTI-14 has no classes for larger vehicles and for motorcycles, so they become cars and bicycles."""
 
 FIRST_MOVING = 252
-"""From this number on, a class is of things that move."""
+"""Classes with this number or a higher one are of moving objects."""
 
 
 def read_point_labels(path: Path, n_points: int) -> NDArray[np.int64]:
@@ -115,7 +115,8 @@ class SemanticKittiSequence(FrameSequence):
     label_set = KITTI_14
 
     def __init__(self, root: str | Path, sequence: str) -> None:
-        self.folder, self.name = Path(root) / "sequences" / sequence, sequence
+        self.folder = Path(root) / "sequences" / sequence
+        self.name = sequence
         self._length = 1 + max(frame_numbers(self.folder / "velodyne", "scans", ".bin"))
 
     def __len__(self) -> int:
@@ -148,7 +149,7 @@ class SemanticKittiSequence(FrameSequence):
         return SEMANTIC_KITTI_CLASSES.classes(self._label_file(k), self._numbers(k))
 
     def moving(self, k: int) -> NDArray[np.bool_]:
-        """Read which returns of one scan come from things that move.
+        """Read which returns of one scan come from moving objects.
 
         Parameters and errors are those of `SemanticKittiSequence.scan`.
 
@@ -161,7 +162,7 @@ class SemanticKittiSequence(FrameSequence):
     def truth(self, k: int, spec: GridSpec, before: int = 0, after: int = 0) -> NDArray[np.uint8]:
         """Return the bird's-eye truth of one frame, from its own scan or accumulated over several by their poses.
 
-        Of the other scans only what stands still is used: what moves was elsewhere then. Scans that the sequence
+        Of the other scans only static points are used: what moves was elsewhere then. Scans that the sequence
         doesn't have are left out. To fill the rest of the grid as the paper does, take
         `np.where(truth == IGNORE, unknown_classes(belief.probability), truth)`.
 
@@ -186,7 +187,8 @@ class SemanticKittiSequence(FrameSequence):
 
     def _labelled_points(self, j: int, k: int) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return scan j in the grid frame of frame k, and its classes, without what has moved between them."""
-        points, classes = self.scan(j)[:, :3].astype(np.float64), self.classes(j)
+        points = self.scan(j)[:, :3].astype(np.float64)
+        classes = self.classes(j)
         if j != k:
             T_lidar_k_from_lidar_j = invert_rigid(self._poses[k]) @ self._poses[j]
             points = transform_points(T_lidar_k_from_lidar_j, points)
@@ -243,7 +245,8 @@ class SemanticKittiSequence(FrameSequence):
     @cached_property
     def _poses(self) -> list[NDArray[np.float64]]:
         """T_world_from_lidar of each frame; the world is the LIDAR at the first one."""
-        path, T_camera0_from_lidar = self.folder / "poses.txt", self._calibration.T_camera0_from_lidar
+        path = self.folder / "poses.txt"
+        T_camera0_from_lidar = self._calibration.T_camera0_from_lidar
         poses = [parse_pose(path, line, f"line {n}") for n, line in enumerate(self._lines(path), 1)]
         return [invert_rigid(T_camera0_from_lidar) @ T @ T_camera0_from_lidar for T in poses]
 

@@ -1,22 +1,21 @@
 """The arrays that a network learns from: images with fewer pixels, occupancy, and the truth of each cell (section 4.1).
 
-`cached_arrays` keeps them until the code of this module, or of what it imports, changes. So only what makes arrays
-stands here.
+`cached_arrays` keeps them until the code of this module, or of what it imports, changes. So this module holds only what
+makes arrays.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import tee
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from semgrid_edu.datasets.frames import LabelledDrive
 from semgrid_edu.datasets.grid_truth import truth_to_learn
 from semgrid_edu.datasets.project_lidar import seen_returns
 from semgrid_edu.errors import DataError
-from semgrid_edu.frame import Frame
+from semgrid_edu.frame import Frame, resize_image
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, track_drive
 
@@ -35,11 +34,14 @@ class ArrayRecipe(NamedTuple):
         Height and width of the resized images, pixels.
     params : CmcdotParams
         Parameters of the occupancy filter.
+    track : callable
+        Runs the filter over a drive: `track_drive`, or its fast twin.
     """
 
     spec: GridSpec
     image_size: tuple[int, int]
     params: CmcdotParams
+    track: Callable = track_drive
 
 
 def drive_arrays(drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRecipe) -> list[dict[str, NDArray]]:
@@ -61,7 +63,7 @@ def drive_arrays(drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRec
         (H, W) uint8, and "return_pixels" and "return_cells" from `seen_returns`.
     """
     frames, scans = tee(drive[k] for k in range(max(labelled) + 1))
-    beliefs = track_drive(scans, recipe.spec, recipe.params, SEED)
+    beliefs = recipe.track(scans, recipe.spec, recipe.params, SEED)
     arrays = {
         k: _frame_arrays(drive, k, frame, belief.probability, recipe)
         for k, (frame, belief) in enumerate(zip(frames, beliefs, strict=True))
@@ -86,20 +88,3 @@ def _frame_arrays(
         "return_pixels": pixels,
         "return_cells": cells,
     }
-
-
-def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.uint8]:
-    """Average an image over larger pixels; its calibration becomes `camera.resized(size)`.
-
-    Parameters
-    ----------
-    image : (h, w, 3) uint8
-        RGB.
-    size : (int, int)
-        The new height and width, pixels.
-
-    Returns
-    -------
-    (*size, 3) uint8
-    """
-    return np.asarray(Image.fromarray(image).resize(size[::-1], Image.Resampling.BOX))

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
@@ -16,7 +15,7 @@ from semgrid_edu.datasets.frames import LabelledDrive
 from semgrid_edu.datasets.index import DatasetIndex
 from semgrid_edu.datasets.label_policies import LidarTruth, drive_labels
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, needed
 from semgrid_edu.storage.files import atomic_path, cache_folder, check_writable
 from semgrid_edu.storage.provenance import code_hash
 from semgrid_edu.storage.tensors import read_arrays
@@ -65,7 +64,8 @@ def cached_arrays(
     """
     drives = index.drives(split)
     folder = cache_folder(index.folder or index.root)
-    decided_by = [repr(recipe), *_code_and_files(index, drives, recipe)]
+    filter_module = recipe.track.__module__
+    decided_by = [repr(recipe._replace(track=filter_module)), *_code_and_files(index, drives, recipe)]
 
     def make_arrays() -> dict[str, NDArray]:
         jobs = [(drive, frames, recipe) for drive, frames in drives]
@@ -123,8 +123,9 @@ def in_each_drive(make: Callable[..., list], jobs: Sequence[tuple], what: str) -
     list
         The entries of all frames, drive by drive.
     """
+    joblib = needed("joblib")
     workers = min(WORKERS, len(jobs))
-    results = Parallel(n_jobs=workers, return_as="generator")(delayed(make)(*job) for job in jobs)
+    results = joblib.Parallel(n_jobs=workers, return_as="generator")(joblib.delayed(make)(*job) for job in jobs)
     return [frame for frames in tqdm(results, desc=what, total=len(jobs), unit="drive") for frame in frames]
 
 
@@ -133,7 +134,8 @@ def _code_and_files(
 ) -> list[str]:
     """Describe the code that makes the arrays, and the drives' files by name, size and time of the last change."""
     readers = {type(drive) for drive, _ in drives}  # these, and the sensor model, may be outside of the package
-    modules = [Path(training_arrays.__file__), *map(_file_of, {*readers, type(recipe.params.sensor)})]
+    parts_of_others = {*readers, type(recipe.params.sensor), recipe.track}
+    modules = [Path(training_arrays.__file__), *map(_file_of, parts_of_others)]
     parts = [code_hash(modules)]
     for drive, labelled in drives:
         found = {os.path.relpath(path, index.root): path.stat() for path in drive.files()}
@@ -142,8 +144,8 @@ def _code_and_files(
     return parts
 
 
-def _file_of(part: type) -> Path:
-    """Return the file that defines a class."""
+def _file_of(part: type | Callable) -> Path:
+    """Return the file that defines a class or a function."""
     try:
         return Path(inspect.getfile(part))
     except (TypeError, OSError):

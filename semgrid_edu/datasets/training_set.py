@@ -20,7 +20,7 @@ from semgrid_edu.datasets.training_cache import cached_arrays
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture
-from semgrid_edu.occupancy import CmcdotParams
+from semgrid_edu.occupancy import CmcdotParams, track_drive
 from semgrid_edu.storage.tensors import read_tensors
 
 FRAMES = "frames.safetensors"
@@ -69,7 +69,7 @@ class TrainingSet(Dataset[Sample]):
         Parameters of the occupancy filter; the package's own when left out.
     truth : LidarTruth, optional
         How to make the truth from image labels and LIDAR, as one must with real data. When left out, the truth is what
-        the data set says of its cells (`LabelledDrive.truth`).
+        that of the data set (`LabelledDrive.truth`).
 
     Attributes
     ----------
@@ -99,6 +99,9 @@ class TrainingSet(Dataset[Sample]):
     >>> torch.utils.data.DataLoader(training, batch_size=6, shuffle=True)  # doctest: +SKIP
     """
 
+    track = staticmethod(track_drive)
+    """Runs the occupancy filter over a drive; `semgrid_edu.fast.TrainingSet` has the compiled one."""
+
     def __init__(
         self,
         dataset: str | Path | DatasetIndex,
@@ -109,12 +112,37 @@ class TrainingSet(Dataset[Sample]):
         truth: LidarTruth | None = None,
     ) -> None:
         index = dataset if isinstance(dataset, DatasetIndex) else load_index(dataset)
-        recipe = ArrayRecipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams())
-        self.spec, self.label_set = recipe.spec, index.label_set
+        recipe = ArrayRecipe(spec or GridSpec.compact(), tuple(image_size), params or CmcdotParams(), self.track)
+        self.spec = recipe.spec
+        self.label_set = index.label_set
         drives = index.drives(split)
         self.camera = _shared_camera(drives).resized(recipe.image_size)
         self.drives = tuple(drive.name for drive, numbers in drives for _ in numbers)
         self.arrays = cached_arrays(index, split, recipe, truth)
+
+    @classmethod
+    def by_camera(
+        cls,
+        dataset: str | Path | DatasetIndex,
+        split: str,
+        spec: GridSpec | None = None,
+        image_size: tuple[int, int] = Architecture.image_size,
+        truth: LidarTruth | None = None,
+    ) -> "list[TrainingSet]":
+        """Open a split of a data set whose drives may have several cameras: one set for each, in the index's order.
+
+        Parameters and errors are those of `TrainingSet`.
+        """
+        index = dataset if isinstance(dataset, DatasetIndex) else load_index(dataset)
+        groups: list[tuple[Camera, list[LabelledFrame]]] = []
+        for name, numbers in index.frames_by_drive(split).items():
+            camera = index.reader(index.root, *name).camera
+            frames = next((found for known, found in groups if known.same_as(camera)), None)
+            if frames is None:
+                groups.append((camera, frames := []))
+            frames += [LabelledFrame(name, number) for number in numbers]
+        parts = (replace(index, splits={split: tuple(frames)}) for _, frames in groups)
+        return [cls(part, split, spec, image_size, truth=truth) for part in parts]
 
     def __len__(self) -> int:
         """Return the number of labelled frames."""
@@ -142,14 +170,14 @@ class TrainingSet(Dataset[Sample]):
 
 
 class Mixture(Sequence[Sample]):
-    """Training sets that take turns in training, such as simulated and real ones; each has a camera of its own.
+    """Training sets that take turns in training, such as simulated and real ones, each with its own camera.
 
     Each step takes its frames from the next data set, however many frames each has, and from its next camera.
 
     Parameters
     ----------
     data_sets : sequence of sequence of TrainingSet
-        For each data set the frames of each of its cameras, as `sets_by_camera` returns them.
+        For each data set the frames of each of its cameras, as `TrainingSet.by_camera` returns them.
 
     Attributes
     ----------
@@ -169,7 +197,8 @@ class Mixture(Sequence[Sample]):
     def __init__(self, data_sets: Sequence[Sequence[TrainingSet]]) -> None:
         if not data_sets or not all(data_sets):
             raise ArgumentError("data_sets", "at least one data set, each of at least one camera", "none")
-        self._data_sets, self.parts = data_sets, tuple(part for parts in data_sets for part in parts)
+        self._data_sets = data_sets
+        self.parts = tuple(part for parts in data_sets for part in parts)
         self.label_set, self.camera = self.parts[0].label_set, self.parts[0].camera
         for part in self.parts:
             if part.label_set != self.label_set:
@@ -199,34 +228,6 @@ class Mixture(Sequence[Sample]):
         cameras = self._data_sets[data_set]
         turns, camera = divmod(round_, len(cameras))
         return cameras[camera], turns
-
-
-def sets_by_camera(
-    dataset: str | Path | DatasetIndex,
-    split: str,
-    spec: GridSpec | None = None,
-    image_size: tuple[int, int] = Architecture.image_size,
-    truth: LidarTruth | None = None,
-) -> list[TrainingSet]:
-    """Open a split of a data set whose drives may have several cameras.
-
-    Parameters and errors are those of `TrainingSet`.
-
-    Returns
-    -------
-    list of TrainingSet
-        One for each camera, in the order in which the index names them.
-    """
-    index = dataset if isinstance(dataset, DatasetIndex) else load_index(dataset)
-    groups: list[tuple[Camera, list[LabelledFrame]]] = []
-    for name, numbers in index.frames_by_drive(split).items():
-        camera = index.reader(index.root, *name).camera
-        frames = next((found for known, found in groups if known.same_as(camera)), None)
-        if frames is None:
-            groups.append((camera, frames := []))
-        frames += [LabelledFrame(name, number) for number in numbers]
-    parts = (replace(index, splits={split: tuple(frames)}) for _, frames in groups)
-    return [TrainingSet(part, split, spec, image_size, truth=truth) for part in parts]
 
 
 def _shared_camera(drives: Sequence[tuple[LabelledDrive, list[int]]]) -> Camera:

@@ -9,7 +9,7 @@ Examples
 >>> tracker = fast.Cmcdot(spec, seed=0)                                                 # doctest: +SKIP
 """
 
-from importlib import import_module
+from semgrid_edu.errors import needed
 
 _WHERE: dict[str, str] = {
     # occupancy
@@ -30,6 +30,7 @@ _WHERE: dict[str, str] = {
     # planes and memory
     "ClassMemory": "memory",
     "PlaneSampler": "planes",
+    "TrainingSet": "training_set",
     "build_net": "networks",
     "carry_classes": "memory",
     "learn_classes": "memory",
@@ -52,4 +53,4 @@ def __getattr__(name: str) -> object:
     """Load a twin when it is first used."""
     if name not in _WHERE:
         raise AttributeError(f"module 'semgrid_edu.fast' has no attribute {name!r}")
-    return getattr(import_module(f"semgrid_edu.fast.{_WHERE[name]}"), name)
+    return getattr(needed(f"semgrid_edu.fast.{_WHERE[name]}"), name)

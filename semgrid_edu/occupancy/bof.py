@@ -7,14 +7,13 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.bof_state import BofParams, BofState
-from semgrid_edu.occupancy.cellwise import mix, ratio, strike_out
+from semgrid_edu.occupancy.bof_state import BofParams, BofState, origins, whole_cells
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.local_belief import local_belief, observe
 from semgrid_edu.occupancy.particles import slow_down
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll, shift
-from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State
-from semgrid_edu.occupancy.steps import update
+from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State, ratio
+from semgrid_edu.occupancy.steps import mix, strike_out, update
 from semgrid_edu.occupancy.walls import Walls, free_beside_static, strike_out_wakes
 from semgrid_edu.occupancy.world import transition_matrix
 
@@ -143,54 +142,6 @@ def _blocked(
         return static + from_wall * (1 - open_ahead) * unseen
 
     return blocked
-
-
-def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Return by how many whole cells each velocity shifts its mass, and the rest of its displacement.
-
-    Parameters
-    ----------
-    state : BofState
-        The belief, of which only the velocities and their remainders count.
-    spec : GridSpec
-        The cells.
-    dt : float
-        The time step, seconds.
-
-    Returns
-    -------
-    cells : (V, 2) int64
-        Number of cells along the x and y axes of the map.
-    remainder : (V, 2) float64
-        The rest along the same axes, metres, at most half a cell.
-    """
-    displacement = state.remainder + state.velocity * dt
-    remainder = (displacement + spec.cell / 2) % spec.cell - spec.cell / 2
-    cells = np.rint((displacement - remainder) / spec.cell)
-    farthest = max(spec.shape)  # mass that leaves the grid is lost, however far it goes
-    return np.clip(cells, -farthest, farthest).astype(np.int64), remainder
-
-
-def origins(velocity: NDArray, spec: GridSpec, walls: Walls, fraction: float = 1.0) -> NDArray[np.int64]:
-    """Return how many cells away mass of each velocity was some time ago, when it was still in another place.
-
-    Parameters
-    ----------
-    velocity : (V, 2) float
-        The velocities along the axes of the map, m/s.
-    spec : GridSpec
-        The cells.
-    walls : Walls
-        How long ago: `clearing_time`, or for slow things the time that they need for `clearing_cells`.
-    fraction : float
-        Which fraction of `clearing_time` ago.
-
-    Returns
-    -------
-    (V, 2) int64
-        Number of whole cells along the x and y axes of the map, to the place where it was.
-    """
-    return np.rint(walls.displacement(velocity, spec.cell, -fraction) / spec.cell).astype(np.int64)
 
 
 def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofParams) -> BofState:

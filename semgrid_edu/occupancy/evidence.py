@@ -95,7 +95,7 @@ class Sensor(Protocol):
         points : (N, 3+) float32 or float64
             Returns: x forward, y left, z above the ground on which the vehicle stands (m), in the grid frame of the
             vehicle now; a fourth column, where there is one, is reflectance, a fifth marks returns from the vehicle
-            itself (`Frame.own`). The filters have checked that x, y and z are finite. N may be 0.
+            itself (`Frame.vehicle_returns`). The filters have checked that x, y and z are finite. N may be 0.
 
         Returns
         -------

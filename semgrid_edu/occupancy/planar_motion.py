@@ -169,7 +169,9 @@ def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpe
         Pose of the frame of `target` in that of `source`, metres and radians.
     """
     rows, cols, inside = source.cells(pose.to_previous(target.centers().reshape(-1, 2)))
-    found = np.where(inside, values[:, rows, cols], outside[:, None])
+    cells = rows * source.shape[1] + cols
+    found = np.take(values.reshape(len(values), -1), cells, axis=1)  # unlike values[:, rows, cols], plane after plane
+    found[:, ~inside] = np.asarray(outside)[:, None]
     return found.reshape(len(values), *target.shape)
 
 

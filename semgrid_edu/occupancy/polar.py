@@ -1,9 +1,17 @@
-"""A scan in polar coordinates: how far each beam sees, and which cells it passes (paper, section 3.2, step 2)."""
+"""A scan in polar coordinates: how far each beam sees, and how high the ground is under each return.
+
+A return counts as an obstacle by its height above the ground, but no street is flat: a car's body pitches, roads rise,
+verges slope. So the ground is found first, outward from the vehicle (after Himmelsbach et al., IV 2010).
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.evidence import check_points
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 
 
@@ -116,3 +124,158 @@ def beyond_reach(reach: NDArray, spec: GridSpec, pose: PlanarMotion) -> NDArray[
     """
     x, y = np.moveaxis(pose.to_now(spec.centers()), -1, 0)
     return np.hypot(x, y) - reach[beams_of(x, y, len(reach))]
+
+
+@dataclass(frozen=True)
+class GroundParams:
+    """How ground can look to a LIDAR on a road vehicle.
+
+    The ground is followed outward along each sector of azimuth. A return d metres beyond the last ground is ground as
+    well when it is at most min(step + slope d, rise + grade d) higher or lower. So ground may be steep over a short
+    distance but must be gentle over a long one. Where the ground was hidden for more than `gap` metres, d = gap.
+
+    Parameters
+    ----------
+    sectors : int
+        Number of sectors of azimuth in a turn, each of which is walked separately. The default sectors of 1 degree hold
+        at least one column of returns of any scanner of this project.
+    bin : float
+        Length of a bin along a sector, metres. It has to be shorter than a car's bonnet, so that the front of a car
+        still shows as something upright.
+    farthest : float
+        Where the walk ends, metres; farther out the ground is taken as level. KITTI's scanner has no ground returns
+        beyond the default.
+    step : float
+        Largest sudden change of the ground's height, metres. The default allows for most of a kerb.
+    slope : float
+        The steepest slope over a short distance. The default 1:3 is that of the steepest embankments that a car can
+        cross (AASHTO, Roadside Design Guide).
+    rise : float
+        Largest difference of height, metres, over any distance on level ground. Where the returns of one bin differ by
+        more, something stands there, and the bin is skipped.
+    grade : float
+        Added to `rise` for each metre of distance, because roads in towns rise by up to about 5 in 100.
+    gap : float
+        The widest gap between two rings on level ground that counts, metres. The default is that of KITTI's scanner at
+        50 m.
+    neighbours : int
+        The ground of a sector is the median of its own profile and of those of this many sectors on each side, because
+        cars and houses hide the ground in some of them.
+    """
+
+    sectors: int = 360
+    bin: float = 0.25
+    farthest: float = 80.0
+    step: float = 0.1
+    slope: float = 1 / 3
+    rise: float = 0.3
+    grade: float = 0.05
+    gap: float = 10.0
+    neighbours: int = 3
+
+    def __post_init__(self) -> None:
+        """Check that ground can be found with these parameters."""
+        check_fields(self, "a whole number, at least 1", positive_count, "sectors")
+        if not isinstance(self.neighbours, int | np.integer) or not 0 <= 2 * self.neighbours < self.sectors:
+            expected = f"a whole number, less than half of the {self.sectors} sectors"
+            raise ArgumentError("neighbours", expected, self.neighbours)
+        check_fields(self, "a finite number, not negative", not_negative, "step", "slope", "rise", "grade", "gap")
+        if not (np.isfinite(self.farthest) and 0 < self.bin <= self.farthest):
+            raise ArgumentError("bin", f"metres, above 0 and up to farthest, {self.farthest}", self.bin)
+
+    @property
+    def bins(self) -> int:
+        """Number of bins along a sector."""
+        return int(np.ceil(self.farthest / self.bin))
+
+
+def height_above_ground(points: NDArray, params: GroundParams) -> NDArray[np.float64]:
+    """Return how high each return of a scan is above the ground below it.
+
+    1. Walk outward along each sector of azimuth to get the ground's profile in it (`walk_sector`).
+    2. Replace each profile by the median over the sector and its neighbours, without sectors that hold no returns.
+    3. Subtract the ground from the height of each return.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns: x forward, y left, z above the point of the ground on which the vehicle stands (m), in the grid frame
+        of the vehicle; N may be 0.
+    params : GroundParams
+        How ground can look.
+
+    Returns
+    -------
+    (N,) float64
+        Heights in metres; z itself where no ground is found.
+    """
+    x, y, z = check_points(points)[:, :3].T.astype(np.float64)
+    distance = np.hypot(x, y)
+    sector = beams_of(x, y, params.sectors)
+    profile = np.full((params.sectors, params.bins), np.nan)
+    order = np.argsort(sector, kind="stable")
+    seen, first = np.unique(sector[order], return_index=True)
+    for s, returns in zip(seen, np.split(order, first[1:]), strict=False):
+        profile[s] = walk_sector(distance[returns], z[returns], params)
+    ground = _median_of_neighbours(profile, params.neighbours)
+    return z - ground[sector, _bins_of(distance, params)]
+
+
+def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[np.float64]:
+    """Walk outward along one sector, and return the height of the ground in each bin.
+
+    The walk starts on the ground on which the vehicle stands. In each bin, the lowest return is accepted as ground when
+    it can be, given the last ground before it. Bins whose returns differ by more than `rise` are skipped, because
+    something stands there. The profile is straight between two places of ground, and level beyond the last.
+
+    Parameters
+    ----------
+    distance, z : (N,) float
+        The returns of the sector: distance from the vehicle as seen from above, and height, metres.
+    params : GroundParams
+        How ground can look.
+
+    Returns
+    -------
+    (B,) float64
+        Height of the ground in the middle of each bin, metres.
+
+    Examples
+    --------
+    A road that rises by 3 in 100, and a wall 12 m ahead:
+
+    >>> distance = np.array([4.0, 6.0, 9.0, 12.0, 12.0, 12.0])
+    >>> z = np.array([0.12, 0.18, 0.27, 0.5, 1.0, 1.5])
+    >>> walk_sector(distance, z, GroundParams(bin=4, farthest=16)).round(2)
+    array([0.06, 0.18, 0.27, 0.27])
+    """
+    bins = _bins_of(distance, params)
+    order = np.lexsort((z, bins))  # outward bin by bin, in each the lowest return first
+    first = np.flatnonzero(np.diff(bins[order], prepend=-1))
+    last = np.append(first[1:], len(z)) - 1
+    lowest = order[first]
+    spread = z[order[last]] - z[lowest]
+    ground_at = [0.0]
+    ground = [0.0]
+    for at, height, rise in zip(distance[lowest].tolist(), z[lowest].tolist(), spread.tolist(), strict=True):
+        farther = min(at - ground_at[-1], params.gap)
+        allowed = min(params.step + params.slope * farther, params.rise + params.grade * farther)
+        if rise <= params.rise and abs(height - ground[-1]) <= allowed:
+            ground_at.append(at)
+            ground.append(height)
+    middles = (np.arange(params.bins) + 0.5) * params.bin
+    return np.interp(middles, ground_at, ground)
+
+
+def _bins_of(distance: NDArray, params: GroundParams) -> NDArray[np.int64]:
+    """Return the bin of each return, (N,); returns beyond the last bin count to it."""
+    return np.minimum(distance / params.bin, params.bins - 1).astype(np.int64)
+
+
+def _median_of_neighbours(profile: NDArray, neighbours: int) -> NDArray[np.float64]:
+    """Take the median over each sector and its neighbours, (S, B); NaN marks sectors without returns."""
+    around = range(-neighbours, neighbours + 1)
+    beside = np.sort([np.roll(profile, k, axis=0) for k in around], axis=0)  # NaN comes last
+    known = np.isfinite(beside[:, :, 0]).sum(axis=0)
+    each = np.arange(len(profile))
+    return (beside[np.maximum(known - 1, 0) // 2, each] + beside[known // 2, each]) / 2

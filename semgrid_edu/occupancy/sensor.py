@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count, types_named
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence, check_points
-from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.polar import beyond_reach, fill_gaps, polar_profile, reach
+from semgrid_edu.occupancy.polar import GroundParams, beyond_reach, fill_gaps, height_above_ground, polar_profile, reach
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class SensorModel:
         from below that obstacle, from between a car's wheels. The default is the length of a car.
     vehicle : (float, float, float, float)
         Outline of the vehicle itself, x_min, x_max, y_min, y_max in the grid frame, metres. Unless the points are
-        marked (`Frame.own`), an obstacle inside it is the vehicle's own bonnet or mirror. The default is
+        marked (`Frame.vehicle_returns`), an obstacle inside it is the vehicle's own bonnet or mirror. The default is
         the outline of KITTI's estate car, whose LIDAR sees the end of its bonnet 2.5 m ahead.
     edge : float
         Up to how far outside the outline an obstacle whose reflectance is 0 counts as the vehicle's own, metres. A
@@ -179,7 +178,7 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.floating]:
     ----------
     points : (N, 3+) float
         Returns: x forward, y left, z above the ground on which the vehicle stands (m), in its grid frame, then
-        reflectance and which are the vehicle's own (`Frame.own`), where these are known; N may be 0.
+        reflectance and which are the vehicle's own (`Frame.vehicle_returns`), where these are known; N may be 0.
     sensor : SensorModel
         The sensor, with the outline of its vehicle, and how the ground is found.
 

@@ -146,3 +146,19 @@ def check_part(name: str, part: object, protocol: type, example: str) -> None:
         raise ArgumentError(name, expected, f"the class {part.__name__} itself: write {part.__name__}()")
     if not isinstance(part, protocol):
         raise ArgumentError(name, expected, type(part).__name__)
+
+
+CERTAIN = 1 - 1e-3
+"""The largest probability with which something arrives in a cell or has left it: below 1, so a scan can contradict."""
+
+
+def ratio(part: NDArray, whole: NDArray) -> NDArray[np.floating]:
+    """Return part / whole cell by cell, and 0 where the divisor is 0.
+
+    Parameters
+    ----------
+    part, whole : (..., H, W) float
+        Dividend and divisor, not negative.
+    """
+    out = np.zeros(np.broadcast_shapes(np.shape(part), np.shape(whole)), np.result_type(part, whole))
+    return np.divide(part, whole, out=out, where=whole > 0)

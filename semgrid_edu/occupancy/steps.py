@@ -1,7 +1,4 @@
-"""CMCDOT's four steps, each a pure function: move, predict, update, resample (paper, section 3.2).
-
-Each checks that the state, and the evidence, cover the cells of `spec`. All arrays are computed in double precision.
-"""
+"""CMCDOT's four steps, each a pure function, in double precision: move, predict, update, resample (section 3.2)."""
 
 from dataclasses import replace
 
@@ -10,12 +7,11 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.cellwise import bayes, mix, ratio, strike_out
 from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.particles import at_cells, cells_of, fly, slow_down, transform, weight_in_cells
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up
 from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
-from semgrid_edu.occupancy.state import FilterState, Particles, State
+from semgrid_edu.occupancy.state import CERTAIN, FilterState, Particles, State, ratio
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -78,10 +74,8 @@ def predict(
         The cells, (H, W).
     world : WorldModel
         Rates of change, how things stop, how they accelerate, and which arrivals to doubt beside walls.
-    dt : float
-        Time since the previous instant, seconds, not negative.
-    rng : numpy.random.Generator
-        Source of the particles' accelerations.
+    dt, rng : float, numpy.random.Generator
+        Time since the previous instant, seconds, not negative; source of the particles' accelerations.
     driven : float
         How far the vehicle has driven along the x axis since the previous instant, metres; negative backwards.
     """
@@ -140,8 +134,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     spec : GridSpec
         The cells, (H, W).
     evidence : Evidence
-        What the scan tells about each cell. However small the two likelihoods are, only their ratio counts. Where no
-        state that was held possible explains the scan, the cell becomes UNKNOWN.
+        What the scan tells about each cell.
     world : WorldModel
         What UNKNOWN cells turn out to be, `first_sight`, and how soon things have left a place, `walls`.
     """
@@ -181,7 +174,7 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     There are two draws of fixed size, by `params.resampling`. The first draws particles in proportion to their weights.
     The second draws cells in proportion to their newborn mass, and puts a particle anywhere in each cell that it draws,
     with a velocity from the wide prior. Then the weights in each cell are scaled to its dynamic probability again.
-    Dynamic mass so small that no particle was drawn for it becomes UNKNOWN.
+    Where no particle was drawn, dynamic mass becomes UNKNOWN. No newborn mass is left.
 
     Parameters
     ----------
@@ -193,11 +186,6 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
         Number of particles, share of births and their velocity prior, and how particles are drawn.
     rng : numpy.random.Generator
         Source of the draws, and of the newborn particles' places and velocities.
-
-    Returns
-    -------
-    FilterState
-        The same belief, carried by new particles, without newborn mass.
 
     Raises
     ------
@@ -220,3 +208,92 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     probability[UNKNOWN] += np.where(carried > 0, 0, dynamic)
     probability[DYNAMIC] = np.where(carried > 0, dynamic, 0)
     return FilterState(probability, Particles(position, velocity, weight), np.zeros(spec.shape))
+
+
+def mix(
+    probability: NDArray, newborn: NDArray, going: NDArray, M: NDArray
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mix the states of each cell by the transition matrix: P(j) = sum_i M[i, j] P(i).
+
+    Parameters
+    ----------
+    probability : (4, H, W) float
+        The four states at the previous instant.
+    newborn : (H, W) float
+        The part of P(DYNAMIC) that has no particles.
+    going : (H, W) float
+        Sum of the weights in each cell, after the matrix and after some particles have stopped. What stopped is STATIC.
+    M : (4, 4) float
+        Transition matrix, M[i, j] = P(state j now | state i before).
+
+    Returns
+    -------
+    probability : (4, H, W) float64
+        The four states now, with all particles still in their cells.
+    newborn : (H, W) float64
+        The part of P(DYNAMIC) that has no particles: what other states have become DYNAMIC is included.
+    """
+    mixed = np.einsum("ij,ihw->jhw", M, probability)
+    carried = M[DYNAMIC, DYNAMIC] * (probability[DYNAMIC] - newborn)
+    mixed[STATIC] += np.maximum(carried - going, 0)
+    without_particles = np.stack([probability[FREE], probability[STATIC], newborn, probability[UNKNOWN]])
+    born = np.einsum("i,ihw->hw", M[:, DYNAMIC], without_particles)
+    mixed[DYNAMIC] = born + going
+    return mixed, born
+
+
+def strike_out(arrives: NDArray, possible: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Strike out the arrivals that can't be true, and scale the rest to 1.
+
+    Something arrives in a cell with probability a. Of the joint distribution of "it arrives" and what the cell holds,
+    the impossible part i is struck out, such as an arrival in a cell that is STATIC: i = a P(STATIC). The
+    rest, 1 - i, is scaled to 1: nothing arrives, 1 - a, and the cell keeps what it held; or the arrival is possible.
+
+    Parameters
+    ----------
+    arrives : (H, W) float
+        Dynamic mass that arrives in the cell. It may exceed 1 where particles crowd; then a is `CERTAIN`.
+    possible : (H, W) float
+        The part of it that can be true.
+
+    Returns
+    -------
+    keep : (H, W) float64
+        Factor of what the cell held, (1 - a) / (1 - i).
+    take : (H, W) float64
+        Factor of the possible arrivals, (a / arrives) / (1 - i).
+    """
+    a = np.minimum(arrives, CERTAIN)
+    share = ratio(a, arrives)
+    consistent = 1 - (a - share * possible)
+    return (1 - a) / consistent, share / consistent
+
+
+def bayes(prior: NDArray, evidence: Evidence) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Multiply by the likelihoods and normalise: P(state | z) = P(z | state) P(state) / P(z).
+
+    STATIC and DYNAMIC share P(z | occupied), FREE and UNKNOWN share P(z | free).
+
+    Parameters
+    ----------
+    prior : (4, H, W) float
+        The four states before the scan.
+    evidence : Evidence
+        The likelihoods of the scan, (H, W).
+
+    Returns
+    -------
+    posterior : (4, H, W) float64
+        The four states given the scan. Where no state that was held possible explains the scan, all is UNKNOWN.
+    factor : (H, W) float64
+        P(DYNAMIC | z) / P(DYNAMIC), the factor of the weights of the cell's particles.
+    """
+    # Only the ratio of the likelihoods counts. The larger becomes 1, because products of tiny numbers would vanish.
+    best = np.maximum(evidence.occupied, evidence.free).astype(np.float64)
+    occupied = ratio(evidence.occupied, best)
+    free = ratio(evidence.free, best)
+    joint = np.stack([free, occupied, occupied, free]) * prior
+    p_z = joint.sum(axis=0)
+    posterior = ratio(joint, p_z)
+    posterior[UNKNOWN] += p_z == 0
+    return posterior, ratio(occupied, p_z)

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import check_fields, not_negative, types_named
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.cellwise import CERTAIN, ratio
 from semgrid_edu.occupancy.particles import at_cells, cells_of, weight_in_cells
-from semgrid_edu.occupancy.state import OUTSIDE, Particles, State
+from semgrid_edu.occupancy.state import CERTAIN, OUTSIDE, Particles, State, ratio
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -178,7 +177,7 @@ def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDAr
     a = np.where(hidden, np.minimum(left, CERTAIN), 0)
     s = posterior[STATIC]
     static = (1 - a) * s / (1 - a * s)
-    return np.stack([posterior[FREE] + s - static, static, posterior[DYNAMIC], posterior[UNKNOWN]])
+    return np.stack([posterior[FREE] + (s - static), static, posterior[DYNAMIC], posterior[UNKNOWN]])
 
 
 def free_beside_static(mixed: NDArray) -> NDArray[np.floating]:

@@ -19,7 +19,7 @@ from torch import Tensor
 from semgrid_edu.camera import Camera
 from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
 from semgrid_edu.datasets.samples import sample_weights
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, MissingExtraError
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.memory import ClassMemory, MemoryParams
 from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
@@ -223,9 +223,7 @@ def _fast_parts() -> Any:
 
     try:
         fast.DriveTracker  # noqa: B018 (loads the compiled filter)
-    except ModuleNotFoundError as error:
-        if error.name != "numba":
-            raise
+    except MissingExtraError:
         warnings.warn(
             "numba is missing, so the slower readable stages run: pip install semgrid_edu[fast]", stacklevel=3
         )

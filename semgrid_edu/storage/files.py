@@ -1,4 +1,4 @@
-"""Files written whole or not at all, checksums, tables beside modules, one writer in a folder, and shipped folders."""
+"""Atomic writes, checksums, tables beside modules, one writer per folder, shipped folders and the cache folder."""
 
 import hashlib
 import json
@@ -27,8 +27,8 @@ CACHE_VARIABLE = "SEMGRID_EDU_CACHE"
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`, which is renamed to `path` when the block ends well.
 
-    So readers see the old file or the new one, never half of one. When the block raises, or the process is killed, the
-    old file stays as it was.
+    Readers see the old file or the new one, never half of one. When the block raises an error or the process is killed,
+    the old file stays as it was.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def named_errors(path: str | Path) -> Iterator[None]:
-    """Add the name of a file to errors of the system that come without one, such as that of a full disk.
+    """Add the name of a file to system errors that lack one, such as that of a full disk.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def named_errors(path: str | Path) -> Iterator[None]:
 
 
 def check_writable(path: str | Path) -> None:
-    """Check that a file can be written, before long work starts whose result would be lost otherwise.
+    """Check that a file can be written, before long work starts whose result would be lost.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def check_writable(path: str | Path) -> None:
     DataError
         When a folder, a pipe or a device is in its place.
     OSError
-        When its folder can't be made or takes no files.
+        When its folder can't be made or written to.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
@@ -102,19 +102,19 @@ def check_writable(path: str | Path) -> None:
 
 
 def check_ours(mark: str, *paths: str | Path, force: bool | None = None) -> None:
-    """Check that files can be written and that nobody else's would be lost; every command asks this before its work.
+    """Check that files can be written and that no other program's would be lost; every command does so before its work.
 
-    A file is ours when it holds the mark that its writer puts into it, such as the command in a result. What is empty
-    may be replaced too.
+    A file is ours when it holds the mark that its writer puts into it, such as the command in a result. Empty files may
+    be replaced too.
 
     Parameters
     ----------
     mark : str
-        What a file of ours holds.
+        What our files contain.
     *paths : path-like
-        The files. The first one holds the mark, and the others belong to it.
+        The files. The first one contains the mark, and the others belong to it.
     force : bool, optional
-        Whether to replace what isn't ours all the same; left out where nobody can ask for that.
+        Whether to replace other files all the same; left out where the command has no such option.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def write_bytes(path: str | Path, content: bytes) -> None:
     path : path-like
         The file to write; its folder is created when missing.
     content : bytes
-        All that the file is to hold.
+        The content of the file.
     """
     with atomic_path(path) as temporary:
         temporary.write_bytes(content)
@@ -153,7 +153,7 @@ def write_text(path: str | Path, content: str) -> None:
     path : path-like
         The file to write; its folder is created when missing.
     content : str
-        All that the file is to hold.
+        The content of the file.
     """
     write_bytes(path, content.encode())
 
@@ -166,7 +166,7 @@ def write_json(path: str | Path, content: object) -> None:
     path : path-like
         The file to write; its folder is created when missing.
     content : object
-        Whatever JSON can hold.
+        Anything that JSON can hold.
     """
     write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
@@ -215,17 +215,17 @@ def named_rows(table: dict[str, dict]) -> dict[str, SimpleNamespace]:
 
 
 LOCK = ".lock"
-"""Name of the file that is locked. It is empty; a process that is killed leaves it behind, which does no harm."""
+"""Name of the file that is locked. It is empty; a killed process leaves it behind, which does no harm."""
 
 PATIENCE = 1.0
-"""Seconds to wait for a lock: when a command is killed, the processes that it had started end a moment later."""
+"""Seconds to wait for a lock: when a command is killed, its worker processes end a moment later."""
 
 
 @contextmanager
 def sole_writer(folder: str | Path) -> Iterator[None]:
-    """Keep other processes from writing to a folder as long as the block runs.
+    """Keep other processes from writing to a folder while the block runs.
 
-    After a kill the lock is free at once, so that the next process can go on.
+    When a process is killed its lock is free at once, so that the next one can resume.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def sole_writer(folder: str | Path) -> Iterator[None]:
     DataError
         When another block, of this process or of another one, writes to the folder.
     OSError
-        When the folder can't be made or takes no files.
+        When the folder can't be made or written to.
 
     Examples
     --------

@@ -9,7 +9,6 @@ import io
 import pickle
 import pickletools
 import zlib
-from importlib import import_module
 from pathlib import Path
 
 from numpy.typing import NDArray
@@ -58,8 +57,7 @@ class _TableUnpickler(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> object:
         if module not in _ALLOWED.get(name, ()):
             raise pickle.UnpicklingError(f"one that names {module}.{name}, which no table needs")
-        module, name = _MOVED.get((module, name), (module, name))
-        return getattr(import_module(module), name)
+        return super().find_class(*_MOVED.get((module, name), (module, name)))
 
 
 def read_pickled_table(path: Path) -> dict[str, NDArray]:

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 """The folder that holds the package, by the path that Python imports it from."""
 
 PROVENANCE = "provenance.json"
-"""Name of the file in a folder of results that says how they were made."""
+"""Name of the file in a folder of results that records how they were made."""
 
 
 def versions(*packages: str) -> dict[str, str]:
@@ -66,7 +66,7 @@ def commit() -> str | None:
     Returns
     -------
     str or None
-        None when the package doesn't lie in a git checkout.
+        None when the package isn't in a git checkout.
     """
     git = ["git", "-C", str(Path(__file__).parent)]
     try:
@@ -85,8 +85,8 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     Parameters
     ----------
     folder : path-like
-        The folder. All files below it are recorded with their SHA-256, except those in `cache/`, which can be made
-        anew, and hidden files and folders, which a writer that was killed may leave.
+        The folder. All files below it are recorded with their SHA-256, except those in `cache/`, which can be computed
+        again, and hidden files and folders, which a killed writer may leave.
     command : str
         The command that made the files.
     seed : int
@@ -94,7 +94,7 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     packages : tuple of str
         Names of the packages whose versions can change the result.
     **details
-        What else a reader should know, such as a date, a duration or scores: whatever JSON can hold.
+        What else a reader should know, such as a date, a duration or scores: anything that JSON can hold.
     """
     folder = Path(folder)
     record = {"command": command, "seed": seed, "versions": versions(*packages), **details}
@@ -112,7 +112,7 @@ def provenance_problems(folder: str | Path) -> list[str]:
     Returns
     -------
     list of str
-        One line for each file that is missing, changed or not recorded; empty when all is as it was made.
+        One line for each file that is missing, changed or not recorded.
     """
     folder = Path(folder)
     record = folder / PROVENANCE
@@ -133,22 +133,6 @@ def _checksums(folder: Path) -> dict[str, str]:
         for name, path in files.items()
         if name.parts[0] not in left_out and not any(part.startswith(".") for part in name.parts)
     }
-
-
-def short_path(weights: str | Path) -> str:
-    """Return the last two parts of a path to weights: the folder, which names the network, and the file.
-
-    Parameters
-    ----------
-    weights : path-like
-        The file.
-
-    Returns
-    -------
-    str
-        Such as "segnet_compact/weights.safetensors".
-    """
-    return "/".join(Path(weights).resolve().parts[-2:])
 
 
 def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
@@ -178,7 +162,7 @@ def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, str
     Parameters
     ----------
     modules : iterable of Path
-        The files to begin with; they may lie outside of the package.
+        The files to begin with; they may be outside of the package.
     root : Path
         The folder that holds the package.
 
@@ -200,7 +184,8 @@ def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, str
 @cache  # by the text: whatever changes in a file is seen, and what doesn't is parsed once
 def _tree_and_imports(text: str) -> tuple[str, list[tuple[str, str, str]]]:
     """Return a module's syntax tree, printed, and from where it imports which names, and what it calls them."""
-    tree, imports = _without_docstrings(ast.parse(text)), []
+    tree = _without_docstrings(ast.parse(text))
+    imports = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             imports += [(*alias.name.rpartition(".")[::2], "") for alias in node.names]
@@ -224,7 +209,7 @@ def _origin(module: str, name: str, root: Path) -> Path | None:
 
 
 def _without_docstrings(tree: ast.Module) -> ast.Module:
-    """Drop every string that stands alone, which is how constants are described as well."""
+    """Drop every statement that is only a string: docstrings, and descriptions of constants."""
     for node in ast.walk(tree):
         for field in ("body", "orelse", "finalbody"):
             if isinstance(statements := getattr(node, field, None), list):

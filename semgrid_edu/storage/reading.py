@@ -1,4 +1,4 @@
-"""Files that are read whole and checked: bytes, text, JSON, PNG and JPEG images, with errors that name the file."""
+"""Checked reading: bytes, text, JSON, PNG and JPEG images, with errors that name the file."""
 
 import io
 import json
@@ -51,20 +51,20 @@ def read_text(path: Path) -> str:
 
 
 def read_json(path: str | Path, kind: type = dict) -> Any:
-    """Return what a JSON file holds.
+    """Read a JSON file.
 
     Parameters
     ----------
     path : path-like
         The file to read: UTF-8.
     kind : type
-        What it has to hold: `dict` for an object, `list` for an array.
+        The expected type: `dict` for an object, `list` for an array.
     """
     return parse_json(path, read_bytes(Path(path)), kind)
 
 
 def parse_json(path: str | Path, text: str | bytes, kind: type = dict) -> Any:
-    """Return what a piece of JSON stands for.
+    """Parse JSON.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def parse_json(path: str | Path, text: str | bytes, kind: type = dict) -> Any:
     text : str or bytes
         The JSON; bytes are UTF-8.
     kind : type
-        What it has to hold: `dict` for an object, `list` for an array.
+        The expected type: `dict` for an object, `list` for an array.
     """
     expected = "a JSON array" if kind is list else "a JSON object"
     try:
@@ -182,48 +182,8 @@ def _open_png(content: bytes) -> Image.Image:
 
 
 def _sixteen_bits(content: bytes) -> NDArray[np.uint16]:
-    """Decode three channels of 16 bits, of which Pillow keeps 8: the upper ones, or the lower ones if told so."""
-    upper, lower = _open_png(content), _open_png(content)
+    """Decode three channels of 16 bits, of which Pillow keeps 8: the upper ones, or the lower ones if asked."""
+    upper = _open_png(content)
+    lower = _open_png(content)
     lower.tile = [(*lower.tile[0][:3], "RGB;16L")]
     return np.array(upper).astype(np.uint16) << 8 | np.array(lower)
-
-
-def resumable_json(
-    log: str | Path, identity: dict[str, object], key: str, kind: type = dict, listed: bool = False
-) -> Any:
-    """Return the finished parts of a result that an experiment writes while it runs, to go on from after a break.
-
-    Parameters
-    ----------
-    log : path-like
-        The file of a result, finished or not; it may be missing.
-    identity : dict
-        What distinguishes the experiment, such as its seed: the file must say the same. It has to survive JSON.
-    key : str
-        Name under which the file keeps the parts.
-    kind : type
-        The type of every part.
-    listed : bool
-        Whether the parts stand in a list; by default they have names.
-
-    Returns
-    -------
-    dict of str to `kind`, or list of `kind`
-        The parts; none when there is no file.
-
-    Raises
-    ------
-    DataError
-        When the file is something else, or was made by another experiment.
-    """
-    path, none = Path(log), [] if listed else {}
-    if not path.exists():
-        return none
-    content = read_json(path)
-    found, parts = {name: content.get(name) for name in identity}, content.get(key)
-    sound = isinstance(parts, type(none)) and all(isinstance(p, kind) for p in (parts if listed else parts.values()))
-    if not sound or not identity.keys() <= content.keys():
-        raise DataError(path, "a result of this experiment, or no file", f"something else: {repr(content)[:200]}")
-    if found != identity:
-        raise DataError(path, f"a result of {identity}", f"{found}: choose another file")
-    return parts

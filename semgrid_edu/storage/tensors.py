@@ -1,4 +1,4 @@
-"""Named tensors (safetensors) and named arrays (npz) on disk: written whole or not at all, and read with checks."""
+"""Named tensors (safetensors) and named arrays (npz) on disk: atomic writes and checked reading."""
 
 import io
 from lzma import LZMAError
@@ -32,8 +32,8 @@ def write_arrays(path: str | Path, arrays: dict[str, NDArray]) -> None:
     Raises
     ------
     OSError
-        When the file can't be written, for example because the disk is full. The error names the file, which stays as
-        it was.
+        When the file can't be written, for example because the disk is full. The error names the file, which is
+        unchanged.
     """
     with atomic_path(path) as temporary:
         np.savez_compressed(temporary, allow_pickle=False, **arrays)
@@ -76,8 +76,8 @@ def write_tensors(path: str | Path, tensors: dict[str, Tensor], header: dict[str
     Raises
     ------
     OSError
-        When the file can't be written, for example because the disk is full. The error names the file, which stays as
-        it was.
+        When the file can't be written, for example because the disk is full. The error names the file, which is
+        unchanged.
     """
     write_bytes(path, save(tensors, metadata=header))
 

@@ -21,8 +21,8 @@ class Batch(NamedTuple):
     frames : Sample
         The fields of all frames, each with an additional first axis B; `image` is float32 in 0..1.
     mirrored : bool
-        Whether the network sees them with left and right exchanged. `image_scores` and `grid_logits` mirror their
-        results back, so that they fit the labels of `frames`.
+        Whether left and right are exchanged for the network. `image_scores` and `grid_logits` mirror their results
+        back, so that they fit the labels of `frames`.
     sampler : PlaneSampler, optional
         Equation (2) for the camera that took these images; the network's own when left out.
     """
@@ -41,9 +41,9 @@ def draw_batch(
     mirror: bool = True,
     tint: float = 0.0,
 ) -> Batch:
-    """Return the frames of a step, with jittered brightness and contrast, mirrored by chance (data augmentation).
+    """Draw the frames of a step, with jittered brightness and contrast, mirrored at random (data augmentation).
 
-    Each pass over the data takes the frames in a new order. There are whole batches only, so a pass may leave a few
+    Each pass over the data takes the frames in a new order. Batches are never incomplete, so a pass may leave a few
     frames out.
 
     Parameters
@@ -53,15 +53,15 @@ def draw_batch(
     size : int
         B, the number of frames in a batch.
     jitter : float
-        How far brightness and contrast vary, as a share of the range of an image: 0.2 is up to 20 % either way.
+        How far brightness and contrast vary, as a fraction of the range of an image: 0.2 is up to 20 % either way.
     iteration : int
-        Number of the step; together with the seed it decides everything.
+        Number of the step; with the seed it determines everything random.
     seed : int
         Seed for the order, the jitter and the mirroring.
     mirror : bool
-        Whether about half of the batches are mirrored.
+        Whether a random half of the batches is mirrored.
     tint : float
-        How far each colour of an image varies by itself, as a share.
+        How far each colour of an image varies independently, as a fraction.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def draw_batch(
 
 
 def frames_of_step(n_frames: int, size: int, iteration: int, seed: int) -> NDArray[np.int64]:
-    """Return which frames the batch of a step holds: each pass over the data takes them in a new order.
+    """Return the numbers of the frames in the batch of a step: each pass over the data takes them in a new order.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def frames_of_step(n_frames: int, size: int, iteration: int, seed: int) -> NDArr
     Returns
     -------
     (B,) int
-        Numbers of frames.
+        Numbers of the frames.
     """
     epoch, k = divmod(iteration, n_frames // size)
     order = np.random.default_rng((seed, 0, epoch)).permutation(n_frames)
@@ -104,14 +104,14 @@ def frames_of_step(n_frames: int, size: int, iteration: int, seed: int) -> NDArr
 
 
 def share_of_batch(batch: Batch, process: int, n_processes: int, device: torch.device | str) -> Batch:
-    """Return the part of a batch that one of several processes takes, on its device.
+    """Return one process's share of a batch, on its device.
 
     Parameters
     ----------
     batch : Batch
         B frames.
     process, n_processes : int
-        The number of the process, from 0, and how many processes there are, which divides B.
+        The number of the process, from 0, and the number of processes, which divides B.
     device : torch.device or str
         The device of the process.
 

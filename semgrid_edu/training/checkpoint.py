@@ -1,4 +1,4 @@
-"""Checkpoints, from which a training run that was killed goes on as if it hadn't been (paper, section 4.1)."""
+"""Checkpoints, from which an interrupted training run resumes as if nothing had happened (paper, section 4.1)."""
 
 import json
 from pathlib import Path
@@ -17,23 +17,23 @@ from semgrid_edu.storage.tensors import read_tensors, write_tensors
 from semgrid_edu.training.log import HEADER, LOG
 
 CHECKPOINT = "checkpoint.safetensors"
-"""The file from which an interrupted run goes on, in the folder of the run."""
+"""Name of the file, in the folder of a run, from which an interrupted run resumes."""
 
 
 def check_folder(folder: Path, resume: bool) -> None:
-    """Refuse to overwrite a finished or an interrupted run, or files of something else.
+    """Check that no finished or interrupted run and no other file would be overwritten.
 
     Parameters
     ----------
     folder : Path
-        The folder of the training run to come.
+        The folder of the new training run.
     resume : bool
         Whether it continues an interrupted one.
 
     Raises
     ------
     DataError
-        When the folder holds a run that would be lost, a data set, or files of something else.
+        When the folder holds a run that would be lost, a data set, or other files.
     """
     if (folder / INDEX_FILE).exists():
         raise DataError(folder, "a folder for the training run alone", "a data set")
@@ -48,13 +48,13 @@ def check_folder(folder: Path, resume: bool) -> None:
 
 
 def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimiser: SGD, iteration: int) -> None:
-    """Write weights, momenta and the number of the next step, all in one file so that they can't disagree.
+    """Write weights, momenta and the number of the next step to one file, so that they can't disagree.
 
     Parameters
     ----------
     path : Path
-        The safetensors file. It is written atomically: after a kill or on a full disk, the checkpoint before it is
-        still there.
+        The safetensors file. It is written atomically: when the process is killed or the disk is full, the previous
+        checkpoint is still there.
     run : dict
         What distinguishes this run from others, such as its seed, by name; anything that JSON can hold.
     net : Module
@@ -79,7 +79,7 @@ def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
     path : Path
         A file that `save_checkpoint` wrote.
     run : dict
-        What distinguishes this run from others; it must equal what the file says.
+        What distinguishes this run from others; it must be equal in the file.
     net : Module
         The network, whose weights are replaced.
     optimiser : SGD
@@ -95,11 +95,12 @@ def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
     DataError
         When the file is missing or damaged.
     ArgumentError
-        When the file belongs to another run; the message says in what the two differ.
+        When the file belongs to another run; the message names the differences.
     """
     header, tensors = read_tensors(path)
     try:
-        found, iteration = parse_json(path, header["run"]), int(header["iteration"])
+        found = parse_json(path, header["run"])
+        iteration = int(header["iteration"])
         if iteration < 0:
             raise ValueError(f"step {iteration}")
     except (KeyError, TypeError, ValueError) as error:
@@ -116,7 +117,7 @@ def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
 
 
 def _check_run(path: Path, found: dict[str, object], run: dict[str, object]) -> None:
-    """Refuse the checkpoint of another run, and name what differs."""
+    """Check that a checkpoint belongs to this run, or name the differences."""
     differing = [name for name in sorted(found.keys() | run.keys()) if found.get(name) != run.get(name)]
     if differing:
         theirs, ours = ({name: one.get(name) for name in differing} for one in (found, run))

@@ -60,14 +60,14 @@ class TrainingLog(NamedTuple):
 
 
 def begin_log(path: Path, start: int) -> None:
-    """Begin a log, or continue one from the step `start` on; later steps, which no checkpoint holds, are dropped.
+    """Begin a log, or continue one from the step `start` on; later steps, which aren't in the checkpoint, are dropped.
 
     Parameters
     ----------
     path : Path
         The file to write.
     start : int
-        Number of the first step to come.
+        Number of the next step.
 
     Raises
     ------
@@ -84,14 +84,14 @@ def begin_log(path: Path, start: int) -> None:
 
 
 def append_step(path: Path, step: Step) -> None:
-    """Add a line to a log; it is in the file at once, so that a running training run can be watched.
+    """Append a line to a log; it is in the file at once, so that training can be watched.
 
     Parameters
     ----------
     path : Path
         The file to add to.
     step : Step
-        The step that has just been done.
+        The step just made.
 
     Raises
     ------

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -15,6 +16,9 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.training.batches import Batch, grid_logits, image_scores
+
+if TYPE_CHECKING:
+    from lightning_fabric import Fabric
 
 TRUTH = {"image": "labels", "grid": "truth"}
 """The field of `Sample` that each stage learns from."""
@@ -115,11 +119,11 @@ def class_weights(dataset: Sequence[Sample], stage: str, n_classes: int, limit: 
 
 
 def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike) -> float:
-    """Compute the loss of section 4.1 literally: cross-entropy, weighted by class, of the labelled pixels or cells.
+    """Compute the loss of section 4.1: cross-entropy of the labelled pixels or cells, weighted by class.
 
     L = sum_j alpha[c_j] (-log g_j[c_j]) / sum_j alpha[c_j], where j runs over the labelled cells, c_j is the true class
-    of cell j, and g_j the soft-max of its scores. It is a weighted mean of -log g, in which the cells of a rare class
-    have more weight.
+    of cell j, and g_j the soft-max of its scores. It is a weighted mean of -log g, in which rare classes have more
+    weight.
 
     Parameters
     ----------
@@ -138,7 +142,7 @@ def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike
     Raises
     ------
     ArgumentError
-        When the shapes don't agree, or `truth` holds something else than classes and 255.
+        When the shapes don't agree, or `truth` holds anything but classes and 255.
 
     Examples
     --------
@@ -159,7 +163,7 @@ def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike
 
 
 def _check_loss_inputs(scores: NDArray, truth: NDArray, alpha: NDArray) -> None:
-    """Refuse scores (B, C, ...), truth (B, ...) and weights (C,) that don't fit each other."""
+    """Check that scores (B, C, ...), truth (B, ...) and weights (C,) fit each other."""
     if scores.ndim < 2 or truth.shape != scores.shape[:1] + scores.shape[2:]:
         found = f"scores of shape {scores.shape}, truth of shape {truth.shape}"
         raise ArgumentError("truth", "shape (B, ...) for scores of shape (B, C, ...)", found)
@@ -176,8 +180,8 @@ def _check_loss_inputs(scores: NDArray, truth: NDArray, alpha: NDArray) -> None:
 def cross_entropy_sums(scores: Tensor, truth: Tensor, alpha: Tensor) -> tuple[Tensor, Tensor]:
     """Return numerator and denominator of `weighted_cross_entropy`, fast and differentiable (section 4.1).
 
-    They are returned separately because a batch can be shared among processes: its loss is the quotient of the sums
-    over all of them.
+    They are separate because several processes can share a batch: its loss is the quotient of the sums over all of
+    them.
 
     Parameters
     ----------
@@ -196,15 +200,40 @@ def cross_entropy_sums(scores: Tensor, truth: Tensor, alpha: Tensor) -> tuple[Te
         sum_j alpha[c_j]; it has no gradient.
     """
     scores = scores.to(torch.promote_types(scores.dtype, torch.float32))  # mixed precision sums in float32
-    alpha, truth = alpha.to(scores), truth.long()
+    alpha = alpha.to(scores)
+    truth = truth.long()
     losses = F.cross_entropy(scores, truth, weight=alpha, ignore_index=IGNORE, reduction="sum")
     return losses, alpha[truth[truth != IGNORE]].sum()
+
+
+def process_loss(fabric: "Fabric", losses: Tensor, weights: Tensor) -> Tensor:
+    """Return this process's part of the loss, such that the mean over processes is the loss of the whole batch.
+
+    The mean over processes is what distributed training takes of the gradients. With one process the part is the loss
+    itself, losses / weights.
+
+    Parameters
+    ----------
+    fabric : lightning_fabric.Fabric
+        The processes.
+    losses : () float
+        Sum of the weighted losses in this process, nats.
+    weights : () float
+        Sum of the weights in this process.
+
+    Returns
+    -------
+    () float
+        0 when no process has any weight: such a batch teaches nothing, and 0/0 would stop the run.
+    """
+    total = fabric.all_reduce(weights.clone(), reduce_op="sum")
+    return fabric.world_size * losses / total.clamp_min(torch.finfo(total.dtype).tiny)
 
 
 class Objective(nn.Module):
     """The objective of one stage of training: the weighted cross-entropy of a batch, as its two sums.
 
-    It is a module because `DistributedDataParallel` works through the forward pass of a module.
+    It is a module because Fabric shares gradients among processes through the forward pass of a module.
 
     Parameters
     ----------
@@ -218,7 +247,9 @@ class Objective(nn.Module):
 
     def __init__(self, net: SemanticGridNet, stage: str, alpha: Tensor) -> None:
         super().__init__()
-        self.net, self.stage, self.alpha = net, stage, alpha
+        self.net = net
+        self.stage = stage
+        self.register_buffer("alpha", alpha)
 
     def forward(self, batch: Batch) -> tuple[Tensor, Tensor]:
         """Return the two sums whose quotient is the loss of a batch, see `cross_entropy_sums`.

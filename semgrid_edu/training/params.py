@@ -10,7 +10,7 @@ from semgrid_edu.errors import check_fields, types_named
 class TrainingParams:
     """How the network learns: first the image network from image labels, then the whole network from grids.
 
-    The first stage takes the place of the paper's ImageNet weights.
+    The first stage replaces the paper's ImageNet weights.
 
     Parameters
     ----------
@@ -19,25 +19,24 @@ class TrainingParams:
     batch_size : int
         Frames per step; 6 in the paper.
     learning_rate : float
-        The rate at the start of each stage, from which it falls to zero along half a cosine. The paper's 1e-3 refines
-        weights that come from ImageNet. Ours start at random with normalisation in every layer, and can take much
-        larger steps.
+        The rate at the start of each stage, from which it falls to zero along half a cosine. The paper's 1e-3
+        fine-tunes ImageNet weights. Our networks begin with random weights and normalise in every layer, so they allow
+        much larger steps.
     momentum : float
-        The share of the last step that is added to the next; 0.9 in the paper.
+        The fraction of the last step that is added to the next; 0.9 in the paper.
     weight_limit : float
         Largest weight of a class, see `median_frequency_weights`. Without a limit, a cell of signage counts three
         hundred times as much as a cell of unknown-unobserved in minikitti, and a handful of cells decides the loss.
     jitter : float
-        How far brightness and contrast of the images vary, as a share of their range (data augmentation): 142 frames
+        How far brightness and contrast of the images vary, as a fraction of their range (data augmentation): 142 frames
         show few kinds of light.
     tint : float
-        How far red, green and blue vary, each by itself, as a share: light and cameras differ from street to street.
+        How far red, green and blue vary independently, as a fraction: light and cameras differ from street to street.
     end_to_end : bool
         Whether the loss on the grid teaches the image network too. If not, training has two separate stages, as in the
         authors' earlier work, and the second stage doesn't change the image network.
     mirror : bool
-        Whether about half of the batches, by chance, are mirrored: a street with left and right exchanged is just as
-        likely.
+        Whether a random half of the batches is mirrored: a street with left and right exchanged is just as likely.
     """
 
     image_iterations: int = 2000
@@ -53,7 +52,7 @@ class TrainingParams:
 
     @types_named
     def __post_init__(self) -> None:
-        """Refuse numbers that nothing can be learnt with."""
+        """Check that something can be learnt with these numbers."""
         check_fields(self, "0 or more", lambda steps: steps >= 0, "image_iterations", "grid_iterations")
         check_fields(self, "at least one frame", lambda frames: frames >= 1, "batch_size")
         check_fields(self, "a positive number", lambda rate: 0 < rate < math.inf, "learning_rate")
@@ -65,6 +64,12 @@ class TrainingParams:
     def iterations(self) -> int:
         """Number of steps of both stages together."""
         return self.image_iterations + self.grid_iterations
+
+    @property
+    def stages(self) -> list[str]:
+        """The stages that have steps: "image", "grid" or both."""
+        steps = {"image": self.image_iterations, "grid": self.grid_iterations}
+        return [stage for stage, number in steps.items() if number]
 
     def stage(self, iteration: int) -> tuple[str, float]:
         """Return the stage that an iteration belongs to, and the learning rate of its step.
@@ -82,7 +87,9 @@ class TrainingParams:
             The rate, which falls to zero along half a cosine in each stage.
         """
         if iteration < self.image_iterations:
-            stage, done = "image", iteration / self.image_iterations
+            stage = "image"
+            done = iteration / self.image_iterations
         else:
-            stage, done = "grid", (iteration - self.image_iterations) / self.grid_iterations
+            stage = "grid"
+            done = (iteration - self.image_iterations) / self.grid_iterations
         return stage, self.learning_rate * (1 + math.cos(math.pi * done)) / 2

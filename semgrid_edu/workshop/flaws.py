@@ -59,7 +59,7 @@ class TruthFlaws:
         check_fields(self, expected, lambda probability: probability <= 1, "missed")
 
     def apply(self, frames: Sequence[Frame], seed: int, number: int) -> list[Frame]:
-        """Return the frames with these errors: `flawed_drive`, whose parameters these are."""
+        """Return the frames of a drive with these errors. Parameters are those of `flawed_drive`."""
         return flawed_drive(frames, self, seed, number)
 
 

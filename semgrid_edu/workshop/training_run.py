@@ -9,9 +9,10 @@ from pathlib import Path
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
-from semgrid_edu.datasets.training_set import Mixture, TrainingSet, sets_by_camera
+from semgrid_edu.datasets.training_set import Mixture
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.fast import build_net, load_net
+from semgrid_edu.fast import TrainingSet, build_net, load_net
+from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, SemanticGridNet, build_segmenter, load_imagenet
 from semgrid_edu.networks.build import with_mean_scores
@@ -20,7 +21,7 @@ from semgrid_edu.networks.weights import read_architecture
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import write_provenance
 from semgrid_edu.training.checkpoint import CHECKPOINT, check_folder
-from semgrid_edu.training.devices import first_process_first, process_group, rank, world_size
+from semgrid_edu.training.devices import open_fabric
 from semgrid_edu.training.loop import train
 from semgrid_edu.training.params import TrainingParams
 from semgrid_edu.workshop.flaws import TruthFlaws
@@ -30,7 +31,7 @@ PAPER_IMAGE = (375, 1242)
 
 
 def architecture(segmenter: str, preset: str = "compact") -> Architecture:
-    """Return the architecture that a preset stands for, with its size of images and its grid.
+    """Return the architecture of a preset, with its image size and its grid.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ def architecture(segmenter: str, preset: str = "compact") -> Architecture:
 def training_params(
     preset: str, iterations: int, end_to_end: bool = True, from_imagenet: bool = False, tint: float = 0.0
 ) -> TrainingParams:
-    """Return the training parameters that a preset stands for.
+    """Return the training parameters of a preset.
 
     Parameters
     ----------
@@ -152,62 +153,78 @@ def train_network(
         overwritten.
     """
     starts = [start] if isinstance(start, str | Path) else list(start)
-    if imagenet and starts:
-        raise ArgumentError("--from", "no network beside the ImageNet weights, which it would replace", str(starts[0]))
-    if len(starts) > 1 and params.end_to_end:
-        expected = "one network, or --two-stage beside several: their image networks don't learn"
-        raise ArgumentError("--from", expected, f"{len(starts)} networks without --two-stage")
-    began, description, folder = datetime.now(UTC), architecture(segmenter, preset), Path(folder)
-    check_folder(folder, resume)
-    # What can't be is refused before the data are prepared, which takes minutes.
-    params = replace(params, image_iterations=0) if len(starts) > 1 else params
-    like_it, resumed = build_segmenter(segmenter, n_classes=1, preset=preset), (folder / CHECKPOINT).exists()
-    if imagenet:
-        load_imagenet(like_it, imagenet)
-    kinds = [read_architecture(path) for path in starts]
-    for path, kind in zip(starts, kinds, strict=True):
-        _check_alike(path, replace(kind, label_set=description.label_set), description)
-    if sum(kind.n_segmenters for kind in kinds) > MOST_SEGMENTERS:
-        raise ArgumentError("--from", f"at most {MOST_SEGMENTERS} image networks together", f"{len(starts)} files")
     folders = [data] if isinstance(data, str | Path) else list(data)
-    with process_group(device) as chosen:
-        with first_process_first():
-            dataset = _open(folders, description, truth)
-        description = replace(description, label_set=dataset.label_set.name)
-        camera = dataset.camera
-        net = _starts_as(starts, description, camera) if starts else build_net(description, camera, seed)
-        if imagenet:
-            load_imagenet(net.segmenter, imagenet)
-        train(net, dataset, folder, params, seed, resume, chosen)
-        processes, is_first = world_size(), rank() == 0
-    if is_first:
+    folder = Path(folder)
+    began = datetime.now(UTC)
+    description = architecture(segmenter, preset)
+    if len(starts) > 1:
+        params = replace(params, image_iterations=0)
+    # All that can be wrong is found before the data are prepared, which takes minutes.
+    _check_starts(starts, imagenet, description, params.end_to_end)
+    check_folder(folder, resume)
+    resumed = (folder / CHECKPOINT).exists()
+    segmenter_alike = build_segmenter(segmenter, n_classes=1, preset=preset)
+    if imagenet:
+        load_imagenet(segmenter_alike, imagenet)
+
+    keep_freed_memory()
+    fabric = open_fabric(device)
+    with fabric.rank_zero_first():  # the others find the arrays that it makes
+        dataset = _open(folders, description, truth)
+    description = replace(description, label_set=dataset.label_set.name)
+    camera = dataset.camera
+    net = _starts_as(starts, description, camera) if starts else build_net(description, camera, seed)
+    if imagenet:
+        load_imagenet(net.segmenter, imagenet)
+    train(net, dataset, folder, params, seed, resume, fabric)
+
+    if fabric.is_global_zero:
         hashes = [sha256(Path(folder) / INDEX_FILE) for folder in folders]
         details = {
             "date": f"{began:%Y-%m-%d}",
             "minutes": round((datetime.now(UTC) - began).total_seconds() / 60, 1),
             "resumed": resumed,
-            "device": chosen.type,
-            "processes": processes,
+            "device": fabric.device.type,
+            "processes": fabric.world_size,
             # JSON has no infinity.
             "params": {name: str(value) if value == math.inf else value for name, value in asdict(params).items()},
             "dataset": hashes[0] if len(hashes) == 1 else hashes,
-            **({"imagenet": sha256(imagenet)} if imagenet else {}),
-            **({"from": [sha256(path) for path in starts]} if starts else {}),
-            **({"truth": asdict(truth)} if truth else {}),
         }
+        if imagenet:
+            details["imagenet"] = sha256(imagenet)
+        if starts:
+            details["from"] = [sha256(path) for path in starts]
+        if truth:
+            details["truth"] = asdict(truth)
         command = _command(folders, folder, description, imagenet, starts, seed, params, truth)
         write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)
+
+
+def _check_starts(
+    starts: Sequence[str | Path], imagenet: str | Path | None, description: Architecture, end_to_end: bool
+) -> None:
+    """Check that training can start from these networks."""
+    if imagenet and starts:
+        raise ArgumentError("--from", "no network beside the ImageNet weights, which it would replace", str(starts[0]))
+    if len(starts) > 1 and end_to_end:
+        expected = "one network, or --two-stage beside several: their image networks don't learn"
+        raise ArgumentError("--from", expected, f"{len(starts)} networks without --two-stage")
+    kinds = [read_architecture(path) for path in starts]
+    for path, kind in zip(starts, kinds, strict=True):
+        _check_alike(path, replace(kind, label_set=description.label_set), description)
+    if sum(kind.n_segmenters for kind in kinds) > MOST_SEGMENTERS:
+        raise ArgumentError("--from", f"at most {MOST_SEGMENTERS} image networks together", f"{len(starts)} files")
 
 
 def _open(folders: Sequence[str | Path], description: Architecture, truth: LidarTruth | None) -> TrainingSet | Mixture:
     """Open the frames to learn from: those of one camera, or a mixture."""
     chosen = {"spec": description.grid, "image_size": description.image_size, "truth": truth}
-    mixture = Mixture([sets_by_camera(folder, "train", **chosen) for folder in folders])
+    mixture = Mixture([TrainingSet.by_camera(folder, "train", **chosen) for folder in folders])
     return mixture.parts[0] if len(mixture.parts) == 1 else mixture
 
 
 def _starts_as(paths: Sequence[str | Path], description: Architecture, camera: Camera) -> SemanticGridNet:
-    """Return the network of another training run, or the mean of several, and refuse those of another architecture."""
+    """Return the network of another training run, or the mean of several; all must have this architecture."""
     nets = [load_net(path, camera) for path in paths]
     for path, net in zip(paths, nets, strict=True):
         _check_alike(path, net.architecture, description)
@@ -215,7 +232,7 @@ def _starts_as(paths: Sequence[str | Path], description: Architecture, camera: C
 
 
 def _check_alike(path: str | Path, found: Architecture, description: Architecture) -> None:
-    """Refuse a network of another architecture; one with several image networks is of the same."""
+    """Check that a network has an architecture, whatever its number of image networks."""
     if replace(found, n_segmenters=1) != description:
         raise DataError(path, f"a network like the one to train, {description}", found)
 
@@ -230,7 +247,7 @@ def _command(
     params: TrainingParams,
     truth: LidarTruth | None,
 ) -> str:
-    """Return the command that makes the same training run, or as near as a command can: not every policy has a name."""
+    """Return the command that repeats a training run, as far as a command can: not every policy has a name."""
     named = (name for name, policy in POLICIES.items() if truth == LidarTruth(policy, TruthFlaws()))
     options = [
         *(f"--data {_name(data)}" for data in folders),

@@ -1,4 +1,4 @@
-"""Where independent tasks are done: in processes of this machine, or on a dask.distributed cluster."""
+"""Where independent tasks run: in processes of this machine, or on a dask.distributed cluster."""
 
 import os
 import signal
@@ -14,10 +14,10 @@ from semgrid_edu.errors import ArgumentError
 
 @contextmanager
 def worker_pool(workers: int) -> Iterator[Executor]:
-    """Yield a pool of processes. When the block raises, work that hasn't begun is dropped.
+    """Yield a pool of processes. When the block raises an error, work that hasn't begun is dropped.
 
     The processes are spawned. Forked ones would inherit the locks of torch's and numba's threads, and hang. A worker of
-    a dask.distributed cluster may start no processes of its own; there one thread does all the work.
+    a dask.distributed cluster must not start processes; there one thread does all the work.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def worker_pool(workers: int) -> Iterator[Executor]:
 
 
 DIED = 'a worker died: does your script start them below `if __name__ == "__main__":`? Else memory may have run out'
-"""What to say when a worker ends before its work: each imports the script that started it."""
+"""The message when a worker dies: each worker imports the script that started it."""
 
 
 def _end_with_parent() -> None:
@@ -90,7 +90,7 @@ def usable_cores() -> int:
 
 
 def check_workers(workers: int) -> None:
-    """Refuse a number of processes that this machine has no cores for.
+    """Check that this machine has cores for a number of processes.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def check_workers(workers: int) -> None:
 
 @contextmanager
 def workplace(workers: int | None = None, scheduler: str | None = None) -> Iterator[Workplace]:
-    """Open the place where tasks are done.
+    """Open the place where tasks run.
 
     Parameters
     ----------

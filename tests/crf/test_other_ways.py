@@ -6,17 +6,18 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from enumeration import enumerated
 from scipy.special import softmax
 from sklearn.kernel_approximation import Nystroem
 from worlds import lecture_11_coupling as coupling_study
 from worlds import lecture_11_error as error_study
 from worlds.lecture_10_crf import all_free, coupled, two_classes
+from worlds.lecture_11_charts import coupling_errors, error_against_time
 from worlds.lecture_11_coupling import random_crf
 from worlds.lecture_11_error import CROP, N_CROPS, CrfProblem, crops
 from worlds.lecture_11_other_ways import LowRankGaussian, mean_field_low_rank, potts_messages, visit_labellings
 from worlds.lecture_11_search import EXPLORED, next_point, params_at
 
-from semgrid_edu import plotting
 from semgrid_edu.crf import (
     CrfParams,
     crf_model,
@@ -27,7 +28,7 @@ from semgrid_edu.crf import (
     unary_from_probability,
 )
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical import loopy_max_product, sum_product
+from semgrid_edu.graphical import sum_product
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 
@@ -46,14 +47,20 @@ def test_every_labelling_gives_what_elimination_gives(shape):
     np.testing.assert_array_equal(labels, most_likely(*crf))
 
 
-@pytest.mark.parametrize(("best", "reference"), [(False, sum_product), (True, loopy_max_product)])
 @pytest.mark.parametrize(("shape", "coupling"), [((2, 2, 2), 0.0), ((3, 2, 2), 1.0), ((3, 1, 2), 4.0)])
-def test_messages_from_cell_to_cell_are_those_through_factors(best, reference, shape, coupling):
+def test_messages_from_cell_to_cell_are_those_through_factors(shape, coupling):
     crf = *random_crf(shape, 1), coupled(coupling)
     model = crf_model(*crf)
-    beliefs = reference(model, iterations=200, damping=0.5).marginals
+    beliefs = sum_product(model, iterations=200, damping=0.5).marginals
     found = np.stack([beliefs[name] for name in model.names], axis=1).reshape(shape)
-    np.testing.assert_allclose(potts_messages(*crf, best), found, atol=1e-6)
+    np.testing.assert_allclose(potts_messages(*crf), found, atol=1e-6)
+
+
+def test_between_two_cells_the_best_messages_give_max_marginals():
+    crf = *random_crf((3, 1, 2), 1), coupled(4.0)
+    labellings, energies = enumerated(*crf)
+    best = [[np.exp(-energies[labellings[:, 0, i] == label].min()) for i in (0, 1)] for label in range(3)]
+    np.testing.assert_allclose(potts_messages(*crf, best=True)[:, 0], best / np.sum(best, axis=0), atol=1e-9)
 
 
 def test_too_many_labellings_and_impossible_classes_are_errors():
@@ -140,11 +147,9 @@ def test_crops_are_one_ahead_of_the_other_in_the_middle():
 
 def test_figures_have_a_line_for_each_way():
     coupling, error = (json.loads((RESULTS / f"crf_{name}.json").read_text()) for name in ("coupling", "error"))
-    assert [len(ax.get_lines()) for ax in plotting.coupling_errors(coupling).axes] == [4] * 4 + [6] * 4
-    figure = plotting.error_against_time(error, "compact grid")
+    assert [len(ax.get_lines()) for ax in coupling_errors(coupling).axes] == [4] * 4 + [6] * 4
+    figure = error_against_time(error, "compact grid")
     assert [len(ax.get_lines()) for ax in figure.axes] == [len(error_study.crf_ways())] * 3
-    with pytest.raises(ArgumentError, match="tiny"):
-        plotting.error_against_time(error, "tiny")
     plt.close("all")
 
 

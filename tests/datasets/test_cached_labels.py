@@ -10,10 +10,9 @@ from tiny_drive import DATE, write_tiny_dataset
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.datasets.ground_truth import TruthPolicy, lidar_truth
 from semgrid_edu.datasets.label_policies import LidarTruth
-from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import TrainingSet, track_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import track_drive
 from semgrid_edu.workshop.flaws import NO_FLAWS, TruthFlaws
 
 SMALL = (6, 20)

@@ -7,9 +7,8 @@ from npz_drive import NpzDrive, write_npz_drives
 from semgrid_edu.datasets import training_cache
 from semgrid_edu.datasets.ground_truth import lidar_truth
 from semgrid_edu.datasets.label_policies import LidarTruth
-from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.fast import track_drive
+from semgrid_edu.fast import TrainingSet, track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import WEIGHTS, Architecture, build_net

@@ -28,8 +28,8 @@ from semgrid_edu.datasets import DatasetIndex, LabelledFrame, PandasetScene, loa
 from semgrid_edu.datasets.cuboids import put_together
 from semgrid_edu.datasets.index import write_pandaset_index
 from semgrid_edu.datasets.pandaset_files import read_pandaset_scan
-from semgrid_edu.datasets.training_set import TrainingSet, sets_by_camera
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import TrainingSet
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.occupancy import SensorModel, scan_evidence
@@ -104,7 +104,7 @@ def test_the_vehicles_own_returns_are_those_on_its_roof_whichever_way_the_grid_l
     columns = dict(zip("xyz", points.T, strict=True)) | {"i": np.zeros(len(points)), "t": np.full(len(points), 100.0)}
     write_table(copy / SCENE / "lidar/00.pkl.gz", columns | {"d": np.append(scan.lidars, [0, 0])})
     frame = PandasetScene(copy, SCENE, camera)[0]
-    assert np.flatnonzero(frame.own).tolist() == [len(frame.points) - 2]
+    assert np.flatnonzero(frame.vehicle_returns).tolist() == [len(frame.points) - 2]
     evidence = scan_evidence(frame.points_grid, SPEC, SensorModel())
     assert class_at(evidence.occupied > evidence.free, *beside)
     assert not np.isin(roof[2] - GROUND, prepare_scan(frame.points_grid, SensorModel(ground=None))[:, 2])
@@ -387,7 +387,7 @@ def test_a_scene_is_learnt_from_like_a_simulated_data_set(root, tmp_path):
     write_pandaset_index(tmp_path / "data", root, SCENE, ["left_camera"])
     index = load_index(tmp_path / "data")
     assert {split: len(frames) for split, frames in index.splits.items()} == {"train": 3, "test": 2}
-    (front,) = sets_by_camera(index, "train")
+    (front,) = TrainingSet.by_camera(index, "train")
     scene = PandasetScene(root, SCENE)
     assert front.camera.same_as(scene.camera.resized((96, 320)))
     for k in range(3):

@@ -7,7 +7,7 @@ from hypothesis.extra.numpy import arrays
 
 from semgrid_edu.camera import Camera, project
 from semgrid_edu.datasets.frames import resize_labels
-from semgrid_edu.datasets.training_arrays import resize_image
+from semgrid_edu.frame import resize_image
 
 labels = arrays(np.uint8, (12, 8), elements=st.sampled_from([0, 3, 13, 255]))
 

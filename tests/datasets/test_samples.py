@@ -14,8 +14,9 @@ from semgrid_edu.datasets.samples import (
     samples_problems,
     trained_segmenters,
 )
-from semgrid_edu.datasets.training_set import FRAMES, TrainingSet, read_excerpt
+from semgrid_edu.datasets.training_set import FRAMES, read_excerpt
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import TrainingSet
 from semgrid_edu.networks import load_net
 from semgrid_edu.storage.files import write_bytes
 from semgrid_edu.workshop.commands.excerpt import write_excerpt

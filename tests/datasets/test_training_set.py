@@ -10,10 +10,10 @@ from tiny_drive import DATE, SIZE, write_tiny_dataset
 from typer.testing import CliRunner
 
 from semgrid_edu.datasets import KittiRawDrive, grid_truth, training_cache
-from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import TrainingSet, track_drive
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import CmcdotParams, track_drive
+from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.storage.files import CACHE_VARIABLE, cache_folder
 from semgrid_edu.workshop.commands.main import app
 

@@ -6,14 +6,11 @@ import pytest
 
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.metrics import METRICS, pixel_accuracy
-from semgrid_edu.workshop.paper.reports.ablations import ablated_runs, ablation_runs
-from semgrid_edu.workshop.paper.reports.claims import CLAIMS, STATEMENTS, Reading, called, called_void, stated
-from semgrid_edu.workshop.paper.reports.deviations import deviations
-from semgrid_edu.workshop.paper.reports.drop import drop_markdown
-from semgrid_edu.workshop.paper.reports.judging import READINGS, _judged, claims_markdown
-from semgrid_edu.workshop.paper.reports.verdicts import ERROR_RATE, Statement, holm, verdict, which_hold
-from semgrid_edu.workshop.paper.runs import claim_runs
-from semgrid_edu.workshop.paper.runs.other_runs import (
+from semgrid_edu.workshop.paper import plans
+from semgrid_edu.workshop.paper.ablations import ablated_runs, ablation_runs
+from semgrid_edu.workshop.paper.claims import CLAIMS, STATEMENTS, Reading, Statement, called, called_void, stated
+from semgrid_edu.workshop.paper.deviations import deviations
+from semgrid_edu.workshop.paper.other_runs import (
     OVERTURNED,
     UPRIGHT,
     UPRIGHT_RANGE,
@@ -21,10 +18,19 @@ from semgrid_edu.workshop.paper.runs.other_runs import (
     p_not_saved,
     time_saved,
 )
-from semgrid_edu.workshop.paper.runs.paper import NETWORKS, TABLE_1_SCORES, TABLE_2_SCORES, TABLE_3_CONFUSION
-from semgrid_edu.workshop.paper.runs.scales import SCALES
-from semgrid_edu.workshop.paper.runs.score_runs import GEOMETRY, NETWORK, TRUE_GEOMETRY, WITH_CRF
-from semgrid_edu.workshop.paper.runs.training_runs import GridStageRun
+from semgrid_edu.workshop.paper.published import NETWORKS, TABLE_1_SCORES, TABLE_3_CONFUSION
+from semgrid_edu.workshop.paper.scales import SCALES
+from semgrid_edu.workshop.paper.score_runs import GEOMETRY, NETWORK, TRUE_GEOMETRY, WITH_CRF
+from semgrid_edu.workshop.paper.training_runs import GridStageRun
+from semgrid_edu.workshop.paper.verdicts import (
+    ERROR_RATE,
+    READINGS,
+    _judged,
+    claims_markdown,
+    holm,
+    verdict,
+    which_hold,
+)
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 from semgrid_edu.workshop.scoring.grids import OCCUPANCY_ALONE
 from semgrid_edu.workshop.scoring.score_with_interval import on_cells, score_with_interval, shown, shown_seeds
@@ -304,22 +310,10 @@ def test_every_deviation_of_scale_is_told(scale):
     )
 
 
-def drop(pixel, by_class):
-    row = {"pixel accuracy": pixel, "class accuracy": by_class, "FmIoU": -0.1}
-    paper = {m: TABLE_2_SCORES["segnet", False][m] - TABLE_1_SCORES["segnet", False][m] for m in METRICS}
-    return drop_markdown({"paper": paper, "ours": row})
-
-
-def test_the_sentence_on_the_drop_follows_the_numbers():
-    assert "the opposite pattern" in drop(-0.09, -0.04)
-    assert "the same pattern" in drop(-0.02, -0.14)
-    assert "class accuracy falls most, by 14.1" in drop(-0.02, -0.14)
-
-
 def test_the_page_shows_quote_rule_labels_and_every_verdict():
     runs = SimpleNamespace(networks=networks(**SMOOTHED), taught_true=networks(**SMOOTHED)["segnet"])
     found = {str(number): _judged(number, runs, None, 3, DRIVES) for number in (1, 2)}
-    text = claims_markdown({"rule": "The rule.", "claims": found, "drop": {"paper": dict.fromkeys(METRICS, -0.1)}})
+    text = claims_markdown({"rule": "The rule.", "claims": found})
     assert all(words in text for words in (CLAIMS[1]["quote"], CLAIMS[2]["judged_by"], *READINGS.values()))
     table = next(line for line in text.splitlines() if line.startswith("| 1 "))
     assert table.count("reproduced") == 2
@@ -335,14 +329,14 @@ def test_ablations_do_every_run_that_a_row_reads(scale):
 
 @pytest.mark.parametrize("scale", SCALES.values(), ids=SCALES)
 def test_claims_share_the_runs_of_tables_and_ablations(scale):
-    runs = claim_runs.runs_of_claims(scale, scale.seeds)
+    runs = plans.runs_of_claims(scale, scale.seeds)
     assert len(runs.unreduced) == len(runs.usual_of_all_seeds) == scale.table1_seeds
     assert {run.network for run in runs.usual} <= {run.network for run in runs.networks["segnet"]}
     assert {run.network.image_stage for run in runs.two_stages} == {run.network.image_stage for run in runs.usual}
     assert not any(run.network.params.end_to_end for run in runs.two_stages)
     assert all(run.frames.grid.cell == 0.2 for run in runs.perfect)
-    assert len({run.name for run in claim_runs.claims_plan(scale, scale.seeds)}) == len(
-        set(claim_runs.claims_plan(scale, scale.seeds))
+    assert len({run.name for run in plans.claims_plan(scale, scale.seeds)}) == len(
+        set(plans.claims_plan(scale, scale.seeds))
     )
 
 
@@ -351,15 +345,6 @@ def test_claim_4_learns_from_many_routes_on_fine_cells():
     assert isinstance(network, GridStageRun)
     assert len(network.arrays.routes) >= 20
     assert network.architecture.grid.cell == network.image_stage.architecture.grid.cell == 0.2
-
-
-def test_the_papers_structure_has_its_frames_in_few_runs():
-    scale = SCALES["reduced"]
-    for split in ("train", "test"):
-        runs, streets = (scale.arrays(data, split, "true") for data in (scale.kitti_runs, scale.kitti))
-        assert runs.n_labelled == streets.n_labelled
-        assert len(runs.routes) == 4
-        assert {(k + 1) % 10 for route in runs.routes for k in route.labelled} == {0}
 
 
 def test_baselines_of_claim_7_are_counted():

@@ -13,16 +13,15 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.storage.tensors import write_arrays
-from semgrid_edu.workshop.paper.runs.other_runs import boxes_on
-from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
-from semgrid_edu.workshop.paper.runs.score_runs import (
+from semgrid_edu.workshop.paper.other_runs import boxes_on
+from semgrid_edu.workshop.paper.run_counts import RunCounts
+from semgrid_edu.workshop.paper.score_runs import (
     CONFUSIONS,
     RELIABILITY,
     SEARCHED,
-    WEIGHTS_FOR_CLASSES,
     CountingRun,
 )
-from semgrid_edu.workshop.paper.runs.variants import EXACT, CalibrationError
+from semgrid_edu.workshop.paper.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scoring.confusions import BANDS, distance_band_names, save_confusions
 from semgrid_edu.workshop.scoring.counting import count_grids, distance_bands
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
@@ -156,5 +155,3 @@ def test_searched_parameters_are_those_of_the_searches():
         found = json.loads((results / name).read_text())
         assert temperature == pytest.approx(found["temperature"], abs=1e-4)
         assert params == CrfParams(**found["chosen"]["pixel accuracy"]["params"])
-        chosen = found["chosen"]["class accuracy"]["params"]
-        assert WEIGHTS_FOR_CLASSES[segmenter] == {name: chosen[name] for name in ("w_bilateral", "w_spatial")}

@@ -12,9 +12,9 @@ from semgrid_edu.datasets import training_cache
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SEGMENTERS
 from semgrid_edu.networks.segmenter import Segmenter
-from semgrid_edu.workshop.paper.reports import reproduce as reports
-from semgrid_edu.workshop.paper.runs.data_runs import DataRun
-from semgrid_edu.workshop.paper.runs.scales import SCALES, Scale, scale_named
+from semgrid_edu.workshop.paper import reproduce as reports
+from semgrid_edu.workshop.paper.data_runs import DataRun
+from semgrid_edu.workshop.paper.scales import SCALES, Scale, scale_named
 from semgrid_edu.workshop.workplace import Workplace
 
 

@@ -5,26 +5,26 @@ from dataclasses import replace
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-
-from semgrid_edu.datasets.samples import real_drive, sample_drive
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.metrics import pixel_accuracy
-from semgrid_edu.workshop.studies.new_drive.faults import FAULTS, YAWS
-from semgrid_edu.workshop.studies.new_drive.own_street import (
-    PIECE,
-    best_table,
-    piece_confusions,
-    semantic_truths,
-    street_pieces,
-)
-from semgrid_edu.workshop.studies.new_drive.report_card import (
+from worlds.lecture_13_faults import FAULTS, YAWS
+from worlds.lecture_13_report_card import (
     Line,
     border_verdict,
     check_lines,
     draw_report_card,
     map_lines,
     motion_verdict,
+)
+
+from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.metrics import pixel_accuracy
+from semgrid_edu.workshop.course.street import (
+    PIECE,
+    best_table,
+    piece_confusions,
+    semantic_truths,
+    street_pieces,
 )
 
 SPEC = GridSpec(x_min=0, x_max=24, y_min=-8, y_max=8, cell=2.0)

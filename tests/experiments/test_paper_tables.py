@@ -8,18 +8,18 @@ from tiny_notes import Note
 
 import semgrid_edu
 from semgrid_edu.labels import SYNTHIA_10
-from semgrid_edu.workshop.paper.reports.experiments import EXPERIMENTS, Experiment
-from semgrid_edu.workshop.paper.reports.pictures import accuracy_picture, confusion_picture
-from semgrid_edu.workshop.paper.reports.reproduce import result_markdown, write_result
-from semgrid_edu.workshop.paper.reports.tables import (
+from semgrid_edu.workshop.paper.experiments import EXPERIMENTS, Experiment
+from semgrid_edu.workshop.paper.pictures import accuracy_picture, confusion_picture
+from semgrid_edu.workshop.paper.published import TABLE_1_SCORES
+from semgrid_edu.workshop.paper.reproduce import result_markdown, write_result
+from semgrid_edu.workshop.paper.scales import SCALES
+from semgrid_edu.workshop.paper.score_runs import FITTED_BASELINES, WITH_CRF
+from semgrid_edu.workshop.paper.tables import (
     accuracy_markdown,
     accuracy_result,
     confusion_markdown,
     confusion_result,
 )
-from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES
-from semgrid_edu.workshop.paper.runs.scales import SCALES
-from semgrid_edu.workshop.paper.runs.score_runs import FITTED_BASELINES, WITH_CRF
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 
 
@@ -96,7 +96,7 @@ def test_table_3_has_its_baselines_with_paired_differences():
 
 def test_every_command_has_a_result():
     assert list(EXPERIMENTS) == [
-        *("table1", "table2", "table3", "claims", "structure", "ablations", "truth-costs", "figures"),
+        *("table1", "table2", "table3", "claims", "ablations", "truth-costs", "figures"),
     ]
 
 
@@ -109,7 +109,7 @@ def test_committed_results_give_the_committed_text(name):
 
 def test_a_result_is_written_with_all_that_made_it(tmp_path):
     runs, scale = [Note("a"), Note("b", (Note("a"),))], SCALES["quick"]
-    for run, own in zip(runs, ({"seconds": 60}, {"seconds": 120, "processes": 2, "device": "cuda"}), strict=True):
+    for run, own in zip(runs, ({"seconds": 60}, {"seconds": 120, "device": "cuda"}), strict=True):
         run.folder(tmp_path).mkdir()
         ended = {"commit": "abc", "date": "2026-01-01", "device": "cpu", **own}
         (run.folder(tmp_path) / "ended.json").write_text(json.dumps(ended))
@@ -126,7 +126,7 @@ def test_a_result_is_written_with_all_that_made_it(tmp_path):
     assert content["x"] == 1
     assert content["commits"] == ["abc"]
     assert content["command"].startswith("semgrid-edu reproduce table --scale quick --seeds 2")
-    assert content["command"].endswith(" --device cuda --processes 2")
+    assert content["command"].endswith(" --device cuda")
     assert any("bfloat16" in line for line in content["deviations"])
     assert all(line in text for line in content["deviations"])
     assert content["deviations"][-1] == "No frame was seen by day."

@@ -1,23 +1,26 @@
-"""What few long runs do to an interval, the drop between tables, and the figures' parts, from counts made by hand."""
+"""What few long runs do to an interval, from counts made by hand and from committed ones; the figures' parts."""
 
+import json
 from itertools import product
-from types import SimpleNamespace
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from worlds.lecture_12_structure import DATA, structure, structure_runs
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.storage.tensors import write_arrays
-from semgrid_edu.workshop.paper.reports import structure
-from semgrid_edu.workshop.paper.reports.drop import drop_between_tables
-from semgrid_edu.workshop.paper.reports.pictures import PARTS, figures_markdown, figures_picture
-from semgrid_edu.workshop.paper.runs.claim_runs import figure_runs, shown_frames, structure_runs
-from semgrid_edu.workshop.paper.runs.other_runs import GRIDS, KEPT
-from semgrid_edu.workshop.paper.runs.paper import TABLE_1_SCORES, TABLE_2_SCORES
-from semgrid_edu.workshop.paper.runs.run_counts import RunCounts
-from semgrid_edu.workshop.paper.runs.scales import SCALES
+from semgrid_edu.workshop.paper.deviations import frame_counts
+from semgrid_edu.workshop.paper.other_runs import GRIDS, KEPT
+from semgrid_edu.workshop.paper.pictures import PARTS, figures_markdown, figures_picture
+from semgrid_edu.workshop.paper.plans import figure_runs, shown_frames
+from semgrid_edu.workshop.paper.recompute import differences
+from semgrid_edu.workshop.paper.run_counts import RunCounts
+from semgrid_edu.workshop.paper.scales import SCALES
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results" / "reduced"
 
 
 class Counted:
@@ -38,16 +41,14 @@ class Counted:
 
 
 @pytest.fixture
-def result(monkeypatch):
+def rows():
     """Streets are 120 drives of a frame each, long runs four of thirty."""
-    scale, n_drives = SCALES["reduced"], {"minikitti": 120, "kittiruns": 4}
-    made = {pair: [Counted(80, n_drives[pair[1]], seed) for seed in range(3)] for pair in structure_runs(scale, 1)}
-    monkeypatch.setattr(structure, "structure_runs", lambda *_: made)
-    return structure.structure(scale, 3, None)
+    n_drives = {"minikitti": 120, "kittiruns": 4}
+    pairs = {pair: [Counted(80, n_drives[pair[1]], seed) for seed in range(3)] for pair in product(DATA, DATA)}
+    return {(row["learned"], row["tested"]): row for row in structure(pairs, None)}
 
 
-def test_few_runs_have_no_interval_and_frames_would_promise_too_much(result):
-    rows = {(row["learned"], row["tested"]): row for row in result["rows"]}
+def test_few_runs_have_no_interval_and_frames_would_promise_too_much(rows):
     assert len(rows) == 4
     streets, runs = rows["minikitti", "minikitti"], rows["minikitti", "kittiruns"]
     assert streets["scores"]["all"]["pixel accuracy"]["low"] is not None
@@ -57,21 +58,19 @@ def test_few_runs_have_no_interval_and_frames_would_promise_too_much(result):
     assert runs["drives"][0] < runs["scores"]["all"]["pixel accuracy"]["mean"] < runs["drives"][1]
 
 
-def test_the_page_on_structure_has_every_pair(result):
-    text = structure.structure_markdown(result)
-    pairs = [tuple(cell.strip() for cell in line.split("|")[1:3]) for line in text.splitlines() if "|" in line]
-    assert all(pairs.count(pair) == 2 for pair in product(("minikitti", "kittiruns"), repeat=2))
-    assert "eight runs" in text
-    plt.close(structure.structure_picture(result))
+def test_the_committed_counts_give_the_committed_rows():
+    committed = json.loads((RESULTS / "structure.json").read_text())
+    pairs = structure_runs(SCALES["reduced"], committed["seeds"])
+    computed = structure(pairs, RunCounts(RESULTS / "structure_counts.npz"))
+    assert not list(differences(committed["rows"], json.loads(json.dumps(computed)), "structure.json"))
 
 
-def test_the_drop_is_table_2_minus_table_1():
-    runs = SimpleNamespace(usual=[Counted(80, 12)], table2=[Counted(60, 12)], new_routes=[Counted(70, 12)])
-    found = drop_between_tables(runs, None)
-    assert found["ours"]["pixel accuracy"] == pytest.approx(-0.2)
-    assert found["ours, more routes"]["pixel accuracy"] == pytest.approx(-0.1)
-    papers = TABLE_2_SCORES["segnet", False]["class accuracy"] - TABLE_1_SCORES["segnet", False]["class accuracy"]
-    assert found["paper"]["class accuracy"] == papers == pytest.approx(-0.141)
+def test_few_runs_have_as_many_frames_as_there_are_streets():
+    counts = frame_counts("kittiruns")
+    assert {split: frames for split, (frames, _) in counts.items()} == {
+        split: frames for split, (frames, _) in frame_counts("minikitti").items()
+    }
+    assert [n_drives for _, n_drives in counts.values()] == [4, 4]
 
 
 def test_figure_6_has_a_scene_of_every_data_set_it_has_in_the_paper(tmp_path):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from worlds.lecture_14_gain import worth_by_distance
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.samples import sample_drive
@@ -10,7 +11,6 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.memory import View
 from semgrid_edu.occupancy import Belief
-from semgrid_edu.workshop.studies.filter.memory_gain import worth_by_distance
 
 SPEC = GridSpec(0, 71, -15.5, 15.5, 1.0)
 

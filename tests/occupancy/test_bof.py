@@ -8,6 +8,7 @@ from filterpy import discrete_bayes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
+from worlds.lecture_04_scenes import hit_cells
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
@@ -33,7 +34,6 @@ from semgrid_edu.occupancy import (
 )
 from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
 from semgrid_edu.occupancy.resampling import draw_velocities
-from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 GRID = GridSpec(0, 3, -1, 1, 0.5)

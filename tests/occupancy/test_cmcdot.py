@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
+from worlds.lecture_04_scenes import hit_cells
 
 from semgrid_edu import fast, occupancy
 from semgrid_edu.camera import Camera, rigid_transform
@@ -17,7 +18,6 @@ from semgrid_edu.fast import Cmcdot, track_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, PlanarMotion, State
-from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 
 SMALL = GridSpec(0, 40, -10, 10, 0.5)
 PARAMS = CmcdotParams(n_particles=50_000)

@@ -32,10 +32,10 @@ from semgrid_edu.occupancy import (
     Walls,
     WorldModel,
 )
-from semgrid_edu.occupancy.ground import GroundParams, height_above_ground
 from semgrid_edu.occupancy.local_belief import velocity_moments
 from semgrid_edu.occupancy.particles import cells_of
 from semgrid_edu.occupancy.planar_motion import look_up
+from semgrid_edu.occupancy.polar import GroundParams, height_above_ground
 from semgrid_edu.occupancy.resampling import systematic_resample
 
 GRID = GridSpec(0, 6, -2, 2, 1)

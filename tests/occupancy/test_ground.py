@@ -10,7 +10,7 @@ from semgrid_edu import fast
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion, SensorModel, scan_evidence
-from semgrid_edu.occupancy.ground import GroundParams, height_above_ground, walk_sector
+from semgrid_edu.occupancy.polar import GroundParams, height_above_ground, walk_sector
 from semgrid_edu.occupancy.sensor import prepare_scan
 
 PARAMS = GroundParams()

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from worlds.lecture_04_scenes import known_scenes
+from worlds.lecture_04_street_scores import StreetScores
+from worlds.lecture_04_suspects import Suspect, run_filter
 
 from semgrid_edu import fast
 from semgrid_edu.errors import ArgumentError
@@ -22,8 +25,8 @@ from semgrid_edu.occupancy import (
     update,
 )
 from semgrid_edu.occupancy.bof import origins
-from semgrid_edu.occupancy.cellwise import CERTAIN
-from semgrid_edu.workshop.studies.filter.streets import measure_streets
+from semgrid_edu.occupancy.state import CERTAIN
+from semgrid_edu.workshop.simulation import simulate
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 ROW = GridSpec(0, 16, 0, 1, 1)
@@ -210,9 +213,9 @@ def test_what_is_no_time_and_no_number_of_cells_is_refused(name, value):
 
 def test_walls_that_come_into_view_stay_static():
     """On a street of walls that come into view, half a second makes less than half as many phantoms as none."""
-    arguments = {"drives": 1, "grids": ("compact",), "streets": ("walls",), "frames": 25}
-    looks, blind = (
-        measure_streets(seed=9, params=CmcdotParams(walls=walls), **arguments)["scores"]["compact"]["walls"]
-        for walls in (Walls(), None)
-    )
-    assert looks["cells"]["scenery"]["called"] < blind["cells"]["scenery"]["called"] / 2
+    spec, drive = GridSpec.compact(), simulate(9000, 25, "walls")
+    scenes, looks, blind = list(known_scenes(drive, spec)), StreetScores(spec), StreetScores(spec)
+    for scores, walls in ((looks, Walls()), (blind, None)):
+        run_filter(drive, scenes, Suspect(params=CmcdotParams(walls=walls)), scores, seed=9)
+    assert looks.cells["scenery"][0] == blind.cells["scenery"][0]
+    assert looks.cells["scenery"][1] < blind.cells["scenery"][1] / 2

@@ -8,13 +8,13 @@ import json
 
 import numpy as np
 import pytest
+from worlds.lecture_04_scenes import hit_cells
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import SensorModel, State
 from semgrid_edu.occupancy.sensor import prepare_scan
-from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 
 pytestmark = pytest.mark.real
 

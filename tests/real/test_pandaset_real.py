@@ -72,7 +72,10 @@ def test_more_scans_label_more_cells_and_no_moving_car_is_smeared(scene):
 def test_the_filter_does_not_miss_the_returns_that_the_excerpt_leaves_out(scene):
     frames, spec = [scene._without_labels(k) for k in range(10)], GridSpec.paper()
     needed = [needed_returns(frame.points_grid) for frame in frames]
-    fewer = [replace(f, points=f.points[some], own=f.own[some]) for f, some in zip(frames, needed, strict=True)]
+    fewer = [
+        replace(f, points=f.points[some], vehicle_returns=f.vehicle_returns[some])
+        for f, some in zip(frames, needed, strict=True)
+    ]
     assert sum(len(frame.points) for frame in fewer) < 0.5 * sum(len(frame.points) for frame in frames)
     for whole, reduced in zip(track_drive(frames, spec), track_drive(fewer, spec), strict=True):
         np.testing.assert_array_equal(whole.probability, reduced.probability)

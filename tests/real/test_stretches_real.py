@@ -7,13 +7,13 @@ import json
 
 import numpy as np
 import pytest
+from worlds.lecture_04_scenes import hit_cells
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State
 from semgrid_edu.plotting.grids import velocity_arrows
-from semgrid_edu.workshop.studies.filter.scenes import hit_cells
 
 pytestmark = pytest.mark.real
 

@@ -6,18 +6,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
-from semgrid_edu.workshop.simulation.street.ego import Ego
 from semgrid_edu.workshop.simulation.street.ground import (
     KERB_HEIGHT,
+    Extent,
     ground_height,
     ground_kind,
     ground_kinds,
+    ground_mesh,
     lane_mark,
     on_wheels,
 )
 from semgrid_edu.workshop.simulation.street.layout import Road, Side, to_road, to_world
-from semgrid_edu.workshop.simulation.street.terrain import Extent, ground_mesh
-from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Trajectory
+from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Ego, Trajectory
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 SIDE = Side(edge=4.0, strip=0.0, walk=2.0, bank_rise=0.8, bank_width=3.0)

@@ -1,7 +1,7 @@
 """The named test streets: each has what its name says, where real streets have it."""
 
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -12,12 +12,11 @@ from semgrid_edu.workshop.simulation import drive
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import TEST_STREETS, named_street
 from semgrid_edu.workshop.simulation.street.builder import Builder
+from semgrid_edu.workshop.simulation.street.ground import ground_mesh
 from semgrid_edu.workshop.simulation.street.plan import ANY, YARD, Wishes, draw_plan
 from semgrid_edu.workshop.simulation.street.road_users import overturned_car
-from semgrid_edu.workshop.simulation.street.terrain import ground_mesh
 from semgrid_edu.workshop.simulation.street.trajectories import Departure
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.studies.filter.detection_latency import convoy_pairs
 
 FENCED = ("mesh", "mesh and hedge", "hedge", "glass", "posts", "walls")
 SEEDS = (0, 1, 2)
@@ -27,6 +26,16 @@ SEEDS = (0, 1, 2)
 def street(name: str, seed: int = 0, frames: int = 2) -> SimulatedDrive:
     """A street that several tests look at; none of them changes it."""
     return named_street(name, seed, frames)
+
+
+def convoy_pairs(moving) -> list[tuple[int, int]]:
+    """The numbers of each car and of the next one behind it: cars on one line at one pace."""
+    lines: dict[object, list[tuple[float, int]]] = {}
+    for path, number in ((actor.trajectory, actor.instance) for actor in moving if actor.kind == Kind.CAR):
+        line = (path.along, path.across, path.d if path.along else path.s, path.pace)
+        lines.setdefault(line, []).append((path.s * path.along + path.d * path.across, number))
+    ordered = [[number for _, number in sorted(line, reverse=True)] for line in lines.values()]
+    return [pair for line in ordered for pair in pairwise(line)]
 
 
 def materials(drive) -> set:

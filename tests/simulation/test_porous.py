@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Instant, PorousMesh, RayMesh
-from semgrid_edu.workshop.simulation.things import furniture
+from semgrid_edu.workshop.simulation.things import roadside
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, box, quads
 
@@ -108,7 +108,7 @@ def test_where_nothing_is_porous_nothing_is_drawn():
 
 
 def test_a_piece_of_mesh_stands_between_its_posts():
-    frame, wire = furniture.sheet_fence("wire", 2.5)
+    frame, wire = roadside.sheet_fence("wire", 2.5)
     assert set(wire.material) == {Material.WIRE}
     assert wire.vertices[:, 0].min() == 0
     assert wire.vertices[:, 0].max() == pytest.approx(2.5)

@@ -5,11 +5,9 @@ import pytest
 import trimesh
 
 from semgrid_edu.workshop.simulation.things.buildings import House, build_house
-from semgrid_edu.workshop.simulation.things.cars import BODIES, car, car_size
-from semgrid_edu.workshop.simulation.things.furniture import FENCES, SIGNS, fence, sign
+from semgrid_edu.workshop.simulation.things.cars_and_people import BODIES, Person, bicycle, car, car_size, rider, walker
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.people import Person, bicycle, rider, walker
-from semgrid_edu.workshop.simulation.things.plants import TREES, bush, hedge, tree
+from semgrid_edu.workshop.simulation.things.roadside import FENCES, SIGNS, TREES, bush, fence, hedge, sign, tree
 from semgrid_edu.workshop.simulation.things.shapes import ball, box, merge, quads, tube
 
 STYLE = {"colour": (0.5, 0.5, 0.5), "material": Material.MATTE, "kind": Kind.POLE}

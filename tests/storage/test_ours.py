@@ -21,7 +21,7 @@ def test_a_new_file_an_empty_one_and_our_own_may_be_written(tmp_path):
         check_ours(MARK, tmp_path / name)
 
 
-@pytest.mark.parametrize("content", ["{}", json.dumps({"command": "semgrid-edu reproduce overfit"}), "notes"])
+@pytest.mark.parametrize("content", ["{}", json.dumps({"command": "semgrid-edu reproduce table1"}), "notes"])
 def test_nothing_else_is_replaced_without_being_asked(tmp_path, content):
     path = tmp_path / "scores.json"
     path.write_text(content)

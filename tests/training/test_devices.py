@@ -1,10 +1,13 @@
 """No GPU is needed: whether there are some is what these tests make up."""
 
+from types import SimpleNamespace
+
+import lightning_fabric
 import pytest
 import torch
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.training.devices import choose_device, mixed_precision
+from semgrid_edu.training.devices import choose_device, open_fabric
 
 
 def _gpus(monkeypatch, number):
@@ -46,15 +49,26 @@ def test_a_device_that_is_not_there_is_named(monkeypatch, gpus, name, process, m
         choose_device(name, process)
 
 
-def test_a_cpu_computes_in_full_precision():
-    with mixed_precision(torch.device("cpu")):
-        assert torch.mm(torch.ones(2, 2), torch.ones(2, 2)).dtype == torch.float32
-
-
-@pytest.mark.parametrize("able", [True, False])
-def test_a_gpu_computes_in_half_the_bits_if_it_can(monkeypatch, able):
-    asked = []
+@pytest.mark.parametrize(
+    ("gpus", "able", "environment", "expected"),
+    [
+        (0, False, {}, ("cpu", 1, 1, "auto", "32-true")),
+        (2, True, {}, ("cuda", [0], 1, "auto", "bf16-mixed")),
+        (2, False, {}, ("cuda", [0], 1, "auto", "32-true")),
+        (0, False, {"WORLD_SIZE": 4, "LOCAL_WORLD_SIZE": 2, "LOCAL_RANK": 1}, ("cpu", 2, 2, "ddp", "32-true")),
+        (2, True, {"WORLD_SIZE": 2, "LOCAL_WORLD_SIZE": 2, "LOCAL_RANK": 1}, ("cuda", 2, 1, "ddp", "bf16-mixed")),
+    ],
+)
+def test_device_precision_and_processes_are_those_of_machine_and_torchrun(
+    monkeypatch, gpus, able, environment, expected
+):
+    """A GPU computes in half the bits if it can do so itself."""
+    _gpus(monkeypatch, gpus)
     monkeypatch.setattr(torch.cuda, "is_bf16_supported", lambda including_emulation: able or including_emulation)
-    monkeypatch.setattr(torch, "autocast", lambda *args, **kwargs: asked.append((args, kwargs)))
-    mixed_precision(torch.device("cuda", 1))
-    assert asked == [(("cuda", torch.bfloat16), {"enabled": able})]
+    for name, value in environment.items():
+        monkeypatch.setenv(name, str(value))
+    asked = []
+    monkeypatch.setattr(lightning_fabric, "Fabric", lambda **given: asked.append(given) or SimpleNamespace(launch=int))
+    open_fabric("auto")
+    names = ("accelerator", "devices", "num_nodes", "strategy", "precision")
+    assert asked == [dict(zip(names, expected, strict=True))]

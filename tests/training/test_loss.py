@@ -13,8 +13,10 @@ from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import build_net
 from semgrid_edu.training import Objective, median_frequency_weights, weighted_cross_entropy
 from semgrid_edu.training.batches import draw_batch, grid_logits, image_scores
-from semgrid_edu.training.devices import shared_mean
-from semgrid_edu.training.loss import class_frequencies, cross_entropy_sums
+from semgrid_edu.training.devices import open_fabric
+from semgrid_edu.training.loss import class_frequencies, cross_entropy_sums, process_loss
+
+FABRIC = open_fabric("cpu")
 
 
 def test_frequencies_and_weights_by_hand():
@@ -75,10 +77,10 @@ def _maps(draw):
 def test_the_fast_loss_is_the_literal_one(maps):
     scores, truth, alpha = maps
     x = torch.from_numpy(scores).requires_grad_()
-    loss = shared_mean(*cross_entropy_sums(x, torch.from_numpy(truth), torch.from_numpy(alpha)))
+    loss = process_loss(FABRIC, *cross_entropy_sums(x, torch.from_numpy(truth), torch.from_numpy(alpha)))
     assert loss.item() == pytest.approx(weighted_cross_entropy(*maps), rel=1e-12, abs=1e-15)
     in_32_bits = cross_entropy_sums(x.detach().float(), torch.from_numpy(truth), torch.from_numpy(alpha).float())
-    assert shared_mean(*in_32_bits).item() == pytest.approx(loss.item(), rel=1e-5, abs=1e-6)
+    assert process_loss(FABRIC, *in_32_bits).item() == pytest.approx(loss.item(), rel=1e-5, abs=1e-6)
     loss.backward()
     assert torch.isfinite(x.grad).all()
 
@@ -102,7 +104,7 @@ def test_the_objective_of_a_stage_is_the_loss_of_its_results(stage, results):
     truth = batch.frames.labels if stage == "image" else batch.frames.truth
     truth[:, 1::3] = IGNORE
     with torch.no_grad():
-        loss = shared_mean(*Objective(net, stage, alpha)(batch))
+        loss = process_loss(FABRIC, *Objective(net, stage, alpha)(batch))
         expected = weighted_cross_entropy(results(net, batch), truth, alpha)
     assert loss.item() == pytest.approx(expected, rel=1e-5)
 

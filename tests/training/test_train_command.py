@@ -8,7 +8,6 @@ import torch
 from typer.testing import CliRunner
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets import index as dataset_index
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError, DataError
@@ -17,8 +16,9 @@ from semgrid_edu.networks import SEGMENTERS, Architecture, build_net, load_net, 
 from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
-from semgrid_edu.training import run as experiment
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
+from semgrid_edu.workshop import training_run as experiment
+from semgrid_edu.workshop.commands import dataset_doubts
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.flaws import TruthFlaws
 
@@ -60,7 +60,7 @@ def one_camera(*arguments, **named):
 @pytest.fixture(autouse=True)
 def data_without_doubts(monkeypatch):
     """The data set isn't on disk, so nothing can be asked of it."""
-    monkeypatch.setattr(dataset_index, "dataset_doubts", lambda *_: [])
+    monkeypatch.setattr(dataset_doubts, "dataset_doubts", lambda *_: [])
 
 
 class _Net:
@@ -68,23 +68,11 @@ class _Net:
 
 
 def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
-    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
     data, out = tmp_path / "minikitti", tmp_path / "compact"
     write_text(data / "dataset.json", "{}")
-    arguments = [
-        "train",
-        "--data",
-        str(data),
-        "--out",
-        str(out),
-        "--segmenter",
-        "fcn",
-        "--seed",
-        "3",
-        "--iterations",
-        "1",
-    ]
-    result = CliRunner().invoke(app, arguments)
+    options = ["--segmenter", "fcn", "--seed", "3", "--iterations", "1"]
+    result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options])
     assert result.exit_code == 0, result.output
     names = {"weights.safetensors", "image_stage.safetensors", "log.csv", "provenance.json"}
     assert {path.name for path in out.iterdir()} == names
@@ -104,7 +92,7 @@ def test_a_network_gets_the_classes_of_its_data(monkeypatch, tmp_path):
     """minisynthia has ten classes and no unknown ones; networks have KITTI-14 by default."""
     built = {}
     monkeypatch.setattr(_Noise, "label_set", SYNTHIA_10)
-    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
     monkeypatch.setattr(experiment, "build_net", lambda description, *_: built.update(net=description) or _Net)
     monkeypatch.setattr(experiment, "train", lambda *_: None)
     write_text(tmp_path / "minisynthia" / "dataset.json", "{}")
@@ -142,7 +130,7 @@ def test_a_paper_preset_is_the_papers():
 def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     """The paper's networks don't fit a test: what trains them is looked at instead."""
     given = {}
-    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
     monkeypatch.setattr(experiment, "build_net", lambda description, *_: given.update(net=description) or _Net)
     monkeypatch.setattr(experiment, "load_imagenet", lambda segmenter, path: given.update(imagenet=(segmenter, path)))
     monkeypatch.setattr(experiment, "train", lambda *args: given.update(train=args))
@@ -155,9 +143,9 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     assert result.exit_code == 0, result.output
     assert given["net"] == experiment.architecture("segnet", "paper")
     assert given["imagenet"] == (_Net.segmenter, imagenet)
-    net, dataset, folder, params, seed, resume, device = given["train"]
+    net, dataset, folder, params, seed, resume, fabric = given["train"]
     assert dataset.truth == LidarTruth(POLICIES[truth], TruthFlaws())
-    assert (net, folder, seed, resume, device) == (_Net, out, 2, True, torch.device("cpu"))
+    assert (net, folder, seed, resume, fabric.device) == (_Net, out, 2, True, torch.device("cpu"))
     assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
     provenance = json.loads((out / "provenance.json").read_text())
     written = "--segmenter segnet --preset paper --imagenet vgg16.safetensors --seed 2 --iterations 7 --two-stage"
@@ -170,7 +158,7 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
 
 @pytest.mark.parametrize("members", [1, 2])
 def test_a_network_starts_from_another_and_says_so(monkeypatch, tmp_path, members):
-    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
     data, first = tmp_path / "minikitti", tmp_path / "first.safetensors"
     write_text(data / "dataset.json", "{}")
     save_net(start := build_net(Architecture(n_segmenters=members), _Noise.camera, seed=5), first)
@@ -188,7 +176,7 @@ def test_a_network_starts_from_another_and_says_so(monkeypatch, tmp_path, member
 
 
 def test_the_mean_of_several_networks_starts_from_them_and_only_its_fusion_learns(monkeypatch, tmp_path):
-    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
     data, files = tmp_path / "minikitti", [tmp_path / f"{seed}.safetensors" for seed in (5, 6)]
     write_text(data / "dataset.json", "{}")
     starts = [build_net(Architecture(), _Noise.camera, seed=seed).eval() for seed in (5, 6)]
@@ -220,7 +208,7 @@ def test_the_mean_of_several_networks_starts_from_them_and_only_its_fusion_learn
 
 
 def test_a_network_of_another_kind_is_no_start(monkeypatch, tmp_path):
-    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
     save_net(build_net(Architecture("fcn"), _Noise.camera), tmp_path / "fcn.safetensors")
     options = ["--data", str(tmp_path), "--out", str(tmp_path / "out"), "--from", str(tmp_path / "fcn.safetensors")]
     with pytest.raises(DataError, match=r"fcn.safetensors: expected a network like the one to train"):
@@ -238,7 +226,7 @@ def test_what_would_be_lost_is_refused_before_the_data_are_prepared(monkeypatch,
     def prepared(*_, **__):
         raise AssertionError("the data were prepared")
 
-    monkeypatch.setattr(experiment, "sets_by_camera", prepared)
+    monkeypatch.setattr(experiment.TrainingSet, "by_camera", prepared)
     write_text(tmp_path / "out" / name, "mine")
     with pytest.raises(DataError, match="which would be lost"):
         experiment.train_network(tmp_path, tmp_path / "out", "segnet", experiment.training_params("compact", 1))
@@ -255,7 +243,7 @@ def test_what_would_be_lost_is_refused_before_the_data_are_prepared(monkeypatch,
     ],
 )
 def test_an_option_that_cannot_be_is_named(monkeypatch, tmp_path, option, message):
-    monkeypatch.setattr(experiment, "sets_by_camera", one_camera)
+    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
     with pytest.raises(ValueError, match=message):
         CliRunner().invoke(
             app, ["train", "--data", str(tmp_path), "--out", str(tmp_path / "out"), *option], catch_exceptions=False

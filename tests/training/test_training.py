@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import torch
 import torch.nn.functional as F
+from lightning_fabric import Fabric
 from safetensors.torch import load_file, save_file
 from sklearn.metrics import accuracy_score
 from tiny_streets import CAMERA, SMALL, tiny_streets
@@ -178,15 +179,15 @@ def test_what_learnt_before_learns_after(streets, tmp_path):
 
 
 @pytest.mark.parametrize("segmenter", SEGMENTERS)
-def test_mixed_precision_learns_too(streets, tmp_path, monkeypatch, segmenter):
+def test_mixed_precision_learns_too(streets, tmp_path, segmenter):
     """What a GPU does, on the CPU: convolutions in bfloat16, weights and loss in float32."""
-    monkeypatch.setattr(training, "mixed_precision", lambda device: torch.autocast(device.type, torch.bfloat16))
+    half = Fabric(accelerator="cpu", devices=1, precision="bf16-mixed")
     net, types, sampled = build_net(replace(SMALL, segmenter=segmenter), CAMERA), set(), []
     for part in net.modules():
         if isinstance(part, torch.nn.Conv2d | torch.nn.Conv3d):
             part.register_forward_hook(lambda conv, x, y: types.add(y.dtype))
     net.sampler.register_forward_hook(lambda _, scores, planes: sampled.append((scores[0].dtype, planes.dtype)))
-    train(net, streets, tmp_path, TrainingParams(10, 15, batch_size=4, learning_rate=0.1))
+    train(net, streets, tmp_path, TrainingParams(10, 15, batch_size=4, learning_rate=0.1), fabric=half)
     log = read_log(tmp_path / "log.csv")
     for stage in ("image", "grid"):
         loss = log.loss[log.stage == stage]

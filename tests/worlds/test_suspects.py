@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from worlds.lecture_04_street_scores import StreetScores
 from worlds.lecture_04_suspects import BEFORE, GROUPS, SUSPECTS, arrivals_barred, counts, opaque, without_pillars
 
 from semgrid_edu.fast import predict
@@ -11,7 +12,6 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import FilterState, Particles, State
 from semgrid_edu.workshop.simulation.named_streets import named_street
 from semgrid_edu.workshop.simulation.things.materials import Kind
-from semgrid_edu.workshop.studies.filter.streets import StreetScores
 
 
 def points_of(change, street="mesh"):

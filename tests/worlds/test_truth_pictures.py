@@ -3,12 +3,12 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from worlds.lecture_09_counts import COUNTED, TruthCounts
 from worlds.lecture_09_pictures import DIFFERENCES, difference_kinds, policy_errors, truth_difference, truth_errors
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.workshop.studies.ground_truth.counts import COUNTED, TruthCounts
 
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
 TRUTH = np.array([[ROAD, ROAD, ROAD], [FREE, FREE, CAR]])

@@ -16,7 +16,7 @@ from semgrid_edu.networks import load_net
 from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import run_pipeline
 from semgrid_edu.workshop.course.answers import answer_array
-from semgrid_edu.workshop.studies.filter.memory_counts import frames_since_seen
+from semgrid_edu.workshop.course.street import frames_since_seen
 from semgrid_instructor import close, generator, hidden, keeping
 
 DRIVEN = slice(5, 15)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from semgrid_edu.camera import invert_rigid, rigid_transform, transform_points
 from semgrid_edu.datasets.samples import real_drive
 from semgrid_edu.workshop.course.answers import answer_array, answer_number
-from semgrid_edu.workshop.studies.new_drive.own_street import semantic_truths, street_results
+from semgrid_edu.workshop.course.street import semantic_truths, street_results
 from semgrid_instructor import close, generator, hidden
 
 

@@ -27,11 +27,10 @@ from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import LogOddsGrid, LogOddsParams, PlanarMotion, SensorModel, State, log_odds
 from semgrid_edu.occupancy import scan_evidence, update_log_odds
-from semgrid_edu.occupancy.ground import walk_sector
+from semgrid_edu.occupancy.polar import walk_sector
 from semgrid_edu.occupancy.polar import beyond_reach
 from semgrid_edu.plotting.colours import STATE_COLOURS, colour_legend
-from semgrid_edu.workshop.simulation.drive import SimulatedDrive
-from semgrid_edu.workshop.simulation.named_streets import named_street
+from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
@@ -164,7 +163,7 @@ plt.show()
 # %% jupyter={"source_hidden": true}
 def park_street(seed):
     """Return a scan of a simulated street through a park, and where in it are bare grass and road users."""
-    drive = SimulatedDrive(seed, n_frames=20, wishes=Wishes(styles=("park", "park"), relief={}))
+    drive = simulate(seed, n_frames=20, street=Wishes(styles=("park", "park"), relief={}))
     kinds, _ = drive.birdseye(0.0)
     fine = kinds.reshape(spec.shape[0], 5, spec.shape[1], 5)  # 0.1 m cells in cells of 0.5 m
     users = np.isin(fine, (Kind.CAR, Kind.PEDESTRIAN, Kind.BICYCLE)).any(axis=(1, 3))
@@ -346,7 +345,7 @@ plt.show()
 # simulated street with such a fence. Behind it stand hedges, which are porous too.
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="fence and hedges seen from above; left, returns of the wire mesh (F) and of hedges behind it (H), with beams that go through the mesh; right, evidence, in which the fence is a dark line and the space behind it mostly grey"
-yard = named_street("mesh and hedge", seed=5, frames=8)
+yard = simulate(seed=5, n_frames=8, street="mesh and hedge")
 side, scan = GridSpec(x_min=0, x_max=20, y_min=-13, y_max=1, cell=0.2), yard.scan(0).points_grid
 kinds = yard.birdseye(0.0)[0]
 rows, cols, _ = GridSpec(x_min=0, x_max=71, y_min=-15.5, y_max=15.5, cell=0.1).cells(scan[:, :2])
@@ -426,7 +425,7 @@ print(f"wire mesh: {100 * (L > 0)[known].mean():.0f} % of {known.sum()} cells ar
 assert (L > 0)[known].all()
 flips = []
 for seed in range(5):
-    street = named_street("hedge", seed, frames=8)
+    street = simulate(seed, n_frames=8, street="hedge")
     porous = first_passed_then_hit(street)
     street.porous = replace(street.porous, opacity=1000 * street.porous.opacity)  # now no beam gets in
     flips.append((porous, first_passed_then_hit(street)))

@@ -30,13 +30,15 @@ from semgrid_edu.fast import Cmcdot
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.occupancy import CmcdotParams, PlanarMotion, State, VelocityLattice
-from semgrid_edu.workshop.studies.filter.occupancy import occupancy_table
-from semgrid_edu.workshop.studies.filter.scenes import hit_cells
+from worlds.lecture_04_filters import occupancy_table
+from worlds.lecture_04_scenes import hit_cells
 
 sys.path.append("..")  # for worlds/, in the folder above
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 from worlds.lecture_04_blur import SCHEMES, measure_blur, winding_road
 from worlds.lecture_04_convergence import measure_convergence
+from worlds.lecture_04_filters import occupancy_table
+from worlds.lecture_04_scenes import hit_cells
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -240,7 +242,7 @@ print(f"recall {both / np.sum(truth == DYNAMIC):.2f}, precision {both / np.sum(c
 # %% [markdown]
 # Now the filters of lectures 02, 03 and 04, on twenty simulated drives that none of them was tuned on, where the
 # truth of every cell is known. The scanner is KITTI's, the grid the paper's, and the roads have crowns and grades.
-# The result lies in the repository; `semgrid-edu reproduce occupancy`, which made it, took 45 minutes.
+# The result lies in the repository; `worlds/lecture_04_filters.py`, which made it, took 45 minutes.
 
 # %% jupyter={"source_hidden": true}
 result = json.loads(Path("../../docs/results/occupancy.json").read_text(encoding="utf-8"))

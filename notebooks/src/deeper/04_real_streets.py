@@ -30,18 +30,20 @@ from IPython.display import Markdown
 # %% jupyter={"source_hidden": true}
 from semgrid_edu import plotting
 from semgrid_edu.fast import Cmcdot
-from semgrid_edu.workshop.studies.filter.occupancy import markdown_table, per_cent
-from semgrid_edu.workshop.studies.filter.streets import LEAST_DYNAMIC, StreetScores
+from worlds.lecture_04_filters import markdown_table, per_cent
+from worlds.lecture_04_street_scores import LEAST_DYNAMIC, StreetScores
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
     CmcdotParams, Evidence, FilterState, Particles, State, Walls, predict, update,
 )  # fmt: skip
-from semgrid_edu.occupancy.cellwise import strike_out
+from semgrid_edu.occupancy.steps import strike_out
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.occupancy.walls import strike_out_wakes
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 
 sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_04_street_scores import LEAST_DYNAMIC, StreetScores
 from worlds.lecture_04_suspects import (
     BARRED, BEFORE, MENDED, SUSPECTS, Suspect, counts, run_filter, scenes_of,
 )  # fmt: skip
@@ -765,9 +767,8 @@ plt.show()
 #   frames of phantoms remain at the far end of what we see.
 # - **Slow starters.** Whoever has just set off has an origin in which they stood a moment ago. So they are doubted when
 #   they go where nobody has looked. On six streets where people set off, at 0.2 m, CMCDOT called 96 % of the walkers'
-#   cells DYNAMIC before (to 25 m, 1.5 s after they set off), and about two thirds now: 70 % in the stored result of
-#   `semgrid-edu reproduce streets`, 66 % in an earlier run of it. Which particles survive matters that much: on
-#   two of the streets, four seeds differ by 12 and by 21 points. In the street that lost most we followed four who
+#   cells DYNAMIC before (to 25 m, 1.5 s after they set off), and about two thirds now: 70 % in one run,
+#   66 % in an earlier one. Which particles survive matters that much: on two of the streets, four seeds differ by 12 and by 21 points. In the street that lost most we followed four who
 #   weren't found: ahead of them were cells of which no scan had said anything.
 # - **A single return.** At first sight most cells are free, so one hit in a new cell isn't believed until a second
 #   scan confirms it.

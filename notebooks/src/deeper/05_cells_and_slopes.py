@@ -18,10 +18,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy import ndimage
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
 from semgrid_edu.datasets.samples import real_drive, sample_drive
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.planes import plane_heights, plane_pixels

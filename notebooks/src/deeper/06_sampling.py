@@ -21,11 +21,12 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import sample_drive
-from semgrid_edu.datasets.training_arrays import resize_image
+from semgrid_edu.fast import PlaneSampler
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels, sample_planes_naive
+from semgrid_edu.planes import plane_heights, plane_pixels, sample_planes_naive
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 torch.set_num_threads(1)
@@ -40,10 +41,10 @@ x_cells = spec.centers()[..., 0]
 # %% [markdown]
 # ## One matrix, built once
 #
-# Three programs compute equation (2). The literal twin goes from point to point. `F.grid_sample` is PyTorch's own, made
-# for points that may move: it works out the four weights again at each call, and on the way back it scatters, adding
-# each point's gradient to four pixels. `PlaneSampler` builds the sparse matrix and its transpose once for a
-# calibration. They agree:
+# Three programs compute equation (2). `sample_planes_naive` goes from point to point. `F.grid_sample` is PyTorch's own,
+# made for points that may move: it works out the four weights again at each call, and on the way back it scatters,
+# adding each point's gradient to four pixels; the package's `planes.PlaneSampler` calls it. `fast.PlaneSampler`, which
+# is used here, builds the sparse matrix and its transpose once for a calibration. They agree:
 
 # %%
 scores = torch.randn((1, 14, *camera.size), generator=torch.Generator().manual_seed(0))

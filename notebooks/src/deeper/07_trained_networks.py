@@ -27,14 +27,13 @@ import torch
 import torch.nn.functional as F
 from scipy.ndimage import binary_opening
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import build_segmenter, load_net
-from semgrid_edu.networks.weights import imagenet_tensors
 from semgrid_edu.plotting.images import draw_image
 
 # %% jupyter={"source_hidden": true}
@@ -186,7 +185,7 @@ for name, columns in looked.items():
 channels = [3, 64, 64, 128, 128, 256, 256, 256] + 6 * [512]
 by_hand = [9 * a * b + b for a, b in pairwise(channels)]
 with torch.device("meta"):
-    wanted = imagenet_tensors(build_segmenter("segnet", n_classes=14, preset="paper"))
+    wanted = build_segmenter("segnet", n_classes=14, preset="paper").imagenet_tensors()
 assert sum(by_hand) == sum(tensor.numel() for tensor in wanted.values()) == 14_714_688
 print(
     f"first ten {sum(by_hand[:10]):,}, last three {sum(by_hand[10:]):,}; names in the file:", *list(wanted)[:2], "..."

@@ -35,13 +35,13 @@ from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy, semantic_cells
 
 # %% jupyter={"source_hidden": true}
-from semgrid_edu.fast import track_drive
-from semgrid_edu.networks import Architecture, build_net, load_net
+from semgrid_edu.fast import build_net, load_net, track_drive
+from semgrid_edu.networks import Architecture
 from semgrid_edu.pipeline import network_image
 from semgrid_edu.planes import plane_heights, plane_pixels
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.batches import Batch, draw_batch, grid_logits
-from semgrid_edu.training.devices import keep_freed_memory
+from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.training.log import read_log
 from semgrid_edu.training.loss import class_weights
 
@@ -289,7 +289,7 @@ assert right > 0.8
 
 # %% [markdown]
 # With 400 steps, from random weights on and every cell counting alike, all four image networks learn such frames
-# (`semgrid-edu reproduce overfit`):
+# (`worlds/lecture_08_overfit.py`):
 
 # %% jupyter={"source_hidden": true}
 by_network = json.loads(Path("../../docs/results/overfit.json").read_text(encoding="utf-8"))["networks"]

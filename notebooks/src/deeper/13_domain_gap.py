@@ -18,19 +18,22 @@
 
 # %% jupyter={"source_hidden": true}
 import json
+import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_image_stage
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import load_net
-from semgrid_edu.workshop.studies.new_drive.domain import (
+
+sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_13_domain import (
     agrees_with_lidar, class_probabilities, colour_distance, image_statistics, match_colours, mean_histograms, mean_over,
     training_images,
 )  # fmt: skip

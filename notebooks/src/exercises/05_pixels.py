@@ -554,8 +554,9 @@ noted = {}
 def sampler_of(frame):
     """Return equation (2) for the planes of the street's repaired camera, or of the one with the fault."""
     from semgrid_edu.camera import Camera
+    from semgrid_edu.fast import PlaneSampler
     from semgrid_edu.grid import GridSpec
-    from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels
+    from semgrid_edu.planes import plane_heights, plane_pixels
 
     points, seen, K, T = _street(frame, PITCH, -1.0)
     if not WITH_FAULT:

@@ -27,10 +27,11 @@ from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.workshop.scoring.statistics import paired_interval
-from semgrid_edu.workshop.studies.new_drive.drive_checks import motion_between, standing_points
-from semgrid_edu.workshop.studies.new_drive.own_street import (
+from semgrid_edu.workshop.course.street import (
+    motion_between,
     piece_confusions,
     semantic_truths,
+    standing_points,
     street_pieces,
     street_results,
 )

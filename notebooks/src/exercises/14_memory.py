@@ -25,11 +25,12 @@ from dataclasses import replace as _replace
 import numpy as np
 
 from semgrid_edu.workshop.course.answers import answer_array
-from semgrid_edu.memory import View, remember_drive as _remember_drive
+from semgrid_edu.fast import remember_drive as _remember_drive
+from semgrid_edu.memory import View
 from semgrid_edu.occupancy import Belief, PlanarMotion  # for task 5
 from semgrid_edu.occupancy.planar_motion import look_up  # for task 5
 from semgrid_edu.stages.stepping import CheckedMemory
-from semgrid_edu.workshop.studies.new_drive.own_street import street_results as _street_results
+from semgrid_edu.workshop.course.street import street_results as _street_results
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 FREE, STATIC, DYNAMIC, UNKNOWN = range(4)

@@ -12,9 +12,9 @@ CLOSING_REACH = 1.5
 """Metres. Of 0.5 to 3 m it gives the best pixel accuracy on minikitti's training split, with true image labels."""
 
 GROUND_REACH = 3.0
-"""Metres. Beyond 30 m the LIDAR's rings lie this far apart on the ground and farther."""
+"""Metres. Beyond 30 m the LIDAR's rings are at least this far apart on the ground."""
 
-THING_REACH = 1.0
+OBJECT_REACH = 1.0
 """Metres. Half the width of the gaps in walls and hedges that are closed. Of the few values tried on six training
 frames of minikitti, 1 m is better than 0.5 m, and 3 m of ground better than 2 m, by mean intersection over union."""
 
@@ -87,11 +87,11 @@ def close_gaps(
 
 
 def close_and_spread(grid: NDArray, cell: float, label_set: LabelSet = KITTI_14) -> NDArray[np.uint8]:
-    """Label the gaps between the LIDAR's rings, so that what stands doesn't grow.
+    """Label the gaps between the LIDAR's rings, without making objects grow.
 
-    The ground lies between the rings too, so it spreads by up to `GROUND_REACH`. What stands would cover the ground
-    around it if it spread. It is closed instead (dilated, then eroded, class by class), which fills the gaps in it that
-    are up to twice `THING_REACH` wide and moves no outline.
+    The ground continues between the rings, so it spreads by up to `GROUND_REACH`. Objects would cover the ground around
+    them if they spread. They are closed instead (dilated, then eroded, class by class), which fills gaps up to twice
+    `OBJECT_REACH` wide and moves no outline.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def close_and_spread(grid: NDArray, cell: float, label_set: LabelSet = KITTI_14)
     flat = np.array([label_set.index(name) for name in label_set.flat])
     only_ground = np.where((grid < label_set.n_semantic) & ~np.isin(grid, flat), unknown_numbers(label_set)[0], grid)
     spread = close_gaps(only_ground, cell, GROUND_REACH, label_set)
-    margin = round(THING_REACH / cell)
+    margin = round(OBJECT_REACH / cell)
     square = np.ones((2 * margin + 1,) * 2, bool)
     fillable = (grid >= label_set.n_semantic) & (grid != unknown_numbers(label_set)[State.UNKNOWN])
     closed = np.where(fillable, spread, grid)

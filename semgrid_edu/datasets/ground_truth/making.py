@@ -104,7 +104,8 @@ def lidar_truth(
     check_shape("probability", probability, (4, *spec.shape))
     returns = gather_returns(frame, before, after, spec, policy)
     rows, cols, inside = spec.cells(returns.places)
-    cells, classes = (rows * spec.shape[1] + cols)[inside], returns.classes[inside]
+    cells = (rows * spec.shape[1] + cols)[inside]
+    classes = returns.classes[inside]
     voters = label_set if policy.vote == "standing" else replace(label_set, flat=())
     truth = carry_labels(classes, np.arange(len(cells)), cells, probability, voters)
     if policy.cleanup == "spread":

@@ -13,7 +13,7 @@ CLEANUPS = ("none", "spread", "close")
 
 @dataclass(frozen=True)
 class TruthPolicy:
-    """How to make a semantic grid from image labels and LIDAR scans. The defaults are the paper's, as far as it says.
+    """How to make a semantic grid from image labels and LIDAR scans. By default as in the paper, as far as it tells.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class TruthPolicy:
     cleanup: str = "close"
 
     def __post_init__(self) -> None:
-        """Refuse what isn't a choice."""
+        """Check that every field is one of its choices."""
         choices_of = {"labels": LABELS, "movers": MOVERS, "vote": VOTES, "visible_to": SIGHTS, "cleanup": CLEANUPS}
         for name, choices in choices_of.items():
             if getattr(self, name) not in choices:

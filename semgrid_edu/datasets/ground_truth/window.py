@@ -1,4 +1,4 @@
-"""Scans before and after the labelled one, moved to its frame: what stands gets dense, what moves needs care (4).
+"""Scans before and after the labelled one, moved to its frame: denser where nothing moves, smeared where it does (4).
 
 A spinning scanner measures one direction after the other, for a tenth of a second, in which the vehicle moves on. A
 return that was measured t seconds after the camera took its image is given in the frame of the LIDAR as it stood at
@@ -82,7 +82,8 @@ def gather_returns(
     """
     moments = [*before, Moment(frame, None), *after]
     frames = [moment.frame for moment in moments]
-    now, own = len(before), policy.labels == "own"
+    now = len(before)
+    own = policy.labels == "own"
     scans = []
     for k in range(max(now - policy.past, 0), min(now + policy.future + 1, len(moments))):
         points = _scan(frames, k, policy.deskew)

@@ -7,8 +7,7 @@ several cells at a time.
 import numpy as np
 from numba import njit
 
-from semgrid_edu.occupancy.cellwise import CERTAIN
-from semgrid_edu.occupancy.state import State
+from semgrid_edu.occupancy.state import CERTAIN, State
 
 FREE, STATIC, DYNAMIC, UNKNOWN = (int(state) for state in State)
 

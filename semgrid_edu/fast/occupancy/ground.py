@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.fast.occupancy.evidence import check_points
 from semgrid_edu.fast.occupancy.polar import beams_of
-from semgrid_edu.occupancy.ground import GroundParams
+from semgrid_edu.occupancy.polar import GroundParams
 
 
 def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:

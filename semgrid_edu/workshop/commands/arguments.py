@@ -22,7 +22,7 @@ TOLD = 20
 
 
 class Commands(TyperGroup):
-    """A group of commands, which knows the one that was asked for and says how to go on after Ctrl-C or `kill`."""
+    """A group of commands that remembers the one asked for, and explains after Ctrl-C or `kill` how to continue."""
 
     asked, command = "semgrid-edu", None
     """The command that was asked for last, such as "semgrid-edu data make"; by name, and itself."""
@@ -38,7 +38,8 @@ class Commands(TyperGroup):
             What was typed after the group's name.
         """
         name, command, rest = super().resolve_command(ctx, args)
-        Commands.asked, Commands.command = " ".join(["semgrid-edu", *ctx.command_path.split()[1:], str(name)]), command
+        Commands.asked = " ".join(["semgrid-edu", *ctx.command_path.split()[1:], str(name)])
+        Commands.command = command
         return name, command, rest
 
     def invoke(self, ctx: object) -> object:
@@ -53,7 +54,7 @@ class Commands(TyperGroup):
 
 
 def check_arguments(arguments: Sequence[str]) -> None:
-    """Refuse arguments that are empty, as those of unset variables are, aren't UTF-8, or are too large numbers.
+    """Reject arguments that are empty (an unset variable), not UTF-8, or too large.
 
     Parameters
     ----------

@@ -108,5 +108,5 @@ def grade(
         ungraded = str(error)
     typer.echo(f"all scores so far: {write_graded(folder)}")
     if ungraded:
-        told = "these stay ungraded, through no fault of the students; the same command without --again tries them anew"
+        told = "these stay ungraded, through no fault of the students; repeat the command without --again"
         sys.exit(f"semgrid-edu: {told}:\n{ungraded}")

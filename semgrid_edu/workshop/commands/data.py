@@ -23,7 +23,7 @@ def list_data() -> None:
         told = ", ".join(f"{number} labelled frames in {split!r}" for split, number in frames.items())
         typer.echo(f"{name}: simulated, {told}, classes of {recipe.label_set}; semgrid-edu data make {name} FOLDER")
     typer.echo("kitti: real drives, no labels; semgrid-edu data fetch kitti --drive 2011_09_26_0013 --folder FOLDER")
-    typer.echo("pandaset: a real street with labels; semgrid-edu data fetch pandaset says where it is")
+    typer.echo("pandaset: a real street with labels; semgrid-edu data fetch pandaset tells where it is")
 
 
 @data.command()

@@ -6,8 +6,9 @@ import torch
 
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.training_arrays import SEED
-from semgrid_edu.datasets.training_set import FRAMES, Sample, TrainingSet
+from semgrid_edu.datasets.training_set import FRAMES, Sample
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.fast import TrainingSet
 from semgrid_edu.storage.provenance import PROVENANCE, write_provenance
 from semgrid_edu.storage.tensors import write_tensors
 
@@ -32,7 +33,8 @@ def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) ->
         When the folder is in the data set, contains it, or has the provenance of something else, which would be lost.
     """
     _check_place(Path(folder), Path(dataset_dir))
-    training, folder = TrainingSet(dataset_dir, "train"), Path(folder)
+    training = TrainingSet(dataset_dir, "train")
+    folder = Path(folder)
     if not 1 <= n_frames <= len(training):
         raise ArgumentError("n_frames", f"1 to {len(training)} frames", n_frames)
     chosen = [training[k * len(training) // n_frames] for k in range(n_frames)]
@@ -44,7 +46,8 @@ def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) ->
 
 def _check_place(folder: Path, dataset_dir: Path) -> None:
     """Check that no other provenance is in the folder or would be mixed with the excerpt's."""
-    here, there = folder.resolve(), dataset_dir.resolve()
+    here = folder.resolve()
+    there = dataset_dir.resolve()
     if here.is_relative_to(there) or there.is_relative_to(here) or (folder / INDEX_FILE).exists():
         raise DataError(folder, f"a folder apart from the data set {dataset_dir}", "one that holds it or is part of it")
     if (folder / PROVENANCE).exists() and not (folder / FRAMES).exists():

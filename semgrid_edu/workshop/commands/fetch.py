@@ -7,13 +7,14 @@ import zlib
 from functools import partial
 from pathlib import Path
 
-import pooch
-import requests
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive, drive_folder
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, needed
 from semgrid_edu.storage.files import named_errors, sha256, write_text
+
+pooch = needed("pooch")
+requests = needed("requests")
 
 KITTI_SOURCE = "https://s3.eu-central-1.amazonaws.com/avg-kitti/raw_data"
 """Where KITTI's archives are; https://www.cvlibs.net/datasets/kitti/raw_data.php links there."""

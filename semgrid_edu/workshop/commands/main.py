@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperCommand
 
 from semgrid_edu import __version__
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, MissingExtraError
 from semgrid_edu.fast.numba_cache import keep_compiled_functions
 from semgrid_edu.storage.files import CACHE_VARIABLE
 from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, tell
@@ -23,7 +23,7 @@ Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that wa
 Force = Annotated[bool, typer.Option("--force", help="Replace files that this command hasn't written, too.")]
 
 PICTURES = (".png", ".pdf", ".svg")
-"""Formats of pictures that say who made them."""
+"""Formats of pictures whose metadata can hold the command."""
 
 app.add_typer(data, name="data")
 app.add_typer(course, name="course")
@@ -187,7 +187,7 @@ def evaluate(
 
 
 def run() -> None:
-    """Run the command line; a mistake in the input, or a disk that refuses, ends in one line, not in a traceback."""
+    """Run the command line; a mistake in the input, or a failing disk, ends in one line, not in a traceback."""
     # Idle OpenMP threads spin, which keeps busy cores from the threads that have work: on two busy cores a frame took
     # 1.2 s instead of 0.07 s. OpenMP reads this once, when a command loads torch or numba, so it must be set before.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
@@ -198,7 +198,7 @@ def run() -> None:
         if told := keep_compiled_functions():
             typer.echo(f"semgrid-edu: {told}", err=True)
         app(prog_name="semgrid-edu")
-    except (ArgumentError, DataError, OSError, RuntimeError) as error:
+    except (ArgumentError, DataError, MissingExtraError, OSError, RuntimeError) as error:
         if isinstance(error, RuntimeError) and "Symlink loop" not in str(error):
             raise
         where = f"{error.filename}: " if getattr(error, "filename", None) else ""

@@ -1,4 +1,4 @@
-"""What exercises ask of a student's answer: arrays or numbers that can be compared, and how much memory it needs."""
+"""Checks of a student's answer: arrays or numbers that can be compared, and how much memory it needs."""
 
 import tracemalloc
 from collections.abc import Callable
@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 
 def answer_array(result: Any, name: str = "it", dtype: type = float) -> NDArray:
-    """Return the result of an answer as an array, or say in a sentence why it is none.
+    """Return the result of an answer as an array, or explain in one sentence why it isn't one.
 
     Parameters
     ----------
     result : Any
         What the answer returned: an array, a number, or lists and tuples of numbers, however deep.
     name : str
-        The subject of the sentence: the name of the function that was to be written, or a part of its result.
+        The subject of the sentence: the name of the function to write, or a part of its result.
     dtype : type
         The type of the array's entries.
 
@@ -28,7 +28,7 @@ def answer_array(result: Any, name: str = "it", dtype: type = float) -> NDArray:
     Raises
     ------
     AssertionError
-        When the result is None, or no array of numbers.
+        When the result is None, or isn't an array of numbers.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def answer_array(result: Any, name: str = "it", dtype: type = float) -> NDArray:
 
 
 def answer_arrays(result: Any, n_arrays: int, name: str = "it") -> list[NDArray]:
-    """Return the result of an answer as several arrays, or say in a sentence why it is something else.
+    """Return the result of an answer as several arrays, or explain in one sentence why it isn't.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def answer_arrays(result: Any, n_arrays: int, name: str = "it") -> list[NDArray]
     Raises
     ------
     AssertionError
-        When the result is None, has another length, or holds something else than arrays of numbers.
+        When the result is None, has another length, or holds anything but arrays of numbers.
     """
     assert result is not None, f"{name} returned nothing: did you forget `return`?"
     found = len(result) if isinstance(result, tuple | list) else 1
@@ -73,7 +73,7 @@ def answer_arrays(result: Any, n_arrays: int, name: str = "it") -> list[NDArray]
 
 
 def answer_number(result: Any, name: str = "it") -> float:
-    """Return the result of an answer as one number, or say in a sentence why it is none.
+    """Return the result of an answer as one number, or explain in one sentence why it isn't one.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def answer_number(result: Any, name: str = "it") -> float:
     Raises
     ------
     AssertionError
-        When the result is None, no number, or more than one.
+        When the result is None or not exactly one number.
     """
     numbers = answer_array(result, name)
     # How many might tell a hidden input: this sentence is also that of hidden tests.
@@ -99,7 +99,7 @@ def answer_number(result: Any, name: str = "it") -> float:
 
 
 def peak_megabytes(function: Callable, *arguments: Any) -> tuple[Any, float]:
-    """Call a function, and measure how much memory it holds at its worst moment.
+    """Call a function, and measure the largest amount of memory that it holds at any time.
 
     Parameters
     ----------

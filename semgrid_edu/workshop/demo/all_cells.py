@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from semgrid_edu.crf import CrfParams, mean_field, unary_from_probability
+from semgrid_edu.crf import CrfParams, unary_from_probability
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import mean_field
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import IGNORE, LABEL_SETS
 from semgrid_edu.networks import SemanticGridNet

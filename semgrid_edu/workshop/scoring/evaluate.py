@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from semgrid_edu.datasets.training_arrays import SEED
-from semgrid_edu.datasets.training_set import TrainingSet
-from semgrid_edu.fast import load_net
+from semgrid_edu.fast import TrainingSet, load_net
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet

@@ -72,7 +72,7 @@ def inverse_perspective(labels: NDArray, places: NDArray, occupancy: NDArray, ob
     Raises
     ------
     ArgumentError
-        When a pixel lies outside the labels, or the shapes of `places` and `occupancy` disagree.
+        When a pixel is outside the labels, or the shapes of `places` and `occupancy` disagree.
     """
     labels, unknown = np.asarray(labels), unknown_classes(occupancy)
     if places.shape != unknown.shape:

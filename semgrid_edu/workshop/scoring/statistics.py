@@ -196,7 +196,7 @@ def _checked(name: str, confusions: ArrayLike) -> NDArray:
     if matrices.ndim != 4 or matrices.shape[2] != matrices.shape[3] or not len(matrices):
         raise ArgumentError(name, "confusion matrices (S, V, C, C) of S seeds on V drives", f"shape {matrices.shape}")
     if matrices.shape[1] < 2:
-        expected = "two drives or more, because one says nothing about how drives differ"
+        expected = "two drives or more, because one doesn't show how drives differ"
         raise ArgumentError(name, expected, matrices.shape[1])
     return matrices
 

@@ -192,7 +192,7 @@ def make_from_recipe(
 
 
 def _claim(root: Path, marker: dict) -> None:
-    """Mark the folder as that of this data set, or refuse it when it holds something else."""
+    """Mark the folder as that of this data set; raise when it holds something else."""
     path = root / "simulation.json"
     if path.exists():
         found = read_json(path)

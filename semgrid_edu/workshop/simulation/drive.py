@@ -8,18 +8,16 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID, Frame
 from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
-from semgrid_edu.workshop.simulation.sensors.gps import Geodesy
 from semgrid_edu.workshop.simulation.sensors.lidar import labelled_scan
 from semgrid_edu.workshop.simulation.sensors.raycast import Instant, PorousMesh, RayMesh
-from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.sensors.rig import Geodesy, Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
-from semgrid_edu.workshop.simulation.street.ego import Ego
 from semgrid_edu.workshop.simulation.street.footprints import footprint_table
 from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes, draw_plan
 from semgrid_edu.workshop.simulation.street.road_users import fill_street
 from semgrid_edu.workshop.simulation.street.scenery import build_scenery
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
-from semgrid_edu.workshop.simulation.street.trajectories import ActorPace
+from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Ego
 
 PERIOD = 0.1
 """Seconds between frames: KITTI's LIDAR turns ten times a second."""
@@ -56,7 +54,7 @@ class SimulatedFrame:
 
 
 class SimulatedDrive:
-    """A drive through a world of its own, the same for the same seed.
+    """A drive through a world drawn for it; the same seed gives the same drive.
 
     Parameters
     ----------
@@ -65,7 +63,7 @@ class SimulatedDrive:
     n_frames : int
         Number of frames, `PERIOD` apart.
     wishes : Wishes
-        What isn't left to chance.
+        The fixed parts of the street; the rest is drawn.
     rig : Rig, optional
         The sensors on the recording car; when left out, the sensors of the simulated data sets.
 
@@ -76,14 +74,15 @@ class SimulatedDrive:
     ego : Ego
         How the recording car moves.
     moving, parked : list of Actor
-        The road users; a pedestrian who stands still is among those that move.
+        The road users; a pedestrian standing still is among those that move.
     """
 
     def __init__(
         self, seed: int | np.random.SeedSequence, n_frames: int, wishes: Wishes = ANY, rig: Rig | None = None
     ) -> None:
         rng = np.random.default_rng(seed)
-        self.n_frames, self.rig = n_frames, rig or Rig()
+        self.n_frames = n_frames
+        self.rig = rig or Rig()
         duration = (n_frames - 1) * PERIOD
         pace = ActorPace.random(rng, wishes.speed)
         self.plan = draw_plan(rng, pace.distance(duration), wishes)
@@ -93,7 +92,8 @@ class SimulatedDrive:
         builder = build_scenery(self.plan, rng)
         traffic = Traffic(builder, self.ego.trajectory, duration)
         (wishes.cast or fill_street)(traffic)
-        self.moving, self.parked = traffic.moving, traffic.parked
+        self.moving = traffic.moving
+        self.parked = traffic.parked
         self.static = RayMesh.of(*zip(*builder.solid, strict=True))
         self.porous = PorousMesh.of(*zip(*builder.porous, strict=True)) if builder.porous else None
         self.static_footprints = footprint_table(builder.footprints)
@@ -119,7 +119,8 @@ class SimulatedDrive:
 
     def instant(self, t: float) -> Instant:
         """Return the world at one instant, ready for rays. Parameters are those of `SimulatedDrive.pose`."""
-        road, eye = self.plan.road, self.pose(t)[:2, 3]
+        road = self.plan.road
+        eye = self.pose(t)[:2, 3]
         near = [a for a in self.moving if np.hypot(*(a.trajectory.pose(road, t)[0][:2] - eye)) < _VIEW]
         moving = RayMesh.of([a.shape(road, t) for a in near], [a.instance for a in near]) if near else None
         return Instant(self.static, moving, self.porous)
@@ -130,21 +131,24 @@ class SimulatedDrive:
         It is given along x and y of the grid frame at that instant, (2,), m/s. Parameters are those of
         `SimulatedDrive.pose`.
         """
-        rotation, road = self.T_grid_from_world(t)[:2, :2], self.plan.road
+        rotation = self.T_grid_from_world(t)[:2, :2]
+        road = self.plan.road
         return {actor.instance: rotation @ actor.trajectory.velocity(road, t) for actor in self.moving}
 
     def objects(self, t: float) -> list[dict]:
-        """Return the cars, pedestrians and bicycles whose centres lie in `LABEL_GRID`, from `Actor.described`.
+        """Return the cars, pedestrians and bicycles whose centres are in `LABEL_GRID`, from `Actor.described`.
 
         Parameters are those of `SimulatedDrive.pose`.
         """
-        road, T, actors = self.plan.road, self.T_grid_from_world(t), self.parked + self.moving
+        road = self.plan.road
+        T = self.T_grid_from_world(t)
+        actors = self.parked + self.moving
         centres = [transform_points(T, actor.middle(road, t)) for actor in actors]
         inside = LABEL_GRID.cells(np.reshape(centres, (-1, 3)))[2]
         return [actor.described(road, t, T) for actor, held in zip(actors, inside, strict=True) if held]
 
     def footprints(self, t: float) -> NDArray[np.float64]:
-        """Return the footprints of all that stands or moves at one instant, (K, 9), as from `footprint_table`.
+        """Return the footprints of everything, standing or moving, at one instant, (K, 9), as from `footprint_table`.
 
         Parameters are those of `SimulatedDrive.pose`.
         """
@@ -177,7 +181,9 @@ class SimulatedDrive:
         picture : Picture
             What the camera took at that instant.
         """
-        road, pose, footprints = self.plan.road, self.pose(t), self.footprints(t)
+        road = self.plan.road
+        pose = self.pose(t)
+        footprints = self.footprints(t)
         cells = world_cells(pose, self.rig)
         kinds, which = birdseye_kinds(cells, footprints, road)
         seen = visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera)
@@ -211,13 +217,14 @@ class SimulatedDrive:
         index : int
             Number of the frame.
         """
-        t, half = index * PERIOD, self.rig.packet_interval / 2
+        t = index * PERIOD
+        half = self.rig.packet_interval / 2
         points, _ = self._labelled_scan(t, self._noise(index, 1))
         nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
         return Frame(None, points, self.rig.camera, self.pose(nearest), t)
 
     def labelled_scan(self, index: int) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Take the scan of `SimulatedDrive.scan`, and say what each return hit, as PandaSet's annotators do.
+        """Take the scan of `SimulatedDrive.scan`, with what each return hit, as PandaSet's annotators label it.
 
         Parameters are those of `SimulatedDrive.scan`.
 
@@ -231,7 +238,7 @@ class SimulatedDrive:
         return self._labelled_scan(index * PERIOD, self._noise(index, 1))
 
     def _labelled_scan(self, t: float, rng: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Take the scan during which the LIDAR looks ahead at time t, and say what each return hit."""
+        """Take the scan during which the LIDAR looks ahead at time t, with what each return hit."""
         world, pose = (lambda after: self.instant(t + after)), (lambda after: self.pose(t + after))
         return labelled_scan(world, pose, self.rig.lidar, self.plan.road, rng)
 

@@ -67,9 +67,12 @@ def named_street(name: str, seed: int, frames: int = FRAMES, rig: Rig = KITTI_RI
 
 def _sample_cast(traffic: Traffic) -> None:
     """Put an overtaking and an oncoming car, a cyclist and pedestrians where the camera sees them, then others."""
-    road, end = traffic.road, traffic.duration
+    road = traffic.road
+    end = traffic.duration
     here = traffic.ends_at
-    overtaking, oncoming, cycling = ActorPace(traffic.ego.pace.mean + 6.0), ActorPace(9.0), ActorPace(5.0)
+    overtaking = ActorPace(traffic.ego.pace.mean + 6.0)
+    oncoming = ActorPace(9.0)
+    cycling = ActorPace(5.0)
     red, blue = ("estate", (0.35, 0.02, 0.02)), ("hatchback", (0.05, 0.12, 0.35))
     traffic.drive_car(here + 9.0 - overtaking.distance(end), -0.5 * road.lane, 1, 0, overtaking, red)
     traffic.drive_car(here + 14.0 + oncoming.distance(end), 0.5 * road.lane, -1, 0, oncoming, blue)

@@ -14,16 +14,14 @@ from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, lidar_from_grid
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.datasets.kitti_labels import WITH_GAPS
 from semgrid_edu.datasets.pandaset import PandasetScene
-from semgrid_edu.datasets.training_arrays import resize_image
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.frame import LABEL_GRID
+from semgrid_edu.frame import LABEL_GRID, resize_image
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import SensorModel
-from semgrid_edu.occupancy.ground import height_above_ground
-from semgrid_edu.occupancy.polar import beams_of
+from semgrid_edu.occupancy.polar import beams_of, height_above_ground
 from semgrid_edu.storage.files import LOCK, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import write_provenance
-from semgrid_edu.workshop.simulation.sensors.gps import Geodesy, oxts_packet
+from semgrid_edu.workshop.simulation.sensors.rig import Geodesy, oxts_packet
 from semgrid_edu.workshop.simulation.writer import WrittenFrame, write_calibration, write_frames
 
 IMAGE_SIZE = (145, 480)
@@ -37,7 +35,7 @@ SCANS = 9
 """Scans before and after a frame whose returns label its cells."""
 
 NOWHERE = Geodesy(latitude=0.0, longitude=0.0, altitude=0.0, heading=0.0)
-"""Where the packets of GPS and IMU begin, so that they don't tell the true place."""
+"""Where the packets of GPS and IMU begin, so that they don't give the true place away."""
 
 
 class _FixedRig(PandasetScene):
@@ -73,9 +71,11 @@ class _FixedRig(PandasetScene):
             return moved
 
         for k in range(n_frames):
-            frame, seen = self[k], self.visible(k, LABEL_GRID, SCANS, SCANS)
+            frame = self[k]
+            seen = self.visible(k, LABEL_GRID, SCANS, SCANS)
             labels = replace(frame.labels, birdseye=self.truth(k, LABEL_GRID, SCANS, SCANS), visible=seen)
-            image, points = resize_image(frame.image, IMAGE_SIZE), frame.points[needed_returns(frame.points_grid)]
+            image = resize_image(frame.image, IMAGE_SIZE)
+            points = frame.points[needed_returns(frame.points_grid)]
             oxts = oxts_packet(pose, times[k] - times[0], NOWHERE)
             yield WrittenFrame(datetime.fromtimestamp(times[k], UTC), image, points, oxts, labels)
 
@@ -97,14 +97,16 @@ def needed_returns(points: NDArray) -> NDArray[np.bool_]:
     (N,) bool
         True for the returns to keep.
     """
-    sensor, (x, y, z) = SensorModel(), points[:, :3].T.astype(np.float64)
-    far, height = np.hypot(x, y), height_above_ground(points, sensor.ground)
+    sensor = SensorModel()
+    x, y, z = points[:, :3].T.astype(np.float64)
+    far = np.hypot(x, y)
+    height = height_above_ground(points, sensor.ground)
     beyond = np.maximum(np.abs(x - LABEL_GRID.x_max / 2) - LABEL_GRID.x_max / 2, np.abs(y) - LABEL_GRID.y_max)
     kept = beyond < AROUND
     ahead = ~kept & (x > -BEHIND)
     bins = np.minimum(far / sensor.ground.bin, sensor.ground.bins - 1).astype(np.int64)
     bins += beams_of(x, y, sensor.ground.sectors).astype(np.int64) * sensor.ground.bins
-    # In the filter's own precision, float32, because many returns lie on the border between two beams.
+    # In the filter's own precision, float32, because many returns are on the border between two beams.
     beam = beams_of(points[:, 0], points[:, 1], sensor.beams)
     obstacle = (height >= sensor.obstacle_min) & (height <= sensor.obstacle_max)
     for place, value, among in (
@@ -145,10 +147,11 @@ def write_real_excerpt(pandaset: str | Path, scene: str, n_frames: int, folder: 
     DataError
         When the folder holds something, the scene has no labels, or a file of it is missing or damaged.
     """
-    excerpt, folder = _FixedRig(Path(pandaset), scene), Path(folder)
+    excerpt = _FixedRig(Path(pandaset), scene)
+    folder = Path(folder)
     if not 2 <= n_frames <= len(excerpt):
         raise ArgumentError("n_frames", f"2 to {len(excerpt)} frames", n_frames)
-    excerpt.visible(0, LABEL_GRID, 0, 0)  # refuses a scene without labels before anything is written
+    excerpt.visible(0, LABEL_GRID, 0, 0)  # raises for a scene without labels before anything is written
     with sole_writer(folder):
         if {path.name for path in folder.iterdir()} - {LOCK}:
             raise DataError(folder, "a new or an empty folder", "one with files")
@@ -157,10 +160,12 @@ def write_real_excerpt(pandaset: str | Path, scene: str, n_frames: int, folder: 
 
 def _write(excerpt: _FixedRig, scene: str, n_frames: int, folder: Path) -> Path:
     """Write the drive, then what describes it."""
-    date, drive = f"{datetime.fromtimestamp(excerpt._camera_times[0], UTC):%Y_%m_%d}", scene.zfill(4)
-    K, T = excerpt.camera.K, excerpt.camera.T_camera_from_lidar
+    date = f"{datetime.fromtimestamp(excerpt._camera_times[0], UTC):%Y_%m_%d}"
+    drive = scene.zfill(4)
+    K = excerpt.camera.K
+    T = excerpt.camera.T_camera_from_lidar
     rig = SimpleNamespace(image_size=IMAGE_SIZE, R_rect=np.eye(3), T_camera0_from_lidar=T, T_lidar_from_imu=np.eye(4))
-    rig.P_rect = lambda _: np.column_stack([K, np.zeros(3)])  # KITTI has four cameras, of which this one is camera 2
+    rig.P_rect = lambda _: np.column_stack([K, np.zeros(3)])  # KITTI has four cameras, and this one is camera 2
     write_calibration(folder, rig, date)
     label_set = f"{KITTI_14.name}\n{WITH_GAPS}"
     written = write_frames(folder, (date, drive), excerpt.frames(n_frames), label_set)

@@ -20,8 +20,7 @@ from semgrid_edu.frame import FrameLabels
 from semgrid_edu.labels import KITTI_14, LabelSet
 from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.workshop.simulation.sensors.gps import DATAFORMAT, oxts_packet
-from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.sensors.rig import DATAFORMAT, Rig, oxts_packet
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
 
 DATE = "2026_01_01"
@@ -68,7 +67,7 @@ def check_complete(folder: Path, n_frames: int, labelled: Collection[int]) -> No
     missing = [name for name in expected if not (folder / name).is_file()]
     if missing:
         found = f"{len(missing)} missing, such as {missing[0]}"
-        raise DataError(folder, f"all {len(expected)} files of a drive (delete the folder to make it anew)", found)
+        raise DataError(folder, f"all {len(expected)} files of a drive (delete the folder to make it again)", found)
 
 
 def _row(name: str, numbers: NDArray | tuple) -> str:
@@ -83,11 +82,12 @@ def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
     root : path-like
         The folder that takes the day's folder.
     rig : Rig
-        Where camera, LIDAR and IMU stand.
+        The poses of camera, LIDAR and IMU.
     date : str
-        The day, of which the folder has the name.
+        The day, which is the folder's name.
     """
-    day, time = Path(root) / date, "calib_time: 01-Jan-2026 09:00:00\n"
+    day = Path(root) / date
+    time = "calib_time: 01-Jan-2026 09:00:00\n"
     height, width = rig.image_size
     text = time + _row("corner_dist", (0.0995,))
     for index in range(4):
@@ -120,7 +120,7 @@ def _save_png(path: Path, pixels: NDArray) -> None:
 
 
 def depth_to_png(depth: NDArray) -> NDArray[np.uint16]:
-    """Return depths as KITTI's depth maps hold them: times 256, 0 for none and for what lies 256 m away or farther.
+    """Return depths as KITTI's depth maps hold them: times 256, 0 for none and for 256 m or farther.
 
     Parameters
     ----------
@@ -174,7 +174,9 @@ def _write_files(folder: Path, frames: Iterable[WrittenFrame], label_set: str) -
     """Write all files of a drive to its folder; return the number of frames, and which have labels."""
     for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
         (folder / name).mkdir(parents=True)
-    objects, times, labelled = {}, [], []
+    objects = {}
+    times = []
+    labelled = []
     for k, frame in enumerate(frames):
         name = f"{k:010d}"
         _save_png(folder / "image_02" / "data" / f"{name}.png", frame.image)
@@ -198,8 +200,10 @@ def _simulated_frames(
     """Take the frames of a simulated drive."""
     classes = class_of_kind(label_set)
     for k in range(simulated.n_frames):
-        frame, labels = simulated.frame(k, k in labelled), None
-        picture, truth = frame.picture, frame.truth
+        frame = simulated.frame(k, k in labelled)
+        labels = None
+        picture = frame.picture
+        truth = frame.truth
         if truth is not None:
             kinds = classes[picture.kind], picture.depth, classes[truth.kinds], truth.visible
             labels = FrameLabels(label_set, *kinds)
@@ -246,7 +250,7 @@ def write_frames(root: Path, drive: tuple[str, str], frames: Iterable[WrittenFra
     frames : iterable of WrittenFrame
         Its frames.
     label_set : str
-        What label_set.txt says: the name of the label set, and `WITH_GAPS` in a second line where that holds.
+        The content of label_set.txt: the name of the label set, and `WITH_GAPS` in a second line where that holds.
 
     Returns
     -------

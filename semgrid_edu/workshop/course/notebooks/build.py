@@ -27,7 +27,7 @@ METADATA = {
     "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
     "language_info": {"name": "python"},
 }
-"""What a notebook says about where it ran: on any Python 3."""
+"""The kernel that a notebook names: any Python 3."""
 
 LIVE = "application/vnd.jupyter.widget-view+json"
 """The output of a widget. It works only with a kernel, and its name is random."""

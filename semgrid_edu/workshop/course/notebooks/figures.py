@@ -34,7 +34,7 @@ def figures(cell: NotebookNode) -> Iterator[NotebookNode]:
 
 
 def alternative_text(cell: NotebookNode, figure: NotebookNode) -> str:
-    """Return the text that stands for a figure when a reader can't see it; "" when it has none.
+    """Return the alternative text of a figure; "" when it has none.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def alternative_text(cell: NotebookNode, figure: NotebookNode) -> str:
 
 
 def resolution(png: bytes) -> int | None:
-    """Return the dots per inch that a PNG says it has, along its x axis; None when it doesn't say or is animated.
+    """Return the dots per inch in a PNG's metadata, along its x axis; None when there are none or it is animated.
 
     Matplotlib writes them into every figure. Other pictures have no size in inches, and the size of an animation is
     limited in bytes instead.

@@ -157,7 +157,7 @@ def stated_minutes(notebook: NotebookNode) -> int | None:
 def minutes_table(sources: list[Path]) -> str:
     """Return a table of minutes: a line for each notebook, or for each section of a single notebook.
 
-    "stated" is what the header says.
+    "stated" is the header's number.
 
     Parameters
     ----------

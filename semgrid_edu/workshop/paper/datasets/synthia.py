@@ -62,7 +62,8 @@ SYNTHIA_PERIOD = 0.2
 GROUND_RANGE = 20.0
 """Metres ahead. Road in the first image that is closer shows how high the camera stands."""
 
-STANDING, MOSTLY = 0.05, 0.9
+STANDING = 0.05
+MOSTLY = 0.9
 """Metres a frame below which a camera stands; the share of a step that a driving camera goes ahead (median)."""
 
 _CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
@@ -173,7 +174,8 @@ class SynthiaSequence(FrameSequence):
     label_set = SYNTHIA_10
 
     def __init__(self, root: str | Path, sequence: str) -> None:
-        self.folder, self.name = Path(root) / sequence, sequence
+        self.folder = Path(root) / sequence
+        self.name = sequence
         self._length = 1 + max(frame_numbers(self.folder / "RGB" / VIEW, "images", ".png"))
 
     def __len__(self) -> int:
@@ -224,7 +226,8 @@ class SynthiaSequence(FrameSequence):
     def _camera_height(self, K: NDArray[np.float64], size: tuple[int, int]) -> float:
         """Return how far below the camera the nearby road of the first image lies, in the median."""
         path = self._file("GT/LABELS", 0)
-        classes, depth = read_synthia_labels(path, size), read_synthia_depth(self._file("Depth", 0), size)
+        classes = read_synthia_labels(path, size)
+        depth = read_synthia_depth(self._file("Depth", 0), size)
         road = np.isin(classes, [SYNTHIA_10.index("road"), SYNTHIA_10.index("lane")]) & (depth < GROUND_RANGE)
         rows = np.nonzero(road)[0]
         if not rows.size:

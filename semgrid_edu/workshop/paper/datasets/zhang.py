@@ -151,8 +151,11 @@ class ZhangDrive(FrameSequence):
     label_set = KITTI_14
 
     def __init__(self, drive: FrameSequence, labels: ZhangLabels, run: int) -> None:
-        self.drive, self.labels, self.run = drive, labels, run
-        self.name, self.folder = f"run {run}", labels.folder
+        self.drive = drive
+        self.labels = labels
+        self.run = run
+        self.name = f"run {run}"
+        self.folder = labels.folder
 
     def __len__(self) -> int:
         """Return the number of frames, labelled or not."""

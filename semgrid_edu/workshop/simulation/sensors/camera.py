@@ -66,7 +66,8 @@ def _smooth(values, distance, step, radius, out):
     # numba compiles the loop: which neighbours count depends on the distance of each pixel
     for r in range(height):
         for c in range(width):
-            total, weight = 0.0, 0.0
+            total = 0.0
+            weight = 0.0
             t = distance[r, c]
             for i in range(max((r - radius) // step, 0), min((r + radius) // step + 1, values.shape[0])):
                 for j in range(max((c - radius) // step, 0), min((c + radius) // step + 1, values.shape[1])):
@@ -85,7 +86,8 @@ def _open(
     From each chosen hit, a little off its surface, a ray goes to `axis` plus the normal, scattered by chance.
     """
     luck = rng.random((len(chosen), 3), dtype=np.float32)
-    normal, ray = instant.normals[hits.triangle[chosen]], hits.directions[chosen]
+    normal = instant.normals[hits.triangle[chosen]]
+    ray = hits.directions[chosen]
     away = normal[:, 0] * ray[:, 0] + normal[:, 1] * ray[:, 1] + normal[:, 2] * ray[:, 2] > 0
     facing = np.where(away, -1.0, 1.0)[:, None] * normal
     offset = 0.004 + 0.0006 * hits.distance[chosen, None].astype(np.float64)
@@ -101,8 +103,10 @@ def _sun_and_sky(
     hits: Hits, instant: Instant, light: Light, shape: tuple[int, int], rng: np.random.Generator
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return how much of sun and sky each pixel's hit sees, 0..1, from one ray to each, smoothed."""
-    distance, met = hits.distance.reshape(shape), hits.triangle >= 0
-    sunlit, open_sky = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    distance = hits.distance.reshape(shape)
+    met = hits.triangle >= 0
+    sunlit = np.empty(shape, np.float32)
+    open_sky = np.empty(shape, np.float32)
     sun = _open(hits, instant, np.flatnonzero(met), light.sun, 0.0, 3.5 * light.softness, rng)
     _smooth(sun.reshape(shape), distance, 1, 1 if light.softness < 0.1 else 3, sunlit)
     grid = np.zeros(shape, bool)
@@ -114,7 +118,8 @@ def _sun_and_sky(
 
 def _lens(radiance: NDArray[np.float32], centre: float) -> NDArray[np.float32]:
     """Blur the picture as a lens does: along each axis the share `centre` stays, the rest goes to the next pixels."""
-    middle, side = np.float32(centre), np.float32((1.0 - centre) / 2)
+    middle = np.float32(centre)
+    side = np.float32((1.0 - centre) / 2)
     for axis in (1, 0):
         at = np.arange(radiance.shape[axis])
         neighbours = radiance.take(at - 1, axis, mode="clip") + radiance.take(at + 1, axis, mode="clip")
@@ -165,7 +170,8 @@ def take_picture(
     pixel = 1.0 / rig.camera.K[0, 0]
     radiance, kind = shade(hits, instant, road, light, sunlit, open_sky, pixel)
 
-    triangles, distance = hits.triangle.reshape(shape), hits.distance.reshape(shape)
+    triangles = hits.triangle.reshape(shape)
+    distance = hits.distance.reshape(shape)
     edges = np.flatnonzero(_discontinuities(triangles, distance, instant.kind, instant.material))
     for du, dv in _SUBPIXELS:
         beside = instant.cast(eye, turned(_rays(rig, du, dv)[edges], rotation), rng)

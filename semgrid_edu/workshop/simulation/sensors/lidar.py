@@ -49,7 +49,8 @@ def labelled_scan(
     rays = lidar.directions
     met = [np.concatenate(part) for part in zip(*_sectors(world, pose, lidar, road, rng), strict=True)]
     near, distance, cosine, reflectance, kinds = (part[np.argsort(met[0])] for part in met)
-    luck, range_noise = rng.random(len(rays), dtype=np.float32), rng.standard_normal(len(rays), dtype=np.float32)
+    luck = rng.random(len(rays), dtype=np.float32)
+    range_noise = rng.standard_normal(len(rays), dtype=np.float32)
     glow = rng.standard_normal(len(rays), dtype=np.float32)
     signal = reflectance * (0.15 + 0.85 * cosine) * (25.0 / np.maximum(distance, 8.0)) ** 2
     kept = luck[near] > lidar.drop + np.exp(-signal / lidar.weakest)
@@ -64,7 +65,8 @@ def _sectors(
     rng: np.random.Generator,
 ) -> Iterator[tuple[NDArray, ...]]:  # fmt: skip
     """Yield what each sector of a scan meets, as `_met` does: all of it at once if the scanner takes no time."""
-    times, rays = lidar.times, lidar.directions
+    times = lidar.times
+    rays = lidar.directions
     poses = np.stack([pose(t) for t in times]) if lidar.turn else pose(0.0)[None]
     sector = np.floor(lidar.azimuths / _SECTOR) * bool(lidar.turn)
     for one in np.unique(sector):
@@ -82,7 +84,8 @@ def _met(
     """Return of the rays that meet something in range: their numbers, distance, |cos|, reflectance and kind."""
     near = np.flatnonzero(hits.distance < min(lidar.range_max, MISS))
     triangle = hits.triangle[near]
-    normals, material = instant.looked_up("normals", triangle), instant.looked_up("material", triangle)
+    normals = instant.looked_up("normals", triangle)
+    material = instant.looked_up("material", triangle)
     kinds = instant.looked_up("kind", triangle)
     ground = material == Material.GROUND
     kinds[ground] = ground_kinds(road, hits.position[near[ground], :2].astype(np.float64))

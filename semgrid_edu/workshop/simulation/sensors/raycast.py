@@ -3,19 +3,22 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from semgrid_edu.errors import needed
 from semgrid_edu.workshop.simulation.things.materials import Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, merge
+
+if TYPE_CHECKING:
+    from embreex.rtcore_scene import EmbreeScene
 
 MISS = np.float32(1e30)
 """Distance that a ray which meets nothing is given, metres."""
 _GRAZING = np.float32(1e-3)
-"""Smallest |cos| between a ray and the normal of a sheet that is told from a ray along the sheet."""
+"""Smallest |cos| between a ray and the normal of a sheet; a smaller one counts as this."""
 _STEP = np.float32(2e-3)
 """By how much a ray starts beyond the surface that it has passed, metres."""
 
@@ -37,7 +40,7 @@ class RayMesh:
 
     @classmethod
     def of(cls, shapes: Sequence[Shape], instances: Sequence[int]) -> "RayMesh":
-        """Put several shapes into one.
+        """Merge several shapes.
 
         Parameters
         ----------
@@ -49,10 +52,11 @@ class RayMesh:
         return cls(merge(shapes), np.repeat(np.asarray(instances, np.int32), [len(s.faces) for s in shapes]))
 
     @cached_property
-    def embree(self) -> EmbreeScene:
+    def embree(self) -> "EmbreeScene":
         """The search tree over the triangles, built when the first ray is tried: not every street is looked at."""
-        embree = EmbreeScene()
-        TriangleMesh(embree, np.ascontiguousarray(self.shape.vertices), np.ascontiguousarray(self.shape.faces))
+        embree = needed("embreex.rtcore_scene").EmbreeScene()
+        vertices, faces = (np.ascontiguousarray(part) for part in (self.shape.vertices, self.shape.faces))
+        needed("embreex.mesh_construction").TriangleMesh(embree, vertices, faces)
         return embree
 
 
@@ -273,10 +277,8 @@ class Instant:
 
         Parameters
         ----------
-        origins : (N, 3) float32
-            Where each ray starts, in the world, metres.
-        directions : (N, 3) float32
-            Unit vectors, in the world.
+        origins, directions : (N, 3) float32
+            Where the rays start in the world, metres, and unit vectors.
         """
         blocked = self.static.embree.run(origins, directions, query="OCCLUDED") >= 0
         if self.moving:
@@ -285,14 +287,12 @@ class Instant:
 
 
 def turned(rays: NDArray, rotation: NDArray) -> NDArray:
-    """Turn rays, (N, 3), with the same bits on any number of cores, which a call of BLAS doesn't promise.
+    """Turn rays, with the same bits on any number of cores, which a call of BLAS doesn't promise.
 
     Parameters
     ----------
-    rays : (N, 3) float
-        Directions.
-    rotation : (3, 3) or (N, 3, 3) float
-        Rotation matrix, or one for each ray.
+    rays, rotation : (N, 3) float, (3, 3) or (N, 3, 3) float
+        Directions, and one rotation matrix or one for each ray.
     """
     x, y, z = rays.T[:, :, None]
     return x * rotation[..., 0] + y * rotation[..., 1] + z * rotation[..., 2]

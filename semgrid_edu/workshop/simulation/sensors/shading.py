@@ -46,7 +46,9 @@ def _paving(tile, s, e, stone, blur, out):
     if not stone:
         slab = texture(tile, 7.3 * np.floor(s / 0.5), 5.1 * np.floor(e / 0.5))
         grey *= 1.0 + 0.22 * (slab - 0.5) * fade
-    out[0], out[1], out[2] = grey * 1.03, grey, grey * 0.94
+    out[0] = grey * 1.03
+    out[1] = grey
+    out[2] = grey * 0.94
 
 
 @njit(cache=True, fastmath=True)
@@ -58,14 +60,17 @@ def _grass(tile, x, y, blur, out):
     dry = texture(tile, 0.8 * x + 7.0, 0.8 * y)
     light = 1.0 + 0.8 * blade + 0.6 * tuft
     red, green, blue = 0.075 + 0.09 * dry * dry, 0.135 + 0.03 * dry, 0.035 + 0.02 * dry
-    out[0], out[1], out[2] = red * light, green * light, blue * light
+    out[0] = red * light
+    out[1] = green * light
+    out[2] = blue * light
 
 
 @njit(cache=True, fastmath=True)
 def _ground(tile, road, x, y, blur, out):
     """Write the albedo of the ground at (x, y); return its kind."""
     s, d = to_road(road, x, y)
-    e, kind = outside_asphalt(road, s, d), ground_kind(road, s, d)
+    e = outside_asphalt(road, s, d)
+    kind = ground_kind(road, s, d)
     if kind == Kind.ROAD:
         mark = _asphalt(tile, road, s, d, blur, out)
         out *= 1.0 - 0.3 * min(max((e + 0.35) / 0.35, 0.0), 1.0)
@@ -87,7 +92,8 @@ def _surface(tile, material, p, n, blur, out):
     fade = 1.0 / (1.0 + 5.0 * blur)
     gain = 1.0
     if material == Material.PLASTER:
-        fine, broad = texture(tile, 25.0 * u, 25.0 * v) - 0.5, texture(tile, 2.5 * u, 1.2 * v) - 0.5
+        fine = texture(tile, 25.0 * u, 25.0 * v) - 0.5
+        broad = texture(tile, 2.5 * u, 1.2 * v) - 0.5
         gain = 1.0 + 0.16 * fine * fade + 0.3 * broad
         gain *= 0.78 + 0.22 * min(max(v / 1.2, 0.0), 1.0)
     elif material == Material.BRICK:
@@ -132,7 +138,8 @@ def _shade(
 ):
     """Write the radiance (N, 3) and the kind (N,) of every hit."""
     sun, sun_colour, zenith, horizon, _, haze, _ = light
-    n, albedo = np.empty(3, np.float32), np.empty(3, np.float32)
+    n = np.empty(3, np.float32)
+    albedo = np.empty(3, np.float32)
     # numba compiles the loop: every material has its own branch, so that an array for each would cost more
     for i in range(len(t)):
         ray = rays[i]
@@ -141,11 +148,14 @@ def _shade(
             kinds[i] = Kind.SKY
             sky_radiance(tile, ray[0], ray[1], ray[2], light, out)
             continue
-        k, p, m = tri[i], pos[i], material[tri[i]]
+        k = tri[i]
+        p = pos[i]
+        m = material[tri[i]]
         facing = normals[k, 0] * ray[0] + normals[k, 1] * ray[1] + normals[k, 2] * ray[2]
         flip = -1.0 if facing > 0.0 and m != Material.LEAF else 1.0
         for c in range(3):
-            n[c], albedo[c] = flip * normals[k, c], colour[k, c]
+            n[c] = flip * normals[k, c]
+            albedo[c] = colour[k, c]
         blur = t[i] * pixel / max(abs(facing), 0.05)
         kinds[i] = kind[k]
         if m == Material.GROUND:
@@ -201,7 +211,8 @@ def shade(
         Members of `Kind`.
     """
     n = len(hits.distance)
-    radiance, kinds = np.empty((n, 3), np.float32), np.empty(n, np.uint8)
+    radiance = np.empty((n, 3), np.float32)
+    kinds = np.empty(n, np.uint8)
     _shade(
         noise_tile(), road, hits.directions, hits.distance, hits.triangle, hits.position,
         instant.normals, instant.colour, instant.material, instant.kind,

@@ -10,7 +10,7 @@ import numpy as np
 
 from semgrid_edu.workshop.simulation.street.builder import Builder
 from semgrid_edu.workshop.simulation.street.footprints import Footprint
-from semgrid_edu.workshop.simulation.things import furniture
+from semgrid_edu.workshop.simulation.things import roadside
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, box, tube
 
@@ -30,22 +30,26 @@ def stand_lamps(builder: Builder, sign: int) -> None:
     sign : int
         1 for the left side, -1 for the right one.
     """
-    rng, extent = builder.rng, builder.plan.extent
+    rng = builder.rng
+    extent = builder.plan.extent
     if rng.random() < 0.25:
         return
-    side, step = builder.road.side(sign), rng.uniform(22, 34)
-    shape = furniture.lamp(float(rng.choice([5.5, 7.5])))
+    side = builder.road.side(sign)
+    step = rng.uniform(22, 34)
+    shape = roadside.lamp(float(rng.choice([5.5, 7.5])))
     for s in np.arange(extent.start + rng.uniform(0, step), extent.end, step):
         builder.try_post(shape, s, sign * (side.edge + 0.6), np.pi if sign > 0 else 0.0, Kind.POLE, 0.11)
 
 
 def stand_signs(builder: Builder, sign: int) -> None:
     """Put traffic signs at the kerb, facing the traffic on their side. Parameters are those of `stand_lamps`."""
-    rng, extent = builder.rng, builder.plan.extent
-    d, yaw = sign * (builder.road.side(sign).edge + 0.75), 0.0 if sign < 0 else np.pi
+    rng = builder.rng
+    extent = builder.plan.extent
+    d = sign * (builder.road.side(sign).edge + 0.75)
+    yaw = 0.0 if sign < 0 else np.pi
     for s in np.arange(extent.start, extent.end, 16.0):
         if rng.random() < 0.45:
-            shape = furniture.sign(str(rng.choice(list(_SIGNS), p=list(_SIGNS.values()))))
+            shape = roadside.sign(str(rng.choice(list(_SIGNS), p=list(_SIGNS.values()))))
             builder.try_post(shape, s + rng.uniform(0, 12), d, yaw + rng.normal(0, 0.08), Kind.SIGN, 0.08)
 
 
@@ -57,16 +61,18 @@ def stand_signals(builder: Builder) -> None:
     builder : Builder
         The world that takes them.
     """
-    road, rng = builder.road, builder.rng
+    road = builder.road
+    rng = builder.rng
     if not road.side_half:
         return
-    lights, green = rng.random() < 0.55, bool(rng.random() < 0.5)
+    lights = rng.random() < 0.55
+    green = bool(rng.random() < 0.5)
     back = road.side_half + road.corner + 0.4
     for sign, yaw in ((-1, 0.0), (1, np.pi)):
-        shape = furniture.traffic_light(green) if lights else furniture.sign("priority")
+        shape = roadside.traffic_light(green) if lights else roadside.sign("priority")
         builder.try_post(shape, road.junction + sign * back, sign * (road.side(sign).edge + 0.5), yaw, Kind.SIGN, 0.09)
     for sign in filter(road.leaves, (1, -1)):
-        shape = furniture.traffic_light(not green) if lights else furniture.sign("stop")
+        shape = roadside.traffic_light(not green) if lights else roadside.sign("stop")
         s, d = road.junction + sign * (road.side_half + 0.5), sign * (road.side(sign).edge + road.corner + 0.5)
         builder.try_post(shape, s, d, -sign * np.pi / 2, Kind.SIGN, 0.09)
 
@@ -77,15 +83,19 @@ Piece = tuple[float, float, float, float]
 
 def _pieces(s0: float, s1: float, d: float, jog: float, step: float, rng: np.random.Generator) -> Iterator[Piece]:
     """Cut a line along the road into pieces of about `step`; every 12 to 30 m it steps aside, up to `jog` away."""
-    s, at = s0, d
+    s = s0
+    at = d
     while s < s1:
-        run, to = rng.uniform(12, 30), d + np.sign(d) * rng.uniform(0, jog)
+        run = rng.uniform(12, 30)
+        to = d + np.sign(d) * rng.uniform(0, jog)
         for length, aside in ((run, 0.0), (2.5, to - at)):
-            whole, yaw = float(np.hypot(length, aside)), float(np.arctan2(aside, length))
+            whole = float(np.hypot(length, aside))
+            yaw = float(np.arctan2(aside, length))
             n = max(round(whole / step), 1)
             for k in range(n):
                 yield s + k * length / n, at + k * aside / n, yaw, round(whole / n, 3)
-            s, at = s + length, at + aside
+            s = s + length
+            at = at + aside
 
 
 def _fit(builder: Builder, piece: Piece, kind: Kind, half: float, top: float) -> Footprint | None:
@@ -105,8 +115,8 @@ def _stand(builder: Builder, piece: Piece, kind: Kind, half: float, top: float, 
 
 def _stand_fence(builder: Builder, piece: Piece, style: str, opacity: float) -> None:
     """Put a piece of wire mesh or a pane into the world, in its frame, unless its place is taken."""
-    frame, sheet = furniture.sheet_fence(style, piece[3])
-    if _stand(builder, piece, Kind.FENCE, _THIN_HALF, furniture.SHEETS[style].height, sheet, opacity):
+    frame, sheet = roadside.sheet_fence(style, piece[3])
+    if _stand(builder, piece, Kind.FENCE, _THIN_HALF, roadside.SHEETS[style].height, sheet, opacity):
         builder.add(frame, *piece[:3])
 
 
@@ -126,7 +136,8 @@ def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
         Where across the road it stands: distance to the left of the centre line, metres.
     """
     rng = builder.rng
-    opacity, step = rng.uniform(0.008, 0.02), rng.choice([2.0, 2.5, 3.0])
+    opacity = rng.uniform(0.008, 0.02)
+    step = rng.choice([2.0, 2.5, 3.0])
     for piece in _pieces(s0, s1, d, 2.5, step, rng):
         _stand_fence(builder, piece, "wire", opacity)
 
@@ -137,19 +148,24 @@ def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
     The hedges beside KITTI's drive 0013 return from 0.2 m inside on average, which is an opacity of 5 /m.
     """
     rng = builder.rng
-    opacity, thickness, height = rng.uniform(2.0, 6.0), rng.uniform(0.6, 1.2), rng.uniform(1.4, 2.1)
+    opacity = rng.uniform(2.0, 6.0)
+    thickness = rng.uniform(0.6, 1.2)
+    height = rng.uniform(1.4, 2.1)
     for piece in _pieces(s0, s1, d + np.sign(d) * thickness / 2, 0.6, 1.0, rng):
         if rng.random() > 0.04:
-            wide, high = thickness * rng.uniform(0.8, 1.1), height * rng.uniform(0.9, 1.1)
-            body = furniture.porous_hedge(piece[3], wide, high)
+            wide = thickness * rng.uniform(0.8, 1.1)
+            high = height * rng.uniform(0.9, 1.1)
+            body = roadside.porous_hedge(piece[3], wide, high)
             _stand(builder, piece, Kind.PLANT, wide / 2, high, body, opacity * rng.uniform(0.7, 1.4))
 
 
 def mesh_and_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Run wire mesh with hedges behind it, along it or in rows across. Parameters are those of `wire_mesh`."""
-    rng, sign = builder.rng, np.sign(d)
+    rng = builder.rng
+    sign = np.sign(d)
     wire_mesh(builder, s0, s1, d)
-    s, behind = s0, d + sign * rng.uniform(0.5, 1.5)
+    s = s0
+    behind = d + sign * rng.uniform(0.5, 1.5)
     while s < s1:
         run = rng.uniform(15, 30)
         (twig_hedge if rng.random() < 0.5 else _rows)(builder, s, s + run, behind)
@@ -159,9 +175,11 @@ def mesh_and_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
 def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Plant hedges across the road's direction, one behind the other, from `d` outwards."""
     rng = builder.rng
-    opacity, height, long = rng.uniform(3.0, 6.0), rng.uniform(1.3, 1.9), rng.uniform(2.5, 4.0)
+    opacity = rng.uniform(3.0, 6.0)
+    height = rng.uniform(1.3, 1.9)
+    long = rng.uniform(2.5, 4.0)
     for s in np.arange(s0, s1, rng.uniform(2.8, 4.0)):
-        body = furniture.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
+        body = roadside.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
         piece = (s, d + np.sign(d) * 1.6, np.sign(d) * np.pi / 2, long)
         _stand(builder, piece, Kind.PLANT, 0.35, height, body, opacity)
 
@@ -169,7 +187,8 @@ def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
 def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Run panes of glass between thin posts, as a bus shelter has. Parameters are those of `wire_mesh`."""
     rng = builder.rng
-    opacity, step = rng.uniform(0.05, 0.15), rng.uniform(1.3, 2.2)
+    opacity = rng.uniform(0.05, 0.15)
+    step = rng.uniform(1.3, 2.2)
     for piece in _pieces(s0, s1, d, 0.8, step, rng):
         if rng.random() > 0.1:
             _stand_fence(builder, piece, "pane", opacity)
@@ -178,8 +197,10 @@ def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
 def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Stand bare posts in a regular row. Parameters are those of `wire_mesh`."""
     rng = builder.rng
-    step, height, radius = rng.uniform(1.4, 2.6), rng.uniform(1.0, 1.8), rng.uniform(0.04, 0.09)
-    post = furniture.bollard(height, radius)
+    step = rng.uniform(1.4, 2.6)
+    height = rng.uniform(1.0, 1.8)
+    radius = rng.uniform(0.04, 0.09)
+    post = roadside.bollard(height, radius)
     for s in np.arange(s0, s1, step):
         builder.try_post(post, s, d, 0.0, Kind.POLE, max(radius, _THIN_HALF))
 
@@ -189,12 +210,15 @@ def walls_behind_gaps(builder: Builder, s0: float, s1: float, d: float) -> None:
 
     As the recording car passes, the walls across come into view from behind the edges of the gaps.
     """
-    rng, sign = builder.rng, np.sign(d)
+    rng = builder.rng
+    sign = np.sign(d)
     s = s0
     while s < s1:
-        run, gap = rng.uniform(4, 10), rng.uniform(7, 15)
+        run = rng.uniform(4, 10)
+        gap = rng.uniform(7, 15)
         _wall(builder, (s, d, 0.0, run), 2.2, _PLANK, Material.WOOD, Kind.FENCE)
-        start, yaw = s + run + rng.uniform(0.3, 1.0) * gap, sign * np.pi / 2 + rng.uniform(-0.5, 0.5)
+        start = s + run + rng.uniform(0.3, 1.0) * gap
+        yaw = sign * np.pi / 2 + rng.uniform(-0.5, 0.5)
         across = (start, d + sign * rng.uniform(0.5, 2.0), yaw, rng.uniform(5, 11))
         _wall(builder, across, rng.uniform(1.9, 3.0), _PLASTER, Material.PLASTER, Kind.BUILDING)
         s += run + gap
@@ -213,9 +237,11 @@ def stand_pillars(builder: Builder, s0: float, s1: float, d: float) -> None:
 
     As the recording car passes, the edge of a pillar's shadow runs along the border behind it.
     """
-    rng, s = builder.rng, s0
+    rng = builder.rng
+    s = s0
     while s < s1:
-        radius, top = rng.uniform(0.3, 0.7), (0, 0, rng.uniform(1.9, 3.5))
+        radius = rng.uniform(0.3, 0.7)
+        top = (0, 0, rng.uniform(1.9, 3.5))
         pillar = tube((0, 0, -0.5), top, radius, _PLASTER, Material.MATTE, Kind.POLE, 12)
         builder.try_post(pillar, s, d, 0.0, Kind.POLE, radius)
         s += rng.uniform(10, 30)

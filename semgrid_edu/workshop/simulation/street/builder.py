@@ -38,7 +38,9 @@ class Builder:
     """
 
     def __init__(self, plan: Plan, rng: np.random.Generator) -> None:
-        self.plan, self.road, self.rng = plan, plan.road, rng
+        self.plan = plan
+        self.road = plan.road
+        self.rng = rng
         self.solid: list[tuple[Shape, int]] = []
         self.porous: list[tuple[Shape, float]] = []
         self.footprints: list[Footprint] = []

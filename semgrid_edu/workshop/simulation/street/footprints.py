@@ -133,7 +133,8 @@ def collides(footprint: Footprint, others: NDArray | list[Footprint], margin: fl
     margin : float
         By how much `footprint` is widened on every side, metres.
     """
-    f, others = footprint, footprint_table(others)
+    f = footprint
+    others = footprint_table(others)
     reach = np.hypot(others[:, 2], others[:, 3]) + np.hypot(f.half_length, f.half_width) + margin
     near = others[np.hypot(others[:, 0] - f.x, others[:, 1] - f.y) < reach]
     mine = footprint_table([f._replace(half_length=f.half_length + margin, half_width=f.half_width + margin)])[0]

@@ -130,7 +130,8 @@ def to_world(road: Road, s: float, d: float) -> tuple[float, float, float]:
     heading : float
         Direction of the road there, rad from the x axis, counter-clockwise.
     """
-    k, s1 = road.curvature, road.bend_start
+    k = road.curvature
+    s1 = road.bend_start
     if s <= s1 or k == 0.0:
         return s, d, 0.0
     heading = k * (min(s, road.bend_end) - s1)
@@ -157,7 +158,8 @@ def to_road(road: Road, x: float, y: float) -> tuple[float, float]:
     s, d : float
         Distance along the centre line and to the left of it, metres.
     """
-    k, s1 = road.curvature, road.bend_start
+    k = road.curvature
+    s1 = road.bend_start
     if x <= s1 or k == 0.0:
         return x, y
     sign, radius = (1.0, 1.0 / k) if k > 0 else (-1.0, -1.0 / k)

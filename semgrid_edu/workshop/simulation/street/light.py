@@ -56,18 +56,24 @@ class Light:
             Decides it.
         """
         overcast = rng.random() < 0.3
-        elevation, azimuth = np.radians(rng.uniform(18, 62)), rng.uniform(0, 2 * np.pi)
+        elevation = np.radians(rng.uniform(18, 62))
+        azimuth = rng.uniform(0, 2 * np.pi)
         low = float(np.clip((np.radians(35) - elevation) / np.radians(20), 0, 1))
         sun = (np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation))
         warm = np.array([1.0, 0.95 - 0.12 * low, 0.86 - 0.3 * low])
         if overcast:
-            strength, sky, horizon = 0.25, np.array([0.62, 0.66, 0.72]), np.array([0.78, 0.80, 0.83])
+            strength = 0.25
+            sky = np.array([0.62, 0.66, 0.72])
+            horizon = np.array([0.78, 0.80, 0.83])
         else:
-            strength, sky = rng.uniform(1.3, 1.8), np.array([0.16, 0.30, 0.62]) * rng.uniform(0.8, 1.2)
+            strength = rng.uniform(1.3, 1.8)
+            sky = np.array([0.16, 0.30, 0.62]) * rng.uniform(0.8, 1.2)
             horizon = np.array([0.66, 0.75, 0.86]) * (1 - 0.25 * low) + np.array([0.22, 0.10, 0.0]) * low
-        clouds, haze = rng.uniform(0.75, 1.0) if overcast else rng.uniform(0.0, 0.6), 10 ** rng.uniform(-3.5, -2.5)
+        clouds = rng.uniform(0.75, 1.0) if overcast else rng.uniform(0.0, 0.6)
+        haze = 10 ** rng.uniform(-3.5, -2.5)
         exposure = rng.uniform(0.85, 1.2) * (1.5 if overcast else 1.15)
-        balance, phase = 1 + rng.normal(0, 0.025, 3), rng.uniform(0, 100)
+        balance = 1 + rng.normal(0, 0.025, 3)
+        phase = rng.uniform(0, 100)
         colours = (tuple(map(float, colour)) for colour in (sun, strength * warm, sky, horizon))
         softness = 0.45 if overcast else 0.012
         return cls(*colours, softness, clouds, haze, exposure, tuple(map(float, balance)), phase)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from semgrid_edu.storage.files import table_beside
+from semgrid_edu.workshop.simulation.street.ground import Extent
 from semgrid_edu.workshop.simulation.street.layout import Road, Side
 from semgrid_edu.workshop.simulation.street.light import Light
-from semgrid_edu.workshop.simulation.street.terrain import Extent
-from semgrid_edu.workshop.simulation.things.furniture import FENCES
+from semgrid_edu.workshop.simulation.things.roadside import FENCES
 
 BORDERS = (*FENCES, "hedge", "none")
 """What may run along the gardens of a suburb."""
@@ -82,7 +82,7 @@ class Plan:
     styles : (str, str)
         Left and right side, members of `STYLES`, or `YARD`.
     borders : (str, str)
-        What runs along the gardens of a suburb, left and right: a fence of `furniture.FENCES`, "hedge" or "none"; along
+        What runs along the gardens of a suburb, left and right: a fence of `roadside.FENCES`, "hedge" or "none"; along
         a yard one of `YARD_BORDERS`.
     parking : (bool, bool)
         Whether there are parking bays left and right.
@@ -113,7 +113,8 @@ _SIDES = table_beside(__file__)  # how it may look beside the road in each style
 
 def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Generator) -> Side:
     """Draw one side of the road."""
-    edge, looks = lanes * lane + (2.2 if parking else 0.35), _SIDES[style]
+    edge = lanes * lane + (2.2 if parking else 0.35)
+    looks = _SIDES[style]
     strip = rng.uniform(1.4, 2.6) if rng.random() < looks["grass"] else 0.0
     walk = rng.uniform(*looks["sidewalk"])
     if style == "park" and rng.random() < 0.4:
@@ -125,9 +126,12 @@ def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Gen
 def _road(rng: np.random.Generator, length: float, layout: str, lanes: tuple, styles: tuple, parking: tuple) -> Road:
     """Draw the geometry of a street on which the recording car drives `length` metres."""
     lane = rng.uniform(3.1, 3.6)
-    start, curvature, arc = 0.0, 0.0, 0.0
+    start = 0.0
+    curvature = 0.0
+    arc = 0.0
     if layout == "bend":
-        start, curvature = rng.uniform(15, 40) + 0.5 * length, rng.choice([-1, 1]) / rng.uniform(75, 220)
+        start = rng.uniform(15, 40) + 0.5 * length
+        curvature = rng.choice([-1, 1]) / rng.uniform(75, 220)
         arc = rng.uniform(0.25, 0.9) / abs(curvature)
     junction = layout in ("junction", CROSSING)
     both = rng.random() < 0.6 or layout == CROSSING

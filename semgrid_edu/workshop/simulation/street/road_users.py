@@ -8,7 +8,7 @@ import numpy as np
 from semgrid_edu.workshop.simulation.street.layout import Side
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
 from semgrid_edu.workshop.simulation.street.trajectories import STAND, ActorPace, Departure, Trajectory
-from semgrid_edu.workshop.simulation.things.cars import car_size
+from semgrid_edu.workshop.simulation.things.cars_and_people import car_size
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 
@@ -26,28 +26,36 @@ def fill_street(traffic: Traffic) -> None:
 
 def park_cars(traffic: Traffic) -> None:
     """Fill the parking bays. Parameters are those of `fill_street`."""
-    road, rng, extent = traffic.road, traffic.rng, traffic.plan.extent
+    road = traffic.road
+    rng = traffic.rng
+    extent = traffic.plan.extent
     for sign, bays in zip((1, -1), traffic.plan.parking, strict=True):
         if not bays:
             continue
-        share, s, middle = rng.uniform(0.35, 0.9), extent.start + 5, road.side(sign).edge - 1.06
+        share = rng.uniform(0.35, 0.9)
+        s = extent.start + 5
+        middle = road.side(sign).edge - 1.06
         while s < extent.end - 60:
             s += rng.uniform(5.7, 6.6)
             near = road.side_half and abs(s - road.junction) < road.side_half + road.corner + 9
             if rng.random() > share or near:
                 continue
-            body, away = traffic.body(), (sign > 0) != (rng.random() < 0.12)
-            d, yaw = sign * (middle + rng.normal(0, 0.05)), rng.normal(0, 0.02) + np.pi * away
+            body = traffic.body()
+            away = (sign > 0) != (rng.random() < 0.12)
+            d = sign * (middle + rng.normal(0, 0.05))
+            yaw = rng.normal(0, 0.02) + np.pi * away
             traffic.park(Kind.CAR, car_size(body), Trajectory(s, d, 1, 0, STAND, yaw), (body, traffic.paint()))
 
 
 def _park_bicycles(traffic: Traffic) -> None:
     """Park a few bicycles on the sidewalks."""
-    road, rng = traffic.road, traffic.rng
+    road = traffic.road
+    rng = traffic.rng
     for sign in (1, -1):
         side = road.side(sign)
         for _ in range(rng.integers(0, 5) if side.walk >= 1.5 else 0):
-            s, n = rng.uniform(4, 70), rng.integers(1, 4)
+            s = rng.uniform(4, 70)
+            n = rng.integers(1, 4)
             for k in range(n):
                 d = sign * (side.edge + side.strip + rng.choice([0.5, side.walk - 0.35]))
                 place = Trajectory(s + 0.75 * k, d, 1, 0, STAND, rng.normal(0, 0.15) + (1.3 if n > 1 else 0))
@@ -56,7 +64,9 @@ def _park_bicycles(traffic: Traffic) -> None:
 
 def _lanes(traffic: Traffic) -> None:
     """Fill every lane with cars that drive alike, so that none catches up with the next."""
-    road, rng, ego = traffic.road, traffic.rng, traffic.ego
+    road = traffic.road
+    rng = traffic.rng
+    ego = traffic.ego
     stands = ego.pace.mean == 0
     ego_lane = round(-ego.d / road.lane - 0.5)
     for index in range(road.lanes_right):
@@ -67,7 +77,8 @@ def _lanes(traffic: Traffic) -> None:
     for index in range(road.lanes_left):
         d = (index + 0.5) * road.lane
         if overtaken and index == 0:
-            at_end, pace = traffic.ends_at + rng.uniform(4, 22), ActorPace(ego.pace.mean + rng.uniform(4, 7))
+            at_end = traffic.ends_at + rng.uniform(4, 22)
+            pace = ActorPace(ego.pace.mean + rng.uniform(4, 7))
             traffic.drive_car(at_end - pace.distance(traffic.duration), d, 1, 0, pace)
         else:
             _fill_lane(traffic, d, -1, STAND if stands else ActorPace(rng.uniform(7, 14)))
@@ -75,8 +86,11 @@ def _lanes(traffic: Traffic) -> None:
 
 def _fill_lane(traffic: Traffic, d: float, along: int, pace: ActorPace) -> None:
     """Put cars that drive alike into a lane, so that they are around the recording car when the drive ends."""
-    road, rng, density = traffic.road, traffic.rng, traffic.plan.density
-    travelled, reach = pace.distance(traffic.duration), road.side_half + road.corner
+    road = traffic.road
+    rng = traffic.rng
+    density = traffic.plan.density
+    travelled = pace.distance(traffic.duration)
+    reach = road.side_half + road.corner
     gap = 6.5 + (0.8 * pace.mean if pace.mean else 0.0)
     s = traffic.ends_at - 30 + rng.uniform(0, 15)
     while s < traffic.ends_at + 110:
@@ -89,7 +103,8 @@ def _fill_lane(traffic: Traffic, d: float, along: int, pace: ActorPace) -> None:
 
 def _cross_traffic(traffic: Traffic) -> None:
     """Let cars wait in the side road, leave by it, or cross while our traffic stands."""
-    road, rng = traffic.road, traffic.rng
+    road = traffic.road
+    rng = traffic.rng
     for sign in filter(road.leaves, (1, -1)):
         towards, away = (road.junction - way * sign * road.side_half / 2 for way in (1, -1))
         edge = road.side(sign).edge
@@ -101,15 +116,18 @@ def _cross_traffic(traffic: Traffic) -> None:
             start = edge + rng.uniform(6, 40)
             traffic.drive_car(away, sign * start, 0, sign, ActorPace(rng.uniform(4, 9)))
         if traffic.ego.pace.mean == 0 and rng.random() < 0.7:
-            pace, end = ActorPace(rng.uniform(5, 9)), rng.uniform(-8, 8)
+            pace = ActorPace(rng.uniform(5, 9))
+            end = rng.uniform(-8, 8)
             traffic.drive_car(towards, sign * (end + pace.distance(traffic.duration)), 0, -sign, pace)
 
 
 def _cyclists(traffic: Traffic) -> None:
     """Let cyclists ride at the edge of the outer lanes."""
-    road, rng = traffic.road, traffic.rng
+    road = traffic.road
+    rng = traffic.rng
     for _ in range(rng.poisson(0.5 + 1.6 * traffic.plan.density)):
-        pace, along = ActorPace(rng.uniform(3.5, 6.5)), int(rng.choice([1, 1, -1]))
+        pace = ActorPace(rng.uniform(3.5, 6.5))
+        along = int(rng.choice([1, 1, -1]))
         lanes = road.lanes_right if along > 0 else road.lanes_left
         d = -along * (lanes * road.lane - rng.uniform(0.35, 0.6))
         traffic.ride(traffic.ends_at + rng.uniform(4, 40) - along * pace.distance(traffic.duration), d, along, pace)
@@ -117,12 +135,15 @@ def _cyclists(traffic: Traffic) -> None:
 
 def _pedestrians(traffic: Traffic) -> None:
     """Let people walk along the sidewalks, stand there, and cross the road."""
-    road, rng, here = traffic.road, traffic.rng, traffic.ends_at
+    road = traffic.road
+    rng = traffic.rng
+    here = traffic.ends_at
     for sign in (1, -1):
         side = road.side(sign)
         for _ in range(rng.poisson(1.0 + 5.0 * traffic.plan.density) if side.walk > 1 else 0):
             d = sign * (side.edge + side.strip + rng.uniform(0.45, side.walk - 0.35))
-            s, along = here + rng.uniform(3, 55), int(rng.choice([-1, 1]))
+            s = here + rng.uniform(3, 55)
+            along = int(rng.choice([-1, 1]))
             if rng.random() < 0.15:
                 traffic.walk(s, d, 1, 0, STAND, rng.uniform(-np.pi, np.pi))
                 continue
@@ -130,7 +151,8 @@ def _pedestrians(traffic: Traffic) -> None:
             if traffic.walk(s, d, along, 0, pace) and rng.random() < 0.35:
                 traffic.walk(s + 0.1, d + rng.choice([-0.75, 0.75]), along, 0, pace)
     for _ in range(rng.poisson(0.4 + 0.9 * traffic.plan.density)):
-        pace, across = ActorPace(float(rng.normal(1.4, 0.15))), int(rng.choice([-1, 1]))
+        pace = ActorPace(float(rng.normal(1.4, 0.15)))
+        across = int(rng.choice([-1, 1]))
         back = road.side_half + road.corner + rng.uniform(1.0, 3.2)
         s = road.junction - back if road.side_half and road.zebra else here + rng.uniform(9, 35)
         end = rng.uniform(-road.right.edge, road.left.edge)
@@ -143,7 +165,9 @@ def convoys(traffic: Traffic) -> None:
     The gaps are 8 to 20 m, so that the first car hides the next one at first. Parameters are those of `fill_street`.
     """
     park_cars(traffic)
-    road, rng, ego = traffic.road, traffic.rng, traffic.ego
+    road = traffic.road
+    rng = traffic.rng
+    ego = traffic.ego
     oncoming = ActorPace(rng.uniform(8, 14))
     meets = rng.uniform(0.6, 1.1) * traffic.duration
     first = ego.at(meets)[0] + oncoming.distance(meets)
@@ -169,14 +193,16 @@ def _on_sidewalk(side: Side, rng: np.random.Generator) -> float:
 def pedestrians(traffic: Traffic) -> None:
     """Let people walk along both sidewalks, and across the road. Parameters are those of `fill_street`."""
     park_cars(traffic)
-    road, rng = traffic.road, traffic.rng
+    road = traffic.road
+    rng = traffic.rng
     middle = traffic.ego.at(traffic.duration / 2)[0]
     for sign in (1, -1):
         for s in np.arange(middle + 2, middle + 55, 5.0):
             d = sign * _on_sidewalk(road.side(sign), rng)
             traffic.walk(s + rng.uniform(0, 4), d, int(rng.choice([-1, 1])), 0, _walking(rng))
     for s in np.arange(middle + 8, middle + 50, 8.0):
-        across, pace = int(rng.choice([-1, 1])), _walking(rng)
+        across = int(rng.choice([-1, 1]))
+        pace = _walking(rng)
         halfway = rng.uniform(-road.right.edge, road.left.edge) - across * pace.distance(traffic.duration / 2)
         traffic.walk(s + rng.uniform(0, 6), halfway, 0, across, pace)
 
@@ -184,7 +210,8 @@ def pedestrians(traffic: Traffic) -> None:
 def slow_starters(traffic: Traffic) -> None:
     """Let people and cars stand for 1 to 2 s, and then set off. Parameters are those of `fill_street`."""
     park_cars(traffic)
-    road, rng = traffic.road, traffic.rng
+    road = traffic.road
+    rng = traffic.rng
     middle = traffic.ego.at(traffic.duration / 2)[0]
     for sign in (1, -1):
         side = road.side(sign)
@@ -203,9 +230,11 @@ def slow_starters(traffic: Traffic) -> None:
 def crossing_cars(traffic: Traffic) -> None:
     """Let cars cross at the junction, two from each side. Parameters are those of `fill_street`."""
     park_cars(traffic)
-    road, rng = traffic.road, traffic.rng
+    road = traffic.road
+    rng = traffic.rng
     for sign in (1, -1):
-        s, pace = road.junction - sign * road.side_half / 2, ActorPace(rng.uniform(5, 11))
+        s = road.junction - sign * road.side_half / 2
+        pace = ActorPace(rng.uniform(5, 11))
         halfway = pace.distance(rng.uniform(0.3, 0.7) * traffic.duration)
         for k in range(2):
             traffic.drive_car(s, sign * (halfway + k * rng.uniform(12, 20)), 0, -sign, pace)
@@ -218,8 +247,10 @@ def overturned_car(traffic: Traffic) -> None:
     """
     rng = traffic.rng
     for _ in range(20):  # until the place is free
-        look, angle = (traffic.body(), traffic.paint()), rng.uniform(-0.5, 0.5)
-        s, direction = traffic.ends_at + rng.uniform(10, 22), (float(np.cos(angle)), float(np.sin(angle)))
+        look = (traffic.body(), traffic.paint())
+        angle = rng.uniform(-0.5, 0.5)
+        s = traffic.ends_at + rng.uniform(10, 22)
+        direction = (float(np.cos(angle)), float(np.sin(angle)))
         place = Trajectory(s, 0.5 * traffic.road.lane, *direction, STAND)
         if traffic.park(Kind.CAR, car_size(look[0]), place, look, overturned=True):
             break

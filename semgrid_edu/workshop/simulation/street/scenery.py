@@ -6,9 +6,9 @@ import numpy as np
 
 from semgrid_edu.workshop.simulation.street import borders
 from semgrid_edu.workshop.simulation.street.builder import Builder
+from semgrid_edu.workshop.simulation.street.ground import ground_mesh
 from semgrid_edu.workshop.simulation.street.plan import YARD, Plan
-from semgrid_edu.workshop.simulation.street.terrain import ground_mesh
-from semgrid_edu.workshop.simulation.things import furniture, plants
+from semgrid_edu.workshop.simulation.things import roadside
 from semgrid_edu.workshop.simulation.things.buildings import House, build_house
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 
@@ -50,11 +50,13 @@ def _meets_side_road(builder: Builder, s0: float, s1: float, sign: int, margin: 
 
 def _tree(builder: Builder, s: float, d: float, species: str | None = None) -> None:
     """Plant a tree; far ones have fewer leaves."""
-    rng, plan = builder.rng, builder.plan
-    species = species or str(rng.choice(plants.TREES, p=[0.5, 0.15, 0.2, 0.15]))
+    rng = builder.rng
+    plan = builder.plan
+    species = species or str(rng.choice(roadside.TREES, p=[0.5, 0.15, 0.2, 0.15]))
     far = abs(d) > 35 or s > plan.extent.end - 120
-    shape = plants.tree(species, int(rng.integers(3)), 350 if far else 1500)
-    scale, season = rng.uniform(0.75, 1.25), (1, 1, 1) if species == "conifer" else plan.foliage
+    shape = roadside.tree(species, int(rng.integers(3)), 350 if far else 1500)
+    scale = rng.uniform(0.75, 1.25)
+    season = (1, 1, 1) if species == "conifer" else plan.foliage
     tint = np.asarray(season) * rng.uniform(0.75, 1.25) * (1 + rng.normal(0, 0.08, 3))
     tinted = shape.tinted(np.where((shape.material == Material.LEAF)[:, None], tint, 1.0))
     if species != "conifer":
@@ -68,7 +70,7 @@ def _bush(builder: Builder, s: float, d: float) -> None:
     rng = builder.rng
     scale = rng.uniform(0.6, 1.3)
     if foot := builder.spot(s, d, Kind.PLANT, 0.95 * scale, 1.2 * scale, top=1.3 * scale):
-        shape = plants.bush(int(rng.integers(3))).tinted(np.asarray(builder.plan.foliage) * rng.uniform(0.7, 1.3))
+        shape = roadside.bush(int(rng.integers(3))).tinted(np.asarray(builder.plan.foliage) * rng.uniform(0.7, 1.3))
         builder.add(shape, s, d, rng.uniform(0, 6.28), foot, scale)
 
 
@@ -82,21 +84,29 @@ def _house(builder: Builder, house: House, s: float, d: float, yaw: float, acros
 
 def _town_house(rng: np.random.Generator) -> House:
     """Draw a house of 2 to 5 storeys, half of which have a shop."""
-    seed, roof = int(rng.integers(2**31)), str(rng.choice(["flat", "hip", "gable"], p=[0.45, 0.3, 0.25]))
-    width, depth, storeys = rng.uniform(9, 17), rng.uniform(9, 12), int(rng.integers(2, 6))
+    seed = int(rng.integers(2**31))
+    roof = str(rng.choice(["flat", "hip", "gable"], p=[0.45, 0.3, 0.25]))
+    width = rng.uniform(9, 17)
+    depth = rng.uniform(9, 12)
+    storeys = int(rng.integers(2, 6))
     return House(width, depth, storeys, roof, bool(rng.random() < 0.5), seed)
 
 
 def _suburb_house(rng: np.random.Generator) -> House:
     """Draw a house of 1 or 2 storeys."""
-    seed, roof = int(rng.integers(2**31)), str(rng.choice(["gable", "hip", "flat"], p=[0.65, 0.25, 0.1]))
+    seed = int(rng.integers(2**31))
+    roof = str(rng.choice(["gable", "hip", "flat"], p=[0.65, 0.25, 0.1]))
     return House(rng.uniform(8, 12), rng.uniform(7.5, 10.5), int(rng.integers(1, 3)), roof, False, seed)
 
 
 def _house_row(builder: Builder, sign: int, town: bool) -> None:
     """Line one side with facades at the sidewalk, or with houses in gardens behind fences and hedges."""
-    rng, side, extent, border = builder.rng, builder.road.side(sign), builder.plan.extent, builder.plan.border(sign)
-    line, setback = side.strip + side.walk, rng.uniform(0.0, 0.4) if town else rng.uniform(3.5, 8.0)
+    rng = builder.rng
+    side = builder.road.side(sign)
+    extent = builder.plan.extent
+    border = builder.plan.border(sign)
+    line = side.strip + side.walk
+    setback = rng.uniform(0.0, 0.4) if town else rng.uniform(3.5, 8.0)
     s = extent.start + rng.uniform(0, 8)
     while s < extent.end - 20:
         house = (_town_house if town else _suburb_house)(rng)
@@ -106,7 +116,7 @@ def _house_row(builder: Builder, sign: int, town: bool) -> None:
             front = side.edge + line + setback + rng.uniform(0, 1.0) * (not town)
             _house(builder, house, s + house.width / 2, sign * front, _facing(sign))
         if not town:
-            border = str(rng.choice([*furniture.FENCES, "hedge"])) if rng.random() < 0.15 else border
+            border = str(rng.choice([*roadside.FENCES, "hedge"])) if rng.random() < 0.15 else border
             _border(builder, s, end, sign, side.edge + line + 0.35, border)
             _garden(builder, s, end, sign, side.edge + line + 1.2, setback)
         elif gap > 2 and rng.random() < 0.6:
@@ -120,10 +130,12 @@ def _tall_houses(
     builder: Builder, sign: int, line: float, behind: tuple, step: float, along: float, share: float
 ) -> None:
     """Scatter houses of a town some metres `behind` a line along the road, so that gaps don't end in nothing."""
-    rng, extent = builder.rng, builder.plan.extent
+    rng = builder.rng
+    extent = builder.plan.extent
     for s in np.arange(extent.start, extent.end, step):
         if rng.random() < share:
-            house, s = _town_house(rng), s + rng.uniform(0, along)
+            house = _town_house(rng)
+            s = s + rng.uniform(0, along)
             _house(builder, house, s, sign * (line + rng.uniform(*behind)), _facing(sign))
 
 
@@ -131,7 +143,9 @@ def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, st
     """Run a fence or a hedge along the road from s0 to s1, in pieces that follow bends; gates stay open."""
     if style == "none":
         return
-    rng, margin, hedge = builder.rng, offset - builder.road.side(sign).edge, style == "hedge"
+    rng = builder.rng
+    margin = offset - builder.road.side(sign).edge
+    hedge = style == "hedge"
     step, half, kind = (1.0, 0.42, Kind.PLANT) if hedge else (2.5, 0.08, Kind.FENCE)
     gate = rng.uniform(s0, s1)
     for s in np.arange(s0, s1 - 0.5 * step, step):
@@ -140,9 +154,9 @@ def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, st
         if at_gate or _meets_side_road(builder, s, s + step, sign, margin) or not builder.free(foot, -0.05):
             continue
         if hedge:
-            piece = plants.hedge(int(rng.integers(3))).placed((0.5, 0, 0)).tinted(rng.uniform(0.85, 1.15))
+            piece = roadside.hedge(int(rng.integers(3))).placed((0.5, 0, 0)).tinted(rng.uniform(0.85, 1.15))
         else:
-            piece = furniture.fence(style, step)
+            piece = roadside.fence(style, step)
         builder.add(piece, s, sign * offset, 0.0, foot)
 
 
@@ -158,9 +172,11 @@ def _garden(builder: Builder, s0: float, s1: float, sign: int, offset: float, de
 
 def _park(builder: Builder, sign: int) -> None:
     """Cover one side with trees and bushes on its bank, perhaps a fence along it."""
-    rng, extent, line = builder.rng, builder.plan.extent, builder.road.side(sign).line
+    rng = builder.rng
+    extent = builder.plan.extent
+    line = builder.road.side(sign).line
     if rng.random() < 0.65:
-        style = str(rng.choice(furniture.FENCES, p=[0.2, 0.25, 0.4, 0.15]))
+        style = str(rng.choice(roadside.FENCES, p=[0.2, 0.25, 0.4, 0.15]))
         _border(builder, extent.start, extent.start + 150, sign, line + rng.uniform(0.8, 2.5), style)
     for s in np.arange(extent.start, extent.end, 5.5):
         for _ in range(2):
@@ -171,7 +187,9 @@ def _park(builder: Builder, sign: int) -> None:
 
 def _yard(builder: Builder, sign: int) -> None:
     """Run a border along one side, and scatter bushes and trees behind it."""
-    rng, extent, line = builder.rng, builder.plan.extent, builder.road.side(sign).line + 0.35
+    rng = builder.rng
+    extent = builder.plan.extent
+    line = builder.road.side(sign).line + 0.35
     borders.YARD_BORDERS[builder.plan.border(sign)](builder, extent.start, extent.end - 60, sign * line)
     borders.stand_pillars(builder, extent.start, extent.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
     for s in np.arange(extent.start, extent.end, 6.0):
@@ -190,10 +208,13 @@ _LINE_SIDE = {
 
 def _street_trees(builder: Builder, sign: int) -> None:
     """Plant a row of trees of one species in the strip beside the kerb."""
-    rng, side, extent = builder.rng, builder.road.side(sign), builder.plan.extent
+    rng = builder.rng
+    side = builder.road.side(sign)
+    extent = builder.plan.extent
     if side.strip < 1.2:
         return
-    species, step = str(rng.choice(["broad", "tall", "birch"])), rng.uniform(8, 15)
+    species = str(rng.choice(["broad", "tall", "birch"]))
+    step = rng.uniform(8, 15)
     for s in np.arange(extent.start + rng.uniform(0, step), extent.end, step):
         if rng.random() < 0.9:
             _tree(builder, s, sign * (side.edge + 0.55 * side.strip), species)
@@ -201,11 +222,13 @@ def _street_trees(builder: Builder, sign: int) -> None:
 
 def _side_street(builder: Builder) -> None:
     """Line the side road with houses on both of its flanks."""
-    road, rng = builder.road, builder.rng
+    road = builder.road
+    rng = builder.rng
     for sign, style in zip((1, -1), builder.plan.styles, strict=True):
         if not road.leaves(sign):
             continue
-        side, town = road.side(sign), style == "town"
+        side = road.side(sign)
+        town = style == "town"
         back = road.side_half + side.strip + side.walk + (0.3 if town else rng.uniform(2, 5))
         for flank in (-1, 1):
             d = side.edge + 8
@@ -220,7 +243,8 @@ def _side_street(builder: Builder) -> None:
 
 def _horizon(builder: Builder) -> None:
     """Close the view with trees and houses far away."""
-    rng, extent = builder.rng, builder.plan.extent
+    rng = builder.rng
+    extent = builder.plan.extent
     for _ in range(70):
         s, d = rng.uniform(extent.start, extent.end + 60), rng.choice([-1, 1]) * rng.uniform(38, 110)
         _tree(builder, s, d)

@@ -11,9 +11,17 @@ from semgrid_edu.workshop.simulation.street.builder import OVERHEAD, Builder
 from semgrid_edu.workshop.simulation.street.ground import on_wheels
 from semgrid_edu.workshop.simulation.street.layout import Road
 from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Trajectory
-from semgrid_edu.workshop.simulation.things.cars import BODIES, PAINTS, car, car_size
+from semgrid_edu.workshop.simulation.things.cars_and_people import (
+    BODIES,
+    PAINTS,
+    Person,
+    bicycle,
+    car,
+    car_size,
+    rider,
+    walker,
+)
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.people import Person, bicycle, rider, walker
 from semgrid_edu.workshop.simulation.things.shapes import Shape
 
 Size = tuple[float, float, float]
@@ -84,7 +92,8 @@ class Actor:
         (x, y, _), yaw = self.trajectory.pose(road, t)
         exponent = {Kind.CAR: footprints.ROUNDED, Kind.PEDESTRIAN: footprints.ROUND}.get(self.kind, footprints.SQUARE)
         length, width, height = self.size
-        half, top = (length / 2, width / 2), min(height, OVERHEAD)
+        half = (length / 2, width / 2)
+        top = min(height, OVERHEAD)
         return footprints.Footprint(x, y, *half, yaw, exponent, int(self.kind), self.instance, top)
 
     def middle(self, road: Road, t: float) -> NDArray[np.float64]:
@@ -151,8 +160,12 @@ class Traffic:
     """
 
     def __init__(self, builder: Builder, ego: Trajectory, duration: float) -> None:
-        self.builder, self.ego, self.duration = builder, ego, duration
-        self.plan, self.rng, self.road = builder.plan, builder.rng, builder.road
+        self.builder = builder
+        self.ego = ego
+        self.duration = duration
+        self.plan = builder.plan
+        self.rng = builder.rng
+        self.road = builder.road
         self.ends_at = ego.at(duration)[0]
         self.moving: list[Actor] = []
         self.parked: list[Actor] = []

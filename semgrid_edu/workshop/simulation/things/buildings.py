@@ -125,8 +125,10 @@ def _gable(house: House, tiles, wall, wall_material, rng: np.random.Generator) -
     across = rng.random() < 0.4
     w, d, z = house.width / 2, house.depth, house.eaves
     span, run = (w, d / 2) if not across else (d / 2, w)
-    rise, over = run * rng.uniform(0.6, 1.0), 0.45
-    eave, ends = (-run - over, -over * rise / run), (-span - over, span + over)
+    rise = run * rng.uniform(0.6, 1.0)
+    over = 0.45
+    eave = (-run - over, -over * rise / run)
+    ends = (-span - over, span + over)
     slope = np.array([(ends[0], *eave), (ends[1], *eave), (ends[1], 0, rise), (ends[0], 0, rise)])
     gable = np.array([[span, -run, 0], [span, run, 0], [span, 0, rise]])
     half_a_turn = np.array([-1.0, -1.0, 1.0])
@@ -145,8 +147,12 @@ def _gable(house: House, tiles, wall, wall_material, rng: np.random.Generator) -
 
 def _hip(house: House, tiles) -> list[Shape]:
     """Put a hip roof on."""
-    w, d, z, over = house.width / 2 + 0.4, house.depth + 0.8, house.eaves, 0.4
-    rise, ridge = 0.35 * min(2 * w, d), max(w - d / 2, 0.3)
+    w = house.width / 2 + 0.4
+    d = house.depth + 0.8
+    z = house.eaves
+    over = 0.4
+    rise = 0.35 * min(2 * w, d)
+    ridge = max(w - d / 2, 0.3)
     eave = [(-w, -over, z), (w, -over, z), (w, d - over, z), (-w, d - over, z)]
     top = [(-ridge, house.depth / 2, z + rise), (ridge, house.depth / 2, z + rise)]
     faces = [[0, 1, 5], [0, 5, 4], [1, 2, 5], [2, 3, 4], [2, 4, 5], [3, 0, 4]]
@@ -185,7 +191,9 @@ def _draw_style(house: House, rng: np.random.Generator) -> tuple:
 
 def _body(house: House, wall, material: Material) -> list[Shape]:
     """Build the four walls as one box, with a darker plinth around their foot."""
-    w, d, middle = house.width, house.depth, house.depth / 2
+    w = house.width
+    d = house.depth
+    middle = house.depth / 2
     return [
         _box((0, middle, (house.eaves + _DEEP) / 2), (w, d, house.eaves - _DEEP), wall, material),
         _box((0, middle, (_DEEP + 0.5) / 2), (w + 0.06, d + 0.06, 0.5 - _DEEP), 0.5 * wall, Material.PLASTER),
@@ -204,7 +212,8 @@ def build_house(house: House) -> Shape:
     material = Material.BRICK if rng.random() < 0.3 else Material.PLASTER
     wall = np.array(_pick(material.name.lower(), rng)) * rng.uniform(0.8, 1.15, 3)
     tiles = np.array(_pick("tiles", rng)) * rng.uniform(0.8, 1.2)
-    parts, style = _body(house, wall, material), _draw_style(house, rng)
+    parts = _body(house, wall, material)
+    style = _draw_style(house, rng)
     sills = 2.9 * np.arange(house.storeys) + 1.3
     front, *others = _walls(house)
     parts += _windows(*front, sills[1:] if house.shop else sills, style, rng)

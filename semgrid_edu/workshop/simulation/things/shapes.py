@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
+from semgrid_edu.errors import needed
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -153,7 +153,7 @@ def merge(shapes: Iterable[Shape]) -> Shape:
 @cache
 def _primitive(name: str, **measures: float) -> tuple[NDArray, NDArray]:
     """Return vertices and faces of a primitive of `trimesh` about the origin."""
-    mesh = getattr(trimesh.creation, name)(**measures)
+    mesh = getattr(needed("trimesh.creation"), name)(**measures)
     return mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32)
 
 

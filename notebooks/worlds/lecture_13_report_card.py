@@ -1,0 +1,177 @@
+"""The report card of a drive: every check with its reading and one of three verdicts, in one figure."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from semgrid_edu.crf import expected_calibration_error, reliability
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.frames import FrameSequence
+from semgrid_edu.frame import Frame
+from semgrid_edu.metrics import METRICS
+from semgrid_edu.workshop.course.street import motion_between, piece_confusions
+from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
+from worlds import lecture_13_checks as checks
+from worlds.lecture_13_domain import distances, training_images
+from worlds.lecture_13_faults import YAWS
+from worlds.lecture_13_scan_borders import edge_contrast
+
+TURNED, LEANS, SHIFTED, OVERSURE = 0.5, 1.0, 0.05, 0.05
+"""Limits: a camera turned by more (degrees), ground that leans by more (degrees), a motion that fits worse than another
+by more (metres), probabilities that are further from the shares of right cells."""
+
+MARKS = {True: ("passes", "#1b9e77", "o"), False: ("ALARM", "#d95f02", "X"), None: ("can't tell", "0.55", "s")}
+"""Word, colour and mark of each verdict."""
+
+
+class Line(NamedTuple):
+    """One line of a report card.
+
+    Parameters
+    ----------
+    check : str
+        What was checked.
+    reading : str
+        What was measured.
+    verdict : bool or None
+        Whether the reading passes; None when this drive can't tell.
+    """
+
+    check: str
+    reading: str
+    verdict: bool | None
+
+
+def border_verdict(contrast: NDArray, turns: NDArray) -> bool | None:
+    """Judge where borders in scan and image agree best.
+
+    Parameters
+    ----------
+    contrast : (n,) float
+        From `edge_contrast`.
+    turns : (n,) float
+        The turns of the camera that were tried, degrees.
+
+    Returns
+    -------
+    bool or None
+        None when the best turn is the first or the last one that was tried, so that a better one may lie beyond, or
+        when even the best contrast isn't above 1: then borders in the scan have nothing to do with those in the image.
+    """
+    best = contrast.argmax()
+    if best in (0, len(turns) - 1) or contrast[best] <= 1:
+        return None
+    return bool(abs(turns[best]) <= TURNED)
+
+
+def motion_verdict(errors: dict[str, float]) -> bool | None:
+    """Judge the motion of the poses by what else was tried.
+
+    Parameters
+    ----------
+    errors : dict of str to float
+        From `axes_errors`, metres.
+
+    Returns
+    -------
+    bool or None
+        None when another motion fits as well, within 5 cm: a vehicle that stands, or drives straight on for the mirror.
+    """
+    margin = min(error for name, error in errors.items() if name != "as the poses say") - errors["as the poses say"]
+    return None if abs(margin) <= SHIFTED else margin > 0
+
+
+def check_lines(drive: FrameSequence, frames: Sequence[Frame]) -> list[Line]:
+    """Put a drive through the checks that need neither network nor labels.
+
+    Parameters
+    ----------
+    drive : FrameSequence
+        The drive.
+    frames : sequence of Frame
+        Its frames with scan and image, more than five.
+    """
+    times, errors = [frame.time for frame in frames], checks.axes_errors(frames)
+    contrast = np.mean([edge_contrast(frame, YAWS) for frame in frames[::3]], axis=0)
+    ground = np.mean([checks.ground_plane(frame.points, frame.camera.lidar_height) for frame in frames], axis=0)
+    problems, gaps, best = len(drive.problems()), len(checks.time_gaps(times)), YAWS[contrast.argmax()]
+    passes = motion_verdict(errors)
+    far = float(np.linalg.norm(motion_between(frames[0], frames[-1])[:3, 3]))
+    return [
+        Line("files", f"{problems} problems", problems == 0),
+        Line("gaps in time", f"{gaps}; a step takes {1000 * np.median(np.diff(times)):.0f} ms", gaps == 0),
+        _clock_line(drive),
+        Line("borders", f"best at {best:+.2f}°, contrast {contrast.max():.2f}", border_verdict(contrast, YAWS)),
+        Line("ground ahead", f"rises by {ground[1]:+.1f}°", bool(abs(ground[1]) <= LEANS)),
+        Line("ground to the left", f"rises by {ground[2]:+.1f}°", bool(abs(ground[2]) <= LEANS)),
+        Line("motion", f"{errors['as the poses say']:.2f} m off; {far:.1f} m driven", passes),
+        _colour_line(frames),
+    ]
+
+
+def _clock_line(drive: FrameSequence) -> Line:
+    """Judge the delays between sensors: if all are zero, one clock was written into every file."""
+    if not isinstance(drive, KittiRawDrive):
+        return Line("clocks", "one time for each frame", None)
+    late = np.concatenate([*checks.sensor_delays(drive).values()])
+    largest = 1000 * np.nanmax(np.abs(late))
+    return Line("clocks", f"up to {largest:.0f} ms apart", bool(largest < 50) if largest else None)
+
+
+def _colour_line(frames: Sequence[Frame]) -> Line:
+    """Compare the colours with those of the training images, of which one is the farthest from the others."""
+    images = training_images()
+    apart = [distances([images[k]], images[:k] + images[k + 1 :])["colour distance"] for k in range(len(images))]
+    distance = distances([frame.need_image() for frame in frames[::4]], images)["colour distance"]
+    return Line("colours", f"{distance:.2f} from simulated ones (limit {max(apart):.2f})", distance <= max(apart))
+
+
+def map_lines(name: str, truths: NDArray, grids: NDArray, table: NDArray, pieces: NDArray) -> list[Line]:
+    """Judge a map by its labels: against the best table of occupancy states, and whether it knows how sure to be.
+
+    Parameters
+    ----------
+    name : str
+        What the map is called.
+    truths : (F, H, W) int
+        True classes, 255 where a cell doesn't count.
+    grids : (F, C, H, W) float
+        The semantic grids.
+    table : (F, H, W) int
+        From `best_table`.
+    pieces : (F, H, W) int
+        From `street_pieces`.
+    """
+    ours, theirs = (piece_confusions(truths, called, pieces) for called in (grids.argmax(axis=1), table))
+    accuracy = METRICS["pixel accuracy"]
+    low, gain, high = paired_interval(ours, theirs, accuracy)
+    error = expected_calibration_error(reliability(np.moveaxis(grids, 1, 0), truths, 10))
+    right = f"{100 * drive_interval(ours, accuracy).mean:.0f} % right"
+    more = f"{100 * gain:+.0f} points ({100 * low:+.0f} to {100 * high:+.0f})"
+    return [
+        Line(f"{name} against the table", f"{right}; {more}", None if low <= 0 <= high else bool(gain > 0)),
+        Line(f"{name}: confidence", f"off by {100 * error:.0f} points", bool(error <= OVERSURE)),
+    ]
+
+
+def draw_report_card(lines: Sequence[Line], ax: Axes) -> Axes:
+    """Draw a report card, one row a line.
+
+    Parameters
+    ----------
+    lines : sequence of Line
+        The lines.
+    ax : Axes
+        Where to draw.
+    """
+    for row, line in enumerate(lines):
+        word, colour, mark = MARKS[line.verdict]
+        ax.plot(0.02, row, mark, color=colour, markersize=9)
+        for x, text in ((0.06, word), (0.2, line.check), (0.58, line.reading)):
+            ax.text(x, row, text, va="center", fontsize=9, color=colour if text == word else "black")
+    ax.set(xlim=(0, 1.05), ylim=(len(lines) - 0.4, -0.6))
+    ax.axis("off")
+    return ax

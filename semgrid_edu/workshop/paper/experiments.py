@@ -1,0 +1,102 @@
+"""The experiments of the paper, each with its runs and how its result is computed and written (section 4)."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from semgrid_edu.storage.files import table_beside
+from semgrid_edu.workshop.paper import pictures, plans, tables
+from semgrid_edu.workshop.paper.ablations import ablation_runs, ablations, ablations_markdown
+from semgrid_edu.workshop.paper.published import TABLE_1_SCORES, TABLE_2_SCORES
+from semgrid_edu.workshop.paper.run import Run
+from semgrid_edu.workshop.paper.run_counts import RunCounts
+from semgrid_edu.workshop.paper.scales import Scale
+from semgrid_edu.workshop.paper.truth_costs import truth_cost_runs, truth_costs, truth_costs_markdown
+from semgrid_edu.workshop.paper.verdicts import claims_markdown, judge_claims
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One table or list of the paper.
+
+    Parameters
+    ----------
+    runs : callable
+        (scale, number of seeds) -> the runs that it is computed from.
+    result : callable
+        (scale, number of seeds, what is known about the runs) -> the result; JSON can hold it.
+    markdown : callable
+        result -> Markdown.
+    title : str
+        What it is called.
+    field : str
+        On which data: "kitti", "chroma" or "synthia", as `deviations` takes it.
+    seeds : str
+        The field of `Scale` with its default number of seeds.
+    deviations : tuple of str
+        In what it differs from the paper beside what all experiments on these data do, one sentence each.
+    help : str
+        The help of its command.
+    picture : callable, optional
+        (result, what is known about the runs) -> Figure, for what only a picture can show.
+    """
+
+    runs: Callable[[Scale, int], Sequence[Run]]
+    result: Callable[[Scale, int, RunCounts], dict]
+    markdown: Callable[[dict], str]
+    title: str
+    field: str = "kitti"
+    seeds: str = "seeds"
+    deviations: tuple[str, ...] = ()
+    help: str = ""
+    picture: Callable[[dict, RunCounts], Figure] | None = None
+
+
+def _seed_by_seed(runs: Iterable[Sequence[Run]]) -> list[Run]:
+    """Return all runs of the first seed, then of the second: a plan that is stopped has whole seeds."""
+    return [run for alike in zip(*runs, strict=True) for run in alike]
+
+
+_WORDS = table_beside(__file__)
+
+
+def _accuracy(name: str, runs: Callable, paper: Mapping) -> Experiment:
+    """Return Table 1 or 2, from runs by image network and the paper's scores; baselines are those of SegNet."""
+
+    def result(scale: Scale, seeds: int, counted: RunCounts) -> dict:
+        networks = runs(scale, seeds)
+        return tables.accuracy_result(networks, counted, paper, plans.baselines_of(networks["segnet"]))
+
+    def plan(scale: Scale, seeds: int) -> list[Run]:
+        networks = runs(scale, seeds)
+        return _seed_by_seed([*networks.values(), plans.baselines_of(networks["segnet"])])
+
+    return Experiment(plan, result, tables.accuracy_markdown, **_WORDS[name])
+
+
+def _table3(scale: Scale, seeds: int, counted: RunCounts) -> dict:
+    networks = plans.table3_runs(scale, seeds)
+    return tables.confusion_result(networks, counted, plans.baselines_of(networks))
+
+
+def _table3_plan(scale: Scale, seeds: int) -> list[Run]:
+    networks = plans.table3_runs(scale, seeds)
+    return _seed_by_seed([networks, plans.baselines_of(networks)])
+
+
+_PARTS = {
+    "table3": (_table3_plan, _table3, tables.confusion_markdown),
+    "claims": (plans.claims_plan, judge_claims, claims_markdown),
+    "ablations": (ablation_runs, ablations, ablations_markdown),
+    "truth-costs": (truth_cost_runs, truth_costs, truth_costs_markdown),
+}
+_FIGURES = (plans.figure_runs, plans.shown_frames, pictures.figures_markdown)
+
+EXPERIMENTS = {
+    "table1": _accuracy("table1", plans.table1_runs, TABLE_1_SCORES),
+    "table2": _accuracy("table2", plans.table2_runs, TABLE_2_SCORES),
+    **{name: Experiment(*parts, **_WORDS[name]) for name, parts in _PARTS.items()},
+    "figures": Experiment(*_FIGURES, **_WORDS["figures"], picture=pictures.figures_picture),
+}
+"""Every experiment by the name of its command."""

@@ -1,1 +1,0 @@
-"""The paper's tables, figures, claims and ablations, written from the runs."""

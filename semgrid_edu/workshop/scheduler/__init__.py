@@ -1,1 +1,0 @@
-"""Units of work planned, shared, resumed, and spread over processes, machines and GPUs."""

@@ -1,1 +1,0 @@
-"""How the network trains: four frames overfitted, and real streets."""
