@@ -77,7 +77,8 @@ def run_frame(frame: Frame, stages: Stages) -> FrameResult:
     frame : Frame
         The next frame of a drive, with a scan and an image.
     stages : Stages
-        A complete set of stages, such as `Stages.of(net)`. Its tracker and its memory remember this frame.
+        A complete set of stages: `Stages.of(net)`, or one of your own after `Stages.started`, which checks what each
+        stage returns. Its tracker and its memory remember this frame.
 
     Returns
     -------
@@ -113,7 +114,7 @@ def run_frame(frame: Frame, stages: Stages) -> FrameResult:
     refined = stages.refine(log_grid, occupancy)
     clock.lap("refine")
 
-    # g -> g over frames: what earlier frames said of a cell. The paper has no such stage.
+    # g -> g over frames: the paper forgets; this optional stage keeps the classes of earlier frames.
     grid = np.exp(log_grid)
     remembered = None
     if stages.remember is not None:
@@ -138,7 +139,7 @@ def run_pipeline(
         The frames in the order of time, each with an image of any size. They are read one at a time.
     stages : Stages or SemanticGridNet
         A set of stages, or a network from `build_net` or `load_net` for the camera of the drive, in evaluation mode.
-        A network, and the stages that a set leaves out, stand for `Stages.fast`; a set without `segment`, `sample` or
+        A network is run by `Stages.fast`, which also fills what a set leaves out: a set without `segment`, `sample` or
         `fuse` gets the shipped SegNet. A drive begins with copies of tracker and memory, so the same set can be
         used again.
     occupancy, crf, seed, memory

@@ -69,7 +69,7 @@ from semgrid_edu.crf import expected_calibration_error, reliability
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_image_stage, sample_weights
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.fast import load_net
+from semgrid_edu.fast import load_net, track_drive
 from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
@@ -680,7 +680,7 @@ left = spec.centers()[..., 1] > 0
 
 def learn_here(weights, steps=30):
     """Train a network on the labels of the left half of the street, in the first frames."""
-    recipe = ArrayRecipe(spec, net.architecture.image_size, CmcdotParams())
+    recipe = ArrayRecipe(spec, net.architecture.image_size, CmcdotParams(), track_drive)
     arrays = [one | {"truth": np.where(left, one["truth"], IGNORE)} for one in drive_arrays(drive, range(half), recipe)]
     lessons = [Sample(*(torch.tensor(one[name]) for name in Sample._fields)) for one in arrays]
     learner = load_net(weights, drive.camera)

@@ -72,6 +72,8 @@ class ClassMemory:
         self.map_spec = map_around(spec, MAX_YAW)
         self.state: MemoryState | None = None
         self.pose = PlanarMotion()
+        self.predicted: MemoryState | None = None
+        self.here: NDArray | None = None
         self._last: Frame | None = None
 
     def step(self, view: View) -> NDArray:

@@ -149,7 +149,7 @@ class Scan:
         obstacles = count_in_cells(xy[obstacle], spec)
         ground = count_in_cells(xy[height < self.sensor.obstacle_min], spec)
         beyond = beyond_reach(self.reach, spec, pose)
-        passed = beyond <= -spec.cell / 2
+        passed = beyond <= -spec.cell / 2  # the beam leaves the cell on its far side
         # Just behind an obstacle, a beam may have come through below it.
         under = (beyond > spec.cell / 2) & (beyond < self.sensor.under)
         return likelihoods(obstacles, passed | ((ground > 0) & ~under), self.sensor)
@@ -221,7 +221,7 @@ def without_own_returns(
     """
     x, y, z = points[:, :3].T
     columns = points.shape[1]
-    if columns > 4:
+    if columns > 4:  # the reader knows which returns are the vehicle's own
         return points[points[:, 4] == 0, :3]
     no_light = points[:, 3] == 0 if columns > 3 else np.zeros(len(points), bool)
     around = np.where(no_light, edge, 0.0)
@@ -253,6 +253,7 @@ def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evide
     >>> likelihoods(np.array([[1, 0, 0]]), np.array([[True, True, False]]), SensorModel()).free.round(2)
     array([[0.05, 0.7 , 1.  ]], dtype=float32)
     """
+    # A table with an entry for each outcome of a cell: 0 to max_returns hits, then "passed". Zero hits say nothing.
     hits = np.arange(sensor.max_returns + 1)
     outcome = np.where(free & (obstacles == 0), len(hits), np.minimum(obstacles, sensor.max_returns))
     occupied = np.append(sensor.p_hit_occupied**hits, sensor.p_pass_occupied).astype(np.float32)

@@ -45,7 +45,7 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
     others = probability[FREE] + probability[STATIC] + probability[UNKNOWN]
     probability = probability * ratio(1 - dynamic, others)
     probability[DYNAMIC] = dynamic
-    probability[UNKNOWN] += np.where(others > 0, 0, 1 - dynamic)
+    probability[UNKNOWN] += np.where(others > 0, 0, 1 - dynamic)  # no other state was possible
     weight = particles.weight * at_cells(ratio(dynamic, claimed), cells)
     return FilterState(probability, replace(particles, weight=weight), state.newborn)
 
@@ -114,7 +114,7 @@ def _collide(
     keep, take = strike_out(arrives, possible)
 
     probability = keep * mixed
-    probability[FREE] += keep * vacated
+    probability[FREE] += keep * vacated  # what flew away leaves free space behind
     probability[DYNAMIC] = keep * (newborn + stays) + take * possible
     factor = np.where(moved, at_cells(take, end) * (1 - blocked), at_cells(keep, end))
     return FilterState(probability, replace(particles, weight=particles.weight * factor), keep * newborn)
@@ -205,7 +205,7 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     probability = state.probability.astype(np.float64)
     dynamic = probability[DYNAMIC]
     weight = weight * at_cells(ratio(dynamic, carried), cells)
-    probability[UNKNOWN] += np.where(carried > 0, 0, dynamic)
+    probability[UNKNOWN] += np.where(carried > 0, 0, dynamic)  # too little mass for a single particle
     probability[DYNAMIC] = np.where(carried > 0, dynamic, 0)
     return FilterState(probability, Particles(position, velocity, weight), np.zeros(spec.shape))
 
@@ -235,7 +235,7 @@ def mix(
     """
     mixed = np.einsum("ij,ihw->jhw", M, probability)
     carried = M[DYNAMIC, DYNAMIC] * (probability[DYNAMIC] - newborn)
-    mixed[STATIC] += np.maximum(carried - going, 0)
+    mixed[STATIC] += np.maximum(carried - going, 0)  # what has stopped
     without_particles = np.stack([probability[FREE], probability[STATIC], newborn, probability[UNKNOWN]])
     born = np.einsum("i,ihw->hw", M[:, DYNAMIC], without_particles)
     mixed[DYNAMIC] = born + going
@@ -295,5 +295,5 @@ def bayes(prior: NDArray, evidence: Evidence) -> tuple[NDArray[np.float64], NDAr
     joint = np.stack([free, occupied, occupied, free]) * prior
     p_z = joint.sum(axis=0)
     posterior = ratio(joint, p_z)
-    posterior[UNKNOWN] += p_z == 0
+    posterior[UNKNOWN] += p_z == 0  # no state that was held possible explains the scan
     return posterior, ratio(occupied, p_z)

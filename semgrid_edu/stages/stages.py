@@ -1,7 +1,7 @@
 """The five stages of the system as functions that can be exchanged, and a sixth that the paper leaves out (Fig. 2).
 
 `Stages.of` assembles the book's parts, `Stages.fast` their compiled twins. This is the only module in the book that
-knows of `semgrid_edu.fast`.
+imports `semgrid_edu.fast`.
 """
 
 import copy
@@ -143,17 +143,20 @@ class Stages:
         return _assembled(_BOOK, net, occupancy, crf, seed, keep_steps, memory)
 
     @classmethod
-    def fast(cls, net: SemanticGridNet, *args: Any, **options: Any) -> "Stages":
+    def fast(
+        cls,
+        net: SemanticGridNet,
+        occupancy: CmcdotParams | None = None,
+        crf: CrfParams | None = None,
+        seed: int = 0,
+        keep_steps: bool = False,
+        memory: bool | MemoryParams = False,
+    ) -> "Stages":
         """Return the same stages by the compiled twins of `semgrid_edu.fast`; the book's where numba is missing.
 
-        Parameters
-        ----------
-        net : SemanticGridNet
-            The network.
-        *args, **options
-            The other parameters of `of`.
+        Parameters and errors are those of `Stages.of`.
         """
-        return _assembled(_fast_parts(), net, *args, **options)
+        return _assembled(_fast_parts(), net, occupancy, crf, seed, keep_steps, memory)
 
     def over(self, other: "Stages") -> "Stages":
         """Return these stages, and those of `other` where one was left out.
@@ -204,7 +207,7 @@ class Stages:
     def started(self) -> "Stages":
         """Return the stages for one drive: with a tracker and a memory of their own, and with their results checked."""
         if missing := set(STAGES) - set(self.given):
-            raise ArgumentError("stages", f"all of {', '.join(STAGES)}", f"none for {', '.join(sorted(missing))}")
+            raise ArgumentError("stages", f"all of {', '.join(STAGES)}", f"no {', '.join(sorted(missing))}")
         architecture = self.architecture or Architecture()
         own = replace(self, track=copy.deepcopy(self.track), remember=copy.deepcopy(self.remember))
         parts = {name: checked(name, getattr(own, name), architecture) for name in self.given}
@@ -234,11 +237,11 @@ def _fast_parts() -> Any:
 def _assembled(
     parts: Any,
     net: SemanticGridNet,
-    occupancy: CmcdotParams | None = None,
-    crf: CrfParams | None = None,
-    seed: int = 0,
-    keep_steps: bool = False,
-    memory: bool | MemoryParams = False,
+    occupancy: CmcdotParams | None,
+    crf: CrfParams | None,
+    seed: int,
+    keep_steps: bool,
+    memory: bool | MemoryParams,
 ) -> Stages:
     """Put the package's own stages together from the book's parts or from the fast ones."""
     architecture = net.need_architecture()
@@ -282,9 +285,7 @@ def _memory(parts: Any, memory: bool | MemoryParams, architecture: Architecture)
         raise ArgumentError("memory", "True, False or MemoryParams", type(memory).__name__)
     if architecture.label_set != KITTI_14.name:
         found = f"{memory} with {architecture.label_set}"
-        raise ArgumentError(
-            "memory", f"False unless the classes are {KITTI_14.name}, which has the unknown ones", found
-        )
+        raise ArgumentError("memory", f"the classes of {KITTI_14.name}, which have unknown ones", found)
     return parts.ClassMemory(architecture.grid, None if memory is True else memory)
 
 

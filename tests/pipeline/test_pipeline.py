@@ -119,7 +119,7 @@ def test_stages_of_networks_with_other_image_networks_can_be_mixed(drive, net, r
 
 
 def test_a_set_that_lacks_stages_does_not_start(net):
-    with pytest.raises(ArgumentError, match=r"^stages: expected all of track, .*, found none for fuse"):
+    with pytest.raises(ArgumentError, match=r"^stages: expected all of track, .*, found no fuse"):
         replace(Stages.fast(net), fuse=None).started()
 
 
