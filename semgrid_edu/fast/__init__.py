@@ -54,3 +54,8 @@ def __getattr__(name: str) -> object:
     if name not in _WHERE:
         raise AttributeError(f"module 'semgrid_edu.fast' has no attribute {name!r}")
     return getattr(needed(f"semgrid_edu.fast.{_WHERE[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """List the twins, loaded or not."""
+    return __all__

@@ -453,7 +453,7 @@ assert sum(sorted(porous for porous, _ in flips)[-2:]) > 0.9 * sum(porous for po
 # 1. On a bank a flat rule calls bare grass an obstacle. Carrying the ground along, bin by bin, removes more than 85 % of
 #    these false hits in three of four simulated parks, and 55 % in the fourth, where the walk loses the bank.
 # 2. Asking each cell for its beam, in place of each ray for its cells, hits the same cells and is the more careful of
-#    the two: where they differ in a scan of the sample drive, walking the ray says free in 98 %.
+#    the two: where they differ in a scan of the sample drive, nearly always only the walk calls the cell free.
 # 3. A post stays in the map if its returns outweigh the passes between two meetings: with two returns in every fifth
 #    scan it is always there, with one in one scan of five.
 # 4. Wire mesh is neither full nor empty. One return overrules all passes of its scan, so the fence stays whole; the

@@ -30,8 +30,6 @@ from semgrid_edu.fast import Cmcdot
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.occupancy import CmcdotParams, PlanarMotion, State, VelocityLattice
-from worlds.lecture_04_filters import occupancy_table
-from worlds.lecture_04_scenes import hit_cells
 
 sys.path.append("..")  # for worlds/, in the folder above
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes

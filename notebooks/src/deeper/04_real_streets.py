@@ -30,8 +30,6 @@ from IPython.display import Markdown
 # %% jupyter={"source_hidden": true}
 from semgrid_edu import plotting
 from semgrid_edu.fast import Cmcdot
-from worlds.lecture_04_filters import markdown_table, per_cent
-from worlds.lecture_04_street_scores import LEAST_DYNAMIC, StreetScores
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
