@@ -7,7 +7,12 @@ from semgrid_edu.networks.segmenter import Segmenter
 from semgrid_edu.networks.segnet import SegNet
 from semgrid_edu.networks.unet import UNet
 
-SEGMENTERS: dict[str, type[Segmenter]] = {"segnet": SegNet, "fcn": Fcn, "deeplab": DeepLab, "unet": UNet}
+SEGMENTERS: dict[str, type[Segmenter]] = {
+    "segnet": SegNet,
+    "fcn": Fcn,
+    "deeplab": DeepLab,
+    "unet": UNet,
+}
 """Commands, experiments, benchmarks and tests all look here, so a new network needs its module and one line here."""
 
 
@@ -17,7 +22,7 @@ def build_segmenter(name: str, n_classes: int, preset: str = "compact", seed: in
     Parameters
     ----------
     name : str
-        A name in `SEGMENTERS`: "segnet", "fcn", "deeplab", "unet".
+        A name in `SEGMENTERS`, such as "segnet".
     n_classes : int
         C, the number of classes that are scored.
     preset : str
