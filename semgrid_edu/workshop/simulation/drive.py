@@ -136,7 +136,7 @@ class SimulatedDrive:
         return {actor.instance: rotation @ actor.trajectory.velocity(road, t) for actor in self.moving}
 
     def objects(self, t: float) -> list[dict]:
-        """Return the cars, pedestrians and bicycles whose centres are in `LABEL_GRID`, from `Actor.described`.
+        """Return the cars, pedestrians and bicycles with centres in `LABEL_GRID`, from `Actor.described`.
 
         Parameters are those of `SimulatedDrive.pose`.
         """

@@ -1,4 +1,4 @@
-"""SYNTHIA's sequences as drives: image, labels, and depth in place of a LIDAR (section 4; Ros et al., CVPR 2016).
+"""SYNTHIA's sequences as drives: image, labels, and depth instead of a LIDAR (section 4; Ros et al., CVPR 2016).
 
     SYNTHIA-SEQS-04-SPRING/RGB/Stereo_Left/Omni_F/000000.png          SYNTHIA-SEQS-04-SPRING/CameraParams/intrinsics.txt
     SYNTHIA-SEQS-04-SPRING/GT/LABELS/Stereo_Left/Omni_F/000000.png
@@ -79,7 +79,7 @@ def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.
     path : Path
         A file of GT/LABELS.
     size : (int, int) or None
-        Height and width that it must have, pixels; None where any size will do.
+        Required height and width, pixels; None for any size.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def read_synthia_depth(path: Path, size: tuple[int, int] | None) -> NDArray[np.f
     path : Path
         A file of Depth.
     size : (int, int) or None
-        Height and width that it must have, pixels; None where any size will do.
+        Required height and width, pixels; None for any size.
 
     Returns
     -------
