@@ -1,8 +1,8 @@
-"""Discrete graphical models, small enough to be solved exactly: the language in which every stage can be written.
+"""Discrete graphical models, small enough for exact inference: a common language for every stage.
 
-A model is a product of factors. `enumerate_marginals` is the definition of inference, `eliminate` and `max_product`
-are exact and efficient, `sum_product` is exact on trees, `mean_field_graph` approximates. `d_separated` reads
-independences off the graph, and `draw` shows it.
+A model is a product of factors. `enumerate_marginals` implements the definition of inference, `eliminate` and
+`max_product` are exact and efficient, `sum_product` is exact on trees, and `mean_field_graph` is approximate.
+`d_separated` reads independences off the graph, and `draw` plots it.
 """
 
 from semgrid_edu.graphical.drawing import draw

@@ -1,7 +1,7 @@
-"""Pictures of graphical models: circles are variables, arrows conditional distributions, black squares factors.
+"""Drawings of graphical models: circles are variables, arrows conditional distributions, black squares factors.
 
-Dashed curves with a text are edges that a real system cuts. daft (https://docs.daft-pgm.org) draws; it is imported
-inside `draw`, because matplotlib takes half a second to load and inference doesn't need it.
+Dashed curves with a text are edges that a real system cuts. `draw` uses daft (https://docs.daft-pgm.org) and imports it
+lazily, because matplotlib takes half a second to load and inference doesn't need it.
 """
 
 from collections.abc import Iterable, Mapping
@@ -36,38 +36,38 @@ def draw(
     Parameters
     ----------
     model : GraphicalModel
-        `GraphicalModel(model.factors)` draws the factor graph of a directed one.
+        The model. To draw the factor graph of a directed model, pass `GraphicalModel(model.factors)`.
     ax : matplotlib Axes, optional
-        Where to draw; a new figure of fitting size when left out.
+        Axes to draw into; by default a new figure of suitable size.
     positions : dict of str to (float, float)
-        The place of every variable: x to the right, y upwards, neighbours about 1 apart; see `in_rows`. It may also
-        place factors, by their label of `model.labels`. Without a place, a factor is drawn in the middle of its
-        variables, or up and to the left of its only one.
+        Position of every variable: x to the right, y upwards, neighbours about 1 apart; see `in_rows`. It may also
+        position factors, by their label in `model.labels`. The default for a factor is the middle of its variables, or
+        above and left of its only variable.
     observed : str or iterable of str
         Variables to shade; a dictionary of evidence works too.
     highlight : str or iterable of str
-        Variables with a thick coloured outline: the ones the text is about.
+        Variables with a thick coloured outline.
     labels : dict of str to str, optional
-        Texts in the nodes, where they aren't the names; "m1" is written as $m_1$ unless told otherwise.
+        Node texts that differ from the names. By default "m1" is written as $m_1$.
     equations : dict of str to str, optional
         Text to the right of a variable or above a factor, by name or label.
     plates : dict of str to iterable of str, optional
-        What is repeated: {"$k = 1 \ldots K$": ("m", "z")} draws a box around m and z.
+        Plates for repeated nodes: {"$k = 1 \ldots K$": ("m", "z")} draws a box around m and z.
     dashed : iterable of Dashed
-        Edges between any two nodes, drawn dashed.
+        Dashed edges between any two nodes.
     ghosts : dict of str to (float, float), optional
-        Nodes that the model doesn't have, and their places; drawn grey with a dashed outline.
+        Positions of nodes that the model doesn't have; drawn in grey with a dashed outline.
 
     Returns
     -------
     matplotlib Axes
-        With equal scales and without frame.
+        With equal aspect and no frame.
 
     Raises
     ------
     ArgumentError
-        When a name isn't a variable (or factor, in `positions` and `equations`) of the model, a variable has no place,
-        or two nodes have the same.
+        When a name isn't a variable of the model (in `positions` and `equations`: or a factor), a variable has no
+        position, or two nodes share a position.
 
     Examples
     --------
@@ -104,7 +104,7 @@ def _check(model: GraphicalModel, groups: Mapping[str, Iterable[str]], positions
 
 
 def _places(model: GraphicalModel, positions: Mapping[str, Place]) -> dict[str, Place]:
-    """Return the place of every variable and, by label, of every factor of an undirected model."""
+    """Return the position of every variable and, for an undirected model, of every factor by label."""
     if missing := [name for name in model.names if name not in positions]:
         raise ArgumentError("positions", "a place for every variable", f"none for {', '.join(missing)}")
     places = {name: (float(x), float(y)) for name, (x, y) in positions.items()}

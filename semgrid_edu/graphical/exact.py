@@ -13,10 +13,10 @@ from semgrid_edu.graphical.factor import Factor, as_names, check_name, rescaled_
 from semgrid_edu.graphical.model import GraphicalModel, possible
 
 MAX_ASSIGNMENTS = 10**6
-"""A loop in Python visits so many in about half a minute."""
+"""A Python loop over this many takes about half a minute."""
 
 NOTHING: Mapping[str, int] = MappingProxyType({})
-"""No variable is given."""
+"""No evidence."""
 
 
 def enumerate_marginals(
@@ -24,17 +24,17 @@ def enumerate_marginals(
 ) -> Factor:
     """Sum the product of all factors over every assignment of the other variables: the definition of a marginal.
 
-    Like `eliminate`, it doesn't normalise. The sum of all entries is then P(given) in a directed model and the
-    partition function Z in an undirected one; `.normalised()` gives P(names | given).
+    Like `eliminate`, it doesn't normalise, so the sum of all entries is P(given) in a directed model and the partition
+    function Z in an undirected one; `.normalised()` gives P(names | given).
 
     Parameters
     ----------
     model : GraphicalModel
-        Directed or not.
+        Directed or undirected.
     names : str or sequence of str
-        The variables to keep, in the order of the result's axes; () gives the total alone.
+        The variables to keep, in the order of the result's axes; () gives only the total.
     given : dict of str to int
-        The states of known variables.
+        The states of observed variables.
 
     Returns
     -------
@@ -71,22 +71,22 @@ def eliminate(
     given: Mapping[str, int] = NOTHING,
     order: Sequence[str] | None = None,
 ) -> Factor:
-    """Sum out one variable after the other, each from the product of only those factors that contain it.
+    """Sum out one variable at a time, each from the product of only the factors that contain it.
 
     The result isn't normalised, because its total is useful: P(given) in a directed model, the partition function Z in
-    an undirected one. `.normalised()` gives P(names | given). With nothing given, a directed model has the total 1, so
-    its marginals come out normalised.
+    an undirected one. `.normalised()` gives P(names | given). Without evidence, the total of a directed model is 1, so
+    its marginals are already normalised.
 
     Parameters
     ----------
     model : GraphicalModel
-        Directed or not.
+        Directed or undirected.
     names : str or sequence of str
-        The variables to keep, in the order of the result's axes; () gives the total alone.
+        The variables to keep, in the order of the result's axes; () gives only the total.
     given : dict of str to int
-        The states of known variables.
+        The states of observed variables.
     order : sequence of str, optional
-        The order in which all other variables are summed out; `min_fill_order` when left out.
+        The order in which to sum out all other variables; by default `min_fill_order`.
 
     Returns
     -------
@@ -97,8 +97,8 @@ def eliminate(
     ------
     ArgumentError
         When a product would have more than 10^7 entries (the message names its variables), a variable or state is
-        unknown, `order` isn't a permutation of the variables to sum out, or the total is beyond the range of floats,
-        as P(given) of a long chain may be; see `log_total`.
+        unknown, `order` isn't a permutation of the variables to sum out, or the total is outside the range of floats,
+        such as P(given) of a long chain; see `log_total`.
 
     Examples
     --------
@@ -119,15 +119,15 @@ def eliminate(
 def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: Sequence[str] | None = None) -> float:
     """Return the logarithm of `eliminate(model, ())`: log P(given), or log Z of an undirected model.
 
-    P(given) of a chain of thousands of readings is below the smallest float, but its logarithm is an ordinary number.
-    log P(x | given) is the difference of two of them: with and without x among the given variables.
+    P(given) of a chain with thousands of measurements underflows, but its logarithm doesn't. log P(x | given) is the
+    difference of two such logarithms: with and without x among the given variables.
 
     Parameters
     ----------
     model : GraphicalModel
-        Directed or not.
+        Directed or undirected.
     given : dict of str to int
-        The states of known variables.
+        The states of observed variables.
     order : sequence of str, optional
         As for `eliminate`.
 
@@ -140,7 +140,7 @@ def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: 
     ------
     ArgumentError
         When a product would have more than 10^7 entries, a variable or state is unknown, or `order` isn't a
-        permutation of the variables that aren't given.
+        permutation of the unobserved variables.
 
     Examples
     --------
@@ -153,24 +153,24 @@ def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: 
 
 
 def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> dict[str, int]:
-    """Find a most likely assignment of all variables that aren't given: elimination with max in place of sum.
+    """Find a most likely assignment of all unobserved variables: elimination with max instead of sum.
 
-    The clique of each eliminated variable is kept. Going through the variables in reverse order, each takes its best
-    state given those already chosen, so the assignment is consistent even when several are equally likely. On a chain
-    this is the Viterbi algorithm. It is exact on every graph, with or without loops, as long as no table exceeds 10^7
-    entries.
+    The forward pass stores the clique of each eliminated variable. The backward pass assigns each variable its best
+    state given the states already chosen, so the assignment is consistent even if several are equally likely. On a
+    chain this is the Viterbi algorithm. It is exact on every graph, with or without loops, as long as no table exceeds
+    10^7 entries.
 
     Parameters
     ----------
     model : GraphicalModel
-        Directed or not.
+        Directed or undirected.
     given : dict of str to int
-        The states of known variables.
+        The states of observed variables.
 
     Returns
     -------
     dict of str to int
-        A state for every variable that isn't given, in the model's order.
+        A state for every unobserved variable, in the model's order.
 
     Raises
     ------
@@ -198,18 +198,18 @@ def max_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> di
 
 
 def min_fill_order(model: GraphicalModel, keep: Iterable[str] = ()) -> tuple[str, ...]:
-    """Order variables for elimination by the min-fill rule.
+    """Return an elimination order by the min-fill heuristic.
 
-    Eliminating a variable couples all its neighbours. The pairs that weren't neighbours before are its fill; the next
-    variable is always one with the least fill, because that keeps the tables small. Ties go to the first in the
-    model's order.
+    Eliminating a variable couples all its neighbours. The pairs that weren't neighbours before are its fill. The next
+    variable is always one with the least fill, because that keeps the tables small. In a tie, the first in the model's
+    order wins.
 
     Parameters
     ----------
     model : GraphicalModel
-        Directed or not; two variables are neighbours when a factor contains both.
+        Directed or undirected; two variables are neighbours if a factor contains both.
     keep : iterable of str
-        Variables that aren't eliminated.
+        Variables not to eliminate.
 
     Examples
     --------
@@ -232,14 +232,14 @@ def min_fill_order(model: GraphicalModel, keep: Iterable[str] = ()) -> tuple[str
 
 
 def _fill(neighbours: Mapping[str, set[str]], name: str) -> list[tuple[str, str]]:
-    """Return the pairs of neighbours of a variable that aren't neighbours of each other."""
+    """Return the pairs of a variable's neighbours that aren't neighbours of each other."""
     return [(one, other) for one, other in combinations(sorted(neighbours[name]), 2) if other not in neighbours[one]]
 
 
 def _summed_out(
     model: GraphicalModel, names: str | Sequence[str], given: Mapping[str, int], order: Sequence[str] | None
 ) -> tuple[Factor, int]:
-    """Return the marginal over `names` divided by 2^n, and n: a power of two is taken out of each product."""
+    """Return the marginal over `names` divided by 2^n, and n; each product is rescaled by a power of two."""
     model = model.given(**given)
     names = _wanted(model, names, given)
     power = 0
@@ -253,7 +253,7 @@ def _summed_out(
 
 
 def _wanted(model: GraphicalModel, names: str | Sequence[str], given: Mapping[str, int]) -> tuple[str, ...]:
-    """Check the variables that are asked for against a model from which the given ones have been sliced away."""
+    """Check the requested variables against a model that is already sliced by the given states."""
     names = as_names(names)
     if known := [name for name in names if name in given]:
         raise ArgumentError("names", "variables that aren't given", f"{known[0]}, which is given as {given[known[0]]}")

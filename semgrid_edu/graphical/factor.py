@@ -1,6 +1,6 @@
-"""A factor: a non-negative table with one named axis per variable, and what inference does with it.
+"""A factor: a non-negative table with one named axis per variable, and the operations of inference.
 
-Product, sum, maximum, slice: every algorithm of this package is a sequence of these four (Koller and Friedman,
+Every algorithm of this package is a sequence of four operations: product, sum, maximum, slice (Koller and Friedman,
 Probabilistic Graphical Models, section 4.2 and chapter 9).
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError
 
 MAX_ENTRIES = 10**7
-"""The largest table that a product may have: 80 MB of float64."""
+"""Maximum table size of a product: 80 MB of float64."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Factor:
     names : tuple of str
         One name per axis of the table; a string is a single name. () makes a constant.
     table : (K_1, ..., K_n) float
-        Non-negative and finite, kept as a read-only float64 copy. K_i is the number of states of variable i.
+        Non-negative and finite, stored as a read-only float64 copy. K_i is the number of states of variable i.
 
     Raises
     ------
@@ -62,16 +62,16 @@ class Factor:
 
     @property
     def cardinalities(self) -> dict[str, int]:
-        """How many states each variable has: {name: K}."""
+        """Number of states of each variable: {name: K}."""
         return dict(zip(self.names, self.table.shape, strict=True))
 
     def __mul__(self, other: "Factor") -> "Factor":
-        """Multiply entry by entry; axes are the left factor's, then those that only the right one has.
+        """Multiply entry by entry. The axes are the left factor's, then the remaining ones of the right factor.
 
         Parameters
         ----------
         other : Factor
-            A variable that occurs in both must have the same number of states in both.
+            The right factor. Shared variables must have the same number of states in both.
         """
         if not isinstance(other, Factor):
             return NotImplemented
@@ -81,7 +81,7 @@ class Factor:
             return Factor(names, self._spread(names) * other._spread(names))
 
     def _spread(self, names: tuple[str, ...]) -> NDArray[np.float64]:
-        """Return the table with its axes in the order of `names`, and an axis of length 1 for each other name."""
+        """Return the table with axes in the order of `names`, and an axis of length 1 for each missing name."""
         states = self.cardinalities
         ordered = self.ordered(*(name for name in names if name in states))
         return ordered.table.reshape([states.get(name, 1) for name in names])
@@ -92,7 +92,7 @@ class Factor:
         Parameters
         ----------
         *names : str
-            Every variable of the factor, once.
+            All variables of the factor, each once.
 
         Examples
         --------
@@ -109,28 +109,28 @@ class Factor:
         Parameters
         ----------
         *names : str
-            The variables that disappear; a constant remains when none is left.
+            The variables to sum out; summing out all of them leaves a constant.
         """
         return self._reduce(np.sum, names)
 
     def marginal(self, name: str) -> "Factor":
-        """Sum all variables out but one: f.marginal("x").
+        """Sum out all variables except one: f.marginal("x").
 
         Parameters
         ----------
         name : str
-            The variable that stays.
+            The variable to keep.
         """
         check_name("name", name, self.names)
         return self.sum(*(other for other in self.names if other != name))
 
     def max(self, *names: str) -> "Factor":
-        """Maximise variables out: the largest entry over all their states.
+        """Maximise over variables: keep the largest entry over all their states.
 
         Parameters
         ----------
         *names : str
-            The variables that disappear.
+            The variables to maximise over.
         """
         return self._reduce(np.max, names)
 
@@ -141,12 +141,12 @@ class Factor:
         return Factor([name for name in self.names if name not in names], operation(self.table, axis=axes))
 
     def given(self, /, **states: int) -> "Factor":
-        """Return the slice of the table where variables have known states: f.given(x=1).
+        """Return the slice of the table at given states: f.given(x=1).
 
         Parameters
         ----------
         **states : int
-            The state of each known variable, from 0. The slice isn't normalised.
+            The state of each given variable, from 0. The slice isn't normalised.
         """
         check_states(states, self.cardinalities)
         index = tuple(int(states[name]) if name in states else slice(None) for name in self.names)
@@ -158,21 +158,21 @@ class Factor:
         Raises
         ------
         ArgumentError
-            When all entries are 0: the given states are impossible under the model.
+            When all entries are 0, so the given states are impossible under the model.
         """
-        table = self.rescaled()[0].table  # so that the sum of huge or tiny entries stays in range
+        table = self.rescaled()[0].table  # keeps the sum of huge or tiny entries in range
         if not table.any():
             zeros = "only zeros: no assignment agrees with all factors and with what is given"
             raise ArgumentError(f"factor over {self.names}", "at least one positive entry to normalise by", zeros)
         return Factor(self.names, table / table.sum())
 
     def rescaled(self) -> tuple["Factor", int]:
-        """Take a power of two out, so that the largest entry is from 1/2 to 1: thousands of products stay in range.
+        """Divide by a power of two so that the largest entry is in [1/2, 1): thousands of products stay in range.
 
         Returns
         -------
         Factor
-            This one divided by 2^n, which costs no bit, because only the exponents of entries change.
+            This factor divided by 2^n. The division is exact, because it changes only the exponents.
         int
             n; 0 when all entries are 0.
 
@@ -187,12 +187,12 @@ class Factor:
 
 
 def product(factors: Iterable[Factor]) -> Factor:
-    """Multiply factors, after checking that the table of the product isn't too large.
+    """Multiply factors, after checking the size of the product.
 
     Parameters
     ----------
     factors : iterable of Factor
-        None at all gives the constant 1.
+        An empty iterable gives the constant 1.
 
     Raises
     ------
@@ -203,17 +203,17 @@ def product(factors: Iterable[Factor]) -> Factor:
 
 
 def rescaled_product(factors: Iterable[Factor]) -> tuple[Factor, int]:
-    """Multiply any number of factors; a power of two is taken out after each, so thousands stay in range.
+    """Multiply any number of factors, rescaling by a power of two after each, so that thousands stay in range.
 
     Parameters
     ----------
     factors : iterable of Factor
-        None at all gives the constant 1.
+        An empty iterable gives the constant 1.
 
     Returns
     -------
     Factor
-        Their product divided by 2^n; its largest entry is from 1/2 to 1.
+        The product divided by 2^n, with its largest entry in [1/2, 1).
     int
         n.
     """
@@ -235,12 +235,12 @@ def _checked(factors: Iterable[Factor]) -> tuple[Factor, ...]:
 
 
 def shared_cardinalities(tables: Iterable[Mapping[str, int]]) -> dict[str, int]:
-    """Return {name: number of states} of several tables, in the order in which the variables first occur.
+    """Merge {name: number of states} of several tables, in order of first occurrence.
 
     Parameters
     ----------
     tables : iterable of dict of str to int
-        The number of states of each variable of a table. A variable may occur in several, which have to agree.
+        The number of states of each variable of a table. Tables that share a variable must agree.
     """
     states: dict[str, int] = {}
     for table in tables:
@@ -252,7 +252,7 @@ def shared_cardinalities(tables: Iterable[Mapping[str, int]]) -> dict[str, int]:
 
 
 def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Return names as a tuple; a single string is one name, not a sequence of letters.
+    """Return names as a tuple; a string is one name, not a sequence of letters.
 
     Parameters
     ----------
@@ -268,18 +268,18 @@ def check_name(argument: str, name: str, known: Iterable[str]) -> None:
     Parameters
     ----------
     argument : str
-        Name of the argument, for the message.
+        Name of the argument, for the error message.
     name : str
-        The variable.
+        The variable to check.
     known : iterable of str
-        The variables that exist.
+        The existing variables.
     """
     if name not in (known := tuple(known)):
         raise ArgumentError(argument, f"variables among {known}", name)
 
 
 def check_states(states: Mapping[str, int], cardinalities: Mapping[str, int]) -> None:
-    """Raise an error for unknown variables, and for states that a variable doesn't have.
+    """Raise an error for unknown variables and for states out of range.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Mean field on any discrete model: the best product of independent distributions, one variable at a time.
+"""Mean field on any discrete model: fits a product of independent distributions, one variable at a time.
 
-Minimises the free energy F(Q) = E_Q[log Q] - E_Q[log product of factors] >= -log Z over Q(x) = prod_i q_i(x_i)
+It minimises the free energy F(Q) = E_Q[log Q] - E_Q[log product of factors] >= -log Z over Q(x) = prod_i q_i(x_i)
 (Koller and Friedman, section 11.5).
 """
 
@@ -23,40 +23,40 @@ Independent = dict[str, NDArray[np.float64]]
 def mean_field_graph(
     model: GraphicalModel, given: Mapping[str, int] = NOTHING, iterations: int = 50, seed: int | None = None
 ) -> Beliefs:
-    """Optimise one variable's distribution after the other, with all others fixed.
+    """Optimise the distribution of one variable at a time, with all others fixed.
 
-    The best q_i is proportional to exp(E[log factors]), so no update raises the free energy. It has several minima, and
-    the start decides which is found. Without a seed each variable starts from the factors over it alone (uniform
-    without any), as the CRF of the paper does. When these don't prefer a state, a symmetric model may stay at its
-    symmetric start, although breaking the symmetry would lower the free energy; a seed starts from random distributions
+    The optimal q_i is proportional to exp(E[log factors]), so no update increases the free energy. The free energy has
+    several minima, and the initialisation decides which one is found. By default each variable starts from its unary
+    factors (uniform if it has none), like the paper's CRF. If these don't prefer a state, a symmetric model may stay at
+    its symmetric start, although breaking the symmetry would lower the free energy. A seed gives a random start
     instead.
 
-    A zero in a factor forbids a combination. The logarithm of zero is taken as the limit of ever larger penalties: an
-    update first minimises the expected number of forbidden combinations, and weighs only the states that do. While Q
-    gives a forbidden combination any probability, its free energy is infinite.
+    A zero in a factor forbids a combination of states. log 0 is treated as the limit of growing penalties: an update
+    first minimises the expected number of forbidden combinations, then compares only the states that reach this
+    minimum. As long as Q gives a forbidden combination any probability, its free energy is infinite.
 
     Parameters
     ----------
     model : GraphicalModel
-        Directed or not.
+        Directed or undirected.
     given : dict of str to int
-        The states of known variables.
+        The states of observed variables.
     iterations : int
-        The largest number of sweeps over all variables, at least 1.
+        Maximum number of sweeps over all variables, at least 1.
     seed : int, optional
-        Start from random distributions.
+        Seed for random initial distributions.
 
     Returns
     -------
     Beliefs
-        `.free_energy` holds F in nats after each sweep; -F is a lower bound of log Z, or of log P(given) in a directed
+        `.free_energy` is F in nats after each sweep; -F is a lower bound on log Z, or on log P(given) in a directed
         model.
 
     Raises
     ------
     ArgumentError
         When a variable or state is unknown, `iterations` is less than 1, or the given states are obviously
-        impossible: a factor is 0 there, or the factors over one variable alone forbid all of its states.
+        impossible: they make a factor zero everywhere, or the unary factors of a variable forbid all its states.
 
     Examples
     --------
@@ -82,7 +82,7 @@ def mean_field_graph(
 
 
 def _start(model: GraphicalModel, seed: int | None) -> Independent:
-    """Start from the factors over one variable alone, or at random."""
+    """Initialise from the unary factors, or at random."""
     if seed is not None:
         rng = np.random.default_rng(seed)
         return {name: rng.dirichlet(np.ones(states)) for name, states in model.cardinalities.items()}
@@ -94,7 +94,7 @@ def _start(model: GraphicalModel, seed: int | None) -> Independent:
 
 
 def _best(model: GraphicalModel, q: Independent, name: str) -> NDArray[np.float64]:
-    """Return the distribution of one variable that minimises the free energy when all others are fixed."""
+    """Return the distribution of one variable that minimises the free energy with all others fixed."""
     states = model.cardinalities[name]
     forbidden = np.zeros(states)
     log = np.zeros(states)
@@ -102,14 +102,14 @@ def _best(model: GraphicalModel, q: Independent, name: str) -> NDArray[np.float6
         if name in factor.names:
             forbidden += _expected(factor.table == 0, factor, q, keep=name)
             log += _expected(_finite_log(factor.table), factor, q, keep=name)
-    # No tolerance where some states are allowed outright: it would let forbidden ones in, and F would be infinite.
+    # No tolerance if some state is fully allowed: it would admit forbidden states, and F would be infinite.
     fewest = forbidden.min()
     allowed = forbidden <= fewest + (TOLERANCE if fewest > 0 else 0)
     return softmax(np.where(allowed, log, -np.inf))
 
 
 def _free_energy(model: GraphicalModel, q: Independent) -> float:
-    """F = E[log Q] - E[log product of factors], infinite when Q allows what a factor forbids."""
+    """Return F = E[log Q] - E[log product of factors]; infinite if Q allows a forbidden combination."""
     if any(_expected(factor.table == 0, factor, q) > 0 for factor in model.factors):
         return np.inf
     energy = -sum(_expected(_finite_log(factor.table), factor, q) for factor in model.factors)
@@ -117,12 +117,12 @@ def _free_energy(model: GraphicalModel, q: Independent) -> float:
 
 
 def _finite_log(table: NDArray) -> NDArray[np.float64]:
-    """Return log(table), and 0 where the table is 0: forbidden combinations are counted apart."""
+    """Return log(table), and 0 where the table is 0, because forbidden combinations are counted separately."""
     return np.log(np.where(table > 0, table, 1.0))
 
 
 def _expected(values: NDArray, factor: Factor, q: Independent, keep: str | None = None) -> NDArray[np.float64]:
-    """Return the mean of a table over its variables' distributions, for each state of the variable `keep`."""
+    """Return the expectation of a table under its variables' distributions, for each state of the variable `keep`."""
     values = np.asarray(values, dtype=np.float64)
     for axis, name in reversed(list(enumerate(factor.names))):
         if name != keep:

@@ -12,28 +12,28 @@ from semgrid_edu.graphical.factor import Factor
 from semgrid_edu.graphical.model import GraphicalModel, possible
 
 TOLERANCE = 1e-10
-"""Iterations have converged when none of their probabilities changes by more than this."""
+"""An iteration has converged when no probability changes by more than this."""
 
 
 @dataclass(frozen=True, eq=False)
 class Beliefs:
-    """Marginals of all variables that weren't given.
+    """Marginals of all unobserved variables.
 
     Parameters
     ----------
     marginals : dict of str to (K,) float64
-        A probability for each state, summing to 1.
+        The probability of each state; sums to 1.
     converged : bool
         Whether the last iteration changed nothing by more than `TOLERANCE`.
     iterations : int
-        How many were run.
+        Number of iterations.
     exact : bool
-        Whether the marginals are known to be exact: they have converged, and the factors leave no loop
-        (sum-product) or no coupling at all (mean field).
+        Whether the marginals are known to be exact: they have converged, and the factor graph has no loops
+        (sum-product) or no couplings (mean field).
     messages : dict of (str, str) to (K,) float64
-        Sum-product's messages by (source, target), normalised; empty from mean field.
+        Normalised messages of sum-product by (source, target); empty for mean field.
     free_energy : (iterations,) float64
-        Mean field's, in nats, after each sweep; empty from sum-product.
+        Free energy of mean field after each sweep, in nats; empty for sum-product.
     """
 
     marginals: Mapping[str, NDArray[np.float64]]
@@ -45,7 +45,7 @@ class Beliefs:
 
 
 Messages = dict[tuple[str, str], NDArray[np.float64]]
-"""From source to target; each a distribution (K,) of the variable at one of the two ends."""
+"""Messages by (source, target); each is a distribution (K,) over the variable at one end of the link."""
 
 
 def sum_product(
@@ -54,35 +54,35 @@ def sum_product(
     """Pass messages between variables and factors until they converge; a belief is the product of incoming messages.
 
     A variable's message to a factor is the product of the messages from its other factors. A factor's message to a
-    variable is its table times the messages from its other variables, summed over them. Every iteration visits all
-    nodes twice, from the leaves inwards and back out. On a tree the first iteration therefore delivers every message,
-    and the second changes nothing. With loops a message comes back to its source as if it were news, and the result
-    is an approximation.
+    variable is its table times the messages from its other variables, summed over these variables. Every iteration
+    visits all nodes twice, from the leaves inwards and back out. So on a tree the first iteration computes every
+    message, and the second changes nothing. On a graph with loops, a message returns to its source as if it were new
+    evidence, and the result is an approximation.
 
     Every message sums to 1, so long chains neither underflow nor overflow.
 
     Parameters
     ----------
     model : GraphicalModel
-        Directed or not.
+        Directed or undirected.
     given : dict of str to int
-        The states of known variables; their factors are sliced first, which may open loops.
+        The states of observed variables. Their factors are sliced first, which may break loops.
     iterations : int
-        The largest number of iterations, at least 1.
+        Maximum number of iterations, at least 1.
     damping : float
-        Share of the old message that is kept, 0 <= damping < 1. It helps loopy graphs to converge.
+        Weight of the old message, 0 <= damping < 1. Damping helps loopy graphs to converge.
 
     Returns
     -------
     Beliefs
-        `.messages[source, target]` between a variable's name and a factor's label of `model.labels`: on a chain,
+        `.messages[source, target]`, between a variable name and a factor label from `model.labels`: on a chain,
         `.messages["x1", "P(x2 | x1)"]` is the filtered belief P(x1 | evidence up to 1). `.exact` is whether the
-        factor graph without the given variables is a tree (or several) and the messages converged.
+        factor graph of the unobserved variables is a tree (or a forest) and the messages converged.
 
     Raises
     ------
     ArgumentError
-        When no assignment agrees with what is given, or an argument is out of range.
+        When no assignment agrees with the given states, or an argument is out of range.
 
     Examples
     --------
@@ -135,13 +135,13 @@ def _links(factors: Mapping[str, Factor], names: tuple[str, ...]) -> dict[str, l
 
 
 def _parts(links: Mapping[str, list[str]]) -> list[list[str]]:
-    """Return the connected parts of the factor graph; each node comes after the one through which it was reached."""
+    """Return the connected components of the factor graph; each node comes after the node it was reached from."""
     parts: list[list[str]] = []
     reached: set[str] = set()
     for root in links:
         part = [root] if root not in reached else []
         reached.add(root)
-        for node in part:  # grows on the way
+        for node in part:  # grows during the loop
             new = [other for other in links[node] if other not in reached]
             reached.update(new)
             part += new
@@ -150,12 +150,12 @@ def _parts(links: Mapping[str, list[str]]) -> list[list[str]]:
 
 
 def _is_forest(links: Mapping[str, list[str]], parts: list[list[str]]) -> bool:
-    """Whether no part has a loop: a tree has one link fewer than nodes."""
+    """Return whether no component has a loop: a tree has one link fewer than nodes."""
     return sum(map(len, links.values())) // 2 == len(links) - len(parts)
 
 
 def _uniform(factors: Mapping[str, Factor], cardinalities: Mapping[str, int]) -> Messages:
-    """Return the messages before the first iteration: uniform."""
+    """Return uniform initial messages."""
     uniform = {name: np.full(count, 1 / count) for name, count in cardinalities.items()}
     pairs = [(label, name) for label, factor in factors.items() for name in factor.names]
     return {link: uniform[name] for label, name in pairs for link in ((label, name), (name, label))}
@@ -168,7 +168,7 @@ def _message(
     factors: Mapping[str, Factor],
     messages: Messages,
 ) -> NDArray[np.float64]:
-    """Return the message of a node to a neighbour, from the messages of all its other neighbours."""
+    """Return the message of a node to a neighbour, computed from the messages of all other neighbours."""
     others = {node: messages[node, source] for node in links[source] if node != target}
     if source in factors:
         return _from_factor(factors[source], others)
@@ -176,17 +176,17 @@ def _message(
 
 
 def _from_factor(factor: Factor, incoming: Mapping[str, NDArray]) -> NDArray[np.float64]:
-    """Return the table times the messages of all variables but one, with these variables summed out."""
+    """Return the table times the messages of all variables except one, summed over these variables."""
     table = factor.table
     for axis, name in reversed(list(enumerate(factor.names))):
         if name in incoming:
-            # Of the later axes only the target's can be left. It moves here, and the axis to sum over becomes the last.
+            # Only the target's axis can remain behind this one. Swap the two, so that the axis to sum over is last.
             table = _normalised(table.swapaxes(axis, -1) @ incoming[name])
     return _normalised(table)
 
 
 def _product(messages: Iterable[NDArray], states: int) -> NDArray[np.float64]:
-    """Return the normalised product of messages about one variable; each partial product is normalised too."""
+    """Return the normalised product of messages about one variable, normalising after each factor."""
     belief = np.full(states, 1 / states)
     for message in messages:
         belief = _normalised(belief * message)

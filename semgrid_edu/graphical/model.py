@@ -1,4 +1,4 @@
-"""A graphical model: a product of factors; directed when each is the distribution of a child given its parents."""
+"""A graphical model: a product of factors; in a directed model each factor is P(child | parents)."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical.factor import Factor, as_names, check_name, check_states, shared_cardinalities
 
 SUM_TOLERANCE = 1e-9
-"""How far rounding may take the sum over a child from 1."""
+"""Tolerance for rounding errors in the sum over a child, which should be 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,14 +23,14 @@ class GraphicalModel:
     Parameters
     ----------
     factors : iterable of Factor
-        In a directed model exactly one per variable: P(child | parents), its axes in any order.
+        In a directed model exactly one per variable: P(child | parents), with axes in any order.
     parents : dict of str to tuple of str, optional
-        The parents of each child; a variable that is left out has none. None makes the model undirected.
+        The parents of each child; a variable that isn't listed has none. None makes the model undirected.
 
     Attributes
     ----------
     cardinalities : dict of str to int
-        Number of states of each variable, in the order in which the variables first occur.
+        Number of states of each variable, in order of first occurrence.
     labels : tuple of str
         One label per factor: "P(r | m1, m2)" in a directed model, "f(x, y)" in an undirected one; the second factor
         over the same variables is "f(x, y) #2".
@@ -38,8 +38,8 @@ class GraphicalModel:
     Raises
     ------
     ArgumentError
-        When factors disagree about a variable's number of states; in a directed model also when there is a cycle,
-        when a factor is missing, and when one doesn't sum to 1 over its child.
+        When factors disagree about the number of states of a variable. In a directed model also when there is a cycle,
+        a factor is missing, or a factor doesn't sum to 1 over its child.
 
     Examples
     --------
@@ -62,12 +62,12 @@ class GraphicalModel:
 
     @cached_property
     def cardinalities(self) -> dict[str, int]:
-        """Number of states of each variable, {name: K}, in the order in which the variables first occur."""
+        """Number of states of each variable, {name: K}, in order of first occurrence."""
         return shared_cardinalities(factor.cardinalities for factor in self.factors)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The variables, in the order in which they first occur."""
+        """The variables, in order of first occurrence."""
         return tuple(self.cardinalities)
 
     @property
@@ -77,7 +77,7 @@ class GraphicalModel:
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
-        """One label per factor, unique: "P(r | m1, m2)" or "f(x, y)"."""
+        """One unique label per factor: "P(r | m1, m2)" or "f(x, y)"."""
         if self.parents is not None:
             owners = {frozenset(family): child for child, family in families(self.parents).items()}
             children = [owners[frozenset(factor.names)] for factor in self.factors]
@@ -91,7 +91,7 @@ class GraphicalModel:
 
     @property
     def neighbours(self) -> dict[str, set[str]]:
-        """The variables that share a factor with each variable: in a directed model, the moral graph."""
+        """The variables that share a factor with each variable; in a directed model, the moral graph."""
         adjacent: dict[str, set[str]] = {name: set() for name in self.names}
         for factor in self.factors:
             for name in factor.names:
@@ -99,18 +99,18 @@ class GraphicalModel:
         return adjacent
 
     def given(self, /, **states: int) -> "GraphicalModel":
-        """Return the model of the other variables when these states are known: every factor is sliced.
+        """Condition on observed states: slice every factor and return the model of the other variables.
 
         Parameters
         ----------
         **states : int
-            The state of each known variable, from 0; `model.given(**evidence)` for a dictionary.
+            The state of each observed variable, from 0; `model.given(**evidence)` for a dictionary.
 
         Returns
         -------
         GraphicalModel
-            Undirected, not normalised, with one factor for each of this model's, in the same order. A factor
-            whose variables are all known becomes a constant.
+            Undirected, not normalised, with the same factors in the same order, sliced. A factor becomes a constant if
+            all its variables are observed.
         """
         check_states(states, self.cardinalities)
         return GraphicalModel(
@@ -128,7 +128,7 @@ class GraphicalModel:
         Returns
         -------
         float
-            In a directed model the probability of the assignment; in an undirected one it is Z times that.
+            The probability of the assignment in a directed model; Z times the probability in an undirected one.
         """
         check_states(assignment, self.cardinalities)
         if missing := set(self.names) - set(assignment):
@@ -138,14 +138,14 @@ class GraphicalModel:
 
 
 def possible(model: GraphicalModel, given: Mapping[str, int]) -> GraphicalModel:
-    """Return the model of the variables that aren't given; an error names a factor that is zero everywhere.
+    """Condition a model like `GraphicalModel.given`, but raise an error if a factor becomes zero everywhere.
 
     Parameters
     ----------
     model : GraphicalModel
-        Directed or not.
+        Directed or undirected.
     given : dict of str to int
-        The states of known variables.
+        The states of observed variables.
     """
     sliced = model.given(**given)
     for label, factor in zip(model.labels, sliced.factors, strict=True):
@@ -157,14 +157,14 @@ def possible(model: GraphicalModel, given: Mapping[str, int]) -> GraphicalModel:
 def check_directed(
     factors: Sequence[Factor], parents: Mapping[str, tuple[str, ...]], names: Sequence[str]
 ) -> dict[str, tuple[str, ...]]:
-    """Check that factors are the conditional distributions that `parents` announces, and complete `parents`.
+    """Check that the factors are the conditional distributions that `parents` specifies, and complete `parents`.
 
     Parameters
     ----------
     factors : sequence of Factor
-        One per variable; an error names the one at fault.
+        One per variable; an error names the invalid factor.
     parents : dict of str to tuple of str
-        The parents of each child; a variable that is left out has none.
+        The parents of each child; a variable that isn't listed has none.
     names : sequence of str
         All variables.
     """
@@ -187,7 +187,7 @@ def check_directed(
 
 
 def _check_conditional(factor: Factor, child: str, parents: tuple[str, ...]) -> None:
-    """Check that P(child | parents) sums to 1 over the child, whatever the parents' states."""
+    """Check that P(child | parents) sums to 1 over the child for all parent states."""
     sums = factor.sum(child).ordered(*parents)
     worst = np.unravel_index(np.argmax(abs(sums.table - 1)), sums.table.shape)
     if abs(sums.table[worst] - 1) > SUM_TOLERANCE:
@@ -212,7 +212,7 @@ def families(parents: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...
 
 
 def topological_order(parents: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
-    """Sort variables so that parents come before their children; an error shows the cycle that prevents it.
+    """Sort variables so that parents come before their children; raise an error if there is a cycle.
 
     Parameters
     ----------

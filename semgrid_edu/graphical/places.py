@@ -1,4 +1,4 @@
-"""What a drawing is given: the places of nodes, and dashed edges."""
+"""Inputs of a drawing: node positions and dashed edges."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,24 +7,24 @@ Place = tuple[float, float]
 """x to the right, y upwards; neighbours are about 1 apart."""
 
 CUT_COLOUR = "#7b3294"
-"""Colour of every dashed edge and of its text."""
+"""Colour of dashed edges and their texts."""
 
 
 class Dashed(NamedTuple):
-    """A dashed edge of a drawing. A straight one replaces the arrow between the same nodes, if there is one.
+    """A dashed edge of a drawing. A straight dashed edge replaces an existing arrow between the same nodes.
 
     Parameters
     ----------
     ends : (str, str)
         The two nodes.
     text : str
-        What is written on it.
+        Text on the edge.
     arrow : bool
         Whether it has an arrow head at the second node.
     bend : float
-        How far its middle is to the left of the straight line, seen from the first node; in units of its length.
+        Offset of its middle to the left of the straight line, seen from the first node, as a share of its length.
     at : float
-        Where the text is: 0 at the first node, 1 at the second.
+        Position of the text: 0 at the first node, 1 at the second.
     """
 
     ends: tuple[str, str]
@@ -35,7 +35,7 @@ class Dashed(NamedTuple):
 
 
 def in_rows(*rows: Sequence[str | None]) -> dict[str, Place]:
-    """Place variables row by row from top to bottom, each row centred.
+    """Position variables row by row from top to bottom, each row centred.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A drawing of a graphical model: how large its nodes, texts, plates and curves are, and daft's calls to draw them."""
+"""Rendering of a graphical model with daft: the geometry of nodes, texts, plates and curves."""
 
 import re
 from collections.abc import Collection, Mapping
@@ -21,40 +21,40 @@ NODE = 0.56
 """Diameter of a node, when neighbours are 1 apart."""
 
 SQUARE = 0.14
-"""Side of a factor."""
+"""Side of a factor's square."""
 
 MARGIN = 0.45
-"""How far a plate and the picture reach beyond the centres of nodes, at least."""
+"""Minimum margin of plates and of the picture around the node centres."""
 
 LETTER = 0.12
-"""Approximate width of a letter, in a figure that `GraphPicture` makes."""
+"""Approximate width of a letter in a figure made by `GraphPicture`."""
 
 INCHES = 0.8
-"""Distance of neighbouring nodes in a figure that `GraphPicture` makes."""
+"""Distance between neighbouring nodes in a figure made by `GraphPicture`."""
 
 FONT_SIZES = 8.0, 12.0
-"""Smallest and largest font, points."""
+"""Smallest and largest font size, points."""
 
 HIGHLIGHT = {"ec": "#d95f02", "lw": 3.0}
-"""Outline of a highlighted node, three times as thick as the others: colour isn't the only mark."""
+"""Outline of a highlighted node: coloured, and three times as thick for readers who can't see the colour."""
 
 GHOST = {"ec": "0.55", "ls": (0, (2, 2)), "fc": "0.97"}
-"""Look of a node that the model doesn't have."""
+"""Style of a node that the model doesn't have."""
 
 
 class GraphPicture:
-    """A model's nodes at their places. Texts, plates and dashed edges are added; `render` draws everything.
+    """The nodes of a model at their positions. Add texts, plates and dashed edges, then draw with `render`.
 
     Parameters
     ----------
     model : GraphicalModel
         The model.
     places : dict of str to (float, float)
-        The centre of each variable and, by label, of each factor.
+        Centre of each variable and, by label, of each factor.
     ghosts : dict of str to (float, float)
         Nodes that the model doesn't have.
     labels : dict of str to str
-        Texts in nodes, where they aren't the names.
+        Node texts that differ from the names.
     """
 
     def __init__(
@@ -84,12 +84,12 @@ class GraphPicture:
                 self.beside[name] = text, x - 0.06, y + 0.2
 
     def surround(self, plates: Mapping[str, tuple[str, ...]]) -> None:
-        """Put boxes around nodes, with room for the text of the box below and for the texts beside the nodes.
+        """Put plates around nodes, with room for the plate's text at the bottom and for texts beside the nodes.
 
         Parameters
         ----------
         plates : dict of str to tuple of str
-            The nodes in each box, by its text.
+            The nodes in each plate, by the plate's text.
         """
         for text, names in plates.items():
             centres = np.array([self.places[name] for name in names])
@@ -121,9 +121,9 @@ class GraphPicture:
         Parameters
         ----------
         ax : Axes, optional
-            Where to draw; a new figure when left out.
+            Axes to draw into; by default a new figure.
         observed, highlight : collection of str
-            The nodes to shade, and those with a coloured outline.
+            The nodes to shade, and the nodes with a coloured outline.
         """
         low, high = self._limits()
         if ax is None:
@@ -136,7 +136,7 @@ class GraphPicture:
             daft.Plate([*low, *(high - low)], label=text, fontsize=size, rect_params={"fc": "none"})
             for text, (low, high) in self.plates.items()
         ]
-        context = daft.PGM(grid_unit=1.0, node_unit=NODE)._ctx  # `PGM.render` would open a figure of its own
+        context = daft.PGM(grid_unit=1.0, node_unit=NODE)._ctx  # `PGM.render` would create another figure
         context._ax = ax
         for thing in (*boxes, *self._edges(nodes), *nodes.values()):
             thing.render(context)
@@ -179,27 +179,27 @@ class GraphPicture:
             if factor.names:
                 place = self.places[label]
                 square = daft.Node(label, "", *place, scale=SQUARE / NODE, plot_params={"fc": "k"}, shape="rectangle")
-                # daft can't end an upright line at a rectangle, so lines end at a circle under the square.
+                # daft can't end a vertical line at a rectangle, so lines end at a circle under the square.
                 circle = daft.Node(label, "", *place, scale=SQUARE / NODE)
                 things += [daft.Edge(nodes[name], circle, directed=False) for name in factor.names]
                 things.append(square)
         return things
 
     def _outline(self, name: str, towards: NDArray) -> NDArray[np.float64]:
-        """Return where the line from the centre of a node to another place leaves the node."""
+        """Return the point at which the line from a node's centre to another point crosses the node's outline."""
         centre = np.array(self.places[name])
         way = (towards - centre) / np.hypot(*(towards - centre))
         half = _half_width(self.inside[name])
         return centre + way * (1 / np.hypot(way[0] / half, way[1] / (NODE / 2)) + 0.03)
 
     def _end(self, name: str) -> float:
-        """Return where the text beside a node ends, approximately."""
+        """Return the approximate right end of the text beside a node."""
         text, x, _ = self.beside[name]
         return x + LETTER * _letters(text)
 
 
 def _symbol(name: str) -> str:
-    """Return the text in a node: m1 and m_1 are symbols with an index, a single letter a symbol, all else a word."""
+    """Return the text in a node: m1 and m_1 become a symbol with index, one letter a symbol, the rest stays a word."""
     found = re.fullmatch(r"([A-Za-z])_?([\d,]*)", name)
     if not found:
         return name
@@ -208,28 +208,28 @@ def _symbol(name: str) -> str:
 
 
 def _letters(text: str) -> int:
-    """Return about how many letters wide a text is, mathematics included."""
+    """Return the approximate width of a text in letters, including mathematics."""
     return len(re.sub(r"\\[A-Za-z]+", "x", text).translate(str.maketrans("", "", "${}_^\\")))
 
 
 def _half_width(text: str) -> float:
-    """Return how far a node with this text reaches to either side of its centre: words make it wider."""
+    """Return half the width of a node with this text; words make it wider."""
     return max(NODE, LETTER * _letters(text)) / 2
 
 
 def _font_size(ax: "Axes", extent: NDArray) -> float:
-    """Return the font size that fits a node at the scale of the axes, within `FONT_SIZES`."""
+    """Return the font size, within `FONT_SIZES`, that fits a node at the scale of the axes."""
     width, height = ax.get_window_extent().size / ax.figure.dpi * 72
     return float(np.clip(0.24 * min(width / extent[0], height / extent[1]), *FONT_SIZES))
 
 
 def _on_curve(points: NDArray, t: float) -> NDArray[np.float64]:
-    """Return a point of a quadratic Bezier curve, (2,)."""
+    """Return a point on a quadratic Bezier curve, (2,)."""
     return np.array([(1 - t) ** 2, 2 * t * (1 - t), t**2]) @ points
 
 
 def _bounding_box(edge: Dashed, points: NDArray) -> NDArray[np.float64]:
-    """Return two corners of the box around a dashed edge and its text, (2, 2)."""
+    """Return two corners of the bounding box of a dashed edge and its text, (2, 2)."""
     half = np.array([LETTER * len(edge.text) / 2 + 0.05, 0.2])
     text = _on_curve(points, edge.at)
     around = np.array([text - half, text + half, *(_on_curve(points, t) for t in (0, 0.25, 0.5, 0.75, 1))])
@@ -237,7 +237,7 @@ def _bounding_box(edge: Dashed, points: NDArray) -> NDArray[np.float64]:
 
 
 def _draw_dashed(edge: Dashed, points: NDArray, ax: "Axes", size: float) -> None:
-    """Draw one dashed edge and its text, on white so that it can be read where it crosses other edges."""
+    """Draw one dashed edge and its text, with a white background so that it is readable on top of other edges."""
     style = {"color": CUT_COLOUR, "lw": 1.6, "zorder": 1.5}
     path = Path(points, [Path.MOVETO, Path.CURVE3, Path.CURVE3])
     ax.add_patch(PathPatch(path, fill=False, ls=(0, (4, 2.5)), **style))

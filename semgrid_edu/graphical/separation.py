@@ -1,6 +1,6 @@
 """Which variables can influence each other: d-separation in directed models, separation in undirected ones.
 
-Reachability along active paths, the "Bayes ball" (Shachter 1998; Koller and Friedman, algorithm 3.1).
+The algorithm searches along active paths, the "Bayes ball" (Shachter 1998; Koller and Friedman, algorithm 3.1).
 """
 
 from collections import deque
@@ -15,7 +15,7 @@ Names = str | Iterable[str]
 
 
 def d_separated(model: GraphicalModel, a: Names, b: Names, given: Names = ()) -> bool:
-    """Whether the graph alone guarantees that a and b are independent once `given` is known, whatever the numbers.
+    """Return whether the graph guarantees that a and b are independent given `given`, for any numbers in the factors.
 
     Parameters
     ----------
@@ -24,16 +24,16 @@ def d_separated(model: GraphicalModel, a: Names, b: Names, given: Names = ()) ->
     a, b : str or iterable of str
         One variable or several.
     given : str or iterable of str
-        Variables whose states are known; a dictionary of evidence works too.
+        Observed variables; a dictionary of evidence works too.
 
     Raises
     ------
     ArgumentError
-        When a variable is unknown, or in two of the three groups.
+        When a variable is unknown, or in more than one of the three groups.
 
     Examples
     --------
-    Two cells and the beam that both may reflect: independent, until the beam is observed.
+    Two cells and a beam that both may reflect are independent until the beam is observed.
 
     >>> import numpy as np
     >>> from semgrid_edu.graphical.factor import Factor
@@ -47,29 +47,29 @@ def d_separated(model: GraphicalModel, a: Names, b: Names, given: Names = ()) ->
 
 
 def why_dependent(model: GraphicalModel, a: Names, b: Names, given: Names = ()) -> tuple[str, ...] | None:
-    """Return a shortest active path from a to b, the reason why they may depend on each other.
+    """Return a shortest active path from a to b, which is why they may be dependent.
 
-    In a directed model a path is active when each inner variable lets influence pass: a chain or a fork
-    (-> x ->, <- x <-, <- x ->) when x is not given, a collider (-> x <-) when x or one of its descendants is given.
+    In a directed model a path is active if each inner variable lets influence pass: a chain or a fork
+    (-> x ->, <- x <-, <- x ->) if x is not given, a collider (-> x <-) if x or one of its descendants is given.
 
     Parameters
     ----------
     model : GraphicalModel
-        Directed or not.
+        Directed or undirected.
     a, b : str or iterable of str
         One variable or several.
     given : str or iterable of str
-        Variables whose states are known.
+        Observed variables.
 
     Returns
     -------
     tuple of str or None
-        The variables along the path, both ends included; None when a and b are separated.
+        The variables along the path, including both ends; None if a and b are separated.
 
     Raises
     ------
     ArgumentError
-        When a variable is unknown, or in two of the three groups.
+        When a variable is unknown, or in more than one of the three groups.
 
     Examples
     --------
@@ -83,7 +83,7 @@ def why_dependent(model: GraphicalModel, a: Names, b: Names, given: Names = ()) 
     known = set(as_names(given))
     _check_groups(model, start, goal, known)
     steps = _directed_steps(model.parents, known) if model.parents is not None else _undirected_steps(model, known)
-    # A place in the search: a variable, and whether the path reached it from one of its parents.
+    # A search state: a variable, and whether the path reached it from one of its parents.
     came_from = {(name, False): None for name in sorted(start)}
     queue = deque(came_from)
     while queue:
@@ -98,7 +98,7 @@ def why_dependent(model: GraphicalModel, a: Names, b: Names, given: Names = ()) 
 
 
 def _directed_steps(parents: Mapping[str, tuple[str, ...]], known: set[str]):
-    """Return the rule of the Bayes ball: where influence goes on from a variable, by where it came from."""
+    """Return the Bayes-ball rule: where influence continues from a variable, depending on where it came from."""
     children = {name: [child for child, above in parents.items() if name in above] for name in parents}
     opens = _with_ancestors(parents, known)
 
@@ -111,7 +111,7 @@ def _directed_steps(parents: Mapping[str, tuple[str, ...]], known: set[str]):
 
 
 def _undirected_steps(model: GraphicalModel, known: set[str]):
-    """Return the rule of undirected graphs: to every neighbour, except from a known variable."""
+    """Return the rule for undirected graphs: influence continues to every neighbour, but not from a given variable."""
     neighbours = model.neighbours
 
     def steps(name: str, from_parent: bool) -> list[tuple[str, bool]]:
@@ -121,7 +121,7 @@ def _undirected_steps(model: GraphicalModel, known: set[str]):
 
 
 def _with_ancestors(parents: Mapping[str, tuple[str, ...]], names: set[str]) -> set[str]:
-    """Return the variables and everything above them: the colliders that they open."""
+    """Return the variables and all their ancestors, which are the colliders that they activate."""
     found = set(names)
     queue = list(names)
     while queue:

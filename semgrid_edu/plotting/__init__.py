@@ -1,8 +1,8 @@
-"""The figures of lectures, demo and experiments, drawn with one vocabulary: maps, images, charts, animations.
+"""Figures for lectures, demo and experiments in a consistent style: maps, images, charts, animations.
 
-Every function that takes `ax` draws into these Axes, or into a new figure when they are left out, and returns the Axes.
-Grids are drawn as maps seen from above with forward up, in metres: the x axis points up, the y axis to the left, so its
-numbers fall from left to right. Arrays are never flipped: row 0 is the farthest ahead, column 0 the leftmost.
+Every function with a parameter `ax` draws into these Axes, by default into a new figure, and returns the Axes. Grids
+are drawn as top-down maps in metres: the x axis points up, which is forward, and the y axis to the left, so its numbers
+decrease from left to right. Arrays are never flipped: row 0 is the farthest ahead, column 0 the leftmost.
 """
 
 from semgrid_edu.plotting.animations import MAX_ANIMATION_BYTES, Animation, animate
@@ -27,7 +27,7 @@ from semgrid_edu.plotting.images import image_labels, image_values, plane_on_ima
 from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
 
 FIGURE_DPI = 110
-"""Dots per inch of every figure in a notebook: `plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI`."""
+"""Dots per inch of all notebook figures: `plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI`."""
 
 __all__ = [
     "DEPTH_RANGE",

@@ -1,4 +1,4 @@
-"""Animations that play wherever a notebook is shown, without a kernel: animated PNGs, small enough to commit."""
+"""Animations that play in every notebook viewer without a kernel: animated PNGs, small enough to commit."""
 
 import io
 from collections.abc import Iterable
@@ -15,52 +15,51 @@ from PIL import Image
 from semgrid_edu.errors import ArgumentError
 
 MAX_ANIMATION_BYTES = 600_000
-"""The largest animation: readers download it with the notebook."""
+"""Maximum size of an animation, because readers download it with the notebook."""
 
 SAMPLE = 200_000
-"""The number of pixels, about, by which colours are chosen."""
+"""Approximate number of pixels that determine the palette."""
 
 
 @dataclass(frozen=True)
 class Animation:
-    """An animation to be shown as the last value of a cell.
+    """An animation, displayed when it is the last value of a cell.
 
-    It is an animated PNG because a notebook's PNGs are shown everywhere. nbconvert leaves GIF and WebP out, and
-    JupyterLab removes `<img src="data:...">` from a notebook that hasn't run on this machine. A program that can't play
-    animations shows the first frame.
+    It is an animated PNG because every notebook viewer shows PNGs. nbconvert drops GIF and WebP, and JupyterLab removes
+    `<img src="data:...">` from untrusted notebooks. A viewer without animation support shows the first frame.
 
     Parameters
     ----------
     png : bytes
-        The file; write it to disk as any PNG.
+        Content of the PNG file.
     alt : str
-        What happens in it, for readers who can't see it.
+        Description for readers who can't see the animation.
     """
 
     png: bytes = field(repr=False)
     alt: str
 
     def _repr_png_(self) -> tuple[bytes, dict[str, str]]:
-        """Hand the file and its alternative text to the notebook."""
+        """Return the file and its alternative text for the notebook."""
         return self.png, {"alt": self.alt}
 
 
 def animate(frames: Iterable[Figure | NDArray[np.uint8]], period: float, alt: str) -> Animation:
-    """Make an animation that runs for ever.
+    """Make an animation that loops forever.
 
     Parameters
     ----------
     frames : iterable of Figure or (h, w, 3) uint8
-        All of one size. A generator may draw on one figure and yield it again and again; figures are closed.
+        Frames of equal size. A generator may redraw and yield the same figure; figures are closed.
     period : float
-        Seconds from one frame to the next.
+        Seconds between frames.
     alt : str
-        What happens in it, for readers who can't see it.
+        Description for readers who can't see the animation.
 
     Returns
     -------
     Animation
-        With at most 256 colours in all its frames together. The same frames give the same bytes.
+        With at most 256 colours over all frames. The same frames give the same bytes.
 
     Raises
     ------
@@ -75,7 +74,7 @@ def animate(frames: Iterable[Figure | NDArray[np.uint8]], period: float, alt: st
     """
     pictures: list[Image.Image] = []
     for before, frame in pairwise(chain([None], frames)):
-        held = frame is before and not getattr(frame, "stale", True)  # a figure in which nothing has changed
+        held = frame is before and not getattr(frame, "stale", True)  # the same figure, unchanged
         pictures.append(pictures[-1] if held else _picture(frame))
     if not pictures or len(sizes := {picture.size for picture in pictures}) > 1:
         found = f"sizes {sorted(sizes)}" if pictures else "no frames"
@@ -92,10 +91,10 @@ def animate(frames: Iterable[Figure | NDArray[np.uint8]], period: float, alt: st
 
 
 def _picture(frame: Figure | NDArray[np.uint8]) -> Image.Image:
-    """Return a frame as it looks now."""
+    """Render the current state of a frame."""
     if not isinstance(frame, Figure):
         return Image.fromarray(np.asarray(frame)).convert("RGB")
-    # `savefig` would draw twice, and pack a PNG that is unpacked at once.
+    # `savefig` would draw twice, and encode a PNG only to decode it again.
     canvas = FigureCanvasAgg(frame)
     canvas.draw()
     plt.close(frame)
@@ -103,9 +102,9 @@ def _picture(frame: Figure | NDArray[np.uint8]) -> Image.Image:
 
 
 def _with_common_palette(pictures: list[Image.Image]) -> list[Image.Image]:
-    """Give all pictures the same 256 colours, so that still parts keep their colour and are stored once.
+    """Quantise all pictures to one palette of 256 colours, so that static parts don't flicker and are stored once.
 
-    Which colours these are is decided on a small picture, in which each colour is about as frequent as in all frames.
+    The palette comes from a small sample in which each colour is about as frequent as in all frames.
     """
     codes = np.stack([np.asarray(picture) @ np.array([1 << 16, 1 << 8, 1]) for picture in pictures])
     counts = np.bincount(codes.ravel())
@@ -119,14 +118,14 @@ def _with_common_palette(pictures: list[Image.Image]) -> list[Image.Image]:
 
 
 def _paletted(indices: NDArray[np.uint8], like: Image.Image) -> Image.Image:
-    """Return a picture of indices into the palette of another."""
+    """Return a picture from indices into the palette of another picture."""
     picture = Image.fromarray(indices)
     picture.putpalette(like.getpalette())
     return picture
 
 
 def _animated_png(pictures: list[Image.Image], milliseconds: int) -> bytes:
-    """Write the pictures into one file; each later one stores only the rectangle in which it differs."""
+    """Encode the pictures as one file; each frame stores only the rectangle that changed."""
     stored = io.BytesIO()
     first, *others = pictures
     first.save(stored, "PNG", save_all=True, append_images=others, duration=milliseconds, loop=0, optimize=True)

@@ -1,4 +1,4 @@
-"""Charts of numbers: a confusion matrix (Table 3), training loss (section 4.1)."""
+"""Charts: confusion matrix (Table 3) and training loss (section 4.1)."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -15,16 +15,16 @@ if TYPE_CHECKING:  # training loads torch
     from semgrid_edu.training.log import TrainingLog
 
 SMOOTHING = 50
-"""Number of steps that a running mean is taken over; a stage with fewer steps takes all of them."""
+"""Window of the running mean, steps; a shorter stage uses all its steps."""
 
 
 def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> Axes:
-    """Draw a confusion matrix as the paper's Table 3: row truth, column prediction, per cent of the row.
+    """Draw a confusion matrix like the paper's Table 3: rows are truth, columns prediction, in per cent of the row.
 
     Parameters
     ----------
     matrix : (n, n) int
-        How often each true class (row) is called each class (column); a class without truth has an empty row.
+        How often each true class (row) is predicted as each class (column); a class that never occurs has an empty row.
     names : sequence of str
         Names of the n classes.
     ax : Axes, optional
@@ -33,7 +33,7 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     Raises
     ------
     ArgumentError
-        When names and matrix differ in number.
+        When the matrix doesn't have one row and one column per name.
     """
     if np.shape(matrix) != (len(names), len(names)):
         raise ArgumentError("matrix", f"shape {(len(names),) * 2}, one row per name", f"shape {np.shape(matrix)}")
@@ -53,22 +53,22 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
 
 
 def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | None = None) -> Axes:
-    """Draw the loss of training runs over their steps: one point per step, and a line for the running mean.
+    """Draw the loss of training runs over steps: one point per step, and a line for the running mean.
 
-    The two stages have losses of different things, pixels and cells, so the line breaks between them. The learning
-    rate, which falls along half a cosine in each stage, isn't drawn.
+    The losses of the two stages aren't comparable, one is over pixels and one over cells, so the line breaks between
+    them. The learning rate, a half cosine in each stage, isn't drawn.
 
     Parameters
     ----------
     logs : TrainingLog, or mapping of name to TrainingLog
-        Logs from `read_log`, by the names that the legend shows.
+        Logs from `read_log`, by their names in the legend.
     ax : Axes, optional
         Axes to draw into.
 
     Raises
     ------
     ArgumentError
-        When there is no training run, or one has no step with a finite loss.
+        When there is no training run, or a run has no step with a finite loss.
     """
     logs = logs if isinstance(logs, Mapping) else {"": logs}
     if not logs or not all(len(log.loss) for log in logs.values()):
@@ -93,7 +93,7 @@ def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | 
 
 
 def _curve(ax: Axes, log: "TrainingLog", name: str, colour: str) -> None:
-    """Draw one training run, stage by stage, with a dotted line where a stage begins."""
+    """Draw one training run by stage, with a dotted line at the start of each stage."""
     ax.scatter(log.iteration, log.loss, s=3, color=colour, alpha=0.2, linewidth=0)
     for stage, begin in _stages(log):
         here = log.stage == stage
@@ -103,5 +103,5 @@ def _curve(ax: Axes, log: "TrainingLog", name: str, colour: str) -> None:
 
 
 def _stages(log: "TrainingLog") -> list[tuple[str, int]]:
-    """Return the stages of a training run and the step with which each begins."""
+    """Return the stages of a training run and the first step of each."""
     return [(stage, log.iteration[log.stage == stage][0]) for stage in dict.fromkeys(log.stage.tolist())]

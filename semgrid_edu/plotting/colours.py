@@ -1,4 +1,4 @@
-"""Colours of occupancy states, velocities and depths, and legends of them (section 3.2); classes' are in `labels`."""
+"""Colours and legends for occupancy states, velocities and depths (section 3.2); class colours are in `labels`."""
 
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -14,26 +14,26 @@ from semgrid_edu.labels import LabelSet
 from semgrid_edu.occupancy import State
 
 STATE_NAMES = tuple(state.name.lower() for state in State)
-"""The occupancy states in their order."""
+"""Names of the occupancy states, in order."""
 
 STATE_COLOURS = ((243, 243, 240), (38, 42, 52), (252, 114, 0), (160, 163, 168))
 """8-bit RGB of each state: free is light, static dark, dynamic a strong warm colour, unknown mid-grey."""
 
 HEADING_COLOURS = ((30, 110, 230), (90, 200, 120), (255, 200, 0), (190, 0, 120))
-"""8-bit RGB of motion forward, to the left, backward and to the right; colours of other headings are mixed from these.
+"""8-bit RGB of motion forward, left, backward and right; other headings are interpolated.
 
-Forward and backward are blue and yellow, which colour-blind readers can tell apart too; left is lighter than right.
+Forward and backward are blue and yellow, which colour-blind readers can distinguish; left is lighter than right.
 """
 
 WHEEL_SPEED = 16.0
-"""Speed, m/s, from which on motion has the full colour of its heading (16 m/s are 58 km/h)."""
+"""Speed, m/s, at which a heading's colour is fully saturated (16 m/s are 58 km/h)."""
 
 DEPTH_RANGE = (4.0, 50.0)
-"""Depths of the first and the last colour, metres; nearer points take the first, farther ones the last."""
+"""Depth range of the colour map, metres; depths outside are clipped."""
 
 
 def occupancy_colours(probability: NDArray) -> NDArray[np.uint8]:
-    """Paint an occupancy grid: each cell mixes the states' colours by their probabilities.
+    """Colour an occupancy grid: each cell mixes the state colours, weighted by probability.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ def occupancy_colours(probability: NDArray) -> NDArray[np.uint8]:
 
 
 def binary_states(p_occupied: NDArray) -> NDArray:
-    """Spread P(occupied) over the four states, so that a binary grid has the colours of the others.
+    """Convert P(occupied) to the four states, so that a binary grid has the same colours as other grids.
 
-    UNKNOWN falls from 1 at P = 0.5 to 0 at 0.25 and 0.75; the rest is FREE below 0.5 and STATIC above.
+    UNKNOWN decreases from 1 at P = 0.5 to 0 at 0.25 and 0.75. The rest is FREE below 0.5 and STATIC above.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def binary_states(p_occupied: NDArray) -> NDArray:
     Returns
     -------
     (4, H, W) float
-        What `occupancy_colours` takes.
+        Probabilities for `occupancy_colours`.
 
     Examples
     --------
@@ -92,14 +92,14 @@ def binary_states(p_occupied: NDArray) -> NDArray:
 
 
 def velocity_colours(velocity: NDArray) -> NDArray[np.uint8]:
-    """Colour velocities by a wheel: the heading decides the hue, and slow motion is darker, like STATIC.
+    """Colour velocities with a colour wheel: the heading gives the hue, and slow motion is darker, like STATIC.
 
-    The share of the heading's colour is sqrt(speed / `WHEEL_SPEED`), so that even a pedestrian has a visible colour.
+    The weight of the heading colour is sqrt(speed / `WHEEL_SPEED`), so that even a pedestrian has a visible colour.
 
     Parameters
     ----------
     velocity : (2, ...) float
-        Velocity along x, forward, and along y, to the left, m/s. Where it is NaN, the colour is that of DYNAMIC.
+        Velocity along x, forward, and along y, left, m/s. NaN gets the colour of DYNAMIC.
 
     Returns
     -------
@@ -138,10 +138,10 @@ def _depth_palette() -> NDArray[np.uint8]:
 
 
 def depth_colours(depth: NDArray) -> NDArray[np.uint8]:
-    """Colour points by depth, from near to far yellow, red and blue, evenly in log(depth).
+    """Colour points by depth, from yellow (near) to red to blue (far), linear in log(depth).
 
-    A metre more or less moves near points farther in the image than far ones. The logarithm gives near points more
-    colours.
+    One metre of depth moves a near point farther in the image than a distant one, so the logarithm gives near points
+    more colours.
 
     Parameters
     ----------
@@ -159,12 +159,12 @@ def depth_colours(depth: NDArray) -> NDArray[np.uint8]:
 
 
 def class_legend(ax: Axes, label_set: LabelSet, labels: NDArray, **style: object) -> Axes:
-    """Name the classes that occur in a map of labels, to the right of it.
+    """Add a legend of the classes that occur in a label map, to the right of it.
 
     Parameters
     ----------
     ax : Axes
-        Axes that get the legend.
+        Axes for the legend.
     label_set : LabelSet
         The classes, for colours and names.
     labels : (...) int
@@ -177,16 +177,16 @@ def class_legend(ax: Axes, label_set: LabelSet, labels: NDArray, **style: object
 
 
 def colour_legend(ax: Axes, names: Sequence[str], rgb: Iterable[tuple[int, int, int]], **style: object) -> Axes:
-    """Name colours, to the right of a picture.
+    """Add a legend of colours to the right of a picture.
 
     Parameters
     ----------
     ax : Axes
-        Axes that get the legend.
+        Axes for the legend.
     names : sequence of str
-        What each colour means.
+        Meaning of each colour.
     rgb : iterable of (int, int, int)
-        The colours, 8-bit RGB, as many as names.
+        One 8-bit RGB colour per name.
     **style
         Passed on to `Axes.legend`.
     """
@@ -196,7 +196,7 @@ def colour_legend(ax: Axes, names: Sequence[str], rgb: Iterable[tuple[int, int, 
 
 
 def colour_patches(names: Sequence[str], rgb: Iterable[tuple[int, int, int]]) -> list[Patch]:
-    """Return the entries of a legend, a patch per colour. Parameters are those of `colour_legend`."""
+    """Return legend entries, one patch per colour. Parameters are those of `colour_legend`."""
     return [
         Patch(facecolor=np.divide(colour, 255), edgecolor="0.4", linewidth=0.5, label=name)
         for name, colour in zip(names, rgb, strict=True)

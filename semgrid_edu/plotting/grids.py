@@ -1,4 +1,4 @@
-"""Bird's-eye grids as maps in metres, forward up: occupancy, velocities, classes and numbers (sections 3.2, 3.4)."""
+"""Bird's-eye maps in metres, forward up: occupancy, velocities, classes and numbers (sections 3.2, 3.4)."""
 
 from collections.abc import Mapping
 
@@ -15,14 +15,14 @@ from semgrid_edu.occupancy import State
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, class_legend, colour_legend, occupancy_colours
 
 ARROW_SECONDS = 0.5
-"""Time, seconds, after which what moves will be where its arrow ends."""
+"""An arrow shows the motion in this time, seconds."""
 
 ARROW_SPACING = 2.0
-"""Side of the squares that get one arrow each, metres, so that the arrows of a car don't hide it."""
+"""Each square with this side length, metres, gets one arrow, so that arrows don't hide a car."""
 
 
 def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, legend: bool = True) -> Axes:
-    """Draw an occupancy grid; a cell mixes the colours of its states by their probabilities.
+    """Draw an occupancy grid; each cell mixes the state colours, weighted by probability.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, lege
     ax : Axes, optional
         Axes to draw into.
     legend : bool
-        Whether to name the states.
+        Whether to add a legend of the states.
 
     Raises
     ------
@@ -45,9 +45,9 @@ def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, lege
 
 
 def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) -> Axes:
-    """Add the arrows of `velocity_arrows` to an occupancy grid, as long as the distance covered in half a second.
+    """Add the arrows of `velocity_arrows` to an occupancy grid; their length is the distance covered in half a second.
 
-    A note below the map gives that time.
+    A note below the map explains this length.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) 
     velocity : (2, H, W) float
         Velocity over ground, along x and y of the grid frame, m/s; NaN where nothing moves.
     ax : Axes
-        Axes in which the grid has been drawn.
+        Axes with the drawn grid.
     """
     start, speed = velocity_arrows(spec, probability, velocity)
     (x, y), (vx, vy) = start.T, speed.T * ARROW_SECONDS
@@ -70,7 +70,7 @@ def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) 
 def velocity_arrows(
     spec: GridSpec, probability: NDArray, velocity: NDArray
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Average the velocities of cells that are probably DYNAMIC, over squares of side `ARROW_SPACING`.
+    """Average the velocities of cells that are probably DYNAMIC over squares of side `ARROW_SPACING`.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def velocity_arrows(
     Returns
     -------
     start : (K, 2) float64
-        Mean place of the moving cells in each square that has any: x and y in the grid frame, metres.
+        Mean position of the moving cells in each of K squares: x and y in the grid frame, metres.
     speed : (K, 2) float64
         Their mean velocity, m/s.
     """
@@ -100,7 +100,7 @@ def velocity_arrows(
 def grid_labels(
     spec: GridSpec, labels: NDArray, label_set: LabelSet, ax: Axes | None = None, legend: bool = True
 ) -> Axes:
-    """Draw a map of classes, with a legend of the classes that occur.
+    """Draw a class map, with a legend of the classes that occur.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def grid_labels(
     ax : Axes, optional
         Axes to draw into.
     legend : bool
-        Whether to name the classes.
+        Whether to add a legend of the classes.
 
     Raises
     ------
@@ -125,14 +125,14 @@ def grid_labels(
 
 
 def label_maps(spec: GridSpec, maps: Mapping[str, NDArray], label_set: LabelSet) -> Figure:
-    """Draw maps of classes side by side, with one legend for all of them.
+    """Draw class maps side by side, with one legend for all of them.
 
     Parameters
     ----------
     spec : GridSpec
         The grid.
     maps : mapping of str to (H, W) int
-        The class of each cell, by the title of the map, from left to right; 255 (unlabelled) is white.
+        Class maps by title, from left to right; 255 (unlabelled) is white.
     label_set : LabelSet
         The classes, for colours and names.
 
@@ -156,9 +156,9 @@ def grid_values(spec: GridSpec, values: NDArray, name: str, ax: Axes | None = No
     spec : GridSpec
         The grid.
     values : (H, W) float
-        The number of each cell; a cell with NaN is left blank.
+        The number of each cell; NaN cells stay blank.
     name : str
-        What the numbers are, with their unit.
+        Label of the colour bar: quantity and unit.
     ax : Axes, optional
         Axes to draw into.
     **style
@@ -175,14 +175,14 @@ def grid_values(spec: GridSpec, values: NDArray, name: str, ax: Axes | None = No
 
 
 def draw_map(spec: GridSpec, raster: NDArray, ax: Axes | None = None, **style: object) -> Axes:
-    """Draw an array over the grid, with axes in metres.
+    """Draw an array as a map, with axes in metres.
 
     Parameters
     ----------
     spec : GridSpec
         The grid.
     raster : (H, W) float or (H, W, 3) uint8
-        The number, or the colour, of each cell.
+        The number or the colour of each cell.
     ax : Axes, optional
         Axes to draw into.
     **style

@@ -1,4 +1,4 @@
-"""Camera images, with LIDAR points and planes coloured by depth, labels or scores (eq. (1), section 3.1)."""
+"""Camera images with LIDAR points, planes, labels or scores (eq. (1), section 3.1)."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,7 +16,7 @@ from semgrid_edu.plotting.colours import DEPTH_RANGE, class_legend, depth_colour
 
 
 def points_on_image(frame: Frame, ax: Axes | None = None, size: float = 3.0, colour_bar: bool = True) -> Axes:
-    """Draw the camera image with the LIDAR returns that the camera sees, coloured by depth.
+    """Draw the camera image with the visible LIDAR returns, coloured by depth.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def points_on_image(frame: Frame, ax: Axes | None = None, size: float = 3.0, col
 def plane_on_image(
     spec: GridSpec, height: float, frame: Frame, ax: Axes | None = None, size: float = 3.0, colour_bar: bool = True
 ) -> Axes:
-    """Draw the camera image with the centres of the grid's cells at one height, where equation (1) puts them.
+    """Draw the camera image with the grid's cell centres at one height, projected by equation (1).
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def plane_on_image(
     size : float
         Area of a point in the figure, points squared.
     colour_bar : bool
-        Whether to add a colour bar in metres. The colours are those of `points_on_image`.
+        Whether to add a colour bar in metres. The colours are the same as in `points_on_image`.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def plane_on_image(
 
 
 def _draw_by_depth(pixels: NDArray, depth: NDArray, ax: Axes, size: float, colour_bar: bool) -> Axes:
-    """Add points to a picture, (N, 2) pixels, coloured by their depth, (N,) metres."""
+    """Add points, (N, 2) pixels, to an image, coloured by depth, (N,) metres."""
     ax.scatter(*pixels.T, s=size, c=depth_colours(depth) / 255, linewidths=0)
     if colour_bar:
         mapping = ScalarMappable(LogNorm(*DEPTH_RANGE), "plasma_r")
@@ -92,9 +92,9 @@ def visible_points(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float3
     Returns
     -------
     pixels : (N, 2) float32
-        u to the right and v down of each return, pixels; the farthest comes first, so that near points are drawn last.
+        u (right) and v (down) of each return, pixels; the farthest is first, so that near points are drawn on top.
     depth : (N,) float32
-        Its depth along the optical axis, metres.
+        Depth of each return along the optical axis, metres.
     """
     points_camera = transform_points(frame.camera.T_camera_from_lidar, frame.points[:, :3])
     pixels, visible = project(points_camera, frame.camera)
@@ -106,20 +106,20 @@ def visible_points(frame: Frame) -> tuple[NDArray[np.float32], NDArray[np.float3
 def image_labels(
     image: NDArray, labels: NDArray, label_set: LabelSet, ax: Axes | None = None, opacity: float = 0.6
 ) -> Axes:
-    """Lay the classes of pixels over an image, with a legend of the classes that occur.
+    """Overlay the pixel classes on an image, with a legend of the classes that occur.
 
     Parameters
     ----------
     image : (h, w, 3) uint8
         RGB.
     labels : (h, w) int
-        Class of each pixel; 255 (unlabelled) leaves the image as it is.
+        Class of each pixel; 255 (unlabelled) leaves the pixel unchanged.
     label_set : LabelSet
         The classes, for colours and names.
     ax : Axes, optional
         Axes to draw into.
     opacity : float
-        Weight of the labels' colours: 0 shows the image alone, 1 the labels alone.
+        Weight of the label colours: 0 shows only the image, 1 only the labels.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def image_labels(
 
 
 def blend_labels(image: NDArray, labels: NDArray, label_set: LabelSet, opacity: float) -> NDArray[np.uint8]:
-    """Mix an image with the colours of its labels; unlabelled pixels stay as they are.
+    """Blend an image with the colours of its labels; unlabelled pixels stay unchanged.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def blend_labels(image: NDArray, labels: NDArray, label_set: LabelSet, opacity: 
     label_set : LabelSet
         The classes, for their colours.
     opacity : float
-        Weight of the labels' colours, 0..1.
+        Weight of the label colours, 0..1.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def image_values(values: NDArray, name: str, ax: Axes | None = None, **style: ob
     values : (h, w) float
         The number of each pixel.
     name : str
-        What the numbers are, with their unit.
+        Label of the colour bar: quantity and unit.
     ax : Axes, optional
         Axes to draw into.
     **style
@@ -175,12 +175,12 @@ def image_values(values: NDArray, name: str, ax: Axes | None = None, **style: ob
 
 
 def draw_image(image: NDArray, ax: Axes | None = None, **style: object) -> Axes:
-    """Draw an image without ticks and frame; the centre of pixel (u, v) is at (u, v).
+    """Draw an image without ticks or frame; the centre of pixel (u, v) is at (u, v).
 
     Parameters
     ----------
     image : (h, w, 3) uint8 or (h, w) float
-        Colours, or numbers.
+        Colours or numbers.
     ax : Axes, optional
         Axes to draw into.
     **style

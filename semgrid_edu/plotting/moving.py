@@ -1,4 +1,4 @@
-"""Pictures of motion: velocities by a colour wheel, particles, an animated drive (section 3.2)."""
+"""Plots of motion: velocity colour wheel, particles, animated drive (section 3.2)."""
 
 from collections.abc import Iterable, Iterator
 
@@ -23,16 +23,16 @@ from semgrid_edu.plotting.colours import (
 from semgrid_edu.plotting.grids import draw_map
 
 MAX_POINTS = 10_000
-"""Largest number of particles in a picture, because more would only hide each other."""
+"""Maximum number of particles in a picture, because more would only hide each other."""
 
 
 def velocity_wheel(
     spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes | None = None, legend: bool = True
 ) -> Axes:
-    """Draw an occupancy grid in which what moves has the colour of its velocity.
+    """Draw an occupancy grid with DYNAMIC coloured by velocity.
 
-    FREE, STATIC and UNKNOWN keep their colours. A hue shows the direction only roughly, and not every reader can tell
-    all hues apart: `velocity`, called with the same axes, adds arrows.
+    FREE, STATIC and UNKNOWN keep their colours. A hue shows the direction only roughly, and not every reader can
+    distinguish all hues. To add arrows, call `velocity` with the same axes.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def velocity_wheel(
     ax : Axes, optional
         Axes to draw into.
     legend : bool
-        Whether to name the states and to show the wheel.
+        Whether to add a legend of the states and the wheel.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def velocity_wheel(
 
 
 def wheel_colours(spec: GridSpec, probability: NDArray, velocity: NDArray) -> NDArray[np.uint8]:
-    """Paint a grid with `velocity_colours` in place of DYNAMIC's, (H, W, 3).
+    """Colour a grid, with `velocity_colours` instead of the colour of DYNAMIC, (H, W, 3).
 
     Parameters are those of `velocity_wheel`.
     """
@@ -69,18 +69,18 @@ def wheel_colours(spec: GridSpec, probability: NDArray, velocity: NDArray) -> ND
 
 
 def particles(spec: GridSpec, particles: Particles, ax: Axes | None = None) -> Axes:
-    """Add particles to a map: points in the colour of their velocity, more opaque with more weight.
+    """Add particles to a map: points coloured by velocity, with opacity by weight.
 
-    When there are more than `MAX_POINTS`, every k-th is drawn. A second line below the map gives the number drawn.
+    Of more than `MAX_POINTS` particles, only every k-th is drawn. A line below the map gives the number drawn.
 
     Parameters
     ----------
     spec : GridSpec
         The grid.
     particles : Particles
-        Particles in the frame of the grid; those outside aren't drawn.
+        Particles in the grid frame; particles outside the grid aren't drawn.
     ax : Axes, optional
-        Axes in which the grid has been drawn; a new, empty map when left out.
+        Axes with the drawn grid; by default a new, empty map.
     """
     ax = ax or draw_map(spec, np.full((*spec.shape, 3), 255, np.uint8))
     inside = np.flatnonzero(spec.cells(particles.position)[2])
@@ -95,31 +95,31 @@ def particles(spec: GridSpec, particles: Particles, ax: Axes | None = None) -> A
 def animate_occupancy(
     spec: GridSpec, beliefs: Iterable[Belief], times: Iterable[float], alt: str, ax: Axes | None = None
 ) -> Animation:
-    """Animate the pictures of `velocity_wheel` over a drive, with the time as title, as fast as it went.
+    """Animate the pictures of `velocity_wheel` over a drive in real time, with the time as title.
 
     Parameters
     ----------
     spec : GridSpec
         The grid.
     beliefs : iterable of Belief
-        Beliefs, such as `track_drive` yields; only their pictures are kept.
+        Beliefs, for example from `track_drive`; only their pictures stay in memory.
     times : iterable of float
-        Times of the beliefs, one each, seconds, ascending; the title counts from the first.
+        One time per belief, seconds, ascending; the title counts from the first.
     alt : str
-        What happens in it, for readers who can't see it.
+        Description for readers who can't see the animation.
     ax : Axes, optional
         Axes to draw into. The whole figure becomes the animation.
 
     Returns
     -------
     Animation
-        Leave it as the last value of a cell to show it.
+        Displayed when it is the last value of a cell.
 
     Raises
     ------
     ArgumentError
-        When there is no belief, times don't match or don't ascend, a belief doesn't fit `spec`, or the animation
-        gets too large.
+        When there is no belief, the times don't match or aren't ascending, a belief doesn't fit `spec`, or the
+        animation is too large.
     """
     pictures = [wheel_colours(spec, belief.probability, belief.velocity) for belief in beliefs]
     times = np.array(list(times), dtype=np.float64)
@@ -132,13 +132,13 @@ def animate_occupancy(
             ax.images[-1].set_data(picture)
             ax.set_title(f"{time:.1f} s")
             yield ax.figure
-            ax.figure.set_layout_engine("none")  # nothing else moves, and laying out takes longer than drawing
+            ax.figure.set_layout_engine("none")  # the layout is fixed, and computing it takes longer than drawing
 
     return animate(frames(), np.diff(times).mean() if len(times) > 1 else 1.0, alt)
 
 
 def _wheel_legend(ax: Axes) -> Axes:
-    """Name the states that keep their colours, and show the wheel below them, with its speeds."""
+    """Add a legend of the states that keep their colours, and below it the wheel with its speeds."""
     still = [state for state in State if state != State.DYNAMIC]
     colour_legend(ax, [STATE_NAMES[s] for s in still], [STATE_COLOURS[s] for s in still])
     words = f"{STATE_NAMES[State.DYNAMIC]}, by velocity:", "ahead", "left", "back", "right"
@@ -154,9 +154,9 @@ def _wheel_legend(ax: Axes) -> Axes:
 
 
 def wheel_picture() -> NDArray[np.uint8]:
-    """Paint the colour wheel of velocities, (101, 101, 4): RGB, and opacity, which is 0 outside the wheel.
+    """Draw the velocity colour wheel, (101, 101, 4): RGB and opacity, which is 0 outside the wheel.
 
-    Forward is up; the rim has full speed, the white ring a quarter of it.
+    Forward is up. The rim is full speed, the white ring a quarter of it.
     """
     across = np.linspace(1, -1, 101)
     forward, left = np.meshgrid(across, across, indexing="ij")

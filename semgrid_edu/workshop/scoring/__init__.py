@@ -1,1 +1,1 @@
-"""One way to score a map: confusion matrices frame by frame, baselines, and intervals over drives and seeds."""
+"""Scoring of semantic grids: confusion matrices per frame, baselines, and intervals over drives and seeds."""

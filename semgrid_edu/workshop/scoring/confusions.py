@@ -1,4 +1,4 @@
-"""Confusion matrices frame by frame, from which all scores and intervals are computed (section 4.2)."""
+"""Confusion matrices per frame, the basis of all scores and intervals (section 4.2)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,23 +12,23 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 
 DRIVES = "drives"
-"""The name of the drives in a file of confusion matrices; no method may have it."""
+"""Key of the drives in a file of confusion matrices; reserved, so no method may use it."""
 
 BANDS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, np.inf)
-"""Cells are counted in bands of distance from the LIDAR with these limits, metres."""
+"""Limits of the bands of distance from the LIDAR in which cells are counted, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrameConfusions:
-    """Confusion matrices frame by frame: how often cells of each true class are called each class.
+    """Confusion matrices per frame: how often cells of each true class are predicted as each class.
 
     Parameters
     ----------
     drives : tuple of str
         The drive of each of the F frames, such as "2026_01_01 0143".
     counts : dict of str to (F, C, C) int64
-        The number of labelled cells of each frame, one row per true class, one column per called class. The keys are
-        methods, or from `count_grids` method, truth and band of distance.
+        Numbers of labelled cells per frame, one row per true class, one column per predicted class. The keys are
+        methods; from `count_grids`, keys of `confusion_key`.
     """
 
     drives: tuple[str, ...]
@@ -44,7 +44,7 @@ class FrameConfusions:
         truth : str
             The labels to compare with, "true" or "lidar".
         band : str, optional
-            One of `distance_band_names`; all distances when left out.
+            One of `distance_band_names`; by default all distances.
         """
         keys = [confusion_key(method, truth, one) for one in ([band] if band else distance_band_names())]
         return FrameConfusions(self.drives, {method: sum(self.counts[key] for key in keys)})
@@ -60,7 +60,7 @@ class FrameConfusions:
         return drive_confusions(self.counts[method], self.drives)
 
     def total(self, method: str) -> NDArray[np.int64]:
-        """Return one matrix (C, C) for all frames. Parameters are those of `FrameConfusions.by_drive`."""
+        """Return the sum over all frames, (C, C). Parameters are those of `FrameConfusions.by_drive`."""
         return self.counts[method].sum(axis=0)
 
 
@@ -70,7 +70,7 @@ def band_names(edges: Sequence[float]) -> list[str]:
     Parameters
     ----------
     edges : sequence of B + 1 float
-        Their limits, metres; the last one may be infinite.
+        The limits of the bands, metres; the last one may be infinite.
 
     Examples
     --------
@@ -86,7 +86,7 @@ def distance_band_names() -> list[str]:
 
 
 def confusion_key(method: str, truth: str, band: str) -> str:
-    """Return the key of a method's counts against one truth in one band of distance.
+    """Return the key for a method's counts against one truth in one band of distance.
 
     Parameters
     ----------
@@ -121,14 +121,14 @@ def drive_confusions(counts: NDArray, drives: Sequence[str]) -> NDArray[np.int64
 
 
 def seed_confusions(runs: Sequence[FrameConfusions], method: str) -> NDArray[np.int64]:
-    """Stack the drives' matrices of several seeds, (S, V, C, C), as `drive_interval` takes them.
+    """Stack the matrices per drive of several seeds, (S, V, C, C), for `drive_interval`.
 
     Parameters
     ----------
     runs : sequence of S FrameConfusions
         One per seed, on the same frames.
     method : str
-        A method that all of them have.
+        A method that all runs contain.
     """
     if len({run.drives for run in runs}) != 1:
         raise ArgumentError("runs", "one or more runs on the same frames", f"{len(runs)} runs, not all on the same")
@@ -136,14 +136,14 @@ def seed_confusions(runs: Sequence[FrameConfusions], method: str) -> NDArray[np.
 
 
 def save_confusions(path: str | Path, confusions: FrameConfusions) -> None:
-    """Write the matrices of all frames to one compressed file, atomically.
+    """Write the matrices of all frames to one compressed file. The write is atomic.
 
     Parameters
     ----------
     path : path-like
-        The .npz file to write; its folder is made when missing.
+        The .npz file to write; its folder is created if it is missing.
     confusions : FrameConfusions
-        What to write; no method may be called "drives".
+        The matrices; no method may be called "drives".
     """
     if DRIVES in confusions.counts:
         raise ArgumentError("confusions", f"methods with another name than {DRIVES!r}", list(confusions.counts))
@@ -167,19 +167,19 @@ def load_confusions(path: str | Path) -> FrameConfusions:
 
 
 def checked_confusions(path: str | Path, arrays: Mapping[str, NDArray]) -> FrameConfusions:
-    """Return the arrays of a file as confusion matrices.
+    """Check the arrays of a file and return them as confusion matrices.
 
     Parameters
     ----------
     path : path-like
-        The file, for the error.
+        The file, for the error message.
     arrays : mapping of str to array
-        The drives, under the name "drives", and the matrices.
+        The drives, under the key "drives", and the matrices.
 
     Raises
     ------
     DataError
-        When they are something else.
+        When the arrays are something else.
     """
     drives = arrays.get(DRIVES, np.empty(0))
     counts = {name: matrices for name, matrices in arrays.items() if name != DRIVES}

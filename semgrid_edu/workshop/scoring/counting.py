@@ -1,4 +1,4 @@
-"""Grids counted against the truth: frame by frame, by distance from the LIDAR, and by confidence (section 4.2)."""
+"""Compare grids with the truth: per frame, per distance from the LIDAR, and per confidence (section 4.2)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -15,17 +15,17 @@ from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.workshop.scoring.confusions import BANDS, FrameConfusions, confusion_key, distance_band_names
 
 Grids = Callable[[int], Mapping[str, NDArray]]
-"""A function k -> the grids of frame k by the name of the method that made them: classes (H, W) int, or a distribution
-(C, H, W) float over the classes, whose calibration is counted as well.
+"""A function k -> the grids of frame k by method name. A grid is (H, W) int with classes, or (C, H, W) float with
+a distribution over the classes; for a distribution, calibration is counted too.
 
-Methods that share work, such as a network with and without the CRF, are made by one function."""
+One function makes the grids of all methods that share work, such as a network with and without the CRF."""
 
 
 def distance_bands(spec: GridSpec, edges: Sequence[float]) -> NDArray[np.int64]:
-    """Return the number of each cell's band of distance, (H, W).
+    """Return the index of each cell's band of distance, (H, W).
 
-    The distance is the horizontal one from the LIDAR to the cell's centre. Cells nearer than the first limit belong to
-    the first band, cells beyond the last limit to the last band.
+    This is the horizontal distance from the LIDAR to the cell's centre. Cells closer than the first limit belong to the
+    first band, cells beyond the last limit to the last band.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def distance_bands(spec: GridSpec, edges: Sequence[float]) -> NDArray[np.int64]:
 
 
 class GridCounts(NamedTuple):
-    """What `count_grids` counted.
+    """The counts from `count_grids`.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ class GridCounts(NamedTuple):
     confusions : FrameConfusions
         By method, truth and band of distance.
     reliability : dict of str to (3, B) float
-        For each method that gave a distribution, by bin of confidence: the number of cells, the sum of their
-        confidence, and how many are right. The keys are those of `reliability_key`.
+        For each method with a distribution, per bin of confidence: the number of cells, the sum of their confidences,
+        and the number of correct cells. The keys come from `reliability_key`.
     """
 
     methods: tuple[str, ...]
@@ -57,7 +57,7 @@ class GridCounts(NamedTuple):
 
 
 def reliability_key(method: str, truth: str) -> str:
-    """Return the key of `GridCounts.reliability` for a method and some labels.
+    """Return the key of `GridCounts.reliability` for a method and a truth.
 
     Parameters
     ----------
@@ -70,19 +70,19 @@ def reliability_key(method: str, truth: str) -> str:
 
 
 def reliability_sums(probability: NDArray, truth: NDArray) -> NDArray[np.float64]:
-    """Return for each bin of confidence its cells, the sum of their confidence, and how many are right: (3, B).
+    """Return the number of cells, the sum of their confidences and the number of correct cells per bin, (3, B).
 
     Parameters
     ----------
     probability, truth : array
-        As `reliability` takes them.
+        As for `reliability`.
     """
     diagram = reliability(probability, truth)
     return np.stack([diagram.cells, diagram.confidence * diagram.cells, diagram.accuracy * diagram.cells])
 
 
 def reliability_of_sums(sums: NDArray) -> Reliability:
-    """Return how often a method is right by its confidence.
+    """Return a method's accuracy as a function of its confidence.
 
     Parameters
     ----------
@@ -95,19 +95,19 @@ def reliability_of_sums(sums: NDArray) -> Reliability:
 
 
 def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:
-    """Compare the grids of one or several methods with the truth, frame by frame.
+    """Compare the grids of one or several methods with the truth, per frame.
 
     Parameters
     ----------
     grids : callable
         Makes the grids of a frame, such as `network_grids(net, frames)` or `lambda k: {"majority class": majority}`.
     frames : TrainingSet
-        The frames, with their drives. Their "truth" is made with the LIDAR if it differs from the "true" one.
+        The frames, with their drives. If its "truth" differs from its "true" labels, it comes from the LIDAR.
 
     Raises
     ------
     ArgumentError
-        When a grid has another shape than the truth, or a class that the frames don't have.
+        When the shape of a grid differs from the truth, or it contains a class that the frames don't have.
     """
     truths, band = truths_of_frames(frames), distance_bands(frames.spec, BANDS)
     counts: dict[str, list[NDArray]] = {}
@@ -129,12 +129,12 @@ def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:
 
 
 def truths_of_frames(frames: TrainingSet) -> dict[str, NDArray]:
-    """Return the labels to compare with by name, (N, H, W): first those that networks learn from, then "true".
+    """Return the labels to compare with by name, (N, H, W): first the training labels, then "true".
 
     Parameters
     ----------
     frames : TrainingSet
-        The frames. Labels that are made with the LIDAR are called "lidar".
+        The frames. Labels made with the LIDAR are called "lidar".
     """
     truth, true = frames.arrays["truth"], frames.arrays["true"]
     return {"true": true} if truth is true else {"lidar": truth, "true": true}

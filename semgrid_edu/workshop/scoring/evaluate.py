@@ -1,4 +1,4 @@
-"""The trained network compared with simple baselines, on frames kept for testing (sections 4.2 and 4.3)."""
+"""Compare the trained network with simple baselines on held-out frames (sections 4.2 and 4.3)."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,10 +21,10 @@ from semgrid_edu.workshop.scoring.score_with_interval import every_metric, markd
 from semgrid_edu.workshop.scoring.statistics import Metric
 
 Scores = dict[str, dict[str, dict[str, float]]]
-"""The metrics, 0..1: by method, by cells ("all" or "semantic"), by metric."""
+"""Scores, 0..1, by method, cells ("all" or "semantic") and metric."""
 
 Intervals = dict[str, dict[str, dict[str, list[float | None]]]]
-"""The same with [low, value, high] of a 95 % interval in place of the value."""
+"""Like `Scores`, with [low, value, high] of a 95 % interval instead of the value."""
 
 
 def evaluate(
@@ -40,27 +40,27 @@ def evaluate(
     dataset_dir : path-like
         A data set with the splits "train" and "test", such as data/minikitti.
     weights : path-like
-        A network that learned from the training split. If `image_stage.safetensors`, the network after the first stage
-        of training, is in the same folder, its image labels are carried to the grid as well: that network has learned
-        from images only, not yet from grids.
+        A network trained on the training split. If its folder contains `image_stage.safetensors`, the network after the
+        first training stage, the image labels of that network are projected to the grid as another baseline: it has
+        learned from images only, not yet from grids.
     refine : callable, optional
-        Refines the network's grids, as in `Stages`, and is named in the row "network + ..."; the CRF when left out.
+        Refines the network's grids, as in `Stages`, and gives the row "network + ..." its name; by default the CRF.
     confusions_file : path-like, optional
-        The file for the confusion matrices of each frame by method, truth and distance, see `save_confusions`.
+        Output file for the confusion matrices per frame, method, truth and distance, see `save_confusions`.
 
     Returns
     -------
     dict
-        The result of `scores_of_counts` and its inputs; it can be written as JSON.
+        The result of `scores_of_counts` and its inputs, JSON-serialisable.
 
     Raises
     ------
     ArgumentError
-        When the data set lacks a split, or the network is for other grids or images.
+        When the data set lacks a split, or the network expects other grids or images.
     DataError
         When a file is missing or damaged.
     StageError
-        When `refine` raises an error, or returns anything but probabilities.
+        When `refine` raises an error, or its result isn't probabilities.
     """
     training, test = TrainingSet(dataset_dir, "train"), TrainingSet(dataset_dir, "test")
     net = load_net(weights, test.camera)
@@ -80,7 +80,7 @@ def evaluate(
 
 
 def _command(data: str, weights: str, refine: Refine | None) -> str:
-    """Return the command, or the Python call if no command can name the refinement."""
+    """Return the shell command, or the Python call if the refinement has no command-line option."""
     if refine is None:
         return f"semgrid-edu evaluate --data {data} --weights {weights}"
     return f'evaluate("{data}", "{weights}", refine={_name(refine)})'
@@ -97,16 +97,16 @@ def count_methods(
     segmenters: Mapping[str, nn.Module],
     refine: Refine | None = None,
 ) -> GridCounts:
-    """Count the grids of a network, refined or not, and of the baselines, on the frames of a data set.
+    """Count the confusions of a network, raw and refined, and of the baselines.
 
     Parameters
     ----------
     net : SemanticGridNet
-        The network, for the grid and the images of the frames.
+        The network, for the grid and image sizes of the frames.
     training, test : TrainingSet
-        The frames that the baselines learn from, and those to score.
+        The frames to fit the baselines to, and the frames to score.
     segmenters : mapping of str to Module
-        Image networks by name, i -> s, whose labels are carried to the grid, see `carried_grids`.
+        Image networks by name, i -> s. Their labels are projected to the grid, see `carried_grids`.
     refine : callable, optional
         Refines the network's grids, as in `evaluate`.
     """
@@ -116,7 +116,7 @@ def count_methods(
 
 
 def scores_of_counts(counted: GridCounts, test: TrainingSet) -> dict[str, object]:
-    """Return the scores of every method, against the labels that networks learn from.
+    """Return the scores of every method against the training labels.
 
     Parameters
     ----------
@@ -128,8 +128,8 @@ def scores_of_counts(counted: GridCounts, test: TrainingSet) -> dict[str, object
     Returns
     -------
     dict
-        "scores" (see `Scores`), "intervals" (see `Intervals`; None when there is one test drive), "confusion" (a matrix
-        for each method, one row per true class), and the "classes".
+        "scores" (see `Scores`), "intervals" (see `Intervals`; None for a single test drive), "confusion" (one matrix
+        per method, one row per true class), and the "classes".
     """
     truth, *_ = truths_of_frames(test)
     counts = {method: counted.confusions.of(method, truth).counts[method] for method in counted.methods}
@@ -144,12 +144,12 @@ def scores_of_counts(counted: GridCounts, test: TrainingSet) -> dict[str, object
 
 
 def intervals(confusions: FrameConfusions, label_set: LabelSet) -> Intervals:
-    """Return the confidence intervals of all scores, each for this single network or baseline on new drives.
+    """Return confidence intervals of all scores, each for this one network or baseline on new drives.
 
     Parameters
     ----------
     confusions : FrameConfusions
-        Confusion matrices of the frames of two drives or more, by method.
+        Confusion matrices by method, for the frames of two or more drives.
     label_set : LabelSet
         The classes, and which of them are semantic.
     """
@@ -162,7 +162,7 @@ def intervals(confusions: FrameConfusions, label_set: LabelSet) -> Intervals:
 
 
 def scores(confusions: dict[str, NDArray], label_set: LabelSet) -> Scores:
-    """Return the three metrics of each method, over all labelled cells and over those with a semantic class.
+    """Return the three metrics of each method, over all labelled cells and over cells with a semantic class.
 
     Parameters
     ----------
@@ -183,9 +183,9 @@ def scores_table(result: Scores, ends: Intervals | None = None) -> str:
     Parameters
     ----------
     result : Scores
-        What `scores` returns.
+        From `scores`.
     ends : Intervals, optional
-        What `intervals` returns for the same methods, shown in brackets; none by default.
+        From `intervals` for the same methods, shown in brackets; by default no intervals.
     """
     head = [f"{name}{cells}" for cells in ("", ", semantic cells") for name in METRICS]
     places = [(cells, name) for cells in ("all", "semantic") for name in METRICS]

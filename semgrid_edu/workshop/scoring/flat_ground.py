@@ -1,9 +1,9 @@
-"""Image labels looked up where flat ground would be, and the baselines that a network must beat (section 4.2).
+"""Flat-ground projection of image labels, and the baselines that a network must beat (section 4.2).
 
-The baselines know two things about a cell. One is the image label at the pixel that would see the cell's ground if the
-ground were flat; cells whose ground the image doesn't show, or whose pixel has no label, get a separate value.
-The other is the cell's most probable occupancy state. How often each class occurs with both is counted over all cells
-of the training frames. Then the class is looked up in a table, or found by naive Bayes, as if label and state were
+The baselines have two inputs per cell. One is the image label at the pixel that would see the cell's ground if the
+ground were flat. Cells outside the image, or with an unlabelled pixel, get a separate value. The other is the cell's
+most probable occupancy state. We count how often each class occurs with each pair over all cells of the training
+frames. The class then comes from a table of these counts, or from naive Bayes, which treats label and state as
 independent given the class.
 """
 
@@ -22,23 +22,23 @@ from semgrid_edu.occupancy import N_STATES, State
 from semgrid_edu.planes import plane_pixels
 
 NOT_SEEN = -1
-"""The number that `ground_pixels` returns for a cell whose ground is outside the image."""
+"""The value of `ground_pixels` for a cell with its ground outside the image."""
 
 Labeller = Callable[[Sample], NDArray]
 """A function that labels the pixels of a frame: sample -> classes (h, w), 255 where unlabelled."""
 
 
 def ground_pixels(spec: GridSpec, camera: Camera) -> NDArray[np.int64]:
-    """Return the pixel that sees the ground at the centre of each cell: equation (1) for plane 0, to the nearest pixel.
+    """Return the pixel that sees the ground at the centre of each cell: equation (1) for plane 0, rounded.
 
-    Pixels (H, W) are numbered as row * w + column; -1 where the ground isn't in the image.
+    Pixel indices (H, W) are row * w + column; -1 if the ground is outside the image.
 
     Parameters
     ----------
     spec : GridSpec
         The grid, (H, W) cells.
     camera : Camera
-        The camera at the size of the label image, (h, w) pixels.
+        The camera, scaled to the size of the label image, (h, w) pixels.
     """
     (pixels,), (visible,) = plane_pixels(spec, [0.0], camera)
     places = np.full(spec.shape, NOT_SEEN)
@@ -48,26 +48,26 @@ def ground_pixels(spec: GridSpec, camera: Camera) -> NDArray[np.int64]:
 
 
 def inverse_perspective(labels: NDArray, places: NDArray, occupancy: NDArray, observed_only: bool = False) -> NDArray:
-    """Carry image labels to the grid as if everything in the image were flat ground: inverse perspective mapping.
+    """Project image labels to the grid as if the whole image showed flat ground: inverse perspective mapping.
 
-    No depth is used, so things above the ground are smeared away from the camera, over all cells that they hide.
+    It uses no depth, so objects above the ground smear away from the camera, over all cells behind them.
 
     Parameters
     ----------
     labels : (h, w) uint8
-        The class of each pixel, KITTI-14: a network's arg-max, or the truth for an upper bound; 255 where unlabelled.
+        The KITTI-14 class of each pixel: a network's arg-max, or the truth for an upper bound; 255 where unlabelled.
     places : (H, W) int
         The pixel that sees each cell's ground, from `ground_pixels`.
     occupancy : (4, H, W) float
         Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
     observed_only : bool
-        Whether cells that are most probably UNKNOWN, such as those behind a car, take no label.
+        Whether to leave cells unlabelled that are most probably UNKNOWN, such as the cells behind a car.
 
     Returns
     -------
     (H, W) uint8
-        The class of its pixel in each cell that the image shows. In other cells, and where the pixel is unlabelled or
-        sky, one of the four unknown classes, by occupancy state.
+        The class of the cell's pixel. A cell outside the image, or with an unlabelled or sky pixel, gets one of the
+        four unknown classes, by occupancy state.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def inverse_perspective(labels: NDArray, places: NDArray, occupancy: NDArray, ob
 
 
 def ground_labels(labels: NDArray, places: NDArray, n_classes: int) -> NDArray[np.int64]:
-    """Return the label of each cell's ground, (H, W); a cell without a label gets C, the number of classes.
+    """Return the flat-ground label of each cell, (H, W); a cell without a label gets C, the number of classes.
 
     Parameters
     ----------
@@ -103,12 +103,12 @@ def ground_labels(labels: NDArray, places: NDArray, n_classes: int) -> NDArray[n
 
 
 def count_labels_and_states(frames: TrainingSet, labeller: Labeller, places: NDArray) -> NDArray[np.int64]:
-    """Count the cells of all frames by label of the ground, most probable state and class, (C + 1, 4, C).
+    """Count the cells of all frames by ground label, most probable state and class, (C + 1, 4, C).
 
     Parameters
     ----------
     frames : TrainingSet
-        The frames; the classes are those that networks learn from.
+        The frames; their training labels give the classes.
     labeller : callable
         Labels the images.
     places : (H, W) int
@@ -126,9 +126,9 @@ def count_labels_and_states(frames: TrainingSet, labeller: Labeller, places: NDA
 
 
 def joint_table(counts: NDArray) -> NDArray[np.int64]:
-    """Return the most frequent class for each label of the ground and each state, (C + 1, 4).
+    """Return the most frequent class for each ground label and each state, (C + 1, 4).
 
-    Nothing is smoothed: if a label and a state never occurred together, the state alone decides.
+    There is no smoothing. If a label and a state never occurred together, the state alone decides.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def joint_table(counts: NDArray) -> NDArray[np.int64]:
 
     Examples
     --------
-    One label or none, two states, and two classes; the label never occurred with the second state:
+    One label (or none), two states and two classes; the label never occurred with the second state:
 
     >>> joint_table(np.array([[[3, 1], [0, 0]], [[1, 2], [0, 4]]])).tolist()
     [[0, 1], [1, 1]]
@@ -146,11 +146,10 @@ def joint_table(counts: NDArray) -> NDArray[np.int64]:
 
 
 def naive_bayes(counts: NDArray) -> NDArray[np.int64]:
-    """Return the most probable class for each label l of the ground and each state s, (C + 1, 4).
+    """Return the most probable class for each ground label l and each state s, (C + 1, 4).
 
-    It is the class c with the largest P(c) P(l | c) P(s | c). One is added to each count of a label or state with
-    a class (Laplace smoothing). Otherwise a class that never occurred with a label would be impossible, whatever the
-    state is.
+    This is the class c that maximises P(c) P(l | c) P(s | c). Laplace smoothing adds one to each count of a label or
+    state with a class. Without it, a class that never occurred with a label would be impossible in every state.
 
     Parameters
     ----------
@@ -165,18 +164,18 @@ def naive_bayes(counts: NDArray) -> NDArray[np.int64]:
 
 
 WAYS = {"table": joint_table, "naive Bayes": naive_bayes}
-"""The ways to find the class from label and state, by name."""
+"""Methods to predict the class from label and state, by name."""
 
 
 def label_and_state(way: str, labels: str) -> str:
-    """Return the name of the grids that are made from labels of the ground and occupancy states.
+    """Return the method name of grids predicted from ground labels and occupancy states.
 
     Parameters
     ----------
     way : str
         A key of `WAYS`.
     labels : str
-        What the image labels are called, such as "true labels".
+        Name of the image labels, such as "true labels".
     """
     return f"{way} of flat ground and state, {labels}"
 
@@ -184,15 +183,15 @@ def label_and_state(way: str, labels: str) -> str:
 def fitted_tables(
     frames: TrainingSet, labellers: Mapping[str, Labeller], places: NDArray
 ) -> dict[str, dict[str, NDArray[np.int64]]]:
-    """Return the class for each label and state, (C + 1, 4), by labeller and by name of `WAYS`.
+    """Return the class for each label and state, (C + 1, 4), by labeller and by key of `WAYS`.
 
     Parameters
     ----------
     frames : TrainingSet
-        The frames to learn from. Their truth is what the networks learn from, true or made with the LIDAR, so that a
-        baseline knows exactly as much as a network.
+        The training frames. Baselines and networks learn from the same labels, true or from the LIDAR, so the
+        comparison is fair.
     labellers : mapping of str to callable
-        The functions that label the images, by name.
+        Functions that label the images, by name.
     places : (H, W) int
         The pixel that sees each cell's ground, from `ground_pixels`.
     """

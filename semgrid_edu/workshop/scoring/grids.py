@@ -1,4 +1,4 @@
-"""The grids that are compared: a network's, refined or not, and those of every baseline, by name (section 4)."""
+"""The grids to compare, by name: a network's, raw and refined, and the baselines' (section 4)."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -27,22 +27,22 @@ from semgrid_edu.workshop.scoring.flat_ground import (
 )
 
 Refine = Callable[[NDArray, NDArray], NDArray]
-"""A stage (log_g (C, H, W), o (4, H, W)) -> g (C, H, W), as `semgrid_edu.pipeline.Stages` describes it."""
+"""A stage (log_g (C, H, W), o (4, H, W)) -> g (C, H, W), see `semgrid_edu.pipeline.Stages`."""
 
 NETWORK = "network"
-"""The network's grid. Refined, it is called "network + " and the name of the refinement."""
+"""Name of the network's grid. A refined grid is called "network + " and the name of the refinement."""
 
 MAJORITY, OCCUPANCY_ALONE = "majority class", "occupancy alone"
-"""The most frequent class of each cell, and of each cell and occupancy state."""
+"""Names of two baselines: the most frequent class per cell, and per cell and occupancy state."""
 
 
 def network_grids(net: SemanticGridNet, frames: TrainingSet, refinements: Mapping[str, Refine] | None = None) -> Grids:
-    """Return the function that makes a network's grids, refined or not, as `count_grids` takes it.
+    """Return a function that makes a network's grids, raw and refined, for `count_grids`.
 
     Parameters
     ----------
     net : SemanticGridNet
-        The network, in evaluation mode, for the sizes of the frames.
+        The network, in evaluation mode, for the image and grid sizes of the frames.
     frames : TrainingSet
         The frames.
     refinements : mapping of str to callable, optional
@@ -52,12 +52,12 @@ def network_grids(net: SemanticGridNet, frames: TrainingSet, refinements: Mappin
     -------
     callable
         k -> the distributions (C, H, W) of frame k: "network", and "network + " with the name of each refinement. It
-        raises `StageError` when a refinement raises an error or returns anything but probabilities.
+        raises `StageError` when a refinement raises an error or its result isn't probabilities.
 
     Raises
     ------
     ArgumentError
-        When the network has other classes than the frames.
+        When network and frames have different classes.
     """
     if net.n_classes != len(frames.label_set):
         raise ArgumentError("net", f"the {len(frames.label_set)} classes of {frames.label_set.name}", net.n_classes)
@@ -76,12 +76,12 @@ def network_grids(net: SemanticGridNet, frames: TrainingSet, refinements: Mappin
 
 @torch.inference_mode()
 def learned_log_g(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
-    """Return the network's semantic grid of a frame as natural logarithms of probabilities, (C, H, W).
+    """Return the network's semantic grid of a frame as log probabilities, (C, H, W).
 
     Parameters
     ----------
     net : SemanticGridNet
-        The network, for the sizes of the frame.
+        The network, for the image and grid size of the frame.
     sample : Sample
         The frame.
     """
@@ -109,27 +109,27 @@ def baseline_grids(
     camera: Camera | None = None,
     returns: Callable[[int], tuple[NDArray, NDArray]] | None = None,
 ) -> Grids:
-    """Return the function that makes the grids of every baseline, as `count_grids` takes it.
+    """Return a function that makes the grids of every baseline, for `count_grids`.
 
     Parameters
     ----------
     training : TrainingSet
-        The frames that baselines learn from, with the same labels as networks.
+        The frames to fit the baselines to, with the same labels as for networks.
     frames : TrainingSet
         The frames to score.
     segmenters : mapping of str to Module
-        Image networks by name, i -> s. Their labels are carried to the grid as the true image labels are.
+        Image networks by name, i -> s. Their labels are projected to the grid in the same way as the true image labels.
     camera : Camera, optional
-        The calibration that geometry uses; by default that of the frames.
+        The calibration for the projection; by default the frames' calibration.
     returns : callable, optional
-        k -> pixels and cells of the LIDAR returns of frame k by that calibration; by default those of the frames.
+        k -> pixels and cells of the LIDAR returns of frame k under that calibration; by default `frames.returns`.
 
     Returns
     -------
     callable
-        k -> classes (H, W) of frame k: "majority class" of each cell; "occupancy alone", the majority class of each
-        cell and state; and for "true" image labels and those of each image network what `carried_grids` makes of them,
-        and what their flat ground and the occupancy state give together (`WAYS`).
+        k -> classes (H, W) of frame k: "majority class" per cell; "occupancy alone", the majority class per cell and
+        state; and, for the "true" image labels and the labels of each image network, the grids of `carried_grids` and
+        the predictions of `WAYS` from flat-ground label and occupancy state.
     """
     truths = training.arrays["truth"]
     returns = returns or frames.returns
@@ -156,7 +156,7 @@ def baseline_grids(
 
 
 def _labellers(segmenters: Mapping[str, nn.Module]) -> dict[str, Labeller]:
-    """Return the functions that label images, by name: the true labels, and the networks."""
+    """Return functions that label images, by name: the true labels and each network."""
     networks = {name: partial(best_labels, segmenter) for name, segmenter in segmenters.items()}
     return {"true": lambda sample: sample.labels.numpy(), **networks}
 
@@ -164,12 +164,14 @@ def _labellers(segmenters: Mapping[str, nn.Module]) -> dict[str, Labeller]:
 def carried_grids(
     name: str, labels: NDArray, occupancy: NDArray, returns: tuple[NDArray, NDArray], ground: NDArray, cell: float
 ) -> dict[str, NDArray[np.uint8]]:
-    """Carry image labels to the grid in every way without learning. Cells without a label take an unknown class.
+    """Project image labels to the grid with every method that needs no training.
+
+    Cells without a label get an unknown class.
 
     Parameters
     ----------
     name : str
-        What the labels are called, such as "true labels".
+        Name of the labels, such as "true labels".
     labels : (h, w) int
         The class of each pixel; 255 where unlabelled.
     occupancy : (4, H, W) float
@@ -184,8 +186,8 @@ def carried_grids(
     Returns
     -------
     dict of str to (H, W) uint8
-        By `carry_labels` ("geometry"), alone and with its gaps closed; by `inverse_perspective` ("flat ground"),
-        everywhere and in observed cells only.
+        From `carry_labels` ("geometry"), raw and with gaps closed; from `inverse_perspective` ("flat ground"), for all
+        cells and for observed cells only.
     """
     by_depth = carry_labels(labels, *returns, occupancy)
     return {
@@ -199,7 +201,7 @@ def carried_grids(
 def majority_class(truths: NDArray) -> NDArray[np.uint8]:
     """Return the most frequent class of each cell, (H, W): the best guess without any input.
 
-    Among equally frequent classes it is the first. A cell that was never labelled takes the most frequent class of all.
+    In a tie, the first class wins. A cell that was never labelled gets the most frequent class overall.
 
     Parameters
     ----------
@@ -224,8 +226,8 @@ def majority_by_state(truths: NDArray, occupancy: NDArray) -> NDArray[np.uint8]:
     Returns
     -------
     (4, H, W) uint8
-        The majority class of the frames in which this state was the most probable one in this cell; if there was none,
-        that of all cells in this state.
+        The majority class over the frames in which this cell was most probably in this state. If there was no such
+        frame, the majority class over all cells in this state.
     """
     states = np.argmax(occupancy, axis=1)
     return np.stack([majority_class(np.where(states == state, truths, IGNORE)) for state in range(N_STATES)])

@@ -1,4 +1,4 @@
-"""A score with its confidence interval and every seed's value, as numbers and as text (section 4.2)."""
+"""Scores with confidence intervals and one value per seed, as numbers and as text (section 4.2)."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -12,15 +12,15 @@ from semgrid_edu.metrics import METRICS, semantic_cells
 from semgrid_edu.workshop.scoring.statistics import MIN_DRIVES, Interval, Metric, drive_interval, paired_interval
 
 ScoreWithInterval = dict[str, object]
-"""The "mean" over the seeds, "low" and "high" of its 95 % interval, and the value of each of the "seeds"; None where
-it can't be computed. Below `MIN_DRIVES` drives there is no interval."""
+"""The "mean" over the seeds, "low" and "high" of its 95 % interval, and the value of each of the "seeds". Values that
+can't be computed are None. With fewer than `MIN_DRIVES` drives there is no interval."""
 
 SHOWN_SEEDS = 5
 """With more seeds than this, `shown_seeds` shows only the lowest and the highest value."""
 
 
 def score_with_interval(confusions: NDArray, metric: Metric) -> ScoreWithInterval:
-    """Return a score.
+    """Compute a score with its interval.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def compared(a: NDArray, b: NDArray, metric: Metric) -> ScoreWithInterval:
     Parameters
     ----------
     a, b : (S, V, C, C) int
-        By seed and drive, see `paired_interval`; a method without seeds may come as (1, V, C, C).
+        By seed and drive, see `paired_interval`; (1, V, C, C) for a method without seeds.
     metric : callable
         Takes a confusion matrix (C, C), row: truth, and returns a number.
     """
@@ -48,7 +48,7 @@ def compared(a: NDArray, b: NDArray, metric: Metric) -> ScoreWithInterval:
 
 
 def _with_interval(seeds: list[float], n_drives: int, interval: Callable[[], Interval]) -> ScoreWithInterval:
-    """Add the interval to a score; its ends are None with few drives, or if a class occurs in only one drive."""
+    """Add the interval to a score; its ends are None if there are few drives or a class occurs in only one drive."""
     low = None
     mean = float(np.mean(seeds))
     high = None
@@ -60,14 +60,14 @@ def _with_interval(seeds: list[float], n_drives: int, interval: Callable[[], Int
 
 
 def on_cells(confusions: NDArray, cells: str, label_set: LabelSet) -> NDArray[np.int64]:
-    """Return confusion matrices of some of the cells.
+    """Restrict confusion matrices to some of the cells.
 
     Parameters
     ----------
     confusions : (..., C, C) int
-        One matrix or several, such as those by seed and drive.
+        One matrix or several, such as one per seed and drive.
     cells : str
-        "all", or "semantic" for those whose truth is a semantic class.
+        "all", or "semantic" for cells with a semantic true class.
     label_set : LabelSet
         The classes.
 
@@ -84,7 +84,7 @@ def on_cells(confusions: NDArray, cells: str, label_set: LabelSet) -> NDArray[np
 def every_metric(
     score: Callable[..., object], label_set: LabelSet, *confusions: NDArray
 ) -> dict[str, dict[str, object]]:
-    """Return a score by every metric, over all cells and over those with a semantic class.
+    """Return a score for every metric, over all cells and over cells with a semantic class.
 
     Parameters
     ----------
@@ -93,19 +93,19 @@ def every_metric(
     label_set : LabelSet
         The classes.
     *confusions : (..., C, C) int
-        The matrices that `score` takes before the metric.
+        The matrices, passed to `score` before the metric.
 
     Returns
     -------
     dict
-        By cells, "all" or "semantic", and by metric.
+        Scores by cells ("all" or "semantic") and metric.
     """
     kept = {cells: [on_cells(one, cells, label_set) for one in confusions] for cells in ("all", "semantic")}
     return {cells: {name: score(*some, metric) for name, metric in METRICS.items()} for cells, some in kept.items()}
 
 
 def shown(value: ScoreWithInterval, digits: int = 1) -> str:
-    """Return a score as text, per cent: mean and interval.
+    """Format a score in per cent: mean and interval.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def shown(value: ScoreWithInterval, digits: int = 1) -> str:
 
 
 def shown_seeds(value: ScoreWithInterval, digits: int = 1) -> str:
-    """Return every seed's value as text, per cent; with more than five seeds the lowest and the highest.
+    """Format every seed's value in per cent; with more than five seeds only the lowest and the highest.
 
     Parameters are those of `shown`.
     """
@@ -135,12 +135,12 @@ def shown_seeds(value: ScoreWithInterval, digits: int = 1) -> str:
 
 
 def per_cent(value: float | None, digits: int = 1) -> str:
-    """Write a share in per cent.
+    """Format a share in per cent.
 
     Parameters
     ----------
     value : float or None
-        A share, 0..1; None for a share of nothing.
+        A share, 0..1; None if it is undefined.
     digits : int
         Digits after the point.
     """
@@ -148,12 +148,12 @@ def per_cent(value: float | None, digits: int = 1) -> str:
 
 
 def markdown_table(rows: list[list[str]]) -> str:
-    """Lay out rows as a Markdown table whose columns also line up in plain text.
+    """Format rows as a Markdown table with columns that also align in plain text.
 
     Parameters
     ----------
     rows : list of list of str
-        The cells of each row, the header first.
+        The cells of each row, header first.
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []

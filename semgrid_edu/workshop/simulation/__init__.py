@@ -1,7 +1,7 @@
-"""The simulator: streets, what sensors take of them, and what is true. `simulate` is its door.
+"""The simulator: streets, sensors that record them, and ground truth. Start with `simulate`.
 
-Shapes come from trimesh and rays are cast by embreex, the optional extra `simulation`; what a simulated drive has
-written is read without them.
+trimesh makes the shapes and embreex casts the rays; both come with the optional extra `simulation`. Reading a drive
+from disk needs neither.
 """
 
 from typing import TYPE_CHECKING
@@ -17,25 +17,25 @@ if TYPE_CHECKING:  # the readers of a written drive don't build streets
 def simulate(
     seed: int | np.random.SeedSequence, n_frames: int, street: "str | Wishes | None" = None, rig: "Rig | None" = None
 ) -> "SimulatedDrive":
-    """Simulate a drive, the same for the same arguments.
+    """Simulate a drive. The same arguments give the same drive.
 
     Parameters
     ----------
     seed : int or numpy.random.SeedSequence
-        Seed for everything that is drawn: the street, who is in it, and the noise of the sensors.
+        Seed for everything random: the street, its road users, and the sensor noise.
     n_frames : int
         Number of frames, ten a second.
     street : str or Wishes, optional
-        A street that is hard for occupancy filters, one of `named_streets.TEST_STREETS`; or what isn't left to chance.
-        Everything is drawn when left out.
+        A street that is hard for occupancy filters, one of `named_streets.TEST_STREETS`; or the properties to fix.
+        By default the whole street is random.
     rig : Rig, optional
-        The sensors on the recording car. When left out, those of the simulated data sets, and `named_streets.KITTI_RIG`
-        in a street with a name.
+        The sensors on the recording car. By default the sensors of the simulated data sets, or
+        `named_streets.KITTI_RIG` on a named street.
 
     Returns
     -------
     SimulatedDrive
-        Its frames, scans and truth are computed when they are asked for.
+        Computes frames, scans and truth on demand.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Simulated data sets in place of those of section 4, and the sample drive: made in parallel, resumed after a stop."""
+"""Simulated stand-ins for the data sets of section 4, and the sample drive: made in parallel, resumable."""
 
 from collections.abc import Iterator
 from concurrent.futures import as_completed
@@ -24,7 +24,7 @@ from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes
 from semgrid_edu.workshop.workplace import check_workers, workplace
 
 FORMAT = 2
-"""Raised whenever the simulator changes what a seed gives, so that old and new drives don't mix in one folder."""
+"""Version of the simulator's output. Increase it when a seed gives a different drive, so that versions don't mix."""
 
 
 @dataclass(frozen=True)
@@ -34,15 +34,15 @@ class Route:
     Parameters
     ----------
     split : str
-        The split that it belongs to, such as "train".
+        Its split, such as "train".
     n_frames : int
         Number of frames, ten a second.
     all_labelled : bool
-        Whether all frames have labels; else the last one alone.
+        Whether all frames have labels. If not, only the last one has.
     wishes : Wishes
-        What isn't left to chance.
+        The fixed properties of the street; the rest is random.
     every : int
-        With `all_labelled`, the step from one labelled frame to the next; 1 labels all.
+        With `all_labelled`, label every n-th frame; 1 labels all of them.
     """
 
     split: str
@@ -53,28 +53,28 @@ class Route:
 
     @property
     def labelled(self) -> range:
-        """The numbers of the frames that have labels."""
+        """Numbers of the labelled frames."""
         return range(self.every - 1 if self.all_labelled else self.n_frames - 1, self.n_frames, self.every)
 
 
 @dataclass(frozen=True)
 class DatasetRecipe:
-    """What a data set consists of; drives are numbered from 0001 in this order.
+    """The recipe of a data set. Drives are numbered from 0001, in the order of `routes`.
 
     Parameters
     ----------
     name : str
-        What the data set is called.
+        Name of the data set.
     label_set : str
         Name of its label set, a key of `LABEL_SETS`.
     routes : tuple of Route
         Its drives.
     dense : bool
-        Whether points come from the depth image, thinned, instead of the LIDAR.
+        Whether points come from the thinned depth image instead of the LIDAR.
     rig : Rig
-        The sensors: KITTI's scanner when left out.
+        The sensors; by default KITTI's scanner.
     edition : int
-        The `FORMAT` with which its drives are drawn, a part of their seed.
+        The simulator's `FORMAT`, part of the seed of each drive.
     """
 
     name: str
@@ -86,12 +86,12 @@ class DatasetRecipe:
 
 
 def read_recipes(name: str) -> dict[str, DatasetRecipe]:
-    """Return the data sets of one of the simulator's tables, by name.
+    """Read the recipes of data sets from a table, by name.
 
     Parameters
     ----------
     name : str
-        The table's file, without its suffix, such as "recipes".
+        File name of the table without its suffix, such as "recipes".
     """
     recipes = {}
     for data, row in table_beside(__file__, name).items():
@@ -108,18 +108,18 @@ RECIPES["sample"] = DatasetRecipe(
     "sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),), rig=SAMPLE_RIG, edition=1
 )
 """Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes.
-"validation" has drives like minikitti's, half as many as its training split, for parameters that are chosen when the
-network is trained already. The name of a data set is part of its seed, so no seed gives a drive of minikitti."""
+"validation" has drives like minikitti's, half as many as in its training split. It serves to tune parameters after the
+network is trained. The name of a data set is part of its seed, so "validation" never repeats a drive of minikitti."""
 
 DATA_SETS = ("minikitti", "minichroma", "minisynthia")
-"""What `semgrid-edu data make all` makes."""
+"""The data sets that `semgrid-edu data make all` makes."""
 
 PACKAGES = ("numpy", "numba", "embreex", "trimesh", "pillow")
-"""The packages whose versions can change what a seed gives."""
+"""Packages whose version can change the drive that a seed gives."""
 
 
 def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2, scheduler: str | None = None) -> Path:
-    """Make a data set of the package, or finish one that was interrupted, as `make_from_recipe` does.
+    """Make one of the package's data sets, or resume an interrupted run, see `make_from_recipe`.
 
     Parameters not named here are those of `make_from_recipe`.
 
@@ -141,22 +141,22 @@ def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2, sched
 def make_from_recipe(
     recipe: DatasetRecipe, folder: Path, seed: int, workers: int, scheduler: str | None = None
 ) -> Path:
-    """Make a data set of your own, or finish one that was interrupted.
+    """Make a custom data set, or resume an interrupted run.
 
-    The same name and seed give the same bytes, whatever the number of workers and of interruptions.
+    The same name and seed give the same bytes, however many workers or interruptions there are.
 
     Parameters
     ----------
     recipe : DatasetRecipe
-        What it consists of.
+        The recipe.
     folder : path-like
-        Takes the data set's own folder, which is named like the recipe.
+        Parent folder. The data set goes into a subfolder with the name of the recipe.
     seed : int
         Seed for all drives; not negative.
     workers : int
-        Number of processes that share the work, at least one.
+        Number of parallel processes, at least one.
     scheduler : str, optional
-        Address of a dask.distributed scheduler whose workers share the work instead, see `workplace`.
+        Address of a dask.distributed scheduler, whose workers then do the work, see `workplace`.
 
     Returns
     -------
@@ -168,12 +168,12 @@ def make_from_recipe(
     ArgumentError
         When the seed is negative, or there are no workers or too many.
     DataError
-        When the folder holds something else, the same with another seed or an older version, or a drive that lacks
-        files; or when another process writes to it.
+        When the folder contains other files, data of another seed or version, or a drive with missing files; or when
+        another process is writing to it.
     """
     check_whole(seed=seed)
     check_workers(workers)
-    root = Path(folder).resolve() / recipe.name  # absolute: the machines of a cluster work in other folders
+    root = Path(folder).resolve() / recipe.name  # absolute, because cluster workers run in other directories
     routes = {f"{k + 1:04d}": route for k, route in enumerate(recipe.routes)}
     with sole_writer(root):
         _claim(root, {"name": recipe.name, "seed": seed, "format": recipe.edition})
@@ -192,7 +192,7 @@ def make_from_recipe(
 
 
 def _claim(root: Path, marker: dict) -> None:
-    """Mark the folder as that of this data set; raise when it holds something else."""
+    """Claim the folder for this data set; raise an error if it contains anything else."""
     path = root / "simulation.json"
     if path.exists():
         found = read_json(path)
@@ -205,7 +205,7 @@ def _claim(root: Path, marker: dict) -> None:
 
 
 def _run(make: partial, drives: list[str], workers: int, scheduler: str | None) -> Iterator[None]:
-    """Make drives in processes (in this one when one is enough), and yield after each."""
+    """Make drives in parallel, or in this process when one is enough; yield after each."""
     if not scheduler and (workers == 1 or len(drives) < 2):
         yield from map(make, drives)
         return
@@ -215,7 +215,7 @@ def _run(make: partial, drives: list[str], workers: int, scheduler: str | None) 
 
 
 def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, drive: str) -> None:
-    """Simulate and write one drive; its random numbers depend on data set, seed and number alone."""
+    """Simulate and write one drive. Its random numbers depend only on data set, seed and drive number."""
     index = int(drive) - 1
     route = recipe.routes[index]
     own_seed = np.random.SeedSequence([seed, recipe.edition, *recipe.name.encode()], spawn_key=(index,))
@@ -224,7 +224,7 @@ def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, drive: str) -> Non
 
 
 def _index(recipe: DatasetRecipe, routes: dict[str, Route], seed: int) -> dict:
-    """Return what dataset.json holds."""
+    """Return the content of dataset.json."""
     splits: dict[str, list] = {}
     for drive, route in routes.items():
         frames = [{"date": writer.DATE, "drive": drive, "frame": k} for k in route.labelled]

@@ -1,4 +1,4 @@
-"""One simulated drive: a world, the car that drives through it, and every frame that its sensors take."""
+"""One simulated drive: a world, the recording car that drives through it, and the frames that its sensors record."""
 
 from dataclasses import dataclass
 
@@ -20,14 +20,14 @@ from semgrid_edu.workshop.simulation.street.traffic import Traffic
 from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Ego
 
 PERIOD = 0.1
-"""Seconds between frames: KITTI's LIDAR turns ten times a second."""
+"""Seconds between frames: KITTI's LIDAR spins at 10 Hz."""
 _VIEW = 110.0
-"""Distance from the recording car, metres, beyond which nothing that moves is seen."""
+"""Moving objects farther than this from the recording car, metres, are left out."""
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedFrame:
-    """One instant of a simulated drive: what its sensors take, and what is true.
+    """One instant of a simulated drive: sensor data and ground truth.
 
     Parameters
     ----------
@@ -36,11 +36,11 @@ class SimulatedFrame:
     T_world_from_lidar : (4, 4) float64
         Pose of the LIDAR, metres.
     picture : Picture
-        What the camera takes, and what each of its pixels shows.
+        The camera image, and what each of its pixels shows.
     points : (N, 4) float32
         LIDAR returns: x, y, z in the LIDAR frame, metres, and reflectance 0..1.
     truth : BirdseyeTruth or None
-        What every cell holds; None for a frame that isn't labelled.
+        The class of every cell; None for an unlabelled frame.
     objects : list of dict
         Cars, pedestrians and bicycles in the bird's-eye grid, from `SimulatedDrive.objects`.
     """
@@ -54,27 +54,27 @@ class SimulatedFrame:
 
 
 class SimulatedDrive:
-    """A drive through a world drawn for it; the same seed gives the same drive.
+    """A drive through a random world. The same seed gives the same drive.
 
     Parameters
     ----------
     seed : int or numpy.random.SeedSequence
-        Seed for everything that is drawn: the world, who is in it, and the noise of the sensors.
+        Seed for everything random: the world, its road users, and the sensor noise.
     n_frames : int
         Number of frames, `PERIOD` apart.
     wishes : Wishes
-        The fixed parts of the street; the rest is drawn.
+        The fixed properties of the street; the rest is random.
     rig : Rig, optional
-        The sensors on the recording car; when left out, the sensors of the simulated data sets.
+        The sensors on the recording car; by default the sensors of the simulated data sets.
 
     Attributes
     ----------
     plan : Plan
-        What the street is like.
+        The plan of the street.
     ego : Ego
         How the recording car moves.
     moving, parked : list of Actor
-        The road users; a pedestrian standing still is among those that move.
+        The road users. `moving` includes pedestrians who stand still.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class SimulatedDrive:
         return self.rig.T_grid_from_lidar @ np.linalg.inv(self.pose(t))
 
     def instant(self, t: float) -> Instant:
-        """Return the world at one instant, ready for rays. Parameters are those of `SimulatedDrive.pose`."""
+        """Return the world at one instant, ready for ray casting. Parameters are those of `SimulatedDrive.pose`."""
         road = self.plan.road
         eye = self.pose(t)[:2, 3]
         near = [a for a in self.moving if np.hypot(*(a.trajectory.pose(road, t)[0][:2] - eye)) < _VIEW]
@@ -128,7 +128,7 @@ class SimulatedDrive:
     def velocities(self, t: float) -> dict[int, NDArray[np.float64]]:
         """Return the velocity over ground of each road user that isn't parked, by its number.
 
-        It is given along x and y of the grid frame at that instant, (2,), m/s. Parameters are those of
+        A velocity is (2,), m/s, along x and y of the grid frame at that instant. Parameters are those of
         `SimulatedDrive.pose`.
         """
         rotation = self.T_grid_from_world(t)[:2, :2]
@@ -136,7 +136,7 @@ class SimulatedDrive:
         return {actor.instance: rotation @ actor.trajectory.velocity(road, t) for actor in self.moving}
 
     def objects(self, t: float) -> list[dict]:
-        """Return the cars, pedestrians and bicycles whose centres are in `LABEL_GRID`, from `Actor.described`.
+        """Return the cars, pedestrians and bicycles with centres in `LABEL_GRID`, from `Actor.described`.
 
         Parameters are those of `SimulatedDrive.pose`.
         """
@@ -148,7 +148,7 @@ class SimulatedDrive:
         return [actor.described(road, t, T) for actor, held in zip(actors, inside, strict=True) if held]
 
     def footprints(self, t: float) -> NDArray[np.float64]:
-        """Return the footprints of everything, standing or moving, at one instant, (K, 9), as from `footprint_table`.
+        """Return the footprints of all objects at one instant, static and moving, (K, 9), see `footprint_table`.
 
         Parameters are those of `SimulatedDrive.pose`.
         """
@@ -156,7 +156,7 @@ class SimulatedDrive:
         return np.concatenate([self.static_footprints, moving])
 
     def birdseye(self, t: float) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-        """Return what the cells of `LABEL_GRID` hold, whether a sensor sees it or not.
+        """Return the content of every cell of `LABEL_GRID`, whether or not a sensor sees it.
 
         Parameters are those of `SimulatedDrive.pose`.
 
@@ -165,21 +165,21 @@ class SimulatedDrive:
         kinds : (710, 310) uint8
             Members of `Kind`.
         instances : (710, 310) int32
-            Number of the car, pedestrian or bicycle there; 0 for all else.
+            Number of the car, pedestrian or bicycle; 0 for anything else.
         """
         footprints = self.footprints(t)
         kinds, which = birdseye_kinds(world_cells(self.pose(t), self.rig), footprints, self.plan.road)
         return kinds, np.where(which >= 0, footprints[which, 7], 0).astype(np.int32)
 
     def truth(self, t: float, picture: Picture) -> BirdseyeTruth:
-        """Return what every cell holds and whether the camera sees it.
+        """Return the content of every cell and whether the camera sees it.
 
         Parameters
         ----------
         t : float
             Seconds since the drive began.
         picture : Picture
-            What the camera took at that instant.
+            The picture that the camera took at that instant.
         """
         road = self.plan.road
         pose = self.pose(t)
@@ -190,14 +190,14 @@ class SimulatedDrive:
         return BirdseyeTruth(kinds, seen)
 
     def frame(self, index: int, labelled: bool) -> SimulatedFrame:
-        """Take one frame. Its noise depends on its number alone, not on which frames were taken before.
+        """Record one frame. Its noise depends only on its number, not on the frames recorded before.
 
         Parameters
         ----------
         index : int
             Number of the frame.
         labelled : bool
-            Whether to find the bird's-eye truth too.
+            Whether to compute the bird's-eye truth too.
         """
         rng = self._noise(index)
         t = index * PERIOD
@@ -208,9 +208,9 @@ class SimulatedDrive:
         return SimulatedFrame(t, pose, picture, points, truth, self.objects(t))
 
     def scan(self, index: int) -> Frame:
-        """Take the LIDAR scan of one frame alone, which is fast. Its noise differs from that of `frame`.
+        """Record only the LIDAR scan of one frame, which is fast. The noise differs from the noise in `frame`.
 
-        The frame has no image and no labels; its pose is that of the nearest packet (`Rig.packet_interval`).
+        The frame has no image and no labels. Its pose comes from the nearest packet (`Rig.packet_interval`).
 
         Parameters
         ----------
@@ -224,25 +224,25 @@ class SimulatedDrive:
         return Frame(None, points, self.rig.camera, self.pose(nearest), t)
 
     def labelled_scan(self, index: int) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Take the scan of `SimulatedDrive.scan`, with what each return hit, as PandaSet's annotators label it.
+        """Record the scan of `SimulatedDrive.scan` and label each return with what it hit, as PandaSet does.
 
         Parameters are those of `SimulatedDrive.scan`.
 
         Returns
         -------
         points : (N, 4) float32
-            LIDAR frame, metres, and reflectance.
+            x, y, z in the LIDAR frame, metres, and reflectance.
         kinds : (N,) uint8
             Members of `Kind`.
         """
         return self._labelled_scan(index * PERIOD, self._noise(index, 1))
 
     def _labelled_scan(self, t: float, rng: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-        """Take the scan during which the LIDAR looks ahead at time t, with what each return hit."""
+        """Record the scan in which the LIDAR points ahead at time t, and what each return hit."""
         world, pose = (lambda after: self.instant(t + after)), (lambda after: self.pose(t + after))
         return labelled_scan(world, pose, self.rig.lidar, self.plan.road, rng)
 
     def _noise(self, *key: int) -> np.random.Generator:
-        """Return the drive's own generator for a key, such as the number of a frame."""
+        """Return this drive's random generator for a key, such as the number of a frame."""
         seed = np.random.SeedSequence(self.sensor_seed.entropy, spawn_key=(*self.sensor_seed.spawn_key, *key))
         return np.random.default_rng(seed)

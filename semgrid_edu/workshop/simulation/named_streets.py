@@ -1,4 +1,4 @@
-"""Streets with a name: ten that are hard for occupancy filters, each in its own way, and the sample drive's street."""
+"""Named streets: ten that are hard for occupancy filters, each for its own reason, and the sample drive's street."""
 
 import numpy as np
 
@@ -13,23 +13,23 @@ from semgrid_edu.workshop.simulation.street.traffic import Traffic
 from semgrid_edu.workshop.simulation.street.trajectories import STAND, ActorPace
 
 KITTI_RIG = Rig(lidar=HDL64E, packet_interval=0.01)
-"""An HDL-64E at 10 Hz, and poses from packets that come every 10 ms."""
+"""An HDL-64E at 10 Hz, with a pose packet every 10 ms."""
 FRAMES = 36
 """Number of frames of a test street, 3.5 s."""
 _TABLES = table_beside(__file__, "streets")
 _STREETS = {name: _TABLES[common] | row for name, (common, row) in _TABLES["streets"].items()}
-"""What is wished for; the name of the cast; and the recording car's slowest and fastest mean speed, m/s."""
+"""Per street: fields of `Wishes`, the name of the cast, and the range of the recording car's mean speed, m/s."""
 TEST_STREETS = tuple(_STREETS)
 """The names of the test streets."""
 
 
 def wishes_of(row: dict) -> Wishes:
-    """Return the wishes of a row of a table.
+    """Return a table row as `Wishes`.
 
     Parameters
     ----------
     row : dict
-        Fields of `Wishes`; its cast is the name of a function of `street/road_users.py`.
+        Fields of `Wishes`. The field `cast` is the name of a function in `street/road_users.py`.
     """
     return Wishes(**row | ({"cast": getattr(casts, row["cast"])} if "cast" in row else {}))
 
@@ -37,17 +37,17 @@ def wishes_of(row: dict) -> Wishes:
 def named_street(name: str, seed: int, frames: int = FRAMES, rig: Rig = KITTI_RIG) -> SimulatedDrive:
     """Return a drive through a test street.
 
-    On the streets with a border the recording car drives at 12 to 14 m/s, 3 to 6 m to the left of it.
+    On streets with a border, the recording car drives at 12 to 14 m/s, 3 to 6 m to the left of the border.
 
     Parameters
     ----------
     name : str
         One of `TEST_STREETS`.
     seed : int
-        Seed for the drive; streets of different names differ for the same seed.
+        Seed for the drive. With the same seed, different names still give different streets.
     frames : int
-        Number of frames, ten a second. The street is as long as the distance driven, so with the same seed another
-        number gives another street.
+        Number of frames, ten a second. The street is as long as the distance driven, so changing the number of frames
+        changes the street, even with the same seed.
     rig : Rig
         The sensors on the recording car.
 
@@ -66,7 +66,7 @@ def named_street(name: str, seed: int, frames: int = FRAMES, rig: Rig = KITTI_RI
 
 
 def _sample_cast(traffic: Traffic) -> None:
-    """Put an overtaking and an oncoming car, a cyclist and pedestrians where the camera sees them, then others."""
+    """Put an overtaking and an oncoming car, a cyclist and pedestrians in view of the camera, then fill the street."""
     road = traffic.road
     end = traffic.duration
     here = traffic.ends_at
@@ -86,4 +86,4 @@ def _sample_cast(traffic: Traffic) -> None:
 
 
 SAMPLE_WISHES = Wishes(**_TABLES["sample"], cast=_sample_cast, light=Light(**_TABLES["sunny"]))
-"""What the shipped sample drive shows: a street with one of everything that the course speaks of."""
+"""The street of the shipped sample drive: it has one of everything that the course discusses."""

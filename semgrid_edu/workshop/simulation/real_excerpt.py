@@ -1,4 +1,4 @@
-"""A few frames of a scene of PandaSet in KITTI's raw layout, small enough to be shipped."""
+"""A few frames of a PandaSet scene in KITTI's raw layout, small enough to ship with the package."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -28,21 +28,21 @@ IMAGE_SIZE = (145, 480)
 """Height and width of the images, pixels: a quarter of the original. At a third, a number plate could be read."""
 
 AROUND, BEHIND = 4.0, 8.0
-"""Metres around the grid in which all returns are kept, because the filter's map is larger than the grid; and metres
-behind the vehicle as far as which the returns that show the course of the ground are kept."""
+"""AROUND: margin around the grid, metres, in which all returns are kept, because the filter's map is larger than the
+grid. BEHIND: how far behind the vehicle, metres, returns are kept for the ground profile."""
 
 SCANS = 9
-"""Scans before and after a frame whose returns label its cells."""
+"""Number of scans before and after a frame whose returns label its cells."""
 
 NOWHERE = Geodesy(latitude=0.0, longitude=0.0, altitude=0.0, heading=0.0)
-"""Where the packets of GPS and IMU begin, so that they don't give the true place away."""
+"""Start of the GPS/IMU track, so that the packets don't reveal the real location."""
 
 
 class _FixedRig(PandasetScene):
-    """A scene as KITTI's car would have seen it: one calibration for all frames, and the LIDAR frame 1.73 m high.
+    """A scene as KITTI's car would record it: one calibration for all frames, LIDAR frame 1.73 m above the ground.
 
-    In the scene the LIDAR frame is level, and the camera sways in it. Here the LIDAR frame sways with the camera, so
-    the calibration is the same in all frames, and the sway is in the poses and in the returns.
+    In the original scene the LIDAR frame is level and the camera sways relative to it. Here the LIDAR frame sways with
+    the camera. So all frames share one calibration, and the poses and returns contain the sway.
     """
 
     def __init__(self, root: Path, scene: str) -> None:
@@ -59,7 +59,7 @@ class _FixedRig(PandasetScene):
         return self._camera_poses[self.numbers[k]] @ self._fixed.T_camera_from_lidar
 
     def frames(self, n_frames: int) -> Iterator[WrittenFrame]:
-        """Take the first frames."""
+        """Yield the first frames."""
         times = self._camera_times[[*self.numbers[:n_frames]]]
         poses = np.stack([self._T_world_from_lidar(k) for k in range(n_frames)])
         velocity = np.gradient(poses[:, :3, 3], times, axis=0)
@@ -81,11 +81,11 @@ class _FixedRig(PandasetScene):
 
 
 def needed_returns(points: NDArray) -> NDArray[np.bool_]:
-    """Choose the returns that the filter needs to believe the same of the cells of `LABEL_GRID` as with all of them.
+    """Select the returns that the filter needs to compute the same belief over `LABEL_GRID` as with the full scan.
 
-    All returns on the grid and closely around it are kept. Of the others the filter only has to know how far each beam
-    sees, and how the ground goes on: the nearest obstacle and the farthest ground of each beam, and ahead the lowest
-    and the highest return in each bin of a sector (`GroundParams`).
+    All returns on the grid and closely around it are kept. From the others the filter needs only the range of each beam
+    and the ground profile: the nearest obstacle and the farthest ground return of each beam, and, ahead of the vehicle,
+    the lowest and the highest return in each bin of a sector (`GroundParams`).
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def needed_returns(points: NDArray) -> NDArray[np.bool_]:
     ahead = ~kept & (x > -BEHIND)
     bins = np.minimum(far / sensor.ground.bin, sensor.ground.bins - 1).astype(np.int64)
     bins += beams_of(x, y, sensor.ground.sectors).astype(np.int64) * sensor.ground.bins
-    # In the filter's own precision, float32, because many returns are on the border between two beams.
+    # In float32, as in the filter, because many returns are on the border between two beams.
     beam = beams_of(points[:, 0], points[:, 1], sensor.beams)
     obstacle = (height >= sensor.obstacle_min) & (height <= sensor.obstacle_max)
     for place, value, among in (
@@ -127,13 +127,13 @@ def write_real_excerpt(pandaset: str | Path, scene: str, n_frames: int, folder: 
     Parameters
     ----------
     pandaset : path-like
-        The folder that holds the scenes.
+        The folder with the scenes.
     scene : str
         Number of the scene, such as "002".
     n_frames : int
-        How many frames, at least two.
+        Number of frames, at least two.
     folder : path-like
-        Takes the day's folder, README.md, dataset.json and provenance.json; new or empty.
+        Output folder, new or empty, for the day's folder, README.md, dataset.json and provenance.json.
 
     Returns
     -------
@@ -145,13 +145,13 @@ def write_real_excerpt(pandaset: str | Path, scene: str, n_frames: int, folder: 
     ArgumentError
         When the scene has fewer frames.
     DataError
-        When the folder holds something, the scene has no labels, or a file of it is missing or damaged.
+        When the folder isn't empty, the scene has no labels, or one of its files is missing or damaged.
     """
     excerpt = _FixedRig(Path(pandaset), scene)
     folder = Path(folder)
     if not 2 <= n_frames <= len(excerpt):
         raise ArgumentError("n_frames", f"2 to {len(excerpt)} frames", n_frames)
-    excerpt.visible(0, LABEL_GRID, 0, 0)  # raises for a scene without labels before anything is written
+    excerpt.visible(0, LABEL_GRID, 0, 0)  # raises an error for a scene without labels, before anything is written
     with sole_writer(folder):
         if {path.name for path in folder.iterdir()} - {LOCK}:
             raise DataError(folder, "a new or an empty folder", "one with files")
@@ -159,7 +159,7 @@ def write_real_excerpt(pandaset: str | Path, scene: str, n_frames: int, folder: 
 
 
 def _write(excerpt: _FixedRig, scene: str, n_frames: int, folder: Path) -> Path:
-    """Write the drive, then what describes it."""
+    """Write the drive, then its metadata."""
     date = f"{datetime.fromtimestamp(excerpt._camera_times[0], UTC):%Y_%m_%d}"
     drive = scene.zfill(4)
     K = excerpt.camera.K

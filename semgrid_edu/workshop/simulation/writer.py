@@ -1,4 +1,4 @@
-"""Drives on disk, simulated ones and excerpts: KITTI's raw layout, each drive written whole or not at all."""
+"""Write simulated drives and excerpts in KITTI's raw layout. Each drive is written atomically."""
 
 import json
 import shutil
@@ -24,19 +24,19 @@ from semgrid_edu.workshop.simulation.sensors.rig import DATAFORMAT, Rig, oxts_pa
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
 
 DATE = "2026_01_01"
-"""The day on which all simulated drives take place."""
+"""Date of all simulated drives."""
 _START = datetime(2026, 1, 1, 10, 0, 0, 125000)
 UNFINISHED = ".partial"
-"""How the name of a drive's hidden folder ends as long as the drive isn't whole."""
+"""Suffix of the hidden folder of a drive that isn't complete yet."""
 
 
 def remove_unfinished(day: Path) -> None:
-    """Remove what killed processes have left of drives. No other process may be writing drives there.
+    """Remove incomplete drives that killed processes left. No other process may be writing drives there.
 
     Parameters
     ----------
     day : Path
-        The folder of the drives of a day.
+        The folder with a day's drives.
     """
     for partial in day.glob(f".*{UNFINISHED}"):
         shutil.rmtree(partial, ignore_errors=True)
@@ -75,16 +75,16 @@ def _row(name: str, numbers: NDArray | tuple) -> str:
 
 
 def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
-    """Write KITTI's three calibration files. The cameras are ideal: they have no distortion and look in one direction.
+    """Write KITTI's three calibration files. The cameras are ideal: undistorted and parallel.
 
     Parameters
     ----------
     root : path-like
-        The folder that takes the day's folder.
+        Parent of the day's folder.
     rig : Rig
         The poses of camera, LIDAR and IMU.
     date : str
-        The day, which is the folder's name.
+        The day, which is also the folder's name.
     """
     day = Path(root) / date
     time = "calib_time: 01-Jan-2026 09:00:00\n"
@@ -105,7 +105,7 @@ def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
 
 
 def _write_times(folder: Path, times: Sequence[datetime]) -> None:
-    """Write timestamps: camera, LIDAR and IMU all take a frame at the middle of the LIDAR's turn."""
+    """Write timestamps. Camera, LIDAR and IMU share the middle of the LIDAR's revolution."""
     offsets = {"image_02/timestamps": 0.0, "oxts/timestamps": 0.0, "velodyne_points/timestamps": 0.0}
     offsets |= {"velodyne_points/timestamps_start": -PERIOD / 2, "velodyne_points/timestamps_end": PERIOD / 2}
     for name, offset in offsets.items():
@@ -114,13 +114,13 @@ def _write_times(folder: Path, times: Sequence[datetime]) -> None:
 
 
 def _save_png(path: Path, pixels: NDArray) -> None:
-    """Write a PNG, at a level of compression above which files hardly get smaller but take longer."""
+    """Write a PNG. Higher compression levels take longer and hardly save space."""
     path.parent.mkdir(parents=True, exist_ok=True)
     Image.fromarray(pixels).save(path, compress_level=4)
 
 
 def depth_to_png(depth: NDArray) -> NDArray[np.uint16]:
-    """Return depths as KITTI's depth maps hold them: times 256, 0 for none and for 256 m or farther.
+    """Encode depths like KITTI's depth maps: metres times 256; 0 for no depth and for 256 m or more.
 
     Parameters
     ----------
@@ -137,20 +137,20 @@ def depth_to_png(depth: NDArray) -> NDArray[np.uint16]:
 
 
 class WrittenFrame(NamedTuple):
-    """One frame as it goes to disk.
+    """One frame to write to disk.
 
     Parameters
     ----------
     time : datetime
-        When the sensors took it.
+        When the sensors recorded it.
     image : (h, w, 3) uint8
         RGB.
     points : (N, 4) float32
         LIDAR returns: x, y, z in the LIDAR frame, metres, and reflectance 0..1.
     oxts : str
-        The packet of GPS and IMU, from `oxts_packet`.
+        The GPS/IMU packet, from `oxts_packet`.
     labels : FrameLabels or None
-        What is true, for a frame that is labelled.
+        Ground truth; None for an unlabelled frame.
     objects : sequence of dict
         Cars, pedestrians and bicycles in the bird's-eye grid, from `SimulatedDrive.objects`.
     """
@@ -164,14 +164,14 @@ class WrittenFrame(NamedTuple):
 
 
 def _write_labels(folder: Path, name: str, labels: FrameLabels) -> None:
-    """Write what is true of one frame."""
+    """Write the labels of one frame."""
     images = (labels.image, depth_to_png(labels.depth), labels.birdseye, np.uint8(255) * labels.visible)
     for kind, pixels in zip(KINDS, images, strict=True):
         _save_png(folder / kind / f"{name}.png", pixels)
 
 
 def _write_files(folder: Path, frames: Iterable[WrittenFrame], label_set: str) -> tuple[int, list[int]]:
-    """Write all files of a drive to its folder; return the number of frames, and which have labels."""
+    """Write all files of a drive to its folder; return the number of frames and the numbers of the labelled ones."""
     for name in ("image_02/data", "velodyne_points/data", "oxts/data", "labels"):
         (folder / name).mkdir(parents=True)
     objects = {}
@@ -197,7 +197,7 @@ def _write_files(folder: Path, frames: Iterable[WrittenFrame], label_set: str) -
 def _simulated_frames(
     simulated: SimulatedDrive, labelled: Collection[int], label_set: LabelSet, dense: bool
 ) -> Iterator[WrittenFrame]:
-    """Take the frames of a simulated drive."""
+    """Yield the frames of a simulated drive."""
     classes = class_of_kind(label_set)
     for k in range(simulated.n_frames):
         frame = simulated.frame(k, k in labelled)
@@ -217,7 +217,7 @@ def write_drive(
     root: Path, drive: str, simulated: SimulatedDrive, labelled: Collection[int],
     label_set: LabelSet = KITTI_14, dense: bool = False,
 ) -> Path:  # fmt: skip
-    """Write a simulated drive, as `write_frames` does.
+    """Write a simulated drive with `write_frames`.
 
     Parameters not named here, result and errors are those of `write_frames`.
 
@@ -226,31 +226,32 @@ def write_drive(
     simulated : SimulatedDrive
         The drive.
     labelled : collection of int
-        Numbers of the frames that get labels.
+        Numbers of the frames to label.
     label_set : LabelSet
         The classes of the labels.
     dense : bool
-        Whether the points come from the depth image, thinned (section 4: SYNTHIA), instead of the LIDAR.
+        Whether points come from the thinned depth image (section 4: SYNTHIA) instead of the LIDAR.
     """
     return write_frames(root, (DATE, drive), _simulated_frames(simulated, labelled, label_set, dense), label_set.name)
 
 
 def write_frames(root: Path, drive: tuple[str, str], frames: Iterable[WrittenFrame], label_set: str) -> Path:
-    """Write a drive: images, points, oxts, timestamps, and labels of some frames.
+    """Write a drive: images, points, oxts, timestamps, and the labels of some frames.
 
-    It grows in a hidden folder of its own, which gets the drive's name when the drive is whole. So a killed process
-    leaves no half drive, and of two processes that make the same drive the first one's stays.
+    The files go into a hidden folder, which is renamed when the drive is complete. So a killed process never leaves
+    half a drive, and if two processes make the same drive, the first one wins.
 
     Parameters
     ----------
     root : path-like
-        The folder that holds the day's folder, into which `write_calibration` writes too.
+        Parent of the day's folder, as in `write_calibration`.
     drive : (str, str)
         Date and number of the drive, four digits.
     frames : iterable of WrittenFrame
         Its frames.
     label_set : str
-        The content of label_set.txt: the name of the label set, and `WITH_GAPS` in a second line where that holds.
+        The content of label_set.txt: the name of the label set, and `WITH_GAPS` on a second line if the labels have
+        gaps.
 
     Returns
     -------
@@ -260,7 +261,7 @@ def write_frames(root: Path, drive: tuple[str, str], frames: Iterable[WrittenFra
     Raises
     ------
     DataError
-        When another process has removed what was written.
+        When another process has removed the files.
     """
     folder = drive_folder(root, *drive)
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -271,6 +272,6 @@ def write_frames(root: Path, drive: tuple[str, str], frames: Iterable[WrittenFra
         partial.rename(folder)
     except OSError:
         shutil.rmtree(partial, ignore_errors=True)
-        if not folder.exists():  # else another process was quicker
+        if not folder.exists():  # otherwise another process was faster
             raise
     return folder

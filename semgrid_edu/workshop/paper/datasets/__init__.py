@@ -1,6 +1,6 @@
-"""The data sets that the paper used: KITTI tracking with the labels of Zhang et al., and SYNTHIA (section 4).
+"""The paper's data sets: KITTI tracking with the labels of Zhang et al., and SYNTHIA (section 4).
 
-Importing this package adds "synthia" to the readers that a dataset.json can name.
+Importing this package registers the reader "synthia" for dataset.json.
 """
 
 from semgrid_edu.datasets.index import READERS, Reader

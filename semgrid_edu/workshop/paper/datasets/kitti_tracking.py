@@ -1,6 +1,6 @@
 """One run of KITTI's tracking benchmark: the images and scans that Zhang et al. labelled (section 4).
 
-The layout is that of the benchmark's development kit, with four of its archives unpacked into one folder:
+The layout follows the benchmark's development kit, with four of its archives unpacked into one folder:
 
     training/image_02/0009/000000.png    training/velodyne/0009/000000.bin
     training/calib/0009.txt              training/oxts/0009.txt (one packet per line)
@@ -21,27 +21,25 @@ from semgrid_edu.frame import Frame
 from semgrid_edu.storage.reading import read_png, read_text
 
 TRACKING_PERIOD = 0.1
-"""Seconds between frames. The benchmark gives no times; KITTI's LIDAR turns at 10 Hz."""
+"""Seconds between frames. The benchmark has no timestamps; KITTI's LIDAR spins at 10 Hz."""
 
 
 class KittiTrackingRun(FrameSequence):
-    """The frames of a run. Each is read, and checked, when it is asked for.
+    """The frames of a run, read and checked on access.
 
-    A few scans of the benchmark were never recorded: such a frame raises the error of a missing file, the others can be
-    read.
+    A few scans of the benchmark were never recorded. These frames raise a missing-file error; the others can be read.
 
     Parameters
     ----------
     root : path-like
-        The folder that holds the folder training.
+        Parent of the folder `training`.
     run : int
         Number of the run, 0 to 20.
 
     Raises
     ------
     DataError
-        When there are no images of the run. `drive[k]` raises it when a file that the frame needs is missing or
-        damaged.
+        When the run has no images. `drive[k]` raises it when a file of the frame is missing or damaged.
     """
 
     def __init__(self, root: str | Path, run: int) -> None:
@@ -64,7 +62,7 @@ class KittiTrackingRun(FrameSequence):
 
     @cached_property
     def camera(self) -> Camera:
-        """The calibration of image_02, the same for all frames; its size is that of the first image."""
+        """The calibration of image_02, the same for all frames, at the size of the first image."""
         height, width = read_png(self._image_file(0), "RGB", None).shape[:2]
         K, T_camera_from_lidar, *_ = self._calibration
         return camera_from(self._calibration_file, K, T_camera_from_lidar, (height, width))
@@ -92,5 +90,5 @@ class KittiTrackingRun(FrameSequence):
         return [parse_packet(path, line) for line in lines]
 
     def _pose(self, k: int) -> NDArray[np.float64]:
-        """Return T_world_from_lidar; the world is the frame of the IMU at the run's first packet."""
+        """Return T_world_from_lidar; the world frame is the IMU frame of the run's first packet."""
         return imu_pose(self._packets[0], self._packets[k]) @ invert_rigid(self._calibration.T_lidar_from_imu)

@@ -1,18 +1,18 @@
-"""SYNTHIA's sequences as drives: image, labels, and depth in place of a LIDAR (section 4; Ros et al., CVPR 2016).
+"""SYNTHIA's sequences as drives: image, labels, and depth instead of a LIDAR (section 4; Ros et al., CVPR 2016).
 
     SYNTHIA-SEQS-04-SPRING/RGB/Stereo_Left/Omni_F/000000.png          SYNTHIA-SEQS-04-SPRING/CameraParams/intrinsics.txt
     SYNTHIA-SEQS-04-SPRING/GT/LABELS/Stereo_Left/Omni_F/000000.png
     SYNTHIA-SEQS-04-SPRING/Depth/Stereo_Left/Omni_F/000000.png
     SYNTHIA-SEQS-04-SPRING/CameraParams/Stereo_Left/Omni_F/000000.txt
 
-Of the eight cameras this is the left one that looks ahead: the paper uses one pair of camera and depth.
+This reader uses the left forward camera out of eight, because the paper uses one pair of camera and depth.
 
-From the readme of the data set (26 June 2016): 5 frames a second; the first channel of a label PNG is the class, the
-second one the instance; depth is in centimetres, 16 bits, in any of three channels. The rest is taken from published
-programs that read it, since no sequence could be looked at: label PNGs have 16 bits a channel; intrinsics.txt holds
-focal length, principal point (u, v) and stereo baseline; a pose is 16 numbers, column by column the matrix that takes
-points from the camera to the world, with a camera whose x points right, y up and z *back*. If a sequence keeps its
-poses otherwise, `SynthiaSequence.problems` says that the camera doesn't move the way it looks.
+The data set's readme (26 June 2016) specifies: 5 frames per second; channel 1 of a label PNG is the class, channel 2
+the instance; depth is in centimetres, 16 bits, the same in all three channels. We couldn't inspect a sequence, so the
+rest follows published readers: label PNGs have 16 bits per channel; intrinsics.txt contains focal length, principal
+point (u, v) and stereo baseline; a pose is 16 numbers, the column-major matrix from camera to world, for a camera with
+x right, y up and z *back*. If a sequence uses another pose convention, `SynthiaSequence.problems` reports that the
+camera doesn't move forward.
 """
 
 from functools import cached_property
@@ -48,26 +48,27 @@ SYNTHIA_CLASSES = ClassTable(
         **dict.fromkeys((10, 11, 13, 14, 15), "void"),  # pedestrian, bicycle, two reserved numbers, traffic light
     },
 )
-"""SYNTHIA-10's class of each number in the labels: the paper leaves sky, people, bicycles and traffic lights out."""
+"""SYNTHIA-10's class of each number in the labels. The paper leaves out sky, people, bicycles and traffic lights."""
 
 SYNTHIA_CAMERA_AXES = np.diag([1.0, -1.0, -1.0])
-"""(3, 3): from this package's camera axes (x right, y down, z ahead) to the axes of SYNTHIA's poses."""
+"""(3, 3): from this package's camera axes (x right, y down, z ahead) to SYNTHIA's camera axes."""
 
 VIEW = "Stereo_Left/Omni_F"
-"""The camera that is read."""
+"""The camera to read."""
 
 SYNTHIA_PERIOD = 0.2
-"""Seconds between frames: the readme says 5 a second."""
+"""Seconds between frames: 5 frames per second according to the readme."""
 
 GROUND_RANGE = 20.0
-"""Metres ahead. Road in the first image that is closer shows how high the camera stands."""
+"""Road pixels of the first image closer than this, metres, determine the height of the camera."""
 
 STANDING = 0.05
 MOSTLY = 0.9
-"""Metres a frame below which a camera stands; the share of a step that a driving camera goes ahead (median)."""
+"""STANDING: a camera that moves less than this counts as stationary, metres per frame. MOSTLY: minimum for the forward
+share of a moving camera's steps (median)."""
 
 _CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-"""From axes that point forward, left and up to the axes of a camera."""
+"""From axes forward, left, up to camera axes."""
 
 
 def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
@@ -78,7 +79,7 @@ def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.
     path : Path
         A file of GT/LABELS.
     size : (int, int) or None
-        Height and width that it must have, pixels; None where any size will do.
+        Required height and width, pixels; None for any size.
 
     Returns
     -------
@@ -96,12 +97,12 @@ def read_synthia_depth(path: Path, size: tuple[int, int] | None) -> NDArray[np.f
     path : Path
         A file of Depth.
     size : (int, int) or None
-        Height and width that it must have, pixels; None where any size will do.
+        Required height and width, pixels; None for any size.
 
     Returns
     -------
     (h, w) float32
-        Metres along the optical axis; NaN where the file holds 0 or 65535, so that nothing was met.
+        Metres along the optical axis; NaN where the file has 0 or 65535, which mean "no surface".
     """
     centimetres = read_png(path, "RGB;16", size)[..., 0]
     nothing = (centimetres == 0) | (centimetres == np.iinfo(np.uint16).max)
@@ -109,7 +110,7 @@ def read_synthia_depth(path: Path, size: tuple[int, int] | None) -> NDArray[np.f
 
 
 def read_synthia_intrinsics(path: Path) -> NDArray[np.float64]:
-    """Read the intrinsic matrix of all cameras.
+    """Read the intrinsic matrix, which all cameras share.
 
     Parameters
     ----------
@@ -139,7 +140,7 @@ def read_synthia_pose(path: Path) -> NDArray[np.float64]:
     Returns
     -------
     (4, 4) float64
-        T_world_from_camera, metres, for a camera whose x points right, y down and z ahead.
+        T_world_from_camera, metres, for a camera with x right, y down and z ahead.
     """
     numbers = parse_numbers(path, read_text(path), "a pose")
     if numbers.size != 16 or not np.array_equal(numbers[3::4], [0, 0, 0, 1]):
@@ -149,26 +150,25 @@ def read_synthia_pose(path: Path) -> NDArray[np.float64]:
 
 
 class SynthiaSequence(FrameSequence):
-    """The frames of a sequence. Each is read, and checked, when it is asked for.
+    """The frames of a sequence, read and checked on access.
 
-    There is no LIDAR. Its frame is put where the camera is, x forward, y left and z up, and `Frame.points` is the depth
-    image thinned by `depth_scan`. The files don't say how high the camera stands: its height is taken from the road in
-    the first image, and it is taken to look horizontally. The bird's-eye truth is made of the labels, carried to the
-    grid by the whole depth image; what the camera doesn't see stays unlabelled. The world is the LIDAR's frame at the
+    There is no LIDAR. The LIDAR frame is placed at the camera, with x forward, y left and z up, and `Frame.points` is
+    the depth image thinned by `depth_scan`. The files don't contain the camera's height, so it is estimated from the
+    road in the first image, assuming a horizontal camera. The bird's-eye truth projects the labels to the grid with the
+    full depth image; cells that the camera doesn't see remain unlabelled. The world frame is the LIDAR frame of the
     first image.
 
     Parameters
     ----------
     root : path-like
-        The folder that holds the sequences.
+        The folder with the sequences.
     sequence : str
         Name of the sequence's folder, such as "SYNTHIA-SEQS-04-SPRING".
 
     Raises
     ------
     DataError
-        When there are no images of the sequence. `drive[k]` raises it when a file that the frame needs is missing or
-        damaged.
+        When the sequence has no images. `drive[k]` raises it when a file of the frame is missing or damaged.
     """
 
     label_set = SYNTHIA_10
@@ -183,17 +183,17 @@ class SynthiaSequence(FrameSequence):
         return self._length
 
     def problems(self) -> list[str]:
-        """Read every frame, and check that the camera moves the way it looks, as on a car that drives ahead.
+        """Read every frame, and check that the camera moves forward, as on a driving car.
 
         Returns
         -------
         list of str
-            One line for each problem; empty when the sequence is sound.
+            One line for each problem; empty when there are none.
         """
         return super().problems() or list(filter(None, [error_of(self._check_motion)]))
 
     def _check_motion(self) -> None:
-        """Refuse poses by which the camera mostly moves otherwise than ahead: they are kept in another convention."""
+        """Reject poses with a camera that doesn't mostly move forward, because they use another convention."""
         poses = [self._pose(k) for k in range(len(self))]
         steps = np.array([(invert_rigid(a) @ b)[:3, 3] for a, b in pairwise(poses)]).reshape(-1, 3)
         lengths = np.linalg.norm(steps, axis=1)
@@ -216,7 +216,7 @@ class SynthiaSequence(FrameSequence):
 
     @cached_property
     def camera(self) -> Camera:
-        """The calibration, the same for all frames; its size is that of the first image."""
+        """The calibration, the same for all frames, at the size of the first image."""
         height, width = read_png(self._file("RGB", 0), "RGB", None).shape[:2]
         path = self.folder / "CameraParams" / "intrinsics.txt"
         K = read_synthia_intrinsics(path)
@@ -224,7 +224,7 @@ class SynthiaSequence(FrameSequence):
         return camera_from(path, K, T_camera_from_lidar, (height, width), self._camera_height(K, (height, width)))
 
     def _camera_height(self, K: NDArray[np.float64], size: tuple[int, int]) -> float:
-        """Return how far below the camera the nearby road of the first image lies, in the median."""
+        """Return the median height of the camera above the nearby road in the first image."""
         path = self._file("GT/LABELS", 0)
         classes = read_synthia_labels(path, size)
         depth = read_synthia_depth(self._file("Depth", 0), size)
@@ -238,14 +238,14 @@ class SynthiaSequence(FrameSequence):
         return height
 
     def _labels(self, classes: NDArray[np.uint8], depth: NDArray[np.float32]) -> FrameLabels:
-        """Carry the labels of an image to the grid by its depth."""
+        """Project the labels of an image to the grid with its depth."""
         points, rows, cols = points_from_depth(depth, self.camera)
         points_grid = transform_points(invert_rigid(lidar_from_grid(self.camera.lidar_height)), points)
         birdseye = birdseye_votes(points_grid, classes[rows, cols], LABEL_GRID, SYNTHIA_10)
         return FrameLabels(SYNTHIA_10, classes, depth, birdseye, visible=birdseye != IGNORE)
 
     def _pose(self, k: int) -> NDArray[np.float64]:
-        """Return the pose of the LIDAR in SYNTHIA's own world."""
+        """Return the pose of the LIDAR in SYNTHIA's world frame."""
         return read_synthia_pose(self._file("CameraParams", k, ".txt")) @ self.camera.T_camera_from_lidar
 
     def _file(self, kind: str, k: int, suffix: str = ".png") -> Path:

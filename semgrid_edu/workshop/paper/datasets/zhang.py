@@ -1,12 +1,12 @@
-"""KITTI's image labels by Zhang, Candra, Vetter and Zakhor (ICRA 2015), which the paper learns from (section 4).
+"""KITTI image labels by Zhang, Candra, Vetter and Zakhor (ICRA 2015), the paper's training data (section 4).
 
-What their own readme (12 August 2015) says: 252 acquisitions of eight runs of KITTI's *tracking* training set are
-labelled, every tenth or twentieth; 140 in the runs 9, 10, 11 and 19 for training, 112 in the runs 0, 4, 5 and 13 for
-testing (the paper says 142 and 110). Image labels are MATLAB files image_02/(trn or test)/(run)/(acquisition), each a
-matrix of the numbers in `ZHANG_CLASSES`.
+According to their readme (12 August 2015), 252 frames ("acquisitions") from eight runs of KITTI's *tracking* training
+set are labelled, every tenth or twentieth frame: 140 in runs 9, 10, 11 and 19 for training, 112 in runs 0, 4, 5 and 13
+for testing (the paper gives 142 and 110). Image labels are MATLAB files image_02/(trn or test)/(run)/(acquisition),
+each a matrix of the numbers in `ZHANG_CLASSES`.
 
-What is assumed here, since the archive itself couldn't be looked at: files end in .mat; their names and the runs'
-folders are numbers, with or without leading zeros; a matrix is the only two-dimensional variable of its file.
+We couldn't inspect the archive, so this reader assumes that files end in .mat, that file and run names are numbers with
+or without leading zeros, and that the matrix is the only two-dimensional variable of its file.
 """
 
 import io
@@ -41,10 +41,10 @@ ZHANG_CLASSES = ClassTable(
         10: "fence",
     },
 )
-"""KITTI-14's class of each number in their matrices."""
+"""KITTI-14's class of each number in the label matrices."""
 
 ZHANG_RUNS = {"train": (9, 10, 11, 19), "test": (0, 4, 5, 13)}
-"""The runs of KITTI's tracking training set that each split consists of."""
+"""Runs of KITTI's tracking training set in each split."""
 
 
 class ZhangLabels:
@@ -53,7 +53,7 @@ class ZhangLabels:
     Parameters
     ----------
     folder : path-like
-        Where the archive was unpacked: holds image_02.
+        The unpacked archive, which contains image_02.
     """
 
     def __init__(self, folder: str | Path) -> None:
@@ -67,7 +67,7 @@ class ZhangLabels:
             raise DataError(self.folder, expected, "none" if self.folder.is_dir() else "no folder")
 
     def frames(self, split: str) -> list[tuple[int, int]]:
-        """Return the labelled acquisitions of a split that are there.
+        """Return the available labelled frames of a split.
 
         Parameters
         ----------
@@ -77,7 +77,7 @@ class ZhangLabels:
         Returns
         -------
         list of (int, int)
-            Run and acquisition, in ascending order.
+            Run and frame number, in ascending order.
         """
         if split not in ZHANG_RUNS:
             raise ArgumentError("split", f"one of {', '.join(ZHANG_RUNS)}", repr(split))
@@ -91,15 +91,15 @@ class ZhangLabels:
         run : int
             Number of the run in KITTI's tracking training set.
         acquisition : int
-            Number of the frame in it.
+            Number of the frame in the run.
         image_size : (int, int)
             Height and width of the image, pixels.
 
         Returns
         -------
         FrameLabels or None
-            Image labels only: depth is NaN and nothing of the bird's-eye view is labelled or visible, because the data
-            set says nothing about them. None for a frame without labels.
+            Image labels only. The data set has no depth and no bird's-eye labels, so depth is NaN and all cells are
+            unlabelled and not visible. None for a frame without labels.
         """
         path = self._files.get((run, acquisition))
         if path is None:
@@ -111,15 +111,15 @@ class ZhangLabels:
 
 
 def _matrix(path: Path) -> NDArray:
-    """Read the one matrix of a MATLAB file."""
-    from scipy.io import loadmat  # here, because it is slow to load and no other reader needs it
+    """Read the only matrix of a MATLAB file."""
+    from scipy.io import loadmat  # imported here because it is slow to load and no other reader needs it
 
     content = read_bytes(path)
     try:
         variables = {name: value for name, value in loadmat(io.BytesIO(content)).items() if not name.startswith("__")}
     except NotImplementedError:
         raise DataError(path, "a MATLAB file up to version 7.2", "version 7.3; save it again with `-v7`") from None
-    except Exception as error:  # scipy lets through whatever a damaged file makes of it: IndexError, zlib.error, ...
+    except Exception as error:  # a damaged file raises anything in scipy: IndexError, zlib.error, ...
         raise DataError(path, "a MATLAB file", f"{type(error).__name__}: {error}") from error
     found = [value for value in variables.values() if isinstance(value, np.ndarray) and min(value.shape) > 1]
     if len(found) != 1 or found[0].ndim != 2 or found[0].dtype.kind not in "iufb":
@@ -128,14 +128,14 @@ def _matrix(path: Path) -> NDArray:
 
 
 class ZhangDrive(FrameSequence):
-    """The frames of a drive, with the labels of those that Zhang et al. labelled.
+    """The frames of a drive, with the labels of Zhang et al. where they exist.
 
     Parameters
     ----------
     drive : FrameSequence
-        The frames of the run: a `KittiTrackingRun`, or a raw drive that begins where the run does. By their numbers of
-        frames these seem to be, for the runs 0, 4, 5, 10, 11 and 13, the drives 0005, 0014, 0015, 0056, 0059 and 0091
-        of 2011_09_26, and for run 19 drive 0071 of 2011_09_29; look at some labels over their images first.
+        The frames of the run: a `KittiTrackingRun`, or a raw drive with the same first frame. Judging by the numbers of
+        frames, runs 0, 4, 5, 10, 11 and 13 are probably drives 0005, 0014, 0015, 0056, 0059 and 0091 of 2011_09_26, and
+        run 19 is drive 0071 of 2011_09_29. Check by overlaying some labels on their images.
     labels : ZhangLabels
         The labels of all runs.
     run : int
@@ -167,7 +167,7 @@ class ZhangDrive(FrameSequence):
         return self.drive.camera
 
     def files(self) -> list[Path]:
-        """Return the files of the drive, and all labels."""
+        """Return the files of the drive and all label files."""
         return [*self.drive.files(), *super().files()]
 
     def _frame(self, k: int) -> Frame:

@@ -1,1 +1,1 @@
-"""The sensors: rays, camera, LIDAR and GPS, and what is true of what they see."""
+"""The sensors (ray casting, camera, LIDAR, GPS) and the ground truth of what they see."""

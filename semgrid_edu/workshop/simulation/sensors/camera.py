@@ -1,4 +1,4 @@
-"""The camera: a picture of the world at one instant, and what each of its pixels shows."""
+"""The camera: renders the world at one instant and records what each pixel shows."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -15,25 +15,25 @@ from semgrid_edu.workshop.simulation.street.layout import Road
 from semgrid_edu.workshop.simulation.street.light import Light
 
 _SKY_STEP = 3
-"""Every third pixel of every third row sends a ray to the sky: how much of it is open changes slowly."""
+"""Sky visibility is sampled at every third pixel of every third row, because it varies slowly."""
 _SUBPIXELS = ((-0.33, 0.33), (0.33, -0.33))
-"""Where pixels at an edge send two more rays, so that outlines aren't jagged: shift to the right and down, pixels."""
+"""Antialiasing: offsets, right and down in pixels, of two extra rays for each pixel on an edge."""
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What the camera takes, and what the simulator knows about every pixel of it.
+    """The camera image, and the ground truth of every pixel.
 
     Parameters
     ----------
     image : (h, w, 3) uint8
-        What the camera takes, RGB.
+        The image, RGB.
     kind : (h, w) uint8
         What each pixel shows, a `Kind`.
     depth : (h, w) float32
         Depth along the optical axis, metres; NaN for sky.
     instance : (h, w) int32
-        Number of the car, pedestrian or bicycle that each pixel shows; 0 for all else.
+        Number of the car, pedestrian or bicycle that each pixel shows; 0 for anything else.
     """
 
     image: NDArray[np.uint8]
@@ -46,7 +46,7 @@ _rays = cache(Rig.pixel_directions)
 
 
 def _discontinuities(triangle: NDArray, distance: NDArray, kind: NDArray, material: NDArray) -> NDArray[np.bool_]:
-    """Mark pixels whose right or lower neighbours show something else, and those neighbours: edges to refine."""
+    """Mark the edges to antialias: each pixel that differs from its right or lower neighbour, and that neighbour."""
     edge = np.zeros(triangle.shape, bool)
     for here, beside in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
         a, b = triangle[here], triangle[beside]
@@ -63,7 +63,7 @@ def _discontinuities(triangle: NDArray, distance: NDArray, kind: NDArray, materi
 def _smooth(values, distance, step, radius, out):
     """Average sparse `values` (one every `step` pixels, -1 for none) over pixels at a similar distance."""
     height, width = distance.shape
-    # numba compiles the loop: which neighbours count depends on the distance of each pixel
+    # a compiled loop, because each pixel's distance decides which neighbours count
     for r in range(height):
         for c in range(width):
             total = 0.0
@@ -81,9 +81,9 @@ def _open(
     hits: Hits, instant: Instant, chosen: NDArray, axis: tuple, along_normal: float, spread: float,
     rng: np.random.Generator,
 ) -> NDArray[np.float32]:  # fmt: skip
-    """Return for every pixel 1 where its hit sees the light, 0 where something is in between, -1 if not chosen.
+    """Return 1 for each chosen pixel whose hit sees the light, 0 if it is occluded, -1 for pixels not chosen.
 
-    From each chosen hit, a little off its surface, a ray goes to `axis` plus the normal, scattered by chance.
+    Each chosen hit casts one ray, starting slightly off the surface, along `axis` plus the normal plus random scatter.
     """
     luck = rng.random((len(chosen), 3), dtype=np.float32)
     normal = instant.normals[hits.triangle[chosen]]
@@ -102,7 +102,7 @@ def _open(
 def _sun_and_sky(
     hits: Hits, instant: Instant, light: Light, shape: tuple[int, int], rng: np.random.Generator
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return how much of sun and sky each pixel's hit sees, 0..1, from one ray to each, smoothed."""
+    """Return how much of the sun and of the sky each pixel's hit sees, 0..1: one ray to each, then smoothed."""
     distance = hits.distance.reshape(shape)
     met = hits.triangle >= 0
     sunlit = np.empty(shape, np.float32)
@@ -117,7 +117,7 @@ def _sun_and_sky(
 
 
 def _lens(radiance: NDArray[np.float32], centre: float) -> NDArray[np.float32]:
-    """Blur the picture as a lens does: along each axis the share `centre` stays, the rest goes to the next pixels."""
+    """Blur the picture like a lens: along each axis a pixel keeps the share `centre`, its neighbours get the rest."""
     middle = np.float32(centre)
     side = np.float32((1.0 - centre) / 2)
     for axis in (1, 0):
@@ -128,7 +128,7 @@ def _lens(radiance: NDArray[np.float32], centre: float) -> NDArray[np.float32]:
 
 
 def _expose(radiance: NDArray, light: Light, rig: Rig, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Turn radiance into what the sensor counts: lens blur, exposure, vignette, tone curve, noise, bits."""
+    """Turn radiance into pixel values: lens blur, exposure, vignette, tone curve, noise, quantisation."""
     height, width = rig.image_size
     v, u = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
     gain = light.exposure * (1 - 0.18 * (u**2 + 0.3 * v**2))[..., None] * np.asarray(light.balance)
@@ -153,13 +153,13 @@ def take_picture(
     T_world_from_lidar : (4, 4) float
         Pose of the LIDAR, metres.
     rig : Rig
-        Where the camera stands, and its noise.
+        The camera's pose and noise.
     road : Road
-        The street, for what the ground is.
+        The street, for the type of ground.
     light : Light
         Sun, sky and exposure.
     rng : numpy.random.Generator
-        Source of the sensor's noise and of the scattered rays that make shadows soft.
+        Source of the sensor noise and of the scattered rays for soft shadows.
     """
     shape = rig.image_size
     rotation = T_world_from_lidar[:3, :3].astype(np.float32)

@@ -1,4 +1,4 @@
-"""The LIDAR: a scan of returns with noisy ranges and reflectance, some of them lost."""
+"""The LIDAR: a scan with noisy ranges, reflectance and lost returns."""
 
 from collections.abc import Callable, Iterator
 
@@ -12,37 +12,37 @@ from semgrid_edu.workshop.simulation.street.layout import Road
 from semgrid_edu.workshop.simulation.things.materials import REFLECTANCE, Kind, Material
 
 _SECTOR = 30.0
-"""Degrees of a turn in which road users count as standing; at 14 m/s they move by 12 cm meanwhile."""
+"""Road users are frozen while the scanner turns by this angle, degrees. At 14 m/s they would move 12 cm."""
 
 
 def labelled_scan(
     world: Callable[[float], Instant], pose: Callable[[float], NDArray], lidar: Lidar, road: Road,
     rng: np.random.Generator,
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:  # fmt: skip
-    """Take one LIDAR scan, and say what each return hit.
+    """Record one LIDAR scan, and label each return with what it hit.
 
-    A scanner that takes its time (`Lidar.turn`) measures each column from where it is then, and gives it in its frame
-    of that moment, as KITTI's raw scans are. A return is lost when too little light comes back. So dark, far and grazed
-    surfaces lose more of their returns than others. Glass reflects the light away from the sensor, and car paint
-    scatters little of it.
+    With a rolling scan (`Lidar.turn` > 0) each column is measured from the pose at its own time and stored in the LIDAR
+    frame of that time, like KITTI's raw scans. A return is lost when too little light comes back. So dark, distant and
+    grazing surfaces lose more returns. Glass reflects the light away from the sensor, and car paint scatters little of
+    it.
 
     Parameters
     ----------
     world : callable
-        Function of the time that returns the world then. The time is in seconds since the scanner looked ahead.
+        t -> the world at time t. Time counts in seconds from the moment when the scanner points ahead.
     pose : callable
-        Function of the same time that returns the pose of the LIDAR, (4, 4), metres.
+        t -> the pose of the LIDAR at time t, (4, 4), metres.
     lidar : Lidar
         Directions and noise.
     road : Road
-        The street, for what the ground reflects.
+        The street, for the reflectance of the ground.
     rng : numpy.random.Generator
         Source of noise and losses.
 
     Returns
     -------
     points : (N, 4) float32
-        x, y, z in the LIDAR frame, metres, and reflectance 0..1, as KITTI's binary files hold them.
+        x, y, z in the LIDAR frame, metres, and reflectance 0..1, as in KITTI's binary files.
     kinds : (N,) uint8
         Members of `Kind`.
     """
@@ -64,7 +64,7 @@ def _sectors(
     world: Callable[[float], Instant], pose: Callable[[float], NDArray], lidar: Lidar, road: Road,
     rng: np.random.Generator,
 ) -> Iterator[tuple[NDArray, ...]]:  # fmt: skip
-    """Yield what each sector of a scan meets, as `_met` does: all of it at once if the scanner takes no time."""
+    """Yield the hits of each sector of a scan, from `_met`; one sector if the whole scan is instantaneous."""
     times = lidar.times
     rays = lidar.directions
     poses = np.stack([pose(t) for t in times]) if lidar.turn else pose(0.0)[None]
@@ -81,7 +81,7 @@ def _sectors(
 def _met(
     instant: Instant, hits: Hits, rays: NDArray[np.int64], lidar: Lidar, road: Road
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Return of the rays that meet something in range: their numbers, distance, |cos|, reflectance and kind."""
+    """Return number, distance, |cos|, reflectance and kind of the rays that hit something within range."""
     near = np.flatnonzero(hits.distance < min(lidar.range_max, MISS))
     triangle = hits.triangle[near]
     normals = instant.looked_up("normals", triangle)
@@ -94,7 +94,7 @@ def _met(
 
 
 def _reflectance(material: NDArray, kinds: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return the reflectance of hits; on the ground lane marks are bright and grass brighter than asphalt."""
+    """Return the reflectance of hits. On the ground, lane marks are bright, and grass is brighter than asphalt."""
     by_kind = np.full(256, 0.2, np.float32)
     by_kind[[Kind.LANE, Kind.SIDEWALK, Kind.GRASS]] = 0.75, 0.3, 0.45
     return np.where(material == Material.GROUND, by_kind[kinds], REFLECTANCE[material])

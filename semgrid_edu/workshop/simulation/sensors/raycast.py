@@ -1,4 +1,4 @@
-"""Rays against the world at one instant, parts of which let some of them through (by the law of Beer and Lambert)."""
+"""Ray casting into the world at one instant. Porous objects let some rays through (Beer-Lambert law)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,23 +16,23 @@ if TYPE_CHECKING:
     from embreex.rtcore_scene import EmbreeScene
 
 MISS = np.float32(1e30)
-"""Distance that a ray which meets nothing is given, metres."""
+"""Distance of a ray that hits nothing, metres."""
 _GRAZING = np.float32(1e-3)
-"""Smallest |cos| between a ray and the normal of a sheet; a smaller one counts as this."""
+"""Lower bound for |cos| between a ray and the normal of a sheet."""
 _STEP = np.float32(2e-3)
-"""By how much a ray starts beyond the surface that it has passed, metres."""
+"""After a ray passes a surface, it restarts this far beyond it, metres."""
 
 
 @dataclass(frozen=True, eq=False)
 class RayMesh:
-    """Shapes that rays can be tried against.
+    """Shapes to cast rays at.
 
     Parameters
     ----------
     shape : Shape
-        All F triangles, in the world.
+        All F triangles, in world coordinates.
     instance : (F,) int32
-        Number of the object that each triangle belongs to; 0 for scenery.
+        Object number of each triangle; 0 for scenery.
     """
 
     shape: Shape
@@ -45,15 +45,15 @@ class RayMesh:
         Parameters
         ----------
         shapes : sequence of Shape
-            In the world; at least one.
+            At least one, in world coordinates.
         instances : sequence of int
-            For each shape the number of its object; 0 for scenery.
+            Object number of each shape; 0 for scenery.
         """
         return cls(merge(shapes), np.repeat(np.asarray(instances, np.int32), [len(s.faces) for s in shapes]))
 
     @cached_property
     def embree(self) -> "EmbreeScene":
-        """The search tree over the triangles, built when the first ray is tried: not every street is looked at."""
+        """The search tree over the triangles, built at the first ray, because some streets are never rendered."""
         embree = needed("embreex.rtcore_scene").EmbreeScene()
         vertices, faces = (np.ascontiguousarray(part) for part in (self.shape.vertices, self.shape.faces))
         needed("embreex.mesh_construction").TriangleMesh(embree, vertices, faces)
@@ -62,21 +62,21 @@ class RayMesh:
 
 @dataclass(frozen=True, eq=False)
 class PorousMesh:
-    """Surfaces and volumes that stop a ray by chance.
+    """Surfaces and volumes that stop a ray with some probability.
 
-    A ray passes with probability exp(-depth), where `depth` is the optical depth that it has crossed:
+    A ray passes with probability exp(-depth), where `depth` is the optical depth along its path:
 
-    - `Material.WIRE`, a sheet: opacity * distance / |cos|. The light of a LIDAR or a pixel is a cone, so the number of
-      wires in it grows with the distance from the sensor, and with the angle between ray and normal.
+    - `Material.WIRE`, a sheet: opacity * distance / |cos|. A LIDAR beam or a pixel is a cone, so it covers more wires
+      at a greater distance from the sensor and at a larger angle between ray and normal.
     - `Material.PANE`, a sheet: opacity / |cos|.
-    - `Material.TWIGS`, a closed volume: opacity * length of the way inside it.
+    - `Material.TWIGS`, a closed volume: opacity * length of the path inside it.
 
     Parameters
     ----------
     mesh : RayMesh
-        All F triangles, in the world.
+        All F triangles in the world.
     opacity : (F,) float32
-        Of each triangle: 1/m for wire and twigs, without unit for panes.
+        Opacity of each triangle: 1/m for wire and twigs, dimensionless for panes.
     """
 
     mesh: RayMesh
@@ -84,14 +84,14 @@ class PorousMesh:
 
     @classmethod
     def of(cls, shapes: Sequence[Shape], opacities: Sequence[float]) -> "PorousMesh":
-        """Build the search tree of several shapes.
+        """Merge several porous shapes.
 
         Parameters
         ----------
         shapes : sequence of Shape
-            In the world; at least one.
+            At least one, in world coordinates.
         opacities : sequence of float
-            For each shape its opacity.
+            Opacity of each shape.
         """
         faces = [len(shape.faces) for shape in shapes]
         return cls(RayMesh.of(shapes, [0] * len(shapes)), np.repeat(np.asarray(opacities, np.float32), faces))
@@ -99,28 +99,28 @@ class PorousMesh:
     def stop(
         self, origins: NDArray, directions: NDArray, ends: NDArray, rng: np.random.Generator
     ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.int32]]:
-        """Find the rays that end here before they meet something solid.
+        """Find the rays that stop here before they hit something solid.
 
-        Each ray that meets any of the surfaces draws the optical depth at which it ends, from the exponential
-        distribution of mean 1, and spends it on its way.
+        Each ray that hits a porous surface samples the optical depth at which it stops from an exponential distribution
+        with mean 1. Every surface on its path uses up part of this budget.
 
         Parameters
         ----------
         origins, directions : (N, 3) float32
-            Where the rays start in the world, metres, and unit vectors.
+            Start points in the world, metres, and unit vectors.
         ends : (N,) float32
-            Distance of what is solid, metres; `MISS` for none.
+            Distance to the first solid surface, metres; `MISS` for none.
         rng : numpy.random.Generator
-            Source of chance.
+            Source of randomness.
 
         Returns
         -------
         rays : (M,) int64
-            The rays that end.
+            Indices of the rays that stop.
         distance : (M,) float32
-            Where they do, metres.
+            Distances at which they stop, metres.
         triangle : (M,) int32
-            What stops them: triangles of `mesh`.
+            Triangles of `mesh` that stop them.
         """
         rays, start = np.arange(len(ends)), np.zeros(len(ends), np.float32)
         rays, start, crossing, triangle = self._next(origins, directions, rays, start)
@@ -137,7 +137,7 @@ class PorousMesh:
         return tuple(np.concatenate(part) for part in zip(*found, strict=True))
 
     def _next(self, origins: NDArray, directions: NDArray, rays: NDArray, start: NDArray) -> tuple[NDArray, ...]:
-        """Return the rays that meet a surface from `start` on, with their starts, its distance and its triangle."""
+        """Return the rays that hit a surface beyond `start`, their start, and the surface's distance and triangle."""
         hits = self.mesh.embree.run(origins[rays] + start[:, None] * directions[rays], directions[rays], output=1)
         met = hits["primID"] >= 0
         return rays[met], start[met], start[met] + hits["tfar"][met], hits["primID"][met]
@@ -145,9 +145,9 @@ class PorousMesh:
     def _spent(
         self, directions: NDArray, start: NDArray, crossing: NDArray, triangle: NDArray, budget: NDArray
     ) -> tuple:
-        """Return where each ray's budget ends on the way to its next surface, `MISS` if beyond it, and the way's cost.
+        """Return where each ray's budget runs out before its next surface (`MISS` if it doesn't), and the cost.
 
-        The way lies inside a volume if the ray leaves one at its end.
+        The path is inside a volume if the ray exits one at the next surface.
         """
         shape, opacity = self.mesh.shape, self.opacity[triangle]
         cosine = (shape.normals[triangle] * directions).sum(axis=1)
@@ -169,11 +169,11 @@ class Hits:
     directions : (N, 3) float32
         Unit vectors of the rays, in the world.
     distance : (N,) float32
-        Length of each ray, metres; `MISS` where it meets nothing.
+        Length of each ray, metres; `MISS` if it hits nothing.
     triangle : (N,) int32
-        What it meets: a row in the tables of the `Instant`; -1 for nothing.
+        The triangle that it hits, a row in the tables of the `Instant`; -1 for none.
     position : (N, 3) float32
-        Where it ends, in the world, metres; 10 km away where it meets nothing.
+        End point in the world, metres; 10 km away if it hits nothing.
     """
 
     directions: NDArray[np.float32]
@@ -183,22 +183,22 @@ class Hits:
 
 
 def _column(name: str) -> cached_property:
-    """Return a table of an `Instant`: an attribute of its shapes, one below the other."""
+    """Return a property of `Instant` that concatenates one attribute of all its shapes."""
     return cached_property(lambda instant: np.concatenate([getattr(mesh.shape, name) for mesh in instant.meshes]))
 
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """The world at one instant: what stands still, what moves, and tables of the F triangles of both.
+    """The world at one instant: static, moving and porous objects, and tables of all their F triangles.
 
     Parameters
     ----------
     static : RayMesh
-        What stands still; its triangles come first in the tables.
+        Static objects; first in the tables.
     moving : RayMesh or None
-        What moves, where it is at this instant; None when nothing moves.
+        Moving objects at their positions of this instant; None when nothing moves.
     porous : PorousMesh or None
-        What lets a part of the rays through; its triangles come last in the tables.
+        Porous objects; last in the tables.
 
     Attributes
     ----------
@@ -218,25 +218,25 @@ class Instant:
 
     @cached_property
     def instance(self) -> NDArray[np.int32]:
-        """(F,) int32: the number of the object that each triangle belongs to; 0 for scenery."""
+        """(F,) int32: object number of each triangle; 0 for scenery."""
         return np.concatenate([mesh.instance for mesh in self.meshes])
 
     @property
     def meshes(self) -> list[RayMesh]:
-        """What there is, in the order of the tables."""
+        """All meshes, in the order of the tables."""
         return [mesh for mesh in (self.static, self.moving, self.porous and self.porous.mesh) if mesh]
 
     def cast(self, origin: NDArray, directions: NDArray, rng: np.random.Generator) -> Hits:
-        """Follow rays to what stops them first.
+        """Cast rays and return their first hits.
 
         Parameters
         ----------
         origin : (3,) or (N, 3) float
-            Where all rays start, or each of them, in the world, metres.
+            One start point for all rays, or one for each, in the world, metres.
         directions : (N, 3) float32
             Unit vectors, in the world.
         rng : numpy.random.Generator
-            Decides which rays pass what is porous; nothing is drawn where nothing is.
+            Decides which rays pass porous objects; unused when there are none.
         """
         origins = np.empty_like(directions)
         origins[:] = origin
@@ -255,7 +255,7 @@ class Instant:
         return Hits(directions, distance, triangle, position)
 
     def looked_up(self, name: str, triangle: NDArray[np.int32]) -> NDArray:
-        """Return rows of one of the tables, without making the whole of it.
+        """Return rows of one of the tables, without building the whole table.
 
         Parameters
         ----------
@@ -273,12 +273,12 @@ class Instant:
         return out
 
     def blocked(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
-        """Return which rays meet anything solid, (N,).
+        """Return which rays hit anything solid, (N,).
 
         Parameters
         ----------
         origins, directions : (N, 3) float32
-            Where the rays start in the world, metres, and unit vectors.
+            Start points in the world, metres, and unit vectors.
         """
         blocked = self.static.embree.run(origins, directions, query="OCCLUDED") >= 0
         if self.moving:
@@ -287,12 +287,12 @@ class Instant:
 
 
 def turned(rays: NDArray, rotation: NDArray) -> NDArray:
-    """Turn rays, with the same bits on any number of cores, which a call of BLAS doesn't promise.
+    """Rotate rays. The result is bitwise equal on any number of cores, which BLAS doesn't guarantee.
 
     Parameters
     ----------
     rays, rotation : (N, 3) float, (3, 3) or (N, 3, 3) float
-        Directions, and one rotation matrix or one for each ray.
+        Directions, and one rotation matrix for all rays or one for each.
     """
     x, y, z = rays.T[:, :, None]
     return x * rotation[..., 0] + y * rotation[..., 1] + z * rotation[..., 2]

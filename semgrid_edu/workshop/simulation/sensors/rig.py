@@ -1,4 +1,4 @@
-"""The recording car in KITTI's conventions: calibration, models of camera and LIDAR, packets of GPS and IMU."""
+"""The recording car in KITTI's conventions: calibration, camera and LIDAR models, GPS/IMU packets."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ KITTI_ELEVATIONS = (
     -11.65, -12.09, -12.51, -13.03, -13.54, -14.12, -14.56, -15.05, -15.41, -16.03, -16.56, -17.14, -17.63,
     -18.07, -18.45, -18.92, -19.46, -19.99, -20.52, -21.00, -21.40, -21.84, -22.47, -23.01, -23.48,
 )  # fmt: skip
-"""Those of KITTI's own scanner, degrees: for each laser the median over its returns in two scans of drive 0013."""
+"""Laser elevations of KITTI's scanner, degrees: per laser the median over its returns in two scans of drive 0013."""
 
 _CAMERA_AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 _KITTI_K = np.array([[721.5377, 0.0, 609.5593], [0.0, 721.5377, 172.8540], [0.0, 0.0, 1.0]])
@@ -35,21 +35,21 @@ class Lidar:
     Parameters
     ----------
     elevations : tuple of float
-        Elevation of each laser, degrees: those of the HDL-64E.
+        Elevation of each laser, degrees; by default the HDL-64E's.
     azimuth_min, azimuth_max, azimuth_step : float
-        Directions of a scan, degrees, positive to the left. The default covers the half-plane ahead in steps of 0.9
-        degrees, so that data sets stay small; the HDL-64E at 10 Hz has -180, 180 and 0.18.
+        Horizontal angles of a scan, degrees, positive to the left. The default covers the half-plane ahead in steps of
+        0.9 degrees, which keeps data sets small; the HDL-64E at 10 Hz has -180, 180 and 0.18.
     range_max : float
-        Longest range, metres. The HDL-64E sees dark surfaces up to 80 m and bright ones up to 120 m.
+        Maximum range, metres. The HDL-64E sees dark surfaces up to 80 m and bright ones up to 120 m.
     range_sigma : float
-        Standard deviation of a range, metres: 2 cm according to the manual.
+        Standard deviation of the range noise, metres: 2 cm according to the manual.
     drop : float
-        Share of returns that are lost whatever the surface, 0..1.
+        Share of returns that are lost on any surface, 0..1.
     weakest : float
-        How little light is seen: of a signal this strong 1 in e is lost. The signal is the reflectance, at 25 m and
-        straight on.
+        Sensitivity: at this signal strength, 1 return in e is lost. At 25 m and perpendicular incidence, the signal
+        equals the reflectance.
     turn : float
-        How long it takes to turn once, clockwise, seconds; 0 for a scan that is all of one instant.
+        Duration of one clockwise revolution, seconds; 0 for an instantaneous scan.
     """
 
     elevations: tuple[float, ...] = HDL64E_ELEVATIONS
@@ -64,12 +64,12 @@ class Lidar:
 
     @cached_property
     def azimuths(self) -> NDArray[np.float64]:
-        """(A,): the direction of each column of a scan, degrees, from left to right."""
+        """(A,): azimuth of each column of a scan, degrees, from left to right."""
         return np.arange(self.azimuth_max, self.azimuth_min, -self.azimuth_step)
 
     @cached_property
     def times(self) -> NDArray[np.float64]:
-        """(A,): when each column is measured, seconds after the instant at which the LIDAR looks ahead."""
+        """(A,): time of each column, seconds, 0 when the LIDAR points ahead."""
         return -self.azimuths / 360 * self.turn
 
     @cached_property
@@ -82,28 +82,28 @@ class Lidar:
 
 
 HDL64E = Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18)
-"""KITTI's scanner at 10 Hz: all around, with all its columns; all of it at one instant."""
+"""KITTI's scanner at 10 Hz: 360 degrees, full resolution, instantaneous."""
 HDL64E_AHEAD = Lidar(KITTI_ELEVATIONS, azimuth_step=0.18, weakest=0.015, turn=0.1)
-"""KITTI's scanner as the simulated data sets have it: the half-plane ahead, measured while the vehicle drives on."""
+"""KITTI's scanner in the simulated data sets: the half-plane ahead, scanned while the vehicle moves."""
 
 
 @dataclass(frozen=True)
 class Rig:
-    """The sensors of the recording car, and where they stand on it.
+    """The sensors of the recording car and their mounting positions.
 
     Parameters
     ----------
     image_size : (int, int)
-        Height and width of camera 2's image: half of KITTI's, (188, 621).
+        Height and width of camera 2's image; by default half of KITTI's, (188, 621).
     lidar : Lidar
         Directions and noise of the LIDAR.
     camera_noise : float
-        Standard deviation of the noise of a pixel at mid grey, in steps of 1/255.
+        Standard deviation of the pixel noise at mid grey, in steps of 1/255.
     bits : int
-        Bits that the camera resolves in each colour channel; 6 keep the PNG files small.
+        Bits per colour channel; 6 keep the PNG files small.
     packet_interval : float
-        Time between two packets of GPS and IMU, seconds, of which a scan takes the nearest one: 0.01 in KITTI, where a
-        pose is therefore up to 5 ms from its scan, at 11 m/s 5 cm. 0 for the pose of the scan itself.
+        Time between two GPS/IMU packets, seconds. A scan gets the pose of the nearest packet. KITTI's interval is 0.01,
+        so a pose is up to 5 ms off, which is 5 cm at 11 m/s. 0 gives the exact pose of the scan.
     """
 
     image_size: tuple[int, int] = (188, 621)
@@ -119,13 +119,13 @@ class Rig:
 
     @cached_property
     def T_camera0_from_lidar(self) -> NDArray[np.float64]:
-        """(4, 4): camera 0 stands 0.27 m ahead of the LIDAR and 0.08 m lower."""
+        """(4, 4): camera 0 is 0.27 m ahead of the LIDAR and 0.08 m lower."""
         tilt = Rotation.from_euler("xyz", [-0.25, 0.35, -0.5], degrees=True).as_matrix()
         return rigid_transform(tilt @ _CAMERA_AXES, np.array([-0.004, -0.076, -0.272]))
 
     @cached_property
     def T_lidar_from_imu(self) -> NDArray[np.float64]:
-        """(4, 4): the IMU stands 0.81 m behind the LIDAR, 0.32 m to its right and 0.8 m lower."""
+        """(4, 4): the IMU is 0.81 m behind the LIDAR, 0.32 m to its right and 0.8 m lower."""
         turn = Rotation.from_euler("xyz", [0.85, 0.12, 0.045], degrees=True).as_matrix()
         return rigid_transform(turn, np.array([-0.81, 0.32, -0.80]))
 
@@ -161,16 +161,16 @@ class Rig:
 
     @cached_property
     def T_grid_from_lidar(self) -> NDArray[np.float64]:
-        """(4, 4): up by the LIDAR's height."""
+        """(4, 4): a translation up by the LIDAR's height."""
         return invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT))
 
     def pixel_directions(self, du: float = 0.0, dv: float = 0.0) -> NDArray[np.float32]:
-        """Return the direction in which every pixel of camera 2 looks.
+        """Return the viewing direction of every pixel of camera 2.
 
         Parameters
         ----------
         du, dv : float
-            Shift to the right and down from the pixels' centres, pixels.
+            Offset to the right and down from the pixel centres, pixels.
 
         Returns
         -------
@@ -187,29 +187,29 @@ class Rig:
 KITTI_AHEAD = Rig(lidar=HDL64E_AHEAD)
 """The sensors of the simulated data sets."""
 SAMPLE_RIG = Rig(lidar=replace(HDL64E_AHEAD, azimuth_step=0.45))
-"""Those of the shipped drive: fewer columns, so that it stays small."""
+"""The sensors of the shipped drive: fewer LIDAR columns, to keep it small."""
 
 
 GRAVITY = 9.81
-"""What an accelerometer at rest reads upwards, m/s^2."""
+"""Upward reading of an accelerometer at rest, m/s^2."""
 _STEP = 1e-3
-"""Seconds between the poses of which velocities and accelerations are central differences."""
+"""Time step of the central differences for velocity and acceleration, seconds."""
 DATAFORMAT = Path(__file__).with_name("dataformat.txt").read_text(encoding="utf-8")
-"""The legend that KITTI puts beside the packets."""
+"""KITTI's description of the packet format."""
 _FLAGS = (0.05, 0.02, 4, 9, 4, 4, 6)
-"""Accuracies and modes, the last numbers of each packet: those of a receiver with a good fix."""
+"""The last numbers of each packet: accuracies and modes of a receiver with a good fix."""
 
 
 @dataclass(frozen=True)
 class Geodesy:
-    """Where on Earth a drive starts, and in which direction its world points.
+    """Geographic start and orientation of a drive.
 
     Parameters
     ----------
     latitude, longitude : float
-        Place of the IMU at the first packet, degrees.
+        Position of the IMU at the first packet, degrees.
     altitude : float
-        Its height above sea level, metres.
+        Height of the IMU above sea level, metres.
     heading : float
         Direction of the world's x axis, rad from east, counter-clockwise.
     """
@@ -221,12 +221,12 @@ class Geodesy:
 
     @classmethod
     def random(cls, rng: np.random.Generator) -> "Geodesy":
-        """Draw a place near Karlsruhe, where KITTI was recorded, and a direction.
+        """Draw a position near Karlsruhe, where KITTI was recorded, and a heading.
 
         Parameters
         ----------
         rng : numpy.random.Generator
-            Decides them.
+            Source of randomness.
         """
         north, east = float(rng.uniform(0, 0.05)), float(rng.uniform(0, 0.05))
         return cls(49.0 + north, 8.4 + east, 114.0, float(rng.uniform(-3.1, 3.1)))
@@ -237,12 +237,12 @@ class Geodesy:
         return Rotation.from_euler("z", self.heading).as_matrix()
 
     def degrees(self, offset: NDArray) -> tuple[float, float]:
-        """Return where on Earth a point is: the inverse of the Mercator projection near the first packet.
+        """Return latitude and longitude of a point: the inverse Mercator projection around the first packet.
 
         Parameters
         ----------
         offset : (3,) float
-            How far the point lies east, north and up of the first packet, metres.
+            Offset of the point from the first packet: east, north and up, metres.
 
         Returns
         -------
@@ -256,16 +256,16 @@ class Geodesy:
 
 
 def oxts_packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) -> str:
-    """Return the thirty numbers of an oxts packet, which `DATAFORMAT` names.
+    """Return the thirty numbers of an oxts packet; `DATAFORMAT` describes them.
 
     Parameters
     ----------
     pose : callable
-        Function of the time in seconds that returns T_world_from_imu, (4, 4), metres.
+        t in seconds -> T_world_from_imu, (4, 4), metres.
     t : float
         Time of the packet, seconds since the drive began.
     geodesy : Geodesy
-        Where on Earth the drive begins.
+        Geographic start of the drive.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Shading: the light that comes from what a ray hits, by material, sun, sky, gloss and haze, in one numba kernel."""
+"""Shading: the radiance of each hit from material, sun, sky, gloss and haze, in one numba kernel."""
 
 import numpy as np
 from numba import njit
@@ -13,7 +13,7 @@ from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 
 @njit(cache=True, fastmath=True)
 def _asphalt(tile, road, s, d, blur, out):
-    """Write the albedo of the carriageway; return whether it is a lane mark."""
+    """Write the albedo of the carriageway; return whether the point is on a lane mark."""
     fade = 1.0 / (1.0 + 6.0 * blur)
     fine = (texture(tile, 40.0 * s, 40.0 * d) - 0.5) * fade
     broad = texture(tile, 1.7 * s + 91.0, 3.0 * d) - 0.5
@@ -84,7 +84,7 @@ def _ground(tile, road, x, y, blur, out):
 
 @njit(cache=True, fastmath=True)
 def _surface(tile, material, p, n, blur, out):
-    """Change the albedo `out` by the texture of the material."""
+    """Apply the texture of the material to the albedo `out`."""
     u = -n[1] * p[0] + n[0] * p[1]
     v = p[2]
     if abs(n[2]) > 0.9:
@@ -115,7 +115,7 @@ def _surface(tile, material, p, n, blur, out):
 
 @njit(cache=True, fastmath=True)
 def _mirror(tile, ray, n, light, gloss, strength, out):
-    """Add what a glossy surface reflects: the sky above the horizon, a dark street below it, the sun's highlight."""
+    """Add the reflections of a glossy surface: sky above the horizon, dark street below it, and sun highlight."""
     sun, sun_colour, _, horizon, _, _, _ = light
     cos = -(ray[0] * n[0] + ray[1] * n[1] + ray[2] * n[2])
     rx, ry, rz = ray[0] + 2 * cos * n[0], ray[1] + 2 * cos * n[1], ray[2] + 2 * cos * n[2]
@@ -140,7 +140,7 @@ def _shade(
     sun, sun_colour, zenith, horizon, _, haze, _ = light
     n = np.empty(3, np.float32)
     albedo = np.empty(3, np.float32)
-    # numba compiles the loop: every material has its own branch, so that an array for each would cost more
+    # a compiled loop, because every material has its own branch, and one array per material would cost more
     for i in range(len(t)):
         ray = rays[i]
         out = radiance[i]
@@ -186,22 +186,22 @@ def _shade(
 def shade(
     hits: Hits, instant: Instant, road: Road, light: Light, sunlit: NDArray, open_sky: NDArray, pixel: float
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """Return what light comes from every hit, and of which kind it is.
+    """Return the radiance and the kind of every hit.
 
     Parameters
     ----------
     hits : Hits
-        Where N rays ended.
+        End points of N rays.
     instant : Instant
-        The world that they were sent into.
+        The world that the rays were cast into.
     road : Road
         The street, for the texture of the ground.
     light : Light
         Sun, sky and haze.
     sunlit, open_sky : (N,) float32
-        How much of the sun and of the sky each hit sees, 0..1.
+        Visibility of the sun and of the sky at each hit, 0..1.
     pixel : float
-        Angle between neighbouring rays, rad: textures finer than it are faded out.
+        Angle between neighbouring rays, rad. Finer textures are faded out.
 
     Returns
     -------

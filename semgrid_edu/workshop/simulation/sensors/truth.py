@@ -1,4 +1,4 @@
-"""What is true from above: the class of every 0.1 m cell, and whether the camera sees what stands in it."""
+"""Bird's-eye ground truth: the kind of every 0.1 m cell, and whether the camera sees it."""
 
 from dataclasses import dataclass
 
@@ -16,24 +16,24 @@ from semgrid_edu.workshop.simulation.street.layout import Road, to_road
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 _SEEN_PIXELS = 12
-"""Pixels of an object that must show for the camera to see all of its footprint."""
+"""If the image shows at least this many pixels of an object, its whole footprint counts as seen."""
 _SOLID_DEPTH = 0.35
-"""Metres of facade or foliage behind its visible surface that count as seen."""
+"""Facades and foliage count as seen to this depth behind their visible surface, metres."""
 
 _LOOKS_LIKE = np.arange(256, dtype=np.uint8)
-"""The kind that each kind is compared as: lane marks as road, signs as the poles that they hang on."""
+"""Kinds merged for the comparison: lane marks count as road, signs as poles."""
 _LOOKS_LIKE[Kind.LANE] = Kind.ROAD
 _LOOKS_LIKE[Kind.SIGN] = Kind.POLE
 
 
 @dataclass(frozen=True, eq=False)
 class BirdseyeTruth:
-    """What is true of a frame, seen from above, over `LABEL_GRID`.
+    """Bird's-eye ground truth of a frame over `LABEL_GRID`.
 
     Parameters
     ----------
     kinds : (710, 310) uint8
-        What each cell holds, a `Kind`.
+        The `Kind` of each cell.
     visible : (710, 310) bool
         Whether the camera sees it.
     """
@@ -43,14 +43,14 @@ class BirdseyeTruth:
 
 
 def world_cells(T_world_from_lidar: NDArray, rig: Rig) -> NDArray[np.float64]:
-    """Return where in the world the centres of the cells of `LABEL_GRID` are, (710, 310, 2), metres.
+    """Return the cell centres of `LABEL_GRID` in the world, (710, 310, 2), metres.
 
     Parameters
     ----------
     T_world_from_lidar : (4, 4) float
         Pose of the LIDAR, metres.
     rig : Rig
-        Where the grid lies below the LIDAR.
+        Gives the height of the LIDAR above the grid.
     """
     T = T_world_from_lidar @ np.linalg.inv(rig.T_grid_from_lidar)
     on_plane = np.concatenate([LABEL_GRID.centers(), np.zeros((*LABEL_GRID.shape, 1))], axis=-1)
@@ -58,7 +58,7 @@ def world_cells(T_world_from_lidar: NDArray, rig: Rig) -> NDArray[np.float64]:
 
 
 def birdseye_kinds(cells: NDArray, footprints: NDArray, road: Road) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-    """Return what every cell holds between the ground and 2.5 m above it, or else the ground's kind.
+    """Return the kind of the object between the ground and 2.5 m in every cell, or else the kind of the ground.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def birdseye_kinds(cells: NDArray, footprints: NDArray, road: Road) -> tuple[NDA
 
 @njit(cache=True)
 def _pixel(T, K, x, y, z):
-    """Return u, v and depth of a point of the world, and its X and Y in the camera frame; depth 0 behind the camera."""
+    """Return u, v and depth of a world point, and X and Y in the camera frame; depth is 0 behind the camera."""
     X = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]
     Y = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]
     Z = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
@@ -111,10 +111,10 @@ def _agrees(u, v, z, tolerance, reach, kind, kinds, depth):
 def _visible(cells, kinds, which, footprints, road, T, K, pixel_kinds, depth, seen, solid, out):
     """Write whether the camera sees each cell.
 
-    A pixel has one depth for the whole patch of surface that it shows. So the tolerance grows with the patch.
+    A pixel has one depth for the whole surface patch that it shows, so the tolerance grows with the patch.
     """
     f = K[0, 0]
-    # numba compiles the loop: most cells are decided by one pixel, so the search ends early
+    # a compiled loop, because one pixel decides most cells, so the search ends early
     for r in range(cells.shape[0]):
         for c in range(cells.shape[1]):
             x, y = cells[r, c]
@@ -142,18 +142,18 @@ def visible_cells(
     cells: NDArray, kinds: NDArray, which: NDArray, footprints: NDArray, road: Road,
     picture: Picture, T_world_from_lidar: NDArray, camera: Camera,
 ) -> NDArray[np.bool_]:  # fmt: skip
-    """Return whether the camera sees what every cell holds.
+    """Return whether the camera sees the content of each cell.
 
-    A point of the cell (on the ground, or at eight heights of what stands there) must project into the image where the
-    picture shows the same kind at the same depth. An object with a number (car, pedestrian, bicycle) is seen whole when
-    12 pixels of it are; of a house or a hedge the camera sees the 0.35 m behind its surface.
+    A cell is seen if one of its points projects to a pixel with the same kind at the same depth. Bare ground has one
+    such point, an object has eight at different heights. A numbered object (car, pedestrian, bicycle) counts as seen
+    completely when the image shows 12 of its pixels. A house or hedge counts as seen to 0.35 m behind its surface.
 
     Parameters
     ----------
     cells : (H, W, 2) float
         Cell centres in the world, metres.
     kinds : (H, W) uint8
-        What each cell holds, from `birdseye_kinds`.
+        Kind of each cell, from `birdseye_kinds`.
     which : (H, W) int32
         Row of the footprint in each cell, -1 for none, from `birdseye_kinds`.
     footprints : (K, 9) float
@@ -161,7 +161,7 @@ def visible_cells(
     road : Road
         The street, for the height of the ground.
     picture : Picture
-        What the camera took.
+        The picture that the camera took.
     T_world_from_lidar : (4, 4) float
         Pose of the LIDAR at that instant, metres.
     camera : Camera

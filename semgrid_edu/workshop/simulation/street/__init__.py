@@ -1,1 +1,1 @@
-"""The street: its ground, its plan, its scenery, and the road users that move along it."""
+"""The street: ground, plan, scenery and road users."""

@@ -1,7 +1,7 @@
-"""What runs along a side of the road and stands at its kerb, drawn once for the whole side.
+"""Borders and street furniture along one side of the road.
 
-Borders that a LIDAR finds hard: wire mesh, porous hedges, panes of glass, posts, and walls across behind gaps. And
-street lamps, traffic signs, and the lights or priority signs of a junction.
+Borders that are hard for a LIDAR: wire mesh, porous hedges, glass panes, posts, and walls behind gaps. Also street
+lamps, traffic signs, and the lights or priority signs of a junction.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,18 +15,18 @@ from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, box, tube
 
 _SIGNS = {"limit": 0.3, "no-entry": 0.2, "parking": 0.25, "warning": 0.15, "direction": 0.1}
-"""How often each sign stands along a road."""
+"""Relative frequency of each sign."""
 _THIN_HALF = 0.08
 _PLASTER, _PLANK = (0.62, 0.6, 0.56), (0.26, 0.16, 0.09)
 
 
 def stand_lamps(builder: Builder, sign: int) -> None:
-    """Put a row of street lamps at the kerb; one side in four, drawn by chance, has none.
+    """Put a row of street lamps at the kerb; one side in four, at random, has none.
 
     Parameters
     ----------
     builder : Builder
-        The world that takes them.
+        Receives the lamps.
     sign : int
         1 for the left side, -1 for the right one.
     """
@@ -42,7 +42,7 @@ def stand_lamps(builder: Builder, sign: int) -> None:
 
 
 def stand_signs(builder: Builder, sign: int) -> None:
-    """Put traffic signs at the kerb, facing the traffic on their side. Parameters are those of `stand_lamps`."""
+    """Put traffic signs at the kerb, facing the traffic on that side. Parameters are those of `stand_lamps`."""
     rng = builder.rng
     extent = builder.plan.extent
     d = sign * (builder.road.side(sign).edge + 0.75)
@@ -54,12 +54,12 @@ def stand_signs(builder: Builder, sign: int) -> None:
 
 
 def stand_signals(builder: Builder) -> None:
-    """Put traffic lights, or signs of priority, at the corners of the junction if there is one.
+    """Put traffic lights or priority signs at the corners of the junction, if there is one.
 
     Parameters
     ----------
     builder : Builder
-        The world that takes them.
+        Receives them.
     """
     road = builder.road
     rng = builder.rng
@@ -78,11 +78,11 @@ def stand_signals(builder: Builder) -> None:
 
 
 Piece = tuple[float, float, float, float]
-"""Where a piece of a border begins (s, d), its direction in the frame of the road, rad, and its length, metres."""
+"""A piece of a border: start (s, d), direction relative to the road, rad, and length, metres."""
 
 
 def _pieces(s0: float, s1: float, d: float, jog: float, step: float, rng: np.random.Generator) -> Iterator[Piece]:
-    """Cut a line along the road into pieces of about `step`; every 12 to 30 m it steps aside, up to `jog` away."""
+    """Split a line along the road into pieces of about `step`; every 12 to 30 m it shifts sideways by up to `jog`."""
     s = s0
     at = d
     while s < s1:
@@ -99,14 +99,14 @@ def _pieces(s0: float, s1: float, d: float, jog: float, step: float, rng: np.ran
 
 
 def _fit(builder: Builder, piece: Piece, kind: Kind, half: float, top: float) -> Footprint | None:
-    """Return the footprint of a piece of a border, or None where it can't stand."""
+    """Return the footprint of a piece of a border, or None if there is no room for it."""
     *place, length = piece
     foot = builder.footprint(*place, kind, (length / 2, half), offset=(length / 2, 0.0), top=top)
     return foot if builder.off_asphalt(foot) and builder.free(foot, -0.1) else None
 
 
 def _stand(builder: Builder, piece: Piece, kind: Kind, half: float, top: float, porous: Shape, opacity: float) -> bool:
-    """Put a porous piece of a border into the world, unless its place is taken."""
+    """Add a porous piece of a border, unless its place is taken."""
     if foot := _fit(builder, piece, kind, half, top):
         builder.footprints.append(foot)
         builder.add_porous(porous, opacity, *piece[:3])
@@ -114,26 +114,26 @@ def _stand(builder: Builder, piece: Piece, kind: Kind, half: float, top: float, 
 
 
 def _stand_fence(builder: Builder, piece: Piece, style: str, opacity: float) -> None:
-    """Put a piece of wire mesh or a pane into the world, in its frame, unless its place is taken."""
+    """Add a piece of wire mesh or a pane with its frame, unless its place is taken."""
     frame, sheet = roadside.sheet_fence(style, piece[3])
     if _stand(builder, piece, Kind.FENCE, _THIN_HALF, roadside.SHEETS[style].height, sheet, opacity):
         builder.add(frame, *piece[:3])
 
 
 def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Run a fence of wire mesh: posts, a rail and a sheet of wire.
+    """Build a wire-mesh fence: posts, a rail and a sheet of wire.
 
-    KITTI's drive 0013 passes such a fence: its posts are 2.5 m apart, and 7 % of the beams return from it at 8 m at a
-    right angle, 60 % at 25 m at a grazing one, which is an opacity of 0.01 to 0.02 /m.
+    KITTI's drive 0013 passes such a fence. Its posts are 2.5 m apart. It returns 7 % of the beams at 8 m and
+    perpendicular incidence, and 60 % at 25 m and grazing incidence. That is an opacity of 0.01 to 0.02 /m.
 
     Parameters
     ----------
     builder : Builder
-        The world that takes it.
+        Receives the fence.
     s0, s1 : float
-        Where along the road it begins and ends, metres.
+        Start and end along the road, metres.
     d : float
-        Where across the road it stands: distance to the left of the centre line, metres.
+        Distance to the left of the centre line, metres.
     """
     rng = builder.rng
     opacity = rng.uniform(0.008, 0.02)
@@ -143,9 +143,9 @@ def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Run a hedge whose twigs let beams in, so that it returns from its depth. Parameters are those of `wire_mesh`.
+    """Build a hedge that beams enter, so that returns come from inside it. Parameters are those of `wire_mesh`.
 
-    The hedges beside KITTI's drive 0013 return from 0.2 m inside on average, which is an opacity of 5 /m.
+    The hedges along KITTI's drive 0013 return beams from 0.2 m inside on average. That is an opacity of 5 /m.
     """
     rng = builder.rng
     opacity = rng.uniform(2.0, 6.0)
@@ -160,7 +160,7 @@ def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def mesh_and_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Run wire mesh with hedges behind it, along it or in rows across. Parameters are those of `wire_mesh`."""
+    """Build wire mesh with hedges behind it, parallel to it or in rows across. Parameters are those of `wire_mesh`."""
     rng = builder.rng
     sign = np.sign(d)
     wire_mesh(builder, s0, s1, d)
@@ -173,7 +173,7 @@ def mesh_and_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Plant hedges across the road's direction, one behind the other, from `d` outwards."""
+    """Plant hedges perpendicular to the road, one after the other, from `d` outwards."""
     rng = builder.rng
     opacity = rng.uniform(3.0, 6.0)
     height = rng.uniform(1.3, 1.9)
@@ -185,7 +185,7 @@ def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Run panes of glass between thin posts, as a bus shelter has. Parameters are those of `wire_mesh`."""
+    """Build glass panes between thin posts, like a bus shelter. Parameters are those of `wire_mesh`."""
     rng = builder.rng
     opacity = rng.uniform(0.05, 0.15)
     step = rng.uniform(1.3, 2.2)
@@ -195,7 +195,7 @@ def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Stand bare posts in a regular row. Parameters are those of `wire_mesh`."""
+    """Build a regular row of bare posts. Parameters are those of `wire_mesh`."""
     rng = builder.rng
     step = rng.uniform(1.4, 2.6)
     height = rng.uniform(1.0, 1.8)
@@ -206,9 +206,9 @@ def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def walls_behind_gaps(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Run a high wall with gaps, and stand walls across behind them. Parameters are those of `wire_mesh`.
+    """Build a high wall with gaps, and cross walls behind the gaps. Parameters are those of `wire_mesh`.
 
-    As the recording car passes, the walls across come into view from behind the edges of the gaps.
+    As the recording car passes, the cross walls appear from behind the edges of the gaps.
     """
     rng = builder.rng
     sign = np.sign(d)
@@ -225,7 +225,7 @@ def walls_behind_gaps(builder: Builder, s0: float, s1: float, d: float) -> None:
 
 
 def _wall(builder: Builder, piece: Piece, height: float, colour: tuple, material: Material, kind: Kind) -> None:
-    """Put a wall, 0.25 m thick, into the world."""
+    """Add a wall, 0.25 m thick."""
     *place, length = piece
     if foot := _fit(builder, piece, kind, 0.13, height):
         body = box((length / 2, 0, height / 2 - 0.3), (length, 0.25, height + 0.6), colour, material, kind)
@@ -233,9 +233,9 @@ def _wall(builder: Builder, piece: Piece, height: float, colour: tuple, material
 
 
 def stand_pillars(builder: Builder, s0: float, s1: float, d: float) -> None:
-    """Stand thick pillars in front of a border, such as overgrown trunks. Parameters are those of `wire_mesh`.
+    """Put thick pillars, such as overgrown trunks, in front of a border. Parameters are those of `wire_mesh`.
 
-    As the recording car passes, the edge of a pillar's shadow runs along the border behind it.
+    As the recording car passes, the edge of a pillar's shadow sweeps along the border behind it.
     """
     rng = builder.rng
     s = s0
@@ -255,4 +255,4 @@ YARD_BORDERS: dict[str, Callable[[Builder, float, float, float], None]] = {
     "posts": post_row,
     "gaps": walls_behind_gaps,
 }
-"""What may run along a yard: functions of the world, where to begin and to end, and the distance from the middle."""
+"""The borders of a yard, by name: functions of builder, start, end, and distance from the centre line."""

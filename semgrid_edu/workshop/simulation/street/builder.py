@@ -1,4 +1,4 @@
-"""The builder of a world: puts things beside the road, one by one, and refuses places that are taken."""
+"""The builder of a world: adds objects beside the road one by one, and rejects places that are taken."""
 
 import numpy as np
 
@@ -10,31 +10,31 @@ from semgrid_edu.workshop.simulation.things.materials import Kind
 from semgrid_edu.workshop.simulation.things.shapes import Shape
 
 OVERHEAD = 2.5
-"""Height above the ground, metres. Higher things don't occupy their cell, because the recording car passes below."""
+"""Height above the ground, metres. Anything higher doesn't occupy a cell, because the car can drive under it."""
 THIN = 0.072
-"""Smallest half-width of a footprint, metres: enough to cover the centre of a 0.1 m cell, however it is turned."""
+"""Minimum half-width of a footprint, metres: at any rotation it covers the centre of a 0.1 m cell."""
 
 
 class Builder:
-    """A world in the making.
+    """A world under construction.
 
     Parameters
     ----------
     plan : Plan
-        What the street is to be like.
+        The plan of the street.
     rng : numpy.random.Generator
-        Source of all that is drawn while the world is built.
+        Source of randomness.
 
     Attributes
     ----------
     solid : list of (Shape, int)
-        All that stands in the world so far, in its frame, with the number of its object; 0 for scenery.
+        The solid objects so far, in world coordinates, each with its object number; 0 for scenery.
     porous : list of (Shape, float)
-        What lets a part of the light through, with its opacity, as `PorousMesh` takes it.
+        The porous objects, each with its opacity as in `PorousMesh`.
     footprints : list of Footprint
-        The ground that is taken.
+        The occupied ground.
     next_instance : int
-        The number that the next object gets.
+        Number of the next object.
     """
 
     def __init__(self, plan: Plan, rng: np.random.Generator) -> None:
@@ -47,14 +47,14 @@ class Builder:
         self.next_instance = 1
 
     def place(self, s: float, d: float, yaw: float = 0.0) -> tuple[np.ndarray, float]:
-        """Return where in the world something stands: its point on the ground, (3,), metres, and its direction, rad.
+        """Return an object's pose in the world: its point on the ground, (3,), metres, and its direction, rad.
 
         Parameters
         ----------
         s, d : float
             Distance along the road and to the left of its centre line, metres.
         yaw : float
-            Direction of the thing, rad from that of the road, counter-clockwise.
+            Direction of the object relative to the road, rad, counter-clockwise.
         """
         position, heading = on_ground(self.road, s, d)
         return position, heading + yaw
@@ -68,15 +68,15 @@ class Builder:
         Parameters
         ----------
         kind : Kind
-            What it is.
+            Kind of the object.
         half : (float, float)
-            Half its length and half its width, metres; `THIN` at least.
+            Half the length and half the width, metres; at least `THIN`.
         exponent : float
-            Shape of its outline: `ROUND`, `ROUNDED` or `SQUARE`.
+            Shape of the outline: `ROUND`, `ROUNDED` or `SQUARE`.
         offset : (float, float)
-            Where its centre lies from its origin: ahead and to the left, metres.
+            Offset of the centre from the origin: ahead and to the left, metres.
         top : float
-            Its height, metres.
+            Height of the object, metres.
         """
         position, angle = self.place(s, d, yaw)
         c, n = np.cos(angle), np.sin(angle)
@@ -93,12 +93,12 @@ class Builder:
         footprint : Footprint
             The place.
         margin : float
-            Distance that everything else must keep from it, metres; a negative one allows some overlap.
+            Minimum distance to everything else, metres; a negative one allows some overlap.
         """
         return not collides(footprint, self.footprints, margin)
 
     def off_asphalt(self, footprint: Footprint) -> bool:
-        """Return whether all of a place lies more than 0.1 m outside the asphalt.
+        """Return whether the whole footprint is more than 0.1 m off the asphalt.
 
         Parameters
         ----------
@@ -110,69 +110,69 @@ class Builder:
     def spot(
         self, s: float, d: float, kind: Kind, radius: float, clear: float, yaw: float = 0.0, top: float = OVERHEAD
     ) -> Footprint | None:
-        """Return a round footprint, or None where its place is taken or too near the asphalt.
+        """Return a round footprint, or None if its place is taken or too close to the asphalt.
 
         Parameters not named here are those of `Builder.footprint` and `Builder.place`.
 
         Parameters
         ----------
         s, d : float
-            Its middle: distance along the road and to the left of its centre line, metres.
+            Its centre: distance along the road and to the left of the centre line, metres.
         yaw : float
-            Direction of the thing, rad from that of the road.
+            Direction of the object relative to the road, rad.
         radius : float
             Its radius, metres.
         clear : float
-            How far its middle must lie from the asphalt, metres.
+            Minimum distance of its centre from the asphalt, metres.
         """
         foot = self.footprint(s, d, yaw, kind, (radius, radius), ROUND, top=top)
         return foot if outside_asphalt(self.road, s, d) > clear and self.free(foot) else None
 
     def add(self, shape: Shape, s: float, d: float, yaw: float, foot: Footprint | None = None, scale=1.0) -> None:
-        """Put a piece of scenery into the world. Parameters not named here are those of `Builder.place`.
+        """Add a piece of scenery. Parameters not named here are those of `Builder.place`.
 
         Parameters
         ----------
         shape : Shape
-            What it looks like, in its own frame.
+            Its shape in local coordinates.
         foot : Footprint, optional
-            The ground that it takes.
+            The ground that it occupies.
         scale : float
-            Factor for its size.
+            Scale factor.
         """
         self.solid.append((shape.placed(*self.place(s, d, yaw), scale), 0))
         if foot:
             self.footprints.append(foot)
 
     def add_porous(self, shape: Shape, opacity: float, s: float, d: float, yaw: float) -> None:
-        """Put something into the world that lets a part of the light through.
+        """Add a porous object.
 
         Parameters not named here are those of `Builder.place`.
 
         Parameters
         ----------
         shape : Shape
-            What it looks like, in its own frame, of `Material.WIRE`, `Material.PANE` or `Material.TWIGS`.
+            Its shape in local coordinates, made of `Material.WIRE`, `Material.PANE` or `Material.TWIGS`.
         opacity : float
-            As `PorousMesh` takes it.
+            As in `PorousMesh`.
         """
         self.porous.append((shape.placed(*self.place(s, d, yaw)), opacity))
 
     def try_post(self, shape: Shape, s: float, d: float, yaw: float, kind: Kind, radius: float, scale=1.0) -> None:
-        """Put something on a round foot, unless the place is asphalt or taken.
+        """Add an object with a round foot, unless the place is on asphalt or taken.
 
         Parameters not named here are those of `Builder.add` and `Builder.place`.
 
         Parameters
         ----------
         s, d : float
-            Where its foot goes: distance along the road and to the left of its centre line, metres.
+            Position of the foot: distance along the road and to the left of the centre line, metres.
         yaw : float
-            Its direction, rad from that of the road.
+            Direction relative to the road, rad.
         kind : Kind
-            What it is.
+            Kind of the object.
         radius : float
-            Radius of its foot, metres.
+            Radius of the foot, metres.
         """
         if foot := self.spot(s, d, kind, radius, radius + 0.15, yaw):
             self.add(shape, s, d, yaw, foot, scale)

@@ -1,4 +1,4 @@
-"""Footprints: which ground each thing covers, seen from above, as outlines and as cells of a grid."""
+"""Footprints: the ground that each object covers, as outlines and as grid cells."""
 
 from typing import NamedTuple
 
@@ -7,26 +7,26 @@ from numba import njit
 from numpy.typing import NDArray
 
 ROUND, ROUNDED, SQUARE = 2.0, 6.0, 200.0
-"""Exponents of outlines: an ellipse, a car's plan, a rectangle."""
+"""Exponents of outlines: an ellipse, a car seen from above, a rectangle."""
 
 
 class Footprint(NamedTuple):
-    """The superellipse |x/a|^p + |y/b|^p <= 1 that something covers below 2.5 m.
+    """The superellipse |x/a|^p + |y/b|^p <= 1 that an object covers below 2.5 m.
 
     Parameters
     ----------
     x, y : float
         Its centre in the world, metres.
     half_length, half_width : float
-        Half its sides, a and b, metres.
+        Half the side lengths, a and b, metres.
     yaw : float
-        Direction of its length in the world, rad from the x axis, counter-clockwise.
+        Direction of the long side in the world, rad from the x axis, counter-clockwise.
     exponent : float
-        Shape of its outline, p: `ROUND`, `ROUNDED` or `SQUARE`.
+        Shape of the outline, p: `ROUND`, `ROUNDED` or `SQUARE`.
     kind : int
-        What covers the ground, a `Kind`.
+        `Kind` of the object.
     instance : int
-        Number of the car, pedestrian or bicycle; 0 for all else.
+        Number of the car, pedestrian or bicycle; 0 for anything else.
     top : float
         Height above the ground, metres, at most 2.5.
     """
@@ -44,7 +44,7 @@ class Footprint(NamedTuple):
 
 @njit(cache=True)
 def _inside(f, x, y):
-    """Return whether the point (x, y) lies in the footprint f, a row of numbers."""
+    """Return whether the point (x, y) is inside the footprint f, a row of numbers."""
     c, s = np.cos(f[4]), np.sin(f[4])
     u = abs(c * (x - f[0]) + s * (y - f[1])) / f[2]
     v = abs(c * (y - f[1]) - s * (x - f[0])) / f[3]
@@ -62,18 +62,18 @@ def stamp(footprints: NDArray, xy: NDArray, cell: float, which: NDArray) -> None
     footprints : (K, 9) float
         From `footprint_table`. Where several overlap, the last one wins.
     xy : (H, W, 2) float
-        Cell centres in the world, metres, of a regular grid that may be turned and shifted. The x axis of the grid runs
+        Cell centres in the world, metres, of a regular grid that may be rotated and shifted. The grid's x axis points
         from high rows to low ones, its y axis from high columns to low ones.
     cell : float
         Side of a cell, metres.
     which : (H, W) int32
-        Written in place: row of the footprint that covers the cell; unchanged where none does.
+        Written in place: row of the footprint that covers the cell; unchanged if none does.
     """
     height, width = which.shape
     ex = (xy[0, 0] - xy[1, 0]) / cell
     ey = (xy[0, 0] - xy[0, 1]) / cell
     origin = xy[0, 0]
-    # numba compiles the loop: each footprint looks at the few cells around it, not at the whole grid
+    # a compiled loop, because each footprint visits only the few cells around it, not the whole grid
     for k in range(len(footprints)):
         f = footprints[k]
         dx, dy = f[0] - origin[0], f[1] - origin[1]
@@ -92,7 +92,7 @@ def footprint_table(footprints: NDArray | list[Footprint]) -> NDArray[np.float64
     Parameters
     ----------
     footprints : list of Footprint or (K, 9) float
-        K of them, or none.
+        K footprints, or none.
     """
     return np.asarray(footprints, dtype=np.float64).reshape(-1, len(Footprint._fields))
 
@@ -103,14 +103,14 @@ def outline(footprint: Footprint, margin: float = 0.0) -> NDArray[np.float64]:
     Parameters
     ----------
     footprint : Footprint
-        What covers the ground.
+        The footprint.
     margin : float
-        By how much it is widened on every side, metres.
+        Widens the footprint on every side, metres.
 
     Returns
     -------
     (25, 2) float64
-        24 points of the outline and, last, the centre: x and y in the world, metres.
+        24 points of the outline, then the centre: x and y in the world, metres.
     """
     f = footprint
     angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
@@ -127,11 +127,11 @@ def collides(footprint: Footprint, others: NDArray | list[Footprint], margin: fl
     Parameters
     ----------
     footprint : Footprint
-        What covers the ground.
+        The footprint to check.
     others : (K, 9) float or list of Footprint
-        K footprints, or none.
+        K other footprints, or none.
     margin : float
-        By how much `footprint` is widened on every side, metres.
+        Widens `footprint` on every side, metres.
     """
     f = footprint
     others = footprint_table(others)
@@ -144,7 +144,7 @@ def collides(footprint: Footprint, others: NDArray | list[Footprint], margin: fl
 
 @njit(cache=True)
 def _any_inside(f, points):
-    """Return whether any of the points lies in the footprint."""
+    """Return whether any of the points is inside the footprint."""
     for i in range(len(points)):  # noqa: SIM110 (numba compiles no generator)
         if _inside(f, points[i, 0], points[i, 1]):
             return True

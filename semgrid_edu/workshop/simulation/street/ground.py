@@ -1,4 +1,4 @@
-"""The ground beside and on a road: what it is, how high it is, where lane marks are painted, and its mesh."""
+"""The ground on and beside a road: its kind, its height, lane marks, and its mesh."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape, shape
 
 KERB_HEIGHT = 0.12
-"""The usual step from carriageway to sidewalk in a town, metres."""
+"""The usual height of a kerb in a town, metres."""
 KERB_WIDTH = 0.18
 """Width of the kerb stone, metres."""
 
@@ -30,9 +30,9 @@ def ground_kind(road: Road, s: float, d: float) -> int:
 
 @njit(cache=True)
 def road_height(road: Road, s: float, d: float) -> float:
-    """Return how high the carriageway lies at a place, or its edge if the place is outside, metres in the world.
+    """Return the height of the carriageway at a place, or of its edge if the place is outside, metres in the world.
 
-    Along the road the height is 0 at s = 0, and its slope is the grade; across it the height falls from the crown.
+    Along the road the height starts at 0 and follows the grade; across the road it falls from the crown.
     Parameters are those of `to_world`.
     """
     length = road.crest_end - road.crest_start
@@ -45,9 +45,9 @@ def road_height(road: Road, s: float, d: float) -> float:
 
 @njit(cache=True)
 def ground_height(road: Road, s: float, d: float) -> float:
-    """Return how high the ground lies at a place, metres in the world. Parameters are those of `to_world`.
+    """Return the height of the ground at a place, metres in the world. Parameters are those of `to_world`.
 
-    All that stands, drives or walks takes its height from here, and so do the mesh and the truth.
+    All objects and road users use this height, and so do the mesh and the ground truth.
     """
     e = outside_asphalt(road, s, d)
     height = road_height(road, s, d)
@@ -62,7 +62,7 @@ def ground_height(road: Road, s: float, d: float) -> float:
 
 
 def on_ground(road: Road, s: float, d: float) -> tuple[NDArray[np.float64], float]:
-    """Return the point of the ground at a place, (3,), metres in the world, and the road's direction there, rad.
+    """Return the ground point at a place, (3,), metres in the world, and the direction of the road, rad.
 
     Parameters are those of `to_world`.
     """
@@ -72,21 +72,23 @@ def on_ground(road: Road, s: float, d: float) -> tuple[NDArray[np.float64], floa
 
 @njit(cache=True)
 def on_wheels(road: Road, s: float, d: float, yaw: float, length: float, width: float) -> tuple[float, float, float]:
-    """Return how a vehicle on four wheels stands on the ground. Parameters not named here are those of `to_world`.
+    """Return height and tilt of a four-wheeled vehicle on the ground.
+
+    Parameters not named here are those of `to_world`.
 
     Parameters
     ----------
     yaw : float
-        Its direction in the world, rad from the x axis.
+        Direction of the vehicle in the world, rad from the x axis.
     length, width : float
-        Distance between its axles, and between the wheels of an axle, metres.
+        Wheelbase and track width, metres.
 
     Returns
     -------
     height : float
-        Mean height of its wheels, metres in the world.
+        Mean height of the wheels, metres in the world.
     roll, pitch : float
-        Its angles, rad: positive where the left wheels, or the rear ones, stand higher.
+        Tilt, rad: positive when the left wheels, or the rear wheels, are higher.
     """
     x, y, _ = to_world(road, s, d)
     along, across, total = 0.0, 0.0, 0.0
@@ -104,13 +106,13 @@ def on_wheels(road: Road, s: float, d: float, yaw: float, length: float, width: 
 
 @njit(cache=True)
 def _stripe(distance: float, half: float, blur: float) -> float:
-    """Return the share of a patch, `blur` wide and `distance` from the middle of a stripe, that the stripe covers."""
+    """Return the share of a patch that a stripe covers; the patch is `blur` wide, `distance` from its middle."""
     return min(max((half - abs(distance)) / blur + 0.5, 0.0), 1.0)
 
 
 @njit(cache=True)
 def _junction_mark(road: Road, s: float, d: float, away: float, blur: float) -> float:
-    """Return the paint of zebra crossings and stop lines around the junction."""
+    """Return the painted share for zebra crossings and stop lines around the junction."""
     if road.zebra and 0.5 <= away <= 3.7:
         return _stripe((d % 1.0) - 0.5, 0.25, blur)
     ours = s < road.junction and -road.lanes_right * road.lane < d < -0.15
@@ -120,15 +122,15 @@ def _junction_mark(road: Road, s: float, d: float, away: float, blur: float) -> 
 
 @njit(cache=True)
 def lane_mark(road: Road, s: float, d: float, blur: float) -> float:
-    """Return how much of the asphalt around a place is painted.
+    """Return the painted share of the asphalt in a patch around a place.
 
-    The marks are the centre line, lane boundaries, edge lines along parking bays, zebra crossings and stop lines. The
-    result is the share of a patch of ground that is painted. Parameters not named here are those of `to_world`.
+    The marks are the centre line, lane boundaries, edge lines along parking bays, zebra crossings and stop lines.
+    Parameters not named here are those of `to_world`.
 
     Parameters
     ----------
     blur : float
-        Width of the patch of ground around the place, metres; at least 1 cm is taken.
+        Width of the patch, metres; smaller values are set to 1 cm.
     """
     blur = max(blur, 0.01)
     away = abs(s - road.junction) - road.side_half - road.corner
@@ -155,7 +157,7 @@ def lane_mark(road: Road, s: float, d: float, blur: float) -> float:
 
 @njit(cache=True)
 def ground_kinds(road: Road, xy: NDArray) -> NDArray[np.uint8]:
-    """Return what the ground is at every point, lane marks included.
+    """Return the kind of the ground at every point, including lane marks.
 
     Parameters
     ----------
@@ -170,7 +172,7 @@ def ground_kinds(road: Road, xy: NDArray) -> NDArray[np.uint8]:
         Members of `Kind`.
     """
     kinds = np.empty(len(xy), np.uint8)
-    # numba compiles the loop: the functions of a place that it calls take one place at a time
+    # a compiled loop, because the functions that it calls take one place at a time
     for i in range(len(xy)):
         s, d = to_road(road, xy[i, 0], xy[i, 1])
         kinds[i] = ground_kind(road, s, d)
@@ -182,17 +184,17 @@ def ground_kinds(road: Road, xy: NDArray) -> NDArray[np.uint8]:
 _OUTWARD = np.array(
     [0.0, 0.03, 0.18, 0.6, 1.2, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 13.0, 17.0, 24.0, 35.0, 50.0, 80.0, 130.0, 250.0]
 )
-"""Distances outside the asphalt's edge at which the mesh has vertices, metres."""
+"""Distances of the mesh vertices from the edge of the asphalt, metres."""
 
 
 @dataclass(frozen=True)
 class Extent:
-    """How far a world reaches along its road.
+    """The extent of a world along its road.
 
     Parameters
     ----------
     start, end : float
-        The first and the last place: s, metres.
+        Smallest and largest s, metres.
     """
 
     start: float
@@ -200,7 +202,7 @@ class Extent:
 
 
 def _across(road: Road) -> NDArray[np.float64]:
-    """Return the d of the mesh's lines: fine at kerbs and, at a junction, over its rounded corners."""
+    """Return the d coordinates of the mesh, dense at kerbs and at the rounded corners of a junction."""
     rim = np.arange(0, road.corner + 0.3, 0.3) if road.side_half else []
     edges = road.left.edge, road.right.edge
     left, right = (np.concatenate([[edge / 2], edge + _OUTWARD, edge + np.asarray(rim)]) for edge in edges)
@@ -208,7 +210,7 @@ def _across(road: Road) -> NDArray[np.float64]:
 
 
 def _along(road: Road, extent: Extent) -> NDArray[np.float64]:
-    """Return the s of the mesh's lines."""
+    """Return the s coordinates of the mesh."""
     lines = [np.arange(extent.start, extent.end + 4, 4.0)]
     if road.side_half:
         beyond = road.corner + np.array([1, 2, 3, 4, 6, 8, 11])
@@ -221,7 +223,7 @@ def _along(road: Road, extent: Extent) -> NDArray[np.float64]:
 def _vertices(road: Road, s: NDArray, d: NDArray) -> NDArray:
     """Return the mesh's vertices, (len(s), len(d), 3)."""
     out = np.empty((len(s), len(d), 3))
-    # numba compiles the loop: the functions of a place that it calls take one place at a time
+    # a compiled loop, because the functions that it calls take one place at a time
     for i in range(len(s)):
         for j in range(len(d)):
             x, y, _ = to_world(road, s[i], d[j])
@@ -230,17 +232,17 @@ def _vertices(road: Road, s: NDArray, d: NDArray) -> NDArray:
 
 
 def ground_mesh(road: Road, extent: Extent) -> Shape:
-    """Make the ground of a street, in the world.
+    """Build the mesh of the ground, in world coordinates.
 
-    All of it has one colour and one kind here: `shade` decides what the ground is where a ray meets it, so that lane
-    marks need no triangles of their own.
+    The whole mesh has one colour and one kind. `shade` looks up the kind where a ray hits the ground, so lane marks
+    need no triangles.
 
     Parameters
     ----------
     road : Road
         The street.
     extent : Extent
-        How far the ground reaches along the street.
+        Extent of the ground along the street.
     """
     s, d = _along(road, extent), _across(road)
     if road.curvature:

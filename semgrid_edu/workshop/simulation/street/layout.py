@@ -1,8 +1,8 @@
-"""Road geometry: coordinates along the road, and how far a place lies outside the asphalt.
+"""Road geometry: road coordinates, and the distance of a place from the asphalt.
 
-A road runs straight, bends along an arc, and runs straight again. `s` is the distance along its centre line, `d` the
-distance to the left of the centre line, both in metres. One side road may cross it. In height it climbs at one grade,
-turns along a parabola, as roads are built, and goes on at another; rain runs off its crown.
+A road is straight, bends along an arc, and is straight again. `s` is the distance along its centre line, `d` the
+distance to the left of the centre line, both in metres. One side road may cross it. Vertically, the road has one grade,
+then a parabolic curve, as real roads do, then another grade. Across, it falls from a crown to both edges.
 """
 
 from typing import NamedTuple
@@ -11,22 +11,22 @@ import numpy as np
 from numba import njit
 
 SIDE_ROAD_LENGTH = 75.0
-"""How far a side road reaches from the main road's centre line, metres."""
+"""Length of a side road from the main road's centre line, metres."""
 
 
 class Side(NamedTuple):
-    """One side of the road, from the asphalt's edge outwards.
+    """One side of the road, from the edge of the asphalt outwards.
 
     Parameters
     ----------
     edge : float
-        Distance of the asphalt's edge from the centre line, metres.
+        Distance from the centre line to the edge of the asphalt, metres.
     strip : float
         Width of the strip of grass between kerb and sidewalk, metres; 0 for none.
     walk : float
         Width of the sidewalk, metres; 0 for none.
     bank_rise, bank_width : float
-        Grass bank behind the sidewalk: by how much it rises, and over which distance, metres.
+        Height and width of the grass bank behind the sidewalk, metres.
     """
 
     edge: float
@@ -42,26 +42,26 @@ class Side(NamedTuple):
 
 
 class Road(NamedTuple):
-    """A street's geometry.
+    """The geometry of a street.
 
     Parameters
     ----------
     bend_start, bend_end : float
-        Where the arc begins and ends: s, metres.
+        Start and end of the arc: s, metres.
     curvature : float
         Curvature of the arc, 1/m, positive to the left; 0 for a straight road.
     lane : float
         Width of a lane, metres.
     lanes_left, lanes_right : int
-        Lanes of the oncoming traffic and of ours; traffic keeps right.
+        Number of oncoming lanes and of lanes in our direction; traffic keeps right.
     left, right : Side
-        What lies beside the asphalt on either side.
+        The two sides of the road.
     junction : float
-        Where the side road's centre line crosses: s, metres.
+        Position of the side road's centre line: s, metres.
     side_half : float
-        Half the width of the side road, metres; 0 where there is no side road.
+        Half the width of the side road, metres; 0 if there is none.
     side_left, side_right : bool
-        On which sides the side road leaves.
+        Whether the side road leaves to the left and to the right.
     corner : float
         Radius of the corners of the junction, metres.
     zebra : bool
@@ -69,11 +69,11 @@ class Road(NamedTuple):
     dashed : bool
         Whether the centre line is dashed (solid otherwise).
     crown : float
-        Fall of the carriageway from its centre line to either edge, metres per metre.
+        Cross fall from the centre line to either edge, metres per metre.
     grade_before, grade_after : float
-        Rise along the road before and after the vertical curve, metres per metre.
+        Grade before and after the vertical curve, metres per metre.
     crest_start, crest_end : float
-        Where the vertical curve, a crest or a sag, begins and ends: s, metres.
+        Start and end of the vertical curve (a crest or a sag): s, metres.
     """
 
     bend_start: float
@@ -108,13 +108,13 @@ class Road(NamedTuple):
         return self.left if sign > 0 else self.right
 
     def leaves(self, sign: int) -> bool:
-        """Return whether the side road leaves on one side. Parameters are those of `Road.side`."""
+        """Return whether the side road leaves to one side. Parameters are those of `Road.side`."""
         return self.side_half > 0 and (self.side_left if sign > 0 else self.side_right)
 
 
 @njit(cache=True)
 def to_world(road: Road, s: float, d: float) -> tuple[float, float, float]:
-    """Return where in the world a place beside the road is.
+    """Convert road coordinates to world coordinates.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def to_world(road: Road, s: float, d: float) -> tuple[float, float, float]:
     x, y : float
         Metres.
     heading : float
-        Direction of the road there, rad from the x axis, counter-clockwise.
+        Direction of the road at this place, rad from the x axis, counter-clockwise.
     """
     k = road.curvature
     s1 = road.bend_start
@@ -144,7 +144,7 @@ def to_world(road: Road, s: float, d: float) -> tuple[float, float, float]:
 
 @njit(cache=True)
 def to_road(road: Road, x: float, y: float) -> tuple[float, float]:
-    """Return where beside the road a point of the world is: the inverse of `to_world`.
+    """Convert world coordinates to road coordinates: the inverse of `to_world`.
 
     Parameters
     ----------
@@ -175,9 +175,9 @@ def to_road(road: Road, x: float, y: float) -> tuple[float, float]:
 
 @njit(cache=True)
 def outside_asphalt(road: Road, s: float, d: float) -> float:
-    """Return how far a place lies outside the asphalt, whose corners at a junction are rounded.
+    """Return the distance of a place from the asphalt, metres; negative on the asphalt.
 
-    The distance is negative on the asphalt, metres. Parameters are those of `to_world`.
+    The corners of a junction are rounded. Parameters are those of `to_world`.
     """
     e = d - road.left.edge if d > 0 else -d - road.right.edge
     crosses = (d > 0 and road.side_left) or (d <= 0 and road.side_right)

@@ -1,4 +1,4 @@
-"""Light and weather of a drive, and the noise from which textures and clouds are made."""
+"""Light and weather of a drive, and the noise for textures and clouds."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -20,19 +20,19 @@ class Light:
     sun : (float, float, float)
         Unit vector towards the sun, in the world.
     sun_colour, sky_colour, horizon_colour : (float, float, float)
-        Linear radiance of the sun's light on a surface that faces it, of the zenith and of the horizon.
+        Linear radiance: of a surface that faces the sun, of the zenith, and of the horizon.
     softness : float
-        Spread of the sun's direction, rad: 0.01 for a clear sky, 0.5 under clouds.
+        Angular spread of the sunlight, rad: 0.01 for a clear sky, 0.5 under clouds.
     clouds : float
-        Share of the sky that clouds cover.
+        Cloud cover, a share of the sky.
     haze : float
         Extinction, 1/m: contrast falls to 37 % over 1/haze.
     exposure : float
         Gain of the camera.
     balance : (float, float, float)
-        Gains of red, green and blue: the error of the camera's white balance.
+        Gains of red, green and blue: the camera's white-balance error.
     phase : float
-        Shift of the clouds, so that every drive has others.
+        Offset of the clouds, different for every drive.
     """
 
     sun: tuple[float, float, float]
@@ -48,12 +48,12 @@ class Light:
 
     @classmethod
     def random(cls, rng: np.random.Generator) -> "Light":
-        """Draw a day: clear, hazy, with a low sun, or overcast.
+        """Draw the light of a day: clear, hazy, with a low sun, or overcast.
 
         Parameters
         ----------
         rng : numpy.random.Generator
-            Decides it.
+            Source of randomness.
         """
         overcast = rng.random() < 0.3
         elevation = np.radians(rng.uniform(18, 62))
@@ -80,14 +80,14 @@ class Light:
 
     @property
     def packed(self) -> tuple:
-        """Sun, its colour, zenith and horizon, each (3,) float32, then clouds, haze and phase, as numba takes them."""
+        """Sun, sun colour, zenith and horizon, each (3,) float32, then clouds, haze and phase, for numba."""
         vectors = (self.sun, self.sun_colour, self.sky_colour, self.horizon_colour)
         return *(np.asarray(v, np.float32) for v in vectors), self.clouds, self.haze, self.phase
 
 
 @cache
 def noise_tile() -> NDArray[np.float32]:
-    """Return fractal noise that repeats without a seam, (TILE, TILE) float32, uniformly distributed in 0..1."""
+    """Return seamless fractal noise, (TILE, TILE) float32, uniformly distributed in 0..1."""
     rng = np.random.default_rng(81)
     frequency = np.fft.fftfreq(TILE)
     radius = np.hypot(frequency[:, None], frequency[None, :])
@@ -100,7 +100,7 @@ def noise_tile() -> NDArray[np.float32]:
 
 @njit(cache=True, fastmath=True, inline="always")
 def texture(tile, u, v):
-    """Return the noise at one place, 0..1, bilinear between texels.
+    """Return the noise at one place, 0..1, bilinearly interpolated.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def texture(tile, u, v):
 
 @njit(cache=True, fastmath=True)
 def sky_radiance(tile, x, y, z, light, out):
-    """Find the radiance that comes from one direction of the sky: gradient, glow of the sun, clouds.
+    """Compute the radiance of the sky in one direction: gradient, glow of the sun, clouds.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The plan of a street: what a world is to be like, drawn at random except for what is asked for."""
+"""The plan of a street: the properties of a world, random unless a wish fixes them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,44 +12,43 @@ from semgrid_edu.workshop.simulation.street.light import Light
 from semgrid_edu.workshop.simulation.things.roadside import FENCES
 
 BORDERS = (*FENCES, "hedge", "none")
-"""What may run along the gardens of a suburb."""
+"""The borders of suburban gardens."""
 STYLES = ("town", "suburb", "park")
-"""What lines a side of the road: facades at the sidewalk; houses in gardens; grass banks and trees."""
+"""Styles of a roadside: facades at the sidewalk; houses in gardens; grass banks and trees."""
 YARD = "yard"
-"""A style that is only wished for, never drawn: a border of `YARD_BORDERS`, and open ground behind it."""
+"""A style that never comes up at random, only by wish: a border of `YARD_BORDERS` with open ground behind it."""
 LAYOUTS = ("straight", "bend", "junction")
-"""What a road may do."""
+"""Random layouts of a road."""
 CROSSING = "crossing"
-"""A layout that is only wished for, never drawn: a junction whose side road leaves on both sides."""
+"""A layout that never comes up at random, only by wish: a junction whose side road leaves to both sides."""
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """What is asked of a drive; whatever is None is drawn at random.
+    """The fixed properties of a drive. Fields that are None are random.
 
     Parameters
     ----------
     layout : str or None
         One of `LAYOUTS`, or `CROSSING`.
     lanes : (int, int) or None
-        Lanes of the oncoming traffic and of ours.
+        Number of oncoming lanes and of lanes in our direction.
     styles, borders : (str, str) or None
-        Left and right, of `STYLES` and `BORDERS`; or `YARD` with one of `YARD_BORDERS`.
+        Left and right: from `STYLES` and `BORDERS`, or `YARD` with one of `YARD_BORDERS`.
     parking : (bool, bool) or None
         Parking bays left and right.
     light : Light or None
         Sun, sky and exposure.
     density : float or None
-        How much traffic and how many people there are, 0..1.
+        Density of traffic and pedestrians, 0..1.
     speed : float or None
         Mean speed of the recording car, m/s.
     ego_lane : int or None
-        Lane of the recording car; 0 is beside the centre line.
+        Lane of the recording car; 0 is next to the centre line.
     cast : callable or None
-        Function that takes the drive's `Traffic` and puts road users on the street, in place of `fill_street`.
+        Function that takes the drive's `Traffic` and puts road users on the street, instead of `fill_street`.
     relief : dict or None
-        Crown, grades and crest, as fields of `Road`. With {} all asphalt is one plane, on which the recording car
-        hardly sways.
+        Crown, grades and crest, as fields of `Road`. With {} the asphalt is flat, and the recording car hardly sways.
     """
 
     layout: str | None = None
@@ -66,32 +65,32 @@ class Wishes:
 
 
 ANY = Wishes()
-"""No wishes: everything is drawn."""
+"""No wishes: everything is random."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What a world is to be like, before anything is built.
+    """The plan of a world, before anything is built.
 
     Parameters
     ----------
     road : Road
-        Its street.
+        The street.
     extent : Extent
-        How far the world reaches along the street.
+        Extent of the world along the street.
     styles : (str, str)
         Left and right side, members of `STYLES`, or `YARD`.
     borders : (str, str)
-        What runs along the gardens of a suburb, left and right: a fence of `roadside.FENCES`, "hedge" or "none"; along
-        a yard one of `YARD_BORDERS`.
+        Borders of suburban gardens, left and right: a fence from `roadside.FENCES`, "hedge" or "none". A yard has one
+        of `YARD_BORDERS`.
     parking : (bool, bool)
         Whether there are parking bays left and right.
     light : Light
         Sun, sky and exposure.
     density : float
-        How much traffic and how many people there are, 0..1.
+        Density of traffic and pedestrians, 0..1.
     foliage : (float, float, float)
-        Factor for red, green and blue of all leaves: the season.
+        Factors for red, green and blue of all leaves, which depend on the season.
     """
 
     road: Road
@@ -104,11 +103,11 @@ class Plan:
     foliage: tuple[float, float, float]
 
     def border(self, sign: int) -> str:
-        """Return what runs along one side. Parameters are those of `Road.side`."""
+        """Return the border of one side. Parameters are those of `Road.side`."""
         return self.borders[0 if sign > 0 else 1]
 
 
-_SIDES = table_beside(__file__)  # how it may look beside the road in each style
+_SIDES = table_beside(__file__)  # ranges for the roadside of each style
 
 
 def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Generator) -> Side:
@@ -124,7 +123,7 @@ def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Gen
 
 
 def _road(rng: np.random.Generator, length: float, layout: str, lanes: tuple, styles: tuple, parking: tuple) -> Road:
-    """Draw the geometry of a street on which the recording car drives `length` metres."""
+    """Draw the geometry of a street for a drive of `length` metres."""
     lane = rng.uniform(3.1, 3.6)
     start = 0.0
     curvature = 0.0
@@ -148,10 +147,10 @@ def _road(rng: np.random.Generator, length: float, layout: str, lanes: tuple, st
 
 
 def _relief(rng: np.random.Generator, length: float) -> dict[str, float]:
-    """Draw the crown and the grades of a road on which the recording car drives `length` metres, as fields of `Road`.
+    """Draw crown and grades of a road for a drive of `length` metres, as fields of `Road`.
 
-    Town roads are built with a cross fall of 2 % or a little more, grades of up to 6 %, and vertical curves that take 4
-    to 12 m for each per cent by which the grade changes.
+    Urban roads have a cross fall of about 2 %, grades of up to 6 %, and vertical curves 4 to 12 m long per per cent of
+    grade change.
     """
     before, after = (float(grade) for grade in rng.normal(0, 0.025, 2).clip(-0.06, 0.06))
     half = 0.5 * max(10.0, 100 * abs(after - before) * rng.uniform(4.0, 12.0))
@@ -161,16 +160,16 @@ def _relief(rng: np.random.Generator, length: float) -> dict[str, float]:
 
 
 def draw_plan(rng: np.random.Generator, length: float, wishes: Wishes) -> Plan:
-    """Draw a world's plan.
+    """Draw the plan of a world.
 
     Parameters
     ----------
     rng : numpy.random.Generator
-        Source of all that is drawn.
+        Source of randomness.
     length : float
         Distance that the recording car drives, metres.
     wishes : Wishes
-        What isn't left to chance.
+        The fixed properties.
     """
     layout = wishes.layout or str(rng.choice(LAYOUTS, p=[0.3, 0.3, 0.4]))
     lanes = wishes.lanes or [(1, 1), (1, 1), (1, 2), (2, 2)][rng.integers(4)]

@@ -1,6 +1,6 @@
-"""Who is on a street: as much traffic as planned, or what a test street is about, such as convoys or crossing cars.
+"""The road users on a street: ordinary traffic, or the special cases of a test street, such as convoys.
 
-Each function puts its road users on the street of the `Traffic` that it is given.
+Each public function adds road users to a `Traffic`.
 """
 
 import numpy as np
@@ -13,12 +13,12 @@ from semgrid_edu.workshop.simulation.things.materials import Kind
 
 
 def fill_street(traffic: Traffic) -> None:
-    """Put parked cars, traffic in every lane, cyclists and pedestrians on the street, as many as planned.
+    """Add parked cars, traffic in every lane, cyclists and pedestrians at the planned density.
 
     Parameters
     ----------
     traffic : Traffic
-        Takes them; it knows the street and the plan.
+        Receives them; contains the street and the plan.
     """
     for fill in (park_cars, _park_bicycles, _lanes, _cross_traffic, _cyclists, _pedestrians):
         fill(traffic)
@@ -63,7 +63,7 @@ def _park_bicycles(traffic: Traffic) -> None:
 
 
 def _lanes(traffic: Traffic) -> None:
-    """Fill every lane with cars that drive alike, so that none catches up with the next."""
+    """Fill every lane with cars at equal speed, so that none catches up with the next."""
     road = traffic.road
     rng = traffic.rng
     ego = traffic.ego
@@ -85,7 +85,7 @@ def _lanes(traffic: Traffic) -> None:
 
 
 def _fill_lane(traffic: Traffic, d: float, along: int, pace: ActorPace) -> None:
-    """Put cars that drive alike into a lane, so that they are around the recording car when the drive ends."""
+    """Fill a lane with cars at equal speed that are around the recording car at the end of the drive."""
     road = traffic.road
     rng = traffic.rng
     density = traffic.plan.density
@@ -102,7 +102,7 @@ def _fill_lane(traffic: Traffic, d: float, along: int, pace: ActorPace) -> None:
 
 
 def _cross_traffic(traffic: Traffic) -> None:
-    """Let cars wait in the side road, leave by it, or cross while our traffic stands."""
+    """Add cars that wait in the side road, drive away on it, or cross while our traffic waits."""
     road = traffic.road
     rng = traffic.rng
     for sign in filter(road.leaves, (1, -1)):
@@ -122,7 +122,7 @@ def _cross_traffic(traffic: Traffic) -> None:
 
 
 def _cyclists(traffic: Traffic) -> None:
-    """Let cyclists ride at the edge of the outer lanes."""
+    """Add cyclists at the edge of the outer lanes."""
     road = traffic.road
     rng = traffic.rng
     for _ in range(rng.poisson(0.5 + 1.6 * traffic.plan.density)):
@@ -134,7 +134,7 @@ def _cyclists(traffic: Traffic) -> None:
 
 
 def _pedestrians(traffic: Traffic) -> None:
-    """Let people walk along the sidewalks, stand there, and cross the road."""
+    """Add people who walk or stand on the sidewalks, and people who cross the road."""
     road = traffic.road
     rng = traffic.rng
     here = traffic.ends_at
@@ -160,9 +160,9 @@ def _pedestrians(traffic: Traffic) -> None:
 
 
 def convoys(traffic: Traffic) -> None:
-    """Let two or three cars come one behind the other, and two overtake in the left one of our lanes.
+    """Add an oncoming convoy of two or three cars, and two cars that overtake in our left lane.
 
-    The gaps are 8 to 20 m, so that the first car hides the next one at first. Parameters are those of `fill_street`.
+    The gaps are 8 to 20 m, so the first car initially hides the next one. Parameters are those of `fill_street`.
     """
     park_cars(traffic)
     road = traffic.road
@@ -178,7 +178,7 @@ def convoys(traffic: Traffic) -> None:
 
 
 def _convoy(traffic: Traffic, s: float, d: float, along: int, pace: ActorPace, cars: int) -> None:
-    """Let cars drive one behind the other, the first of them from s on."""
+    """Add cars that follow each other; the first one starts at s."""
     for _ in range(cars):
         look = (traffic.body(), traffic.paint())
         traffic.drive_car(s, d, along, 0, pace, look)
@@ -186,12 +186,12 @@ def _convoy(traffic: Traffic, s: float, d: float, along: int, pace: ActorPace, c
 
 
 def _on_sidewalk(side: Side, rng: np.random.Generator) -> float:
-    """Draw a place on the sidewalk: its distance from the centre line, metres."""
+    """Draw a position on the sidewalk: its distance from the centre line, metres."""
     return side.edge + side.strip + rng.uniform(0.4, max(side.walk - 0.4, 0.5))
 
 
 def pedestrians(traffic: Traffic) -> None:
-    """Let people walk along both sidewalks, and across the road. Parameters are those of `fill_street`."""
+    """Add people who walk along both sidewalks and across the road. Parameters are those of `fill_street`."""
     park_cars(traffic)
     road = traffic.road
     rng = traffic.rng
@@ -208,7 +208,7 @@ def pedestrians(traffic: Traffic) -> None:
 
 
 def slow_starters(traffic: Traffic) -> None:
-    """Let people and cars stand for 1 to 2 s, and then set off. Parameters are those of `fill_street`."""
+    """Add people and cars that wait for 1 to 2 s and then start. Parameters are those of `fill_street`."""
     park_cars(traffic)
     road = traffic.road
     rng = traffic.rng
@@ -228,7 +228,7 @@ def slow_starters(traffic: Traffic) -> None:
 
 
 def crossing_cars(traffic: Traffic) -> None:
-    """Let cars cross at the junction, two from each side. Parameters are those of `fill_street`."""
+    """Add cars that cross at the junction, two from each side. Parameters are those of `fill_street`."""
     park_cars(traffic)
     road = traffic.road
     rng = traffic.rng
@@ -241,7 +241,7 @@ def crossing_cars(traffic: Traffic) -> None:
 
 
 def overturned_car(traffic: Traffic) -> None:
-    """Let a car lie on its top in the oncoming lane, 10 to 22 m ahead at the end, in the usual traffic.
+    """Add an overturned car in the oncoming lane, 10 to 22 m ahead at the end of the drive, in ordinary traffic.
 
     Parameters are those of `fill_street`.
     """
@@ -258,5 +258,5 @@ def overturned_car(traffic: Traffic) -> None:
 
 
 def _walking(rng: np.random.Generator) -> ActorPace:
-    """Draw how fast a person walks."""
+    """Draw a walking speed."""
     return ActorPace(float(np.clip(rng.normal(1.4, 0.2), 0.9, 2.0)))

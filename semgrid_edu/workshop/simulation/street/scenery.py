@@ -1,4 +1,4 @@
-"""The scenery of a planned street: its ground, houses, fences, trees, lamps and signs."""
+"""The scenery of a street: ground, houses, fences, trees, lamps and signs."""
 
 from functools import partial
 
@@ -14,14 +14,14 @@ from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 
 
 def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
-    """Build all that never moves, but for parked cars and bicycles, and return the world, ready for road users.
+    """Build everything static except parked vehicles, and return the builder, ready for road users.
 
     Parameters
     ----------
     plan : Plan
-        What the street is to be like.
+        The plan of the street.
     rng : numpy.random.Generator
-        Source of all that is drawn.
+        Source of randomness.
     """
     builder = Builder(plan, rng)
     builder.solid.append((ground_mesh(plan.road, plan.extent), 0))
@@ -37,19 +37,19 @@ def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
 
 
 def _facing(sign: int) -> float:
-    """Return the yaw that turns a front (-y) to the road."""
+    """Return the yaw for a front (-y) that faces the road."""
     return 0.0 if sign > 0 else np.pi
 
 
 def _meets_side_road(builder: Builder, s0: float, s1: float, sign: int, margin: float) -> bool:
-    """Return whether the stretch s0..s1 meets the side road and its sidewalks."""
+    """Return whether the stretch s0..s1 overlaps the side road and its sidewalks."""
     road = builder.road
     reach = road.side_half + margin
     return road.leaves(sign) and road.junction - reach < s1 and s0 < road.junction + reach
 
 
 def _tree(builder: Builder, s: float, d: float, species: str | None = None) -> None:
-    """Plant a tree; far ones have fewer leaves."""
+    """Plant a tree; distant trees have fewer leaves."""
     rng = builder.rng
     plan = builder.plan
     species = species or str(rng.choice(roadside.TREES, p=[0.5, 0.15, 0.2, 0.15]))
@@ -75,7 +75,7 @@ def _bush(builder: Builder, s: float, d: float) -> None:
 
 
 def _house(builder: Builder, house: House, s: float, d: float, yaw: float, across_road: bool = False) -> None:
-    """Put a house with the middle of its front at (s, d) if the place is free; on asphalt only if it may."""
+    """Put a house with the middle of its front at (s, d), if the place is free and off the asphalt or `across_road`."""
     half = (house.width / 2, house.depth / 2)
     foot = builder.footprint(s, d, yaw, Kind.BUILDING, half, offset=(0.0, house.depth / 2))
     if (across_road or builder.off_asphalt(foot)) and builder.free(foot, 0.05):
@@ -83,7 +83,7 @@ def _house(builder: Builder, house: House, s: float, d: float, yaw: float, acros
 
 
 def _town_house(rng: np.random.Generator) -> House:
-    """Draw a house of 2 to 5 storeys, half of which have a shop."""
+    """Draw a house of 2 to 5 storeys; every second one has a shop."""
     seed = int(rng.integers(2**31))
     roof = str(rng.choice(["flat", "hip", "gable"], p=[0.45, 0.3, 0.25]))
     width = rng.uniform(9, 17)
@@ -129,7 +129,7 @@ def _house_row(builder: Builder, sign: int, town: bool) -> None:
 def _tall_houses(
     builder: Builder, sign: int, line: float, behind: tuple, step: float, along: float, share: float
 ) -> None:
-    """Scatter houses of a town some metres `behind` a line along the road, so that gaps don't end in nothing."""
+    """Scatter town houses `behind` a line along the road, metres, so that gaps show houses instead of nothing."""
     rng = builder.rng
     extent = builder.plan.extent
     for s in np.arange(extent.start, extent.end, step):
@@ -140,7 +140,7 @@ def _tall_houses(
 
 
 def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, style: str) -> None:
-    """Run a fence or a hedge along the road from s0 to s1, in pieces that follow bends; gates stay open."""
+    """Build a fence or a hedge from s0 to s1, in pieces that follow bends, with a gap for a gate."""
     if style == "none":
         return
     rng = builder.rng
@@ -161,7 +161,7 @@ def _border(builder: Builder, s0: float, s1: float, sign: int, offset: float, st
 
 
 def _garden(builder: Builder, s0: float, s1: float, sign: int, offset: float, depth: float) -> None:
-    """Plant the ground between border and house, and beside the house."""
+    """Plant the garden between border and house, and beside the house."""
     rng = builder.rng
     for _ in range(rng.integers(1, 4)):
         s, d = rng.uniform(s0, s1), sign * (offset + rng.uniform(0.6, max(depth - 1.5, 0.8)))
@@ -171,7 +171,7 @@ def _garden(builder: Builder, s0: float, s1: float, sign: int, offset: float, de
 
 
 def _park(builder: Builder, sign: int) -> None:
-    """Cover one side with trees and bushes on its bank, perhaps a fence along it."""
+    """Cover one side with trees and bushes on its bank, sometimes with a fence."""
     rng = builder.rng
     extent = builder.plan.extent
     line = builder.road.side(sign).line
@@ -186,7 +186,7 @@ def _park(builder: Builder, sign: int) -> None:
 
 
 def _yard(builder: Builder, sign: int) -> None:
-    """Run a border along one side, and scatter bushes and trees behind it."""
+    """Build a border along one side, and scatter bushes and trees behind it."""
     rng = builder.rng
     extent = builder.plan.extent
     line = builder.road.side(sign).line + 0.35
@@ -203,7 +203,7 @@ _LINE_SIDE = {
     "park": _park,
     YARD: _yard,
 }
-"""What lines a side of each style: functions of the world and of the side, 1 for the left and -1 for the right one."""
+"""The builder of each roadside style: functions of builder and side, 1 for left and -1 for right."""
 
 
 def _street_trees(builder: Builder, sign: int) -> None:
@@ -221,7 +221,7 @@ def _street_trees(builder: Builder, sign: int) -> None:
 
 
 def _side_street(builder: Builder) -> None:
-    """Line the side road with houses on both of its flanks."""
+    """Line both flanks of the side road with houses."""
     road = builder.road
     rng = builder.rng
     for sign, style in zip((1, -1), builder.plan.styles, strict=True):
@@ -242,7 +242,7 @@ def _side_street(builder: Builder) -> None:
 
 
 def _horizon(builder: Builder) -> None:
-    """Close the view with trees and houses far away."""
+    """Close the horizon with distant trees and houses."""
     rng = builder.rng
     extent = builder.plan.extent
     for _ in range(70):

@@ -1,4 +1,4 @@
-"""Traffic: cars, cyclists and pedestrians, and how they take part in a drive where they don't run into anything."""
+"""Traffic: cars, cyclists and pedestrians, added to a drive only if they don't collide with anything."""
 
 from dataclasses import dataclass
 
@@ -27,7 +27,7 @@ from semgrid_edu.workshop.simulation.things.shapes import Shape
 Size = tuple[float, float, float]
 Look = tuple[str, tuple[float, float, float]] | Person
 MOVING_SPEED = 0.05
-"""Speed, m/s, above which something is said to move."""
+"""Speed, m/s, above which an actor counts as moving."""
 EGO_SIZE = (4.5, 1.85, 1.5)
 """Length, width and height of the recording car, metres; its own sensors don't see it."""
 
@@ -41,17 +41,17 @@ class Actor:
     instance : int
         Its number in the world.
     kind : Kind
-        What it is; a cyclist is a `Kind.BICYCLE`.
+        Its kind; a cyclist is a `Kind.BICYCLE`.
     size : (float, float, float)
         Length, width and height, metres.
     trajectory : Trajectory
-        Where it is at every instant.
+        Its position over time.
     look : (str, (float, float, float)) or Person
-        The body of a car ("bicycle" for a parked bicycle) and its paint; for a pedestrian or a cyclist, the person.
+        Body and paint of a car ("bicycle" for a parked bicycle); for a pedestrian or a cyclist, the person.
     phase : float
-        Distance added to the one covered, metres, so that people don't walk in step.
+        Offset of the distance travelled, metres, so that people don't walk in step.
     overturned : bool
-        Whether it lies on its top, as a car may after an accident.
+        Whether it is upside down, like a car after an accident.
     """
 
     instance: int
@@ -97,11 +97,11 @@ class Actor:
         return footprints.Footprint(x, y, *half, yaw, exponent, int(self.kind), self.instance, top)
 
     def middle(self, road: Road, t: float) -> NDArray[np.float64]:
-        """Return the middle of its box in the world, (3,), metres. Parameters are those of `Actor.shape`."""
+        """Return the centre of its box in the world, (3,), metres. Parameters are those of `Actor.shape`."""
         return np.add(self.trajectory.pose(road, t)[0], (0, 0, self.size[2] / 2))
 
     def described(self, road: Road, t: float, T_grid_from_world: NDArray) -> dict[str, object]:
-        """Describe it at one instant, as a file of labels holds it.
+        """Describe it at one instant, in the format of the label files.
 
         Parameters not named here are those of `Actor.shape`.
 
@@ -114,8 +114,8 @@ class Actor:
         -------
         dict
             "id" and "class"; "centre" (x, y, z) and "size" (length, width, height) of its box, metres; "yaw", rad;
-            "velocity" (x, y) over ground, m/s; and whether it is "moving". All are in the grid frame. "overturned" is
-            there only if it is true.
+            "velocity" (x, y) over ground, m/s; and whether it is "moving". All are in the grid frame. The key
+            "overturned" exists only if it is true.
         """
         yaw = self.trajectory.pose(road, t)[1]
         velocity = T_grid_from_world[:3, :2] @ self.trajectory.velocity(road, t)
@@ -139,24 +139,24 @@ def _rounded(values: ArrayLike) -> list[float]:
 class Traffic:
     """The actors of a drive.
 
-    None collides with another, with the scenery or with the recording car. This is checked at 25 instants of the drive,
-    or at 6 when it is shorter than 2 s.
+    No actor collides with another, with the scenery or with the recording car. This is checked at 25 instants of the
+    drive, or at 6 if it is shorter than 2 s.
 
     Parameters
     ----------
     builder : Builder
-        The world with its scenery; parked cars and bicycles are added to it.
+        The world with its scenery; receives parked cars and bicycles.
     ego : Trajectory
-        Where the recording car is at every instant.
+        Trajectory of the recording car.
     duration : float
-        How long the drive lasts, seconds.
+        Duration of the drive, seconds.
 
     Attributes
     ----------
     moving, parked : list of Actor
-        The actors so far; a pedestrian who stands still is among those that move.
+        The actors so far. `moving` includes pedestrians who stand still.
     ends_at : float
-        Where along the road the recording car is at the end of the drive: s, metres.
+        Position of the recording car at the end of the drive: s, metres.
     """
 
     def __init__(self, builder: Builder, ego: Trajectory, duration: float) -> None:
@@ -175,20 +175,20 @@ class Traffic:
         self._static = footprints.footprint_table(builder.footprints)
 
     def add(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look, margin: float = 0.25) -> bool:
-        """Let a road user take part in the drive, and return True, unless it would run into something.
+        """Add a road user, unless it would collide with something; return whether it was added.
 
         Parameters
         ----------
         kind : Kind
-            What it is.
+            Its kind.
         size : (float, float, float)
             Length, width and height, metres.
         trajectory : Trajectory
-            Where it is at every instant.
+            Its position over time.
         look : (str, (float, float, float)) or Person
             As for `Actor`.
         margin : float
-            Distance that it keeps from other road users, metres.
+            Minimum distance to other road users, metres.
         """
         actor = Actor(self.builder.next_instance, kind, size, trajectory, look, float(self.rng.uniform(0, 3)))
         feet = [actor.footprint(self.road, t) for t in self._times]
@@ -203,16 +203,16 @@ class Traffic:
         return True
 
     def park(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look, overturned: bool = False) -> bool:
-        """Park a car or a bicycle for the whole drive, and return True, unless the place is taken.
+        """Park a car or a bicycle for the whole drive, unless the place is taken; return whether it was added.
 
         Parameters not named here are those of `Traffic.add`.
 
         Parameters
         ----------
         trajectory : Trajectory
-            Where it stands; its pace is `STAND`.
+            Its place, with the pace `STAND`.
         overturned : bool
-            Whether it lies on its top.
+            Whether it is upside down.
         """
         actor = Actor(self.builder.next_instance, kind, size, trajectory, look, overturned=overturned)
         foot = actor.footprint(self.road, 0.0)
@@ -226,48 +226,48 @@ class Traffic:
         return True
 
     def paint(self) -> tuple[float, float, float]:
-        """Draw the paint of a car, (3,) linear albedo; the usual colours come more often."""
+        """Draw the paint of a car, (3,) linear albedo; common colours are more likely."""
         weights = 1 / (3.0 + np.arange(len(PAINTS)))
         return PAINTS[self.rng.choice(len(PAINTS), p=weights / weights.sum())]
 
     def body(self) -> str:
-        """Draw the body of a car, one of `BODIES`."""
+        """Draw a car body, one of `BODIES`."""
         return str(self.rng.choice(BODIES, p=[0.32, 0.22, 0.2, 0.16, 0.1]))
 
     def drive_car(
         self, s: float, d: float, along: float, across: float, pace: ActorPace, look: Look | None = None
     ) -> bool:
-        """Let a car drive, and return True, unless it would run into something.
+        """Add a driving car, unless it would collide with something; return whether it was added.
 
         Parameters
         ----------
         s, d : float
-            Where it is at t = 0: distance along the road and to the left of its centre line, metres.
+            Position at t = 0: distance along the road and to the left of its centre line, metres.
         along, across : float
             Direction in (s, d), as in `Trajectory`.
         pace : ActorPace
-            How fast it moves; `STAND` if it stands.
+            Its speed over time; `STAND` for a car that doesn't move.
         look : (str, (float, float, float)), optional
-            Its body and paint; drawn when left out.
+            Body and paint; random by default.
         """
         look = look or (self.body(), self.paint())
         return self.add(Kind.CAR, car_size(look[0]), Trajectory(s, d, along, across, pace), look, 0.3)
 
     def walk(self, s: float, d: float, along: float, across: float, pace: ActorPace, turn: float = 0.0) -> bool:
-        """Let a person walk or stand, and return True, unless they would run into something.
+        """Add a walking or standing person, unless they would collide; return whether they were added.
 
         Parameters not named here are those of `Traffic.drive_car`.
 
         Parameters
         ----------
         turn : float
-            Angle between this direction and the one in which the person looks, rad.
+            Angle between this direction and the direction that the person faces, rad.
         """
         person = Person.random(self.rng)
         return self.add(Kind.PEDESTRIAN, (0.7, 0.6, person.height), Trajectory(s, d, along, across, pace, turn), person)
 
     def ride(self, s: float, d: float, along: float, pace: ActorPace) -> bool:
-        """Let a person ride a bicycle along the road, and return True, unless they would run into something.
+        """Add a cyclist who rides along the road, unless they would collide; return whether they were added.
 
         Parameters are those of `Traffic.drive_car`.
         """

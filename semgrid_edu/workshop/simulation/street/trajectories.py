@@ -1,4 +1,4 @@
-"""How things move along the road, at a speed that swings a little, and how the recording car moves on its springs."""
+"""Motion along the road at a slightly oscillating speed, and the recording car's motion on its suspension."""
 
 from dataclasses import dataclass
 
@@ -13,18 +13,18 @@ from semgrid_edu.workshop.simulation.things.shapes import rotation_matrix
 
 @dataclass(frozen=True)
 class ActorPace:
-    """A speed over time, mean + swing sin(rate t + phase), and the distance covered, its integral in closed form.
+    """A speed over time, mean + swing sin(rate t + phase), and the distance travelled, its integral in closed form.
 
     Parameters
     ----------
     mean : float
         Mean speed, m/s.
     swing : float
-        Amplitude of the speed's swing, m/s.
+        Amplitude of the oscillation, m/s.
     rate : float
-        Angular frequency of the swing, rad/s.
+        Angular frequency of the oscillation, rad/s.
     phase : float
-        Phase of the swing at t = 0, rad.
+        Phase of the oscillation at t = 0, rad.
     """
 
     mean: float
@@ -34,14 +34,14 @@ class ActorPace:
 
     @classmethod
     def random(cls, rng: np.random.Generator, mean: float | None = None) -> "ActorPace":
-        """Draw how fast the recording car drives.
+        """Draw the speed of the recording car.
 
         Parameters
         ----------
         rng : numpy.random.Generator
-            Source of all that is drawn.
+            Source of randomness.
         mean : float, optional
-            Mean speed, m/s; when left out, 5 to 14 m/s and in one drive of ten 0.
+            Mean speed, m/s; by default random from 5 to 14 m/s, and 0 in one drive of ten.
         """
         drawn = 0.0 if rng.random() < 0.1 else float(rng.uniform(5, 14))
         mean = drawn if mean is None else mean
@@ -50,7 +50,7 @@ class ActorPace:
         return cls(mean, swing, 0.8, phase)
 
     def distance(self, t: float) -> float:
-        """Return the distance covered since t = 0, metres.
+        """Return the distance travelled since t = 0, metres.
 
         Parameters
         ----------
@@ -65,21 +65,21 @@ class ActorPace:
 
 
 STAND = ActorPace(0.0)
-"""The pace of what stands still."""
+"""The pace of an object that doesn't move."""
 
 
 @dataclass(frozen=True)
 class Departure:
-    """A pace that stands, sets off at a steady acceleration, and then keeps its speed.
+    """A pace that waits, accelerates at a constant rate, and then keeps its speed.
 
     Parameters
     ----------
     mean : float
-        The speed that it reaches, m/s.
+        The final speed, m/s.
     start : float
-        When it sets off, seconds.
+        Time of departure, seconds.
     acceleration : float
-        How fast it speeds up, m/s^2.
+        The acceleration, m/s^2.
     """
 
     mean: float
@@ -87,7 +87,7 @@ class Departure:
     acceleration: float
 
     def distance(self, t: float) -> float:
-        """Return the distance covered since t = 0, metres. Parameters are those of `ActorPace.distance`."""
+        """Return the distance travelled since t = 0, metres. Parameters are those of `ActorPace.distance`."""
         since = max(t - self.start, 0.0)
         rising = min(since, self.mean / self.acceleration)
         return 0.5 * self.acceleration * rising**2 + self.mean * (since - rising)
@@ -99,18 +99,18 @@ class Departure:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A straight line in the coordinates of the road, followed at a pace.
+    """A straight line in road coordinates, followed at a pace.
 
     Parameters
     ----------
     s, d : float
-        Where it begins at t = 0: distance along the road and to the left of its centre line, metres.
+        Position at t = 0: distance along the road and to the left of its centre line, metres.
     along, across : float
         Direction in (s, d): (1, 0) with our traffic, (-1, 0) against it, (0, 1) across the road to the left.
     pace : ActorPace or Departure
-        How fast the line is followed.
+        Speed over time.
     turn : float
-        Angle between this direction and the one that the thing points in, rad, for things that stand.
+        Angle between this direction and the direction that the object faces, rad, for objects that don't move.
     """
 
     s: float
@@ -132,7 +132,7 @@ class Trajectory:
         return self.s + self.along * travelled, self.d + self.across * travelled
 
     def pose(self, road: Road, t: float) -> tuple[NDArray[np.float64], float]:
-        """Return the place and the direction in the world at one instant.
+        """Return position and direction in the world at one instant.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class Trajectory:
         position : (3,) float64
             The point on the ground, metres.
         yaw : float
-            Direction of the thing, rad from the x axis, counter-clockwise.
+            Direction of the object, rad from the x axis, counter-clockwise.
         """
         s, d = self.at(t)
         position, heading = on_ground(road, s, d)
@@ -162,25 +162,25 @@ class Trajectory:
 
 
 _AXLES, _TRACK = 2.7, 1.55
-"""Distance between the axles of the recording car, and between the wheels of an axle, metres."""
+"""Wheelbase and track width of the recording car, metres."""
 
 
 @dataclass(frozen=True)
 class Ego:
-    """The motion of the recording car: it keeps its lane, sways in it, and rolls and pitches on its springs.
+    """The motion of the recording car: it drifts within its lane, and rolls and pitches on its suspension.
 
     Parameters
     ----------
     road : Road
         The street.
     trajectory : Trajectory
-        The middle of its lane, and its pace.
+        The centre line of its lane, and its pace.
     sway : float
         Amplitude of its sideways drift, metres.
     roll, pitch : float
-        Amplitudes of these angles about the plane below its wheels, rad.
+        Amplitudes of roll and pitch relative to the plane under its wheels, rad.
     phase : float
-        Phase of all of these oscillations, rad.
+        Phase of all three oscillations, rad.
     """
 
     road: Road
@@ -194,20 +194,20 @@ class Ego:
     def random(
         cls, rng: np.random.Generator, road: Road, pace: ActorPace, lane: int | None = None, swing: tuple = (0.3, 0.6)
     ) -> "Ego":
-        """Draw the recording car's lane and how it sways.
+        """Draw the lane and the oscillations of the recording car.
 
         Parameters
         ----------
         rng : numpy.random.Generator
-            Source of all that is drawn.
+            Source of randomness.
         road : Road
             The street.
         pace : ActorPace
-            How fast it drives.
+            Its speed over time.
         lane : int, optional
-            Number of its lane, 0 beside the centre line; when left out, the outer one in two drives of three.
+            Number of its lane, 0 next to the centre line; by default the outer lane in two drives out of three.
         swing : (float, float)
-            Least and largest amplitude of roll and pitch, degrees.
+            Smallest and largest amplitude of roll and pitch, degrees.
         """
         drawn = road.lanes_right - 1 if rng.random() < 0.65 else 0
         lane = drawn if lane is None else lane
@@ -218,7 +218,7 @@ class Ego:
         return cls(road, Trajectory(0.0, d, 1.0, 0.0, pace), sway, roll, pitch, phase)
 
     def T_world_from_lidar(self, t: float) -> NDArray[np.float64]:
-        """Return the LIDAR's pose at one instant, (4, 4), metres; it tilts about the point on the ground below it.
+        """Return the LIDAR's pose at one instant, (4, 4), metres. It tilts about the ground point below it.
 
         Parameters
         ----------

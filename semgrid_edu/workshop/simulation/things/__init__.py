@@ -1,1 +1,1 @@
-"""Things that stand or move on a street, each a mesh with materials."""
+"""Objects on a street, each a mesh with materials."""

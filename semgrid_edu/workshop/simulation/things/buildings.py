@@ -1,4 +1,4 @@
-"""Shapes of houses: walls with windows and doors under a gable, hip or flat roof."""
+"""Houses: walls with windows and doors, and a gable, hip or flat roof."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -11,20 +11,20 @@ from semgrid_edu.workshop.simulation.things.materials import PALETTES, Kind, Mat
 from semgrid_edu.workshop.simulation.things.shapes import UP, Shape, merge, quads
 
 _DEEP = -2.5
-"""How far walls reach into the ground, metres, so that no gap opens below them on a slope."""
+"""Walls go this deep into the ground, metres, so that no gap opens on a slope."""
 _box, _shape = partial(shapes.box, kind=Kind.BUILDING), partial(shapes.shape, kind=Kind.BUILDING)
 
 
 @dataclass(frozen=True)
 class House:
-    """The plan of a house: x along its front, y away from the street, the middle of its front at the origin.
+    """The plan of a house: x along the front, y away from the street, origin in the middle of the front.
 
     Parameters
     ----------
     width, depth : float
         Sides of the plan, metres.
     storeys : int
-        Full storeys of 2.9 m.
+        Number of full storeys, 2.9 m each.
     roof : str
         "gable", "hip" or "flat".
     shop : bool
@@ -51,7 +51,7 @@ def _pick(palette: str, rng: np.random.Generator) -> tuple[float, float, float]:
 
 
 def _walls(house: House) -> list[tuple[NDArray, NDArray, float]]:
-    """Return origin, direction and length of the four walls, each going right as seen from outside; front first."""
+    """Return origin, direction and length of the four walls, each left to right as seen from outside; front first."""
     w, d = house.width / 2, house.depth
     corners = np.array([[-w, 0, 0], [w, 0, 0], [w, d, 0], [-w, d, 0]])
     edges = np.roll(corners, -1, axis=0) - corners
@@ -60,14 +60,14 @@ def _walls(house: House) -> list[tuple[NDArray, NDArray, float]]:
 
 
 def _panel(corner, right, up, out: float, colour, material=Material.MATTE) -> Shape:
-    """Hang rectangles on a wall, `out` metres in front of it."""
+    """Place rectangles on a wall, `out` metres in front of it."""
     normal = np.cross(right, up)
     normal /= np.linalg.norm(normal)
     return quads(corner + out * normal, right, up, colour, material, Kind.BUILDING)
 
 
 def _windows(origin, along, length: float, sills: NDArray, style: tuple, rng: np.random.Generator) -> list[Shape]:
-    """Hang a grid of windows on a wall: frame, two panes, sill, perhaps shutters."""
+    """Place a grid of windows on a wall: frame, two panes, optional sill and shutters."""
     spacing, (w, h), frame, shutters, has_sill = style
     n = max(int((length - 0.8) / spacing), 1)
     step = length / n
@@ -91,7 +91,7 @@ def _windows(origin, along, length: float, sills: NDArray, style: tuple, rng: np
 
 
 def _front_door(origin, along, length: float, rng: np.random.Generator) -> list[Shape]:
-    """Hang a door with its frame, a step and a small canopy near the middle of the front."""
+    """Place a door with its frame, a window and a small canopy near the middle of the front."""
     at = origin + (length * rng.uniform(0.3, 0.6)) * along
     colour = _pick("doors", rng)
     out = np.cross(along, UP)
@@ -104,7 +104,7 @@ def _front_door(origin, along, length: float, rng: np.random.Generator) -> list[
 
 
 def _shop_front(origin, along, length: float, rng: np.random.Generator) -> list[Shape]:
-    """Hang a shop's windows, door and sign board on the ground floor."""
+    """Place a shop's windows and sign board on the ground floor."""
     colour = np.array(_pick("shops", rng))
     n = max(int(length / 2.6), 1)
     step = (length - 0.8) / n
@@ -121,7 +121,7 @@ def _shop_front(origin, along, length: float, rng: np.random.Generator) -> list[
 
 
 def _gable(house: House, tiles, wall, wall_material, rng: np.random.Generator) -> list[Shape]:
-    """Put a gable roof on: its ridge along the street or across it, eaves overhanging, a chimney."""
+    """Build a gable roof with overhanging eaves and a chimney; its ridge is along the street or across it."""
     across = rng.random() < 0.4
     w, d, z = house.width / 2, house.depth, house.eaves
     span, run = (w, d / 2) if not across else (d / 2, w)
@@ -146,7 +146,7 @@ def _gable(house: House, tiles, wall, wall_material, rng: np.random.Generator) -
 
 
 def _hip(house: House, tiles) -> list[Shape]:
-    """Put a hip roof on."""
+    """Build a hip roof."""
     w = house.width / 2 + 0.4
     d = house.depth + 0.8
     z = house.eaves
@@ -160,7 +160,7 @@ def _hip(house: House, tiles) -> list[Shape]:
 
 
 def _flat(house: House, wall) -> list[Shape]:
-    """Put a flat roof with a cornice on."""
+    """Build a flat roof with a cornice."""
     w, d, z = house.width, house.depth, house.eaves
     cornice = 0.8 * np.asarray(wall) + 0.1
     return [
@@ -170,7 +170,7 @@ def _flat(house: House, wall) -> list[Shape]:
 
 
 def _balconies(house: House, rng: np.random.Generator) -> list[Shape]:
-    """Hang a column of balconies on the front."""
+    """Place a column of balconies on the front."""
     x = rng.uniform(-0.25, 0.25) * house.width
     parts = []
     for storey in range(1, house.storeys):
@@ -181,7 +181,7 @@ def _balconies(house: House, rng: np.random.Generator) -> list[Shape]:
 
 
 def _draw_style(house: House, rng: np.random.Generator) -> tuple:
-    """Draw what the windows of a house share: spacing, size, colours of frame and shutters, whether they have sills."""
+    """Draw the window style of a house: spacing, size, colours of frame and shutters, whether there are sills."""
     frame = (0.72, 0.71, 0.68) if rng.random() < 0.75 else (0.12, 0.08, 0.06)
     shutters = PALETTES["doors"][rng.integers(4)] if house.roof == "gable" and rng.random() < 0.45 else None
     size = (rng.uniform(1.0, 1.5), rng.uniform(1.35, 1.7))
@@ -190,7 +190,7 @@ def _draw_style(house: House, rng: np.random.Generator) -> tuple:
 
 
 def _body(house: House, wall, material: Material) -> list[Shape]:
-    """Build the four walls as one box, with a darker plinth around their foot."""
+    """Build the four walls as one box, with a darker plinth at the base."""
     w = house.width
     d = house.depth
     middle = house.depth / 2
@@ -206,7 +206,7 @@ def build_house(house: House) -> Shape:
     Parameters
     ----------
     house : House
-        Its plan; x along the front, y away from the street.
+        The plan of the house.
     """
     rng = np.random.default_rng([house.seed, 80])
     material = Material.BRICK if rng.random() < 0.3 else Material.PLASTER

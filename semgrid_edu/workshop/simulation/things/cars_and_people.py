@@ -1,4 +1,4 @@
-"""Shapes of cars, people and bicycles. They stand on z = 0 and point along x."""
+"""Cars, people and bicycles. The ground is z = 0, and they face along x."""
 
 import itertools
 from dataclasses import dataclass, replace
@@ -15,9 +15,9 @@ from semgrid_edu.workshop.simulation.things.shapes import Shape, ball, box, merg
 _TABLES = table_beside(__file__, "cars")
 _BODIES = named_rows(_TABLES["bodies"])
 BODIES = tuple(_BODIES)
-"""The car bodies that `car` knows."""
+"""The available car bodies."""
 PAINTS = PALETTES["paint"]
-"""Linear colours of car paint, the usual ones first."""
+"""Linear colours of car paint, common ones first."""
 _GLASS, _DARK = (0.025, 0.03, 0.035), (0.02, 0.02, 0.022)
 
 
@@ -34,7 +34,7 @@ def car_size(body: str) -> tuple[float, float, float]:
 
 
 def _rings(body: SimpleNamespace) -> list[list[tuple[float, float, float]]]:
-    """Return the eight corners of each cross-section, from the left sill over the top to the right sill."""
+    """Return the eight corners of each cross-section, from the left sill over the roof to the right sill."""
     rings = []
     rows = (body.x, body.sill, body.shoulder, body.top, body.half, body.half_top)
     for x, sill, shoulder, top, half, half_top in zip(*rows, strict=True):
@@ -47,7 +47,7 @@ def _rings(body: SimpleNamespace) -> list[list[tuple[float, float, float]]]:
 
 
 def _loft(body: SimpleNamespace) -> list[Shape]:
-    """Span the skin between the cross-sections of a body."""
+    """Loft the skin between the cross-sections of a body."""
     rings = _rings(body)
     parts: dict[Material, list] = {Material.PAINT: [], Material.GLASS: [], Material.RUBBER: []}
     for i, (a, b) in enumerate(itertools.pairwise(rings)):
@@ -68,7 +68,7 @@ def _loft(body: SimpleNamespace) -> list[Shape]:
 
 
 def _wheels(body: SimpleNamespace) -> list[Shape]:
-    """Put four wheels with hubs, and the dark arches around them."""
+    """Make four wheels with hubs and dark wheel arches."""
     parts = []
     for x, side in itertools.product((-0.295 * body.length, 0.315 * body.length), (-1, 1)):
         for ring in _TABLES["wheel"]:
@@ -79,7 +79,7 @@ def _wheels(body: SimpleNamespace) -> list[Shape]:
 
 
 def _boxes(body: SimpleNamespace, names: tuple[str, ...], side: int = 1) -> list[Shape]:
-    """Put the boxes of some tables on a body; 1 for the left side, where it matters."""
+    """Make the boxes of some tables for a body; `side` is 1 for the left side and -1 for the right."""
     parts = []
     over = np.array([body.length, body.width / 2, 1.0])
     for row in itertools.chain.from_iterable(_TABLES[name] for name in names):
@@ -92,7 +92,7 @@ def _boxes(body: SimpleNamespace, names: tuple[str, ...], side: int = 1) -> list
 
 @cache
 def car(body: str) -> Shape:
-    """Make a car; `Shape.recoloured(Material.PAINT, colour)` gives it another paint.
+    """Make a car; `Shape.recoloured(Material.PAINT, colour)` repaints it.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ _BICYCLE = table_beside(__file__, "bicycle")
 
 
 def _wheel(x: float) -> list[Shape]:
-    """Make a bicycle wheel: a ring of tubes, and spokes."""
+    """Make a bicycle wheel: a ring of tubes with spokes."""
     angle = np.linspace(0, 2 * np.pi, 17)
     rim = np.stack([x + 0.33 * np.cos(angle), 0 * angle, 0.35 + 0.33 * np.sin(angle)], axis=1)
     tyre = [tube(a, b, 0.025, _BLACK, Material.RUBBER, Kind.BICYCLE, 4) for a, b in itertools.pairwise(rim)]
@@ -120,7 +120,7 @@ def _wheel(x: float) -> list[Shape]:
 
 @cache
 def bicycle() -> Shape:
-    """Make a bicycle, 1.75 m long; its frame is of `Material.PAINT`, so that it can be recoloured."""
+    """Make a bicycle, 1.75 m long; its frame has `Material.PAINT`, so it can be recoloured."""
     metal = partial(tube, colour=_GREY, material=Material.METAL, kind=Kind.BICYCLE, sides=5)
     frame = [tube(*measures, PAINTS[5], Material.PAINT, Kind.BICYCLE, 5) for measures in _BICYCLE["frame"]]
     bar, pedals = (metal((x, -y, z), (x, y, z), thick) for x, y, z, thick in _BICYCLE["bars"])
@@ -135,16 +135,16 @@ _TOP, _TROUSERS, _SKIN_SLOT, _HAIR_SLOT, _SHOES = range(5)
 
 @dataclass(frozen=True)
 class Person:
-    """What a person looks like.
+    """The appearance of a person.
 
     Parameters
     ----------
     height : float
-        Body height, metres; adults are 1.5 to 1.95 m.
+        Body height, metres; 1.5 to 1.95 m for adults.
     top, trousers, skin, hair : (float, float, float)
         Linear albedo, red, green and blue, 0..1.
     frame : (float, float, float)
-        Linear albedo of the bicycle's paint, for a person who rides one.
+        Linear albedo of the bicycle's paint, for a cyclist.
     """
 
     height: float
@@ -161,7 +161,7 @@ class Person:
         Parameters
         ----------
         rng : numpy.random.Generator
-            Decides them.
+            Source of randomness.
         """
         clothes = PALETTES["clothes"]
         choices = (clothes, clothes[:4] + clothes[7:], PALETTES["skin"], PALETTES["hair"], PAINTS)
@@ -171,19 +171,19 @@ class Person:
 
 
 def _blob(centre: ArrayLike, radii: tuple, slot: int, kind: Kind, detail: int = 1) -> Shape:
-    """Make an ellipsoid of one garment."""
+    """Make an ellipsoid in the colour slot of one garment."""
     return ball(centre, radii, (slot,) * 3, Material.CLOTH, kind, detail)
 
 
 def _limb(joints: list, radii: tuple, slot: int, kind: Kind) -> list[Shape]:
-    """Make a chain of tubes through three joints, rounded where it bends."""
+    """Make a chain of tubes through three joints, with a ball at the bend."""
     bones = zip(itertools.pairwise(joints), itertools.pairwise(radii), strict=True)
     parts = [tube(*ends, thick, (slot,) * 3, Material.CLOTH, kind) for ends, thick in bones]
     return [*parts, _blob(joints[1], (radii[1],) * 3, slot, kind, 0)]
 
 
 def _trunk(hip: NDArray, shoulder: NDArray, kind: Kind) -> list[Shape]:
-    """Make hips, chest, neck, head and hair along the spine."""
+    """Make hips, chest, neck, head and hair."""
     face = np.add(shoulder, (0.03, 0, 0.17))
     return [
         tube(hip, shoulder, (0.145, 0.17), (_TOP,) * 3, Material.CLOTH, kind, 9),
@@ -197,7 +197,7 @@ def _trunk(hip: NDArray, shoulder: NDArray, kind: Kind) -> list[Shape]:
 
 @cache
 def _walking(phase: int) -> Shape:
-    """Make a person 1.78 m high in mid-stride, coloured with garment numbers."""
+    """Make a person of 1.78 m in mid-stride; colours are garment numbers."""
     kind = Kind.PEDESTRIAN
     swing = np.sin(2 * np.pi * phase / _PHASES)
     hip, shoulder = np.array([0.0, 0.0, 0.95]), np.array([0.03, 0.0, 1.45])
@@ -217,7 +217,7 @@ def _walking(phase: int) -> Shape:
 
 @cache
 def _riding(phase: int) -> Shape:
-    """Make a cyclist without the bicycle, coloured with garment numbers."""
+    """Make a cyclist without the bicycle; colours are garment numbers."""
     kind = Kind.BICYCLE
     hip, shoulder = np.array([-0.22, 0.0, 0.98]), np.array([0.1, 0.0, 1.48])
     parts = _trunk(hip, shoulder, kind)
@@ -233,7 +233,7 @@ def _riding(phase: int) -> Shape:
 
 
 def _dressed(body: Shape, person: Person) -> Shape:
-    """Replace garment numbers by the person's colours."""
+    """Replace garment numbers with the person's colours."""
     palette = np.array([person.top, person.trousers, person.skin, person.hair, (0.03, 0.025, 0.02)], np.float32)
     return replace(body, colour=palette[body.colour[:, 0].astype(int)])
 
@@ -244,9 +244,9 @@ def walker(person: Person, distance: float) -> Shape:
     Parameters
     ----------
     person : Person
-        How tall the person is, and what colours they wear.
+        Height and colours of the person.
     distance : float
-        Distance walked so far, metres; the legs repeat their motion every 1.45 m.
+        Distance walked so far, metres; the gait repeats every 1.45 m.
     """
     phase = round(distance / 1.45 * _PHASES) % _PHASES
     return _dressed(_walking(phase), person).placed((0, 0, 0), scale=person.height / 1.78)
@@ -258,7 +258,7 @@ def rider(person: Person, distance: float) -> Shape:
     Parameters
     ----------
     person : Person
-        The colours of clothes and bicycle; all riders are of one height.
+        The colours of clothes and bicycle; all riders have the same height.
     distance : float
         Distance ridden so far, metres; the pedals turn once every 5 m.
     """

@@ -1,4 +1,4 @@
-"""What things are and what they are made of, and the class that each label set of section 4 gives them."""
+"""Kinds and materials of surfaces, and the class of each kind in the label sets of section 4."""
 
 from enum import IntEnum
 
@@ -10,13 +10,13 @@ from semgrid_edu.storage.files import table_beside
 
 _TABLES = table_beside(__file__)
 Kind = IntEnum("Kind", tuple(_TABLES["classes"]), start=0, module=__name__)
-"""What a surface belongs to: finer than either label set, so that both can be derived."""
+"""The object that a surface belongs to; finer than both label sets, so both can be derived from it."""
 Material = IntEnum("Material", tuple(_TABLES["reflectance"]), start=0, module=__name__)
-"""What a surface is made of: decides its texture, its gloss and its LIDAR reflectance."""
+"""The material of a surface; decides its texture, gloss and LIDAR reflectance."""
 REFLECTANCE = np.array(tuple(_TABLES["reflectance"].values()), np.float32)
-"""Share of 905 nm light that each `Material` sends back (1: retroreflective plates and signs)."""
+"""Share of 905 nm light that each `Material` reflects (1: retroreflective plates and signs)."""
 PALETTES = _TABLES["palettes"]
-"""Linear colours of what comes in several, by what wears them."""
+"""Linear colours to choose from, such as "paint" and "clothes"."""
 
 
 def class_of_kind(label_set: LabelSet) -> NDArray[np.uint8]:
@@ -28,12 +28,12 @@ def class_of_kind(label_set: LabelSet) -> NDArray[np.uint8]:
     Parameters
     ----------
     label_set : LabelSet
-        The classes to translate to.
+        The target classes.
 
     Returns
     -------
     (256,) uint8
-        A table to index with kinds; 255 (unlabelled) stays 255.
+        Lookup table from kinds to classes; 255 (unlabelled) stays 255.
     """
     table = np.full(256, IGNORE, dtype=np.uint8)
     for kind, names in zip(Kind, _TABLES["classes"].values(), strict=True):

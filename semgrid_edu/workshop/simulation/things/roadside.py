@@ -1,4 +1,4 @@
-"""Shapes beside a street: fences, signs, lamps, traffic lights, wire mesh, panes, posts, trees, bushes and hedges."""
+"""Roadside objects: fences, signs, lamps, traffic lights, wire mesh, panes, posts, trees, bushes and hedges."""
 
 from dataclasses import replace
 from functools import cache, partial
@@ -16,9 +16,9 @@ _TWIGS = (0.05, 0.11, 0.028)
 _TABLES = table_beside(__file__, "furniture")
 _FENCES, _FACES = named_rows(_TABLES["fences"]), _TABLES["signs"]
 FENCES = (*_FENCES, "wall")
-"""The fences that `fence` knows."""
+"""The styles of `fence`."""
 SHEETS = named_rows(_TABLES["sheets"])
-"""The fences that `sheet_fence` knows."""
+"""The styles of `sheet_fence`, by name."""
 _fence_box, _fence_quads = partial(box, kind=Kind.FENCE), partial(quads, kind=Kind.FENCE)
 
 
@@ -29,7 +29,7 @@ def fence(style: str, length: float) -> Shape:
     Parameters
     ----------
     style : str
-        One of `FENCES`; "wall" is a low garden wall of stone, a fence to both label sets.
+        One of `FENCES`; "wall" is a low stone garden wall, which both label sets count as fence.
     length : float
         Length of the piece, metres.
     """
@@ -56,7 +56,7 @@ def fence(style: str, length: float) -> Shape:
 
 @cache
 def sheet_fence(style: str, length: float) -> tuple[Shape, Shape]:
-    """Make a piece of a fence that lets light through, from the origin along x.
+    """Make a piece of a fence that is partly transparent, from the origin along x.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def sheet_fence(style: str, length: float) -> tuple[Shape, Shape]:
     Returns
     -------
     frame, sheet : Shape
-        The post at the origin with the rails, and what a part of the light passes.
+        The post at the origin with the rails, and the porous sheet.
     """
     its = SHEETS[style]
     look = (SHEETS[style].colour, Material.METAL)
@@ -92,7 +92,7 @@ def porous_hedge(length: float, thickness: float, height: float) -> Shape:
 
 @cache
 def bollard(height: float, radius: float) -> Shape:
-    """Make a post without a fence on the origin.
+    """Make a free-standing post at the origin.
 
     Parameters
     ----------
@@ -110,19 +110,19 @@ def _plate(corners: ArrayLike, colour, x: float, material=Material.RETRO) -> Sha
 
 
 def _corners(face: dict) -> np.ndarray:
-    """Return the corners of a face of a sign, about the middle of the sign."""
+    """Return the corners of a face of a sign, relative to the centre of the sign."""
     n, radius, turn = face.get("regular", (0, 0, 0))
     angle = np.radians(turn) + 2 * np.pi * np.arange(n) / max(n, 1)
     return face.get("corners") or np.stack([-radius * np.cos(angle), radius * np.sin(angle)], axis=1)
 
 
 SIGNS = tuple(_FACES)
-"""The traffic signs that `sign` knows."""
+"""The available traffic signs."""
 
 
 @cache
 def sign(name: str) -> Shape:
-    """Make a traffic sign on its pole at the origin; it faces -x, so that a driver who goes along x sees it.
+    """Make a traffic sign on its pole at the origin; it faces -x, towards a driver who drives along x.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def sign(name: str) -> Shape:
 
 @cache
 def lamp(height: float) -> Shape:
-    """Make a street lamp on the origin, whose arm reaches 1.5 m along y.
+    """Make a street lamp at the origin with an arm of 1.5 m along y.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def traffic_light(green: bool) -> Shape:
     Parameters
     ----------
     green : bool
-        Whether it shows green; else red.
+        Whether it is green; otherwise it is red.
     """
     parts = [
         tube((0, 0, -0.5), (0, 0, 3.3), (0.06, 0.055), (0.2, 0.21, 0.2), Material.METAL, Kind.POLE),
@@ -178,11 +178,11 @@ _bark = partial(shapes.tube, material=Material.BARK, kind=Kind.PLANT)
 
 _SPECIES = named_rows(table_beside(__file__, "plants"))
 TREES = tuple(_SPECIES)
-"""The species that `tree` knows."""
+"""The available tree species."""
 
 
 def _foliage(points: NDArray, outward: NDArray, size: float, green: tuple, rng: np.random.Generator) -> Shape:
-    """Scatter one leaf cluster (a triangle) at every point, shaded by the `outward` direction there."""
+    """Place one leaf cluster (a triangle) at every point, shaded by its `outward` direction."""
     n = len(points)
     corners = rng.normal(0, 1, (n, 3, 3))
     corners *= size * rng.uniform(0.5, 1.1, (n, 1, 1)) / np.linalg.norm(corners, axis=2, keepdims=True)
@@ -223,16 +223,16 @@ def _cone(n: int, size: float, green: tuple, rng: np.random.Generator) -> Shape:
 
 @cache
 def tree(species: str, variant: int, n_leaves: int = 1500) -> Shape:
-    """Make a tree about 7 m high (the tall ones 10 m), its foot at the origin.
+    """Make a tree about 7 m high (tall species 10 m), with its foot at the origin.
 
     Parameters
     ----------
     species : str
         One of `TREES`.
     variant : int
-        Number of the variant: trees of one species and variant are the same.
+        Number of the variant; trees of one species and variant are identical.
     n_leaves : int
-        Triangles of foliage; trees far away need fewer.
+        Number of foliage triangles; distant trees need fewer.
     """
     rng = np.random.default_rng([TREES.index(species), variant, 77])
     its = _SPECIES[species]
@@ -250,12 +250,12 @@ def tree(species: str, variant: int, n_leaves: int = 1500) -> Shape:
 
 @cache
 def bush(variant: int) -> Shape:
-    """Make a bush about 2 m wide and 1.4 m high, its foot at the origin.
+    """Make a bush about 2 m wide and 1.4 m high, with its foot at the origin.
 
     Parameters
     ----------
     variant : int
-        Number of the variant: bushes of one variant are the same.
+        Number of the variant; bushes of one variant are identical.
     """
     rng = np.random.default_rng([variant, 78])
     centre = rng.uniform(-1, 1, (4, 3)) * [0.5, 0.5, 0.2] + [0, 0, 0.55]
@@ -265,12 +265,12 @@ def bush(variant: int) -> Shape:
 
 @cache
 def hedge(variant: int) -> Shape:
-    """Make one metre of hedge along x, 0.8 m thick and 1.3 m high, with the origin in its middle.
+    """Make one metre of hedge along x, 0.8 m thick and 1.3 m high, centred on the origin.
 
     Parameters
     ----------
     variant : int
-        Number of the variant: hedges of one variant are the same.
+        Number of the variant; hedges of one variant are identical.
     """
     rng = np.random.default_rng([variant, 79])
     n = 260

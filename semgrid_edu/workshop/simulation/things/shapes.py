@@ -1,4 +1,4 @@
-"""Shapes of triangles, each with a colour, a material and a kind; boxes, ellipsoids, tubes and parallelograms."""
+"""Triangle meshes with a colour, a material and a kind per triangle: boxes, ellipsoids, tubes, parallelograms."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -21,11 +21,11 @@ class Shape:
     Parameters
     ----------
     vertices : (V, 3) float32
-        Corners of the triangles, metres, z up: in the thing's own frame, or in the world once it is `placed`.
+        Corners of the triangles, metres, z up: in local coordinates, or in the world once `placed`.
     faces : (F, 3) int32
-        The rows of `vertices` that are the corners of each triangle, counter-clockwise as seen from outside.
+        Vertex indices of each triangle, counter-clockwise as seen from outside.
     normals : (F, 3) float32
-        Unit normal of each triangle, for shading. (Leaves take the normal of the crown that they are part of.)
+        Unit normal of each triangle, for shading. Leaves use the normal of their crown.
     colour : (F, 3) float32
         Linear albedo of each triangle, red, green and blue, 0..1.
     material, kind : (F,) uint8
@@ -42,16 +42,16 @@ class Shape:
     def placed(
         self, position: ArrayLike, yaw: float = 0.0, scale: ArrayLike = 1.0, tilt: tuple[float, float] = (0.0, 0.0)
     ) -> "Shape":
-        """Return the shape scaled, then tilted and turned about the z axis, then moved.
+        """Return the shape scaled, then rotated, then translated.
 
         Parameters
         ----------
         position : (3,) float
-            Where its origin goes, metres.
+            New position of the origin, metres.
         yaw : float
-            Angle about the z axis, counter-clockwise, rad.
+            Rotation about the z axis, counter-clockwise, rad.
         scale : float or (3,) float
-            Factor for all sides, or one for each of x, y and z.
+            One factor, or one each for x, y and z.
         tilt : (float, float)
             Roll and pitch, rad, see `rotation_matrix`.
         """
@@ -60,7 +60,7 @@ class Shape:
         return replace(self, vertices=vertices, normals=self.normals @ rotation.T)
 
     def overturned(self, height: float) -> "Shape":
-        """Return the shape turned about the x axis by half a turn, so that it stands on its top.
+        """Return the shape upside down: rotated by half a turn about the x axis, then lifted.
 
         Parameters
         ----------
@@ -77,9 +77,9 @@ class Shape:
         Parameters
         ----------
         material : Material
-            Which triangles change.
+            The material to recolour.
         colour : (3,) float
-            Their new linear albedo, 0..1.
+            The new linear albedo, 0..1.
         """
         colours = self.colour.copy()
         colours[self.material == material] = colour
@@ -91,26 +91,26 @@ class Shape:
         Parameters
         ----------
         factor : float, (3,) float or (F, 3) float
-            Factor for all, for each of red, green and blue, or for each triangle; products above 1 become 1.
+            One factor, one each for red, green and blue, or three per triangle; products are clipped to 1.
         """
         return replace(self, colour=(self.colour * np.asarray(factor, np.float32)).clip(0, 1))
 
 
 def shape(vertices: ArrayLike, faces: ArrayLike, colour: ArrayLike, material: Material, kind: Kind) -> Shape:
-    """Make a shape of one material, each triangle with its own normal.
+    """Make a flat-shaded shape of one material.
 
     Parameters
     ----------
     vertices : (V, 3) float
         Corners, metres.
     faces : (F, 3) int
-        The rows of `vertices` that are the corners of each triangle, counter-clockwise as seen from outside.
+        Vertex indices of each triangle, counter-clockwise as seen from outside.
     colour : (3,) or (F, 3) float
         Linear albedo, 0..1: one for all triangles, or one for each.
     material : Material
-        What it is made of.
+        Its material.
     kind : Kind
-        What it belongs to.
+        Its kind.
     """
     vertices = np.asarray(vertices, dtype=np.float32)
     faces = np.asarray(faces, dtype=np.int32)
@@ -136,12 +136,12 @@ def rotation_matrix(roll: float, pitch: float, yaw: float) -> NDArray[np.float64
 
 
 def merge(shapes: Iterable[Shape]) -> Shape:
-    """Join several shapes to one.
+    """Merge several shapes into one.
 
     Parameters
     ----------
     shapes : iterable of Shape
-        At least one; the triangles of the first come first.
+        At least one; their triangles keep this order.
     """
     shapes = list(shapes)
     offsets = np.cumsum([0] + [len(s.vertices) for s in shapes[:-1]])
@@ -152,18 +152,18 @@ def merge(shapes: Iterable[Shape]) -> Shape:
 
 @cache
 def _primitive(name: str, **measures: float) -> tuple[NDArray, NDArray]:
-    """Return vertices and faces of a primitive of `trimesh` about the origin."""
+    """Return vertices and faces of a `trimesh` primitive at the origin."""
     mesh = getattr(needed("trimesh.creation"), name)(**measures)
     return mesh.vertices.astype(np.float32), mesh.faces.astype(np.int32)
 
 
 def box(centre: ArrayLike, size: ArrayLike, colour: ArrayLike, material: Material, kind: Kind) -> Shape:
-    """Make a box whose sides lie along the axes. Parameters not named here are those of `shape`.
+    """Make an axis-aligned box. Parameters not named here are those of `shape`.
 
     Parameters
     ----------
     centre : (3,) float
-        Its middle, metres.
+        Its centre, metres.
     size : (3,) float
         Its sides along x, y and z, metres.
     """
@@ -172,16 +172,16 @@ def box(centre: ArrayLike, size: ArrayLike, colour: ArrayLike, material: Materia
 
 
 def ball(centre: ArrayLike, radii: ArrayLike, colour: ArrayLike, material: Material, kind: Kind, detail=1) -> Shape:
-    """Make an ellipsoid whose axes lie along x, y and z. Parameters not named here are those of `shape`.
+    """Make an axis-aligned ellipsoid. Parameters not named here are those of `shape`.
 
     Parameters
     ----------
     centre : (3,) float
-        Its middle, metres.
+        Its centre, metres.
     radii : (3,) float
-        Half its extent along x, y and z, metres.
+        Semi-axes along x, y and z, metres.
     detail : int
-        How often the 20 faces of an icosahedron are divided by four.
+        Number of subdivisions of the icosahedron; each one splits every face into four.
     """
     vertices, faces = _primitive("icosphere", subdivisions=detail)
     return shape(vertices * np.asarray(radii, np.float32) + np.asarray(centre), faces, colour, material, kind)
@@ -196,11 +196,11 @@ def tube(
     Parameters
     ----------
     start, end : (3,) float
-        The two ends of its axis, metres.
+        End points of the axis, metres.
     radii : float or (float, float)
-        Its radius, or the radii at the start and at the end, metres.
+        The radius, or the radii at start and end, metres.
     sides : int
-        Faces around the axis.
+        Number of faces around the axis.
     """
     start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     first, last = radii if isinstance(radii, tuple) else (radii, radii)
@@ -222,7 +222,7 @@ def quads(
     Parameters
     ----------
     corner, right, up : (N, 3) or (3,) float
-        A corner of each parallelogram and the two edges that start there, metres; one row stands for all N.
+        One corner of each parallelogram and its two edges from there, metres; a single row applies to all N.
     colour : (N, 3) or (3,) float
         Linear albedo, 0..1.
     """
