@@ -188,7 +188,7 @@ def load_imagenet(segmenter: Segmenter, path: str | Path) -> None:
     the classifier, with scales, shifts and running statistics of its batch normalisation. Decoders and score layers
     keep their weights.
 
-    Pickled files (`.pth`) are rejected, because reading one can run any code in it. Convert a file from a trusted
+    Pickled files (`.pth`) are rejected, because reading one can run arbitrary code. Convert a file from a trusted
     source once::
 
         tensors = torch.load("vgg16.pth", map_location="cpu", weights_only=True)
