@@ -41,7 +41,7 @@ class LatticeFrame(NamedTuple):
 
 
 def vertex_places(vertices: ArrayLike) -> NDArray[np.float64]:
-    """Return where vertices lie in the plane of the two features, (M, 2).
+    """Return the positions of vertices in the plane of the two features, (M, 2).
 
     Parameters
     ----------
