@@ -67,8 +67,8 @@ def measure_blur(scheme: str, motions: Sequence[PlanarMotion], drops: int = 20, 
     ----------
     scheme : str
         One of `SCHEMES`. "bilinear": in each step, every cell takes the mean of the four old cells around its centre,
-        weighted by how near they are. "nearest": in each step, every cell takes the value of the old cell that its
-        centre lies in. "scrolling": as `Cmcdot` moves its maps, by whole cells, and turned once per `MAX_YAW`.
+        weighted by how near they are. "nearest": in each step, every cell takes the value of the old cell that contains
+        its centre. "scrolling": as `Cmcdot` moves its maps, by whole cells, and turned once per `MAX_YAW`.
     motions : sequence of PlanarMotion
         Motions of the vehicle, T of them; some of the cells at the start must stay in the map at every step.
     drops : int

@@ -112,7 +112,7 @@ class CellScores:
         scene : KnownScene
             What is true.
         estimate : Estimate
-            What the filter says.
+            The filter's output.
         """
         truth = np.where(scene.never_seen, State.UNKNOWN, scene.truth.state)
         scored, occupied = scene.never_seen | scene.observed, estimate.occupied > 0.5

@@ -23,7 +23,7 @@ from worlds.lecture_04_scenes import known_scenes
 
 GRIDS = {"paper": GridSpec.paper(), "compact": GridSpec.compact()}
 LIDARS = {"HDL-64E": HDL64E, "coarse": Lidar()}
-"""The real scanner at 10 Hz, and that of the small data sets, which looks ahead with a fifth of its columns."""
+"""The real scanner at 10 Hz, and the small data sets' scanner, which looks ahead with a fifth of its columns."""
 FRAMES = 30
 """Number of frames of a drive, 3 s."""
 HELD_OUT = 100

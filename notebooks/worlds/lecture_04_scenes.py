@@ -230,7 +230,7 @@ class SceneHistory:
         return KnownScene(frame, motion, truth, hit, observed, ~seen, left, self._in_view(truth.instance[hit]))
 
     def _any_of(self, masks: list[NDArray], source: GridSpec, skip: int = 0) -> NDArray[np.bool_]:
-        """Return the present cells that lie in any of the masks, one per frame up to the `skip` last ones."""
+        """Return the present cells that are in any of the masks, one per frame without the last `skip` ones."""
         found, outside = np.zeros(self.spec.shape, bool), np.zeros(1, np.float32)
         poses = self._poses[len(self._poses) - skip - len(masks) : len(self._poses) - skip]
         for pose, mask in zip(poses, masks, strict=True):

@@ -97,7 +97,7 @@ class TruthCounts:
         dict of str to (...) float64
             Shares from 0 to 1, in the order of the tables' columns; NaN where there is nothing to share. "found",
             "mistaken" and "missed": of the cells that the camera sees, those with the right label, with another label,
-            and without a label. "wrong": of the labelled cells, those in which something else stands. "hidden": of the
+            and without a label. "wrong": of the labelled cells, those with another true class. "hidden": of the
             labelled cells, those that the camera doesn't see. "iou": intersection over union of both, among the cells
             that the camera sees.
         """

@@ -27,7 +27,7 @@ class LatticeFrame(NamedTuple):
     title : str
         The step it shows.
     places : (M, 2) float
-        Where the marks lie, in features.
+        Positions of the marks, in features.
     values : (M,) float
         What is there: a weighted mean of the values of points.
     weights : (M,) float

@@ -163,7 +163,7 @@ class Agreement(NamedTuple):
     lane : float
         Share of the returns from the ground of the vehicle's own lane whose pixel is called road.
     standing : float
-        Share of the returns from things that stand up whose pixel is called something that stands up.
+        Share of the returns from upright things whose pixel is predicted as something upright.
     """
 
     lane: float

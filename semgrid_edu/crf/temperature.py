@@ -75,13 +75,16 @@ def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = 
     ignore : int
         Class number of what is unlabelled, which counts nowhere.
 
-        Returns ------- float T, from 0.01 to 100.
+    Returns
+    -------
+    float
+        T, from 0.01 to 100.
 
     Raises
     ------
     ArgumentError
-        When the shapes don't fit, a label is no class, no cell is labelled, a probability is 0, or the best
-        temperature lies outside: when every cell is right, or log p has nothing to do with the truth.
+        When the shapes don't fit, a label is no class, no cell is labelled, a probability is 0, or the best temperature
+        is outside this range: when every cell is right, or log p has nothing to do with the truth.
 
     Examples
     --------

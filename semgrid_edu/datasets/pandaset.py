@@ -141,7 +141,10 @@ class PandasetScene(FrameSequence):
         before, after : int
             How many scans before and after this frame's are added.
 
-            Returns ------- (H, W) uint8 Classes of KITTI-14; 255 in a cell without a labelled return.
+        Returns
+        -------
+        (H, W) uint8
+            Classes of KITTI-14; 255 in a cell without a labelled return.
 
         Raises
         ------

@@ -143,7 +143,7 @@ def _scaled(slices, splats, points, scale):
     """Return both weights of each point times its scale."""
     scaled_slices, scaled_splats = np.empty_like(slices), np.empty_like(splats)
     for i in prange(len(slices)):
-        for corner in range(slices.shape[1]):  # by corner: by row, numba would allocate an array for each product
+        for corner in range(slices.shape[1]):  # not row by row: numba would allocate an array for each product
             scaled_slices[i, corner] = scale[i] * slices[i, corner]
     for n in prange(len(splats)):
         scaled_splats[n] = scale[points[n]] * splats[n]

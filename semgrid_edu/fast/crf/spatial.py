@@ -73,8 +73,8 @@ class SeparableGaussian:
             One row per cell, cells counted row by row; `out` is overwritten.
         """
         grid, filtered = (array.reshape(len(self.row_scale), -1) for array in (np.ascontiguousarray(values), out))
-        # A zero makes the number of taps even. The tap at distance 0 is halved,
-        # because the loops add it twice, forward and backward.
+        # A zero tap makes their number even, and zero scales exclude rows beyond the grid. The tap at distance 0 is
+        # halved, because the loops add it twice, forward and backward.
         taps = np.append(self.taps, np.zeros(len(self.taps) % 2, np.float32))
         taps[0] /= 2
         row_scale = np.pad(self.row_scale, len(taps))
