@@ -15,7 +15,7 @@ FOCAL_LENGTHS = (0.01, 100.0)
 
 
 def rigid_transform(rotation: NDArray, translation: NDArray) -> NDArray[np.float64]:
-    """Return the transform that rotates, then shifts, for homogeneous column vectors, (4, 4).
+    """Return the (4, 4) transform of homogeneous column vectors that rotates, then shifts.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def transform_points(T_target_from_source: NDArray, points: NDArray) -> NDArray:
 
 
 def lidar_from_grid(lidar_height: float) -> NDArray[np.float64]:
-    """Return T_lidar_from_grid, (4, 4), from the ground below the LIDAR: a shift, as both frames have the same axes.
+    """Return T_lidar_from_grid, (4, 4): a shift from the ground below the LIDAR; both frames have the same axes.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def lidar_from_grid(lidar_height: float) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A rectified pinhole camera and where it stands. In its frame x points right, y down and z ahead.
+    """A rectified pinhole camera and its pose. In its frame x points right, y down and z ahead.
 
     Parameters
     ----------
@@ -94,14 +94,14 @@ class Camera:
     lidar_height: float = KITTI_LIDAR_HEIGHT
 
     def __post_init__(self) -> None:
-        """Refuse matrices of the wrong shape, and numbers that no camera has."""
+        """Reject matrices of the wrong shape, and numbers that no camera has."""
         _check_matrix("K", "a 3x3 intrinsic matrix", self.K, (3, 3))
         _check_matrix("T_camera_from_lidar", "a 4x4 transform", self.T_camera_from_lidar, (4, 4))
         _check_pinhole(self.K, np.array(self.size[::-1]))
 
     @property
     def T_camera_from_grid(self) -> NDArray[np.float64]:
-        """(4, 4): from the grid frame, on the ground below the LIDAR, to the camera."""
+        """Rigid transform, (4, 4), from the grid frame (on the ground below the LIDAR) to the camera frame."""
         return self.T_camera_from_lidar @ lidar_from_grid(self.lidar_height)
 
     def same_as(self, other: "Camera") -> bool:
@@ -110,7 +110,7 @@ class Camera:
         Parameters
         ----------
         other : Camera
-            The other one.
+            The camera to compare with.
         """
         matrices = ((self.K, other.K), (self.T_camera_from_lidar, other.T_camera_from_lidar))
         sizes = (self.size, self.lidar_height) == (other.size, other.lidar_height)
@@ -120,7 +120,7 @@ class Camera:
         """Return the camera that would have taken the same picture with another number of pixels.
 
         Pixel centres are integers, so the image spans -1/2 .. w - 1/2, and scaling it by s moves the principal point to
-        c' = (c + 1/2) s - 1/2. Without the halves every look-up would be off by up to half a pixel.
+        c' = (c + 1/2) s - 1/2. Without the halves every projected point would be off by up to half a pixel.
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ def _check_matrix(name: str, expected: str, matrix: NDArray, shape: tuple[int, i
 
 
 def _check_pinhole(K: NDArray, size: NDArray) -> None:
-    """Refuse focal lengths (pixels) that no lens has, for images of (w, h) pixels."""
+    """Reject focal lengths (pixels) that no lens has, for images of (w, h) pixels."""
     (shortest, longest), focal_lengths = FOCAL_LENGTHS, np.diag(K)[:2]
     if not ((focal_lengths >= shortest * size) & (focal_lengths <= longest * size)).all():
         expected = f"focal lengths of {shortest:g} to {longest:g} times {size[0]} x {size[1]} pixels"
@@ -162,8 +162,8 @@ def project(points: NDArray, camera: Camera) -> tuple[NDArray, NDArray[np.bool_]
     pixels : (..., 2) float
         u to the right and v down, pixels; NaN for a point that isn't in front of the camera.
     visible : (...) bool
-        Whether the point is in front of the camera and its pixel lies among the centres of the image's
-        pixels, 0 <= u <= w - 1, 0 <= v <= h - 1, where equation (2) can interpolate.
+        Whether the point is in front of the camera and projects between the centres of the image's pixels, 0 <= u <= w
+        - 1, 0 <= v <= h - 1, where equation (2) can interpolate.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The bird's-eye grid: where its cells lie, and which cell a point falls into (paper, section 4.1)."""
+"""The bird's-eye grid: where its cells are, and which cell contains a point (paper, section 4.1)."""
 
 from dataclasses import dataclass
 
@@ -12,8 +12,8 @@ from semgrid_edu.errors import ArgumentError, types_named
 class GridSpec:
     """A rectangle of square cells in the grid frame: x forward, y left, origin on the ground below the LIDAR.
 
-    Arrays over it are maps seen from above with forward up: row 0 is the farthest ahead, column 0 the
-    leftmost. Cell (r, c) has its centre at x = x_max - (r + 1/2) cell, y = y_max - (c + 1/2) cell.
+    Arrays over it are maps seen from above with forward up: row 0 is the farthest ahead, column 0 the leftmost. The
+    centre of cell (r, c) is at x = x_max - (r + 1/2) cell, y = y_max - (c + 1/2) cell.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class GridSpec:
 
     @types_named
     def __post_init__(self) -> None:
-        """Refuse a grid that no array can hold."""
+        """Reject a grid that is too large for an array."""
         if not (np.isfinite(self.cell) and self.cell > 0):
             raise ArgumentError("cell", "a positive size in metres", self.cell)
         for axis, low, high in (("x", self.x_min, self.x_max), ("y", self.y_min, self.y_max)):
@@ -53,7 +53,7 @@ class GridSpec:
     def paper(cls) -> "GridSpec":
         """Return the paper's grid (section 4.1): 71 m ahead, 31 m wide, 0.2 m cells, (355, 155).
 
-        The paper gives the extent of the grid, not where it lies. Ours begins at the LIDAR, because the camera looks
+        The paper gives the size of the grid, but not its position. Ours begins at the LIDAR, because the camera looks
         ahead.
         """
         return cls(x_min=0.0, x_max=71.0, y_min=-15.5, y_max=15.5, cell=0.2)
@@ -70,7 +70,7 @@ class GridSpec:
 
     @property
     def corner(self) -> tuple[float, float, float]:
-        """x_max, y_max and cell as floats: numba compiles a loop anew for each mixture of them with whole numbers."""
+        """x_max, y_max and cell as floats, because numba compiles a loop again for each mixture of ints and floats."""
         return float(self.x_max), float(self.y_max), float(self.cell)
 
     def centers(self) -> NDArray[np.float64]:
@@ -81,23 +81,23 @@ class GridSpec:
         return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
 
     def distances(self) -> NDArray[np.float64]:
-        """Return how far the centre of every cell is from the origin of the grid frame, (H, W), metres."""
+        """Return the distance of every cell's centre from the origin of the grid frame, (H, W), metres."""
         return np.hypot(*np.moveaxis(self.centers(), -1, 0))
 
     def cells(self, xy: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        """Find the cell that each point falls into.
+        """Find the cell that contains each point.
 
         Parameters
         ----------
         xy : (N, 2+) float
-            Points in the grid frame, metres; further columns are ignored. A point with a NaN lies in no cell.
+            Points in the grid frame, metres; further columns are ignored. A point with a NaN is in no cell.
 
         Returns
         -------
         rows, cols : (N,) int64
             The cell of each point; 0 for a point outside, so use them only where `inside` holds.
         inside : (N,) bool
-            Whether the point lies in the grid. The borders x_max and y_max belong to it, x_min and y_min don't.
+            Whether the point is in the grid, which includes the borders x_max and y_max, but not x_min and y_min.
         """
         xy = np.asarray(xy)
         if xy.ndim != 2 or xy.shape[1] < 2:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.errors import ArgumentError
 
 IGNORE = 255
-"""The class number of what is unlabelled: left out of the loss and of the metrics."""
+"""The class number of unlabelled pixels and cells, which loss and metrics leave out."""
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class LabelSet:
     Parameters
     ----------
     name : str
-        What the set is called.
+        The name of the set.
     names : tuple of str
         The name of each class; class c is `names[c]`.
     rgb : tuple of (int, int, int)
@@ -26,7 +26,7 @@ class LabelSet:
     n_semantic : int
         Number of semantic classes. They come first; the others are kinds of unknown.
     flat : tuple of str
-        Names of the classes of the ground, on which an object can be. `most_voted` prefers any other class to these.
+        Names of the ground classes. `most_voted` prefers any other class to these.
 
     Examples
     --------
@@ -69,7 +69,7 @@ class LabelSet:
         return palette[np.asarray(labels)]
 
     def most_voted(self, votes: NDArray, otherwise: ArrayLike) -> NDArray[np.uint8]:
-        """Return the class that each cell takes when several were seen in it.
+        """Return the class of each cell from the votes of the classes seen in it.
 
         An object outvotes the ground below it: one vote for a thin pole beats many for the road. Otherwise the most
         frequent class wins; of equally frequent classes, the first.
@@ -95,7 +95,8 @@ class LabelSet:
         return np.where(votes.any(axis=0), best, otherwise).astype(np.uint8)
 
 
-# The palette of Cityscapes (Cordts et al., 2016), moved as little as needed for a deuteranope to tell every pair apart.
+# The palette of Cityscapes (Cordts et al., 2016), with the smallest changes that let a deuteranope tell all classes
+# apart.
 _KITTI_COLOURS = {
     "road": (126, 59, 122),
     "sidewalk": (255, 64, 252),
@@ -143,7 +144,7 @@ SYNTHIA_10 = LabelSet(
     names=tuple(_SYNTHIA_COLOURS),
     rgb=tuple(_SYNTHIA_COLOURS.values()),
     n_semantic=10,
-    flat=("void", "road", "sidewalk", "vegetation", "lane"),  # anything outvotes void, as it does the ground
+    flat=("void", "road", "sidewalk", "vegetation", "lane"),  # anything outvotes void and the ground
 )
 """The ten classes of the paper's Table 3, in its order."""
 

@@ -8,9 +8,9 @@ from semgrid_edu.labels import IGNORE, LabelSet
 
 
 def confusion_matrix(truth: ArrayLike, predicted: ArrayLike, n_classes: int, ignore: int = IGNORE) -> NDArray[np.int64]:
-    """Count how often each true class is called each class.
+    """Count how often each true class is predicted as each class.
 
-    The matrices of several frames can be added. The metrics of a data set are those of the sum.
+    The matrices of several frames can be added. The metrics of a data set are computed from the sum.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ def confusion_matrix(truth: ArrayLike, predicted: ArrayLike, n_classes: int, ign
     n_classes : int
         Number of classes, C.
     ignore : int
-        Class number of what is unlabelled. A cell with this truth counts nowhere, whatever is predicted there.
+        Class number of unlabelled cells. They aren't counted, whatever is predicted there.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def confusion_matrix(truth: ArrayLike, predicted: ArrayLike, n_classes: int, ign
 
 
 def _classes(name: str, labels: NDArray, n_classes: int) -> NDArray[np.int64]:
-    """Return the labels as int64 once they are known to be classes."""
+    """Return the labels as int64, after checking that they are classes."""
     if labels.size and not np.issubdtype(labels.dtype, np.integer):
         raise ArgumentError(name, "integer classes", f"type {labels.dtype}")
     if labels.size and not (labels.min() >= 0 and labels.max() < n_classes):
@@ -53,9 +53,9 @@ def _classes(name: str, labels: NDArray, n_classes: int) -> NDArray[np.int64]:
 def semantic_cells(confusion: ArrayLike, label_set: LabelSet) -> NDArray[np.int64]:
     """Keep only the cells whose truth is a semantic class.
 
-    Most cells are unknown, and they are the easiest to get right, because the occupancy grid tells which they are.
-    Without them a metric says how well the semantic classes are known. A semantic cell that is called unknown still
-    counts as wrong.
+    Most cells are unknown, and they are the easiest to get right, because the occupancy grid shows which they are.
+    Without them a metric measures the semantic classes alone. A semantic cell that is predicted as unknown still counts
+    as wrong.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def semantic_cells(confusion: ArrayLike, label_set: LabelSet) -> NDArray[np.int6
     Returns
     -------
     (C, C) int64
-        The same matrix with the rows of the other classes emptied.
+        The same matrix with zeros in the rows of the other classes.
     """
     kept = _matrix(confusion).copy()
     if len(kept) != len(label_set):
@@ -78,21 +78,21 @@ def semantic_cells(confusion: ArrayLike, label_set: LabelSet) -> NDArray[np.int6
 
 
 def pixel_accuracy(confusion: ArrayLike) -> float:
-    """Return the share of labelled cells that are called right, 0..1; NaN when no cell is labelled.
+    """Return the share of labelled cells that are predicted correctly, 0..1; NaN when no cell is labelled.
 
     Parameters
     ----------
     confusion : (C, C) int
-        How often each true class (row) is called each class (column).
+        How often each true class (row) is predicted as each class (column).
     """
     matrix = _matrix(confusion)
     return _ratio(np.trace(matrix), matrix.sum())
 
 
 def class_accuracy(confusion: ArrayLike) -> float:
-    """Return the mean over classes of the share of a class's cells that are called right, 0..1.
+    """Return the mean over classes of the share of a class's cells that are predicted correctly, 0..1.
 
-    A class without truth cells is left out of the mean; NaN when no cell is labelled. Parameters are those of
+    Classes without cells in the truth are left out of the mean; NaN when no cell is labelled. Parameters are those of
     `pixel_accuracy`.
     """
     matrix = _matrix(confusion)
@@ -104,8 +104,8 @@ def class_accuracy(confusion: ArrayLike) -> float:
 def frequency_weighted_iou(confusion: ArrayLike) -> float:
     """Return FmIoU: the mean over classes of intersection over union, weighted by frequency, 0..1.
 
-    With N labelled cells, of which class c has n_c, is predicted m_c times, and TP_c times rightly, it is
-    sum_c n_c / N * TP_c / (n_c + m_c - TP_c); NaN when no cell is labelled. Parameters are those of `pixel_accuracy`.
+    With N labelled cells, n_c cells of class c, m_c predictions of it and TP_c correct ones, it is sum_c n_c / N * TP_c
+    / (n_c + m_c - TP_c); NaN when no cell is labelled. Parameters are those of `pixel_accuracy`.
     """
     matrix = _matrix(confusion)
     cells, hits = matrix.sum(axis=1), np.diag(matrix)
@@ -115,7 +115,7 @@ def frequency_weighted_iou(confusion: ArrayLike) -> float:
 
 
 def class_iou(confusion: ArrayLike) -> NDArray[np.float64]:
-    """Return the intersection over union of each class, (C,), 0..1; NaN for a class that no cell has or is called.
+    """Return the intersection over union of each class, (C,), 0..1; NaN for a class in neither truth nor prediction.
 
     TP_c / (n_c + m_c - TP_c), see `frequency_weighted_iou`. Parameters are those of `pixel_accuracy`.
     """
@@ -126,7 +126,7 @@ def class_iou(confusion: ArrayLike) -> NDArray[np.float64]:
 
 
 def _matrix(confusion: ArrayLike) -> NDArray:
-    """Return the confusion matrix as an array, or say why it isn't one."""
+    """Return the confusion matrix as an array, or raise an error that explains why it isn't one."""
     matrix = np.asarray(confusion)
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1]:
         raise ArgumentError("confusion", "a square matrix, row: truth", f"shape {matrix.shape}")

@@ -1,4 +1,4 @@
-"""Toy worlds with their exact answers, and figures, that one lecture needs: one module per topic.
+"""Toy worlds with exact answers, and figures, for a single lecture: one module per topic.
 
 `worlds/lecture_NN_topic.py` belongs to lecture NN, the first that shows it. A lecture writes
 `from worlds.lecture_02_boxes import Box`, because a kernel's working directory is the notebook's folder. A companion is

@@ -1,4 +1,4 @@
-"""The register of the paper's equations, `lecture_00_equations.toml`: code, lecture and exercise of each."""
+"""The paper's equations, with the code, lecture and exercise of each, from `lecture_00_equations.toml`."""
 
 import tomllib
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class Equation:
     section : str
         Number of the paper's section, such as "3.2".
     title : str
-        What it states, in a few words.
+        Its meaning, in a few words.
     literal : str
         Dotted name of the code that reads like the equation.
     fast : str, optional
@@ -25,7 +25,7 @@ class Equation:
     lecture : str
         "NN_name#tag": the notebook and the tag of the cell that derives it.
     exercise : str, optional
-        "NN_name#task": the exercise and the grade_id of its answer cell; without one, it is still to come.
+        "NN_name#task": the exercise and the grade_id of its answer cell; empty if it has no exercise yet.
     """
 
     id: str

@@ -1,4 +1,4 @@
-"""All stages as graphical models, and the ledger: what each edge costs that the real system cuts."""
+"""All stages as graphical models, and the ledger: the cost of each edge that the real system cuts."""
 
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -31,7 +31,7 @@ class Stage(NamedTuple):
     id : str
         A short name, such as "bof".
     title : str
-        What is modelled, in a few words.
+        The subject of the model, in a few words.
     build : callable
         Builds the model; its parameters have defaults.
     cut : tuple of CutEdge
@@ -191,9 +191,9 @@ class LedgerLine(NamedTuple):
     stage, edge : str
         The id of the stage, such as "bof", and the edge that is cut.
     exact, system : float
-        The exact answer, and the answer without the edge.
+        The exact answer and the answer without the edge.
     unit : str
-        What the two numbers are.
+        The meaning of the two numbers.
     lecture : str
         Number of the lecture that shows it, such as "03".
     """
@@ -207,7 +207,7 @@ class LedgerLine(NamedTuple):
 
 
 def ledger(stage: str | None = None) -> tuple[LedgerLine, ...]:
-    """Measure the price of every cut edge that has one: of one stage, or of all, which takes a few seconds."""
+    """Measure the price of every cut edge that has one, in one stage or in all (which takes a few seconds)."""
     return tuple(
         LedgerLine(each.id, edge.edge, *edge.price(), each.lecture[:2])
         for each in STAGES

@@ -1,4 +1,4 @@
-"""The graph of one stage of the system: its model, how it is drawn, and the edges that the real system cuts."""
+"""The graph of one stage of the system: its model, its drawing, and the edges that the real system cuts."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, draw
 
 
 class Price(NamedTuple):
-    """What one cut edge costs on a toy world: the exact answer, the answer without the edge, and what was asked."""
+    """The cost of one cut edge on a toy world: the question, the exact answer, and the answer without the edge."""
 
     exact: float
     system: float
@@ -18,12 +18,12 @@ class Price(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The two numbers as they are written on the edge, such as ".34 → .57"."""
+        """The label of the edge with both numbers, such as ".34 → .57"."""
         return f"{short(self.exact)} \u2192 {short(self.system)}"
 
 
 def short(number: float) -> str:
-    """Round a number >= 0 to two decimals, or to three where two would hide it.
+    """Round a number >= 0 to two decimals, or to three if two would hide it.
 
     >>> short(0.3), short(0.0512), short(0.998), short(1.241), short(1), short(0)
     ('.30', '.051', '.998', '1.24', '1', '0')
@@ -47,7 +47,7 @@ class CutEdge(NamedTuple):
     price : callable, optional
         Measures the cost by exact inference.
     bend, at : float
-        Curvature of the line, and where on it the price is written: see `Dashed`.
+        Curvature of the line, and the position of the price on it: see `Dashed`.
     """
 
     edge: str
@@ -89,7 +89,7 @@ class StageGraph:
     observed : tuple of str
         The observed variables; drawn shaded.
     labels, equations : dict of str to str
-        Text in each node and to the right of it: see `draw`.
+        Text in each node, and to its right: see `draw`.
     plates : dict of str to tuple of str
         Nodes that are repeated for every cell, beam or step, by the text of the box around them.
     cut : tuple of CutEdge
@@ -127,7 +127,7 @@ class StageGraph:
 
     @property
     def dashed(self) -> list[Dashed]:
-        """The cut edges as they are drawn: those whose two ends this graph has (a shorter row of cells lacks some)."""
+        """The cut edges to draw: those with both ends in this graph (a shorter row of cells lacks some)."""
         drawn = {*self.model.names, *self.ghosts}
         shown = [edge for edge in self.cut if drawn.issuperset(edge.ends)]
         texts = [edge.price().text if edge.price else "" for edge in shown]

@@ -1,7 +1,7 @@
-"""A toy street for the whole system: two cells on one ray, which a LIDAR beam and one pixel of the camera share.
+"""A toy street for the whole system: two cells on one ray, which a LIDAR beam and a camera pixel share.
 
-The near cell hides the far one from the camera when a thing is in it, and from the LIDAR when it reflects the beam.
-When neither cell holds a thing, the pixel sees the ground of the far one.
+An object in the near cell hides the far cell from the camera, and from the LIDAR if it reflects the beam. If neither
+cell has an object, the pixel sees the ground of the far cell.
 """
 
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ STREET = (0.5, 0.2, 0.1, 0.1, 0.1)
 """Share of the street's cells with each content."""
 
 RATES = (
-    # to FREE, STATIC, DYNAMIC, UNKNOWN, 1/s: lecture 01's, by which a moving thing has left its cell after a second
+    # to FREE, STATIC, DYNAMIC, UNKNOWN, 1/s: as in lecture 01, where a moving thing leaves its cell within a second
     (0.0, 0.02, 0.2, 0.2),
     (0.02, 0.0, 0.02, 0.1),
     (1.0, 0.1, 0.0, 0.5),
@@ -38,7 +38,7 @@ RATES = (
 )
 
 PARAMS = WorldModel(rates=RATES, first_sight=(0.7, 0.2, 0.1))
-"""What the filter assumes, which is right for this street: the rates, and how frequent the states are."""
+"""The filter's assumptions, which are true of this street: the rates, and the frequencies of the states."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +54,8 @@ class SystemWorld:
     range_error : float
         Probability that a return from one of the cells is measured in the other.
     pixel_right : float
-        Probability that the segmentation network names the class that the pixel sees. Its errors are spread evenly over
-        the other classes.
+        Probability that the segmentation network predicts the class that the pixel sees. Its errors are spread evenly
+        over the other classes.
     params : WorldModel
         Rates of the street and of the filter, first sight, and p_hit of the scanner.
     """
@@ -67,11 +67,11 @@ class SystemWorld:
     params: WorldModel = PARAMS
 
     def change(self) -> NDArray[np.float64]:
-        """Return P(content now | content before), (5, 5), by the filter's rates, but without any towards UNKNOWN.
+        """Return P(content now | content before), (5, 5), by the filter's rates, but without transitions to UNKNOWN.
 
         The street itself forgets nothing, so there is no UNKNOWN. A cell that keeps its state keeps its content. A cell
-        that becomes FREE is road or sidewalk, in the proportions of the street; one that becomes STATIC holds a parked
-        car, and one that becomes DYNAMIC a moving car.
+        that becomes FREE is road or sidewalk, in the proportions of the street; a cell that becomes STATIC gets a
+        parked car, and a cell that becomes DYNAMIC a moving car.
         """
         rates = np.array(self.params.rates)
         rates[:, State.UNKNOWN] = 0
@@ -91,21 +91,21 @@ class SystemWorld:
         return reflection(beam).table[np.ix_(occupied, occupied)] @ measured
 
     def sees(self) -> NDArray[np.float64]:
-        """Return P(class that the pixel sees | near, far), (5, 5, 4): near's if a thing is there, else far's."""
+        """Return P(class that the pixel sees | near, far), (5, 5, 4): near's if an object is there, else far's."""
         near = np.broadcast_to(CLASS_OF[:, None], (5, 5, 4))
         far = np.broadcast_to(CLASS_OF[None, :], (5, 5, 4))
         return np.where((STATE_OF != State.FREE)[:, None, None], near, far)
 
     def image(self) -> NDArray[np.float64]:
-        """Return P(i | near, far), (5, 5, 4): the class that the network names, right with `pixel_right`."""
+        """Return P(i | near, far), (5, 5, 4): the class that the network predicts, right with `pixel_right`."""
         return self.sees() @ self.confusion()
 
     def confusion(self) -> NDArray[np.float64]:
-        """Return P(class named | class seen), (4, 4)."""
+        """Return P(class predicted | class seen), (4, 4)."""
         return np.where(np.eye(4) == 1, self.pixel_right, (1 - self.pixel_right) / 3)
 
     def occupancy(self) -> list[NDArray[np.float32]]:
-        """Return o: what the package's filter believes after every possible sequence of scans.
+        """Return o: the belief of the package's filter after every possible sequence of scans.
 
         Returns
         -------
@@ -123,7 +123,7 @@ class SystemWorld:
 
 
 def _after(state: FilterState, scan: int, spec: GridSpec, params: WorldModel, dt: float) -> FilterState:
-    """Predict, then update each cell: it has the return, or the beam passes it, or it is behind the return."""
+    """Predict, then update each cell: it has the return, the beam passes it, or it is behind the return."""
     obstacles = np.array([[scan == 0, scan == 1]]).astype(int)
     passed = np.array([[scan != 0, scan == 2]])
     evidence = likelihoods(obstacles, passed, params.sensor)

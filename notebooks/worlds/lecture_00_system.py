@@ -1,6 +1,6 @@
 """The whole system as a graph, from the world to the semantic grid, and the edges that the paper cuts (figure 2).
 
-The drawing shows the world above the sensors, and what the paper computes below them: l -> o, i -> s -> p, (p, o) -> g.
+The drawing shows the world above the sensors, and the paper's computation below them: l -> o, i -> s -> p, (p, o) -> g.
 Information flows down, never up, and from one instant to the next only inside o.
 """
 
@@ -57,7 +57,7 @@ def street(world: SystemWorld) -> GraphicalModel:
 
 
 def class_and_sensors(world: SystemWorld, t: int) -> NDArray[np.float64]:
-    """Return the joint distribution of a cell's class at instant t and of all readings up to then.
+    """Return the joint distribution of a cell's class at instant t and all readings so far.
 
     (2, 4, 3^(t+1), 4^(t+1)): near and far cell; class; sequence of scans; sequence of images. In a sequence, the last
     reading changes fastest.
@@ -70,12 +70,12 @@ def class_and_sensors(world: SystemWorld, t: int) -> NDArray[np.float64]:
 
 
 def same_belief(o: NDArray) -> NDArray[np.int64]:
-    """Give each of N sequences of scans a number; two get the same when the filter believes the same (o) after both."""
+    """Assign numbers to N sequences of scans; two that lead to the same belief o get the same number."""
     return np.unique(o.reshape(len(o), -1).round(6), axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def _labels(world: SystemWorld, t: int) -> NDArray[np.float64]:
-    """Return P(g | o, p): the best label of each cell, given its own column of o and the class that the pixel names."""
+    """Return P(g | o, p): the best label of each cell, given its part of o and the pixel's predicted class."""
     joint = class_and_sensors(world, t)
     o = world.occupancy()[t]
     now = joint.reshape(2, 4, len(o), -1, 4).sum(axis=3)
@@ -201,4 +201,4 @@ CUT = (
         bend=-0.05,
     ),
 )
-"""What the system leaves out."""
+"""The edges that the system cuts."""

@@ -1,7 +1,7 @@
-"""Bayes on a line: a vehicle's place on a ring road as a hidden Markov model (paper, section 3.2).
+"""Bayes on a line: a vehicle's position on a ring road as a hidden Markov model (paper, section 3.2).
 
 A filter is half of message passing on a chain: its beliefs are the messages that run forward in time. The messages that
-run backward carry what later readings tell about earlier places.
+run backward carry the evidence of later readings about earlier positions.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ def bayes_on_a_line(
     hit: float = 0.8,
     false_alarm: float = 0.1,
 ) -> StageGraph:
-    """Build the ring road: places n0, n1, ... one step apart, and what the sensor reads at each.
+    """Build the ring road: positions n0, n1, ... one step apart, and the sensor's reading at each.
 
     Parameters
     ----------
@@ -93,13 +93,13 @@ def _given(stage: StageGraph, readings: Sequence[int]) -> dict[str, int]:
 
 @cache
 def the_future() -> Price:
-    """How often the most probable place is right in trips of six steps, with all readings and with those so far."""
+    """How often the most probable position is right in trips of six steps, with all readings and with past ones."""
     stage = bayes_on_a_line(steps=6)
     return Price(_right(stage, smoothed), _right(stage, filtered), "place right, mean of six steps")
 
 
 def _right(stage: StageGraph, beliefs: Callable) -> float:
-    """Return the probability that the most probable place is right, over all readings and steps."""
+    """Return the probability that the most probable position is right, over all readings and steps."""
     total = 0.0
     for readings in every_combination((0, 1), repeat=len(stage.observed)):
         probability = eliminate(stage.model, (), _given(stage, readings)).table
@@ -118,4 +118,4 @@ CUT = (
         bend=-0.55,
     ),
 )
-"""What the filter leaves out."""
+"""The edges that the filter cuts."""

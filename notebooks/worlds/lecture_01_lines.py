@@ -14,13 +14,13 @@ TOP = 1.25
 """Upper end of an axis as a multiple of its largest number, so that there is room for the number itself."""
 
 MAX_NUMBERS = 12
-"""Largest number of cells for which numbers are written: longer lines have no room for them."""
+"""Largest number of cells with printed numbers: longer lines have no room for them."""
 
 
 def probability_lines(
     lines: Mapping[str, NDArray], names: Sequence[str] | None = None, truth: int | None = None
 ) -> Figure:
-    """Draw several lines of cells below each other, such as prior, likelihood and posterior, to one scale.
+    """Draw several lines of cells below each other on one scale, such as prior, likelihood and posterior.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def probability_lines(
     names : sequence of str, optional
         Names of the N cells; 0, 1, ... when left out.
     truth : int, optional
-        The right cell, which a triangle marks in every line.
+        The true cell, marked by a triangle in every line.
     """
     size = (6, 0.5 + 1.3 * len(lines))
     top = TOP * (max(np.max(values, initial=0) for values in lines.values()) or 1)
@@ -63,7 +63,7 @@ def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | Non
     ax : Axes, optional
         Axes to draw into; a new figure with a colour bar when left out.
     truth : (T,) int, optional
-        The right cell at each step, which a circle marks.
+        The true cell at each step, marked by a circle.
     """
     if ax is None:
         ax = plt.subplots(figsize=(6, 2.6), layout="constrained")[1]

@@ -1,6 +1,6 @@
-"""A beam over several cells, which an occupancy grid cuts into single cells; and several rings that share a pose error.
+"""A beam over several cells, which an occupancy grid treats separately; and several rings that share a pose error.
 
-A beam passes cells until one reflects it, so a single range tells something about all cells up to that one: Thrun,
+A beam passes cells until one reflects it, so a single range is evidence about all cells up to that one: Thrun,
 "Learning occupancy grid maps with forward sensor models", Autonomous Robots 15, 2003.
 """
 
@@ -18,15 +18,15 @@ from semgrid_edu.graphical import Factor, in_rows, product
 from worlds.lecture_00_stage_graph import CutEdge, Price, StageGraph, binary, directed
 
 BINS_PER_CELL = 10
-"""A range is read to a tenth of a cell: 2 cm for cells of 0.2 m."""
+"""Ranges have a resolution of a tenth of a cell: 2 cm for cells of 0.2 m."""
 
 MARGIN = 6
-"""Standard deviations by which a range may be in front of the first cell or behind the last one."""
+"""Standard deviations by which a range may be in front of the first cell or behind the last cell."""
 
 
 @dataclass(frozen=True)
 class BeamWorld:
-    """Cells along a beam, nearest first, and how the beam is reflected and measured.
+    """Cells along a beam, nearest first, and a model of the beam's reflection and range error.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def reflection(world: BeamWorld, name: str = "r") -> Factor:
 
 
 def range_bins(world: BeamWorld) -> NDArray[np.float64]:
-    """Return the ranges that can be read, ascending, in cells: 0 is the middle of the nearest cell, 1 that of the next.
+    """Return the possible ranges, ascending, in cells: 0 is the middle of the nearest cell, 1 of the next cell.
 
     There is one every tenth of a cell, or one per cell when the range is exact.
     """
@@ -116,7 +116,7 @@ def measurement(world: BeamWorld) -> NDArray[np.float64]:
 
 
 def range_state(world: BeamWorld, z: float | None) -> int:
-    """Return the state of the variable z for a range in cells, or for None, when nothing came back."""
+    """Return the state of the variable z for a range in cells, or for None if nothing came back."""
     bins = range_bins(world)
     if z is None:
         return len(bins)
@@ -132,7 +132,7 @@ def beam_likelihood(world: BeamWorld, z: float | None) -> Factor:
 
 
 class BeamBeliefs(NamedTuple):
-    """Exact inference beside an occupancy grid with the same sensor, after each of n ranges.
+    """Results of exact inference and of an occupancy grid with the same sensor, after each of n ranges.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ class BeamBeliefs(NamedTuple):
 
 
 def beam_beliefs(world: BeamWorld, ranges: Sequence[float | None]) -> BeamBeliefs:
-    """Take in ranges one after the other, exactly and cell by cell.
+    """Update with one range after the other, exactly and cell by cell.
 
     For the ranges 4.0, 4.6, 3.6, 4.2 of a wall in the fifth of eight cells and the defaults of `BeamWorld`, the cell
     behind the wall gets P(occupied) = 0.57 cell by cell, instead of the exact 0.34.
@@ -189,4 +189,4 @@ CUT_BEAM = (
         bend=0.55,
     ),
 )
-"""What a grid leaves out."""
+"""The edges that a grid cuts."""

@@ -1,4 +1,4 @@
-"""A toy world, upright boxes on flat ground, and a LIDAR that scans it exactly, within milliseconds."""
+"""A toy world of upright boxes on flat ground, and an exact LIDAR simulation that takes milliseconds."""
 
 from typing import NamedTuple
 
@@ -50,7 +50,7 @@ def scan_boxes(
     Parameters
     ----------
     boxes : list of Box
-        The things in the world.
+        The objects in the world.
     x, y, yaw : float
         Pose of the vehicle in the world, metres and rad; its LIDAR is as high as KITTI's.
     columns, rings : int
@@ -87,7 +87,7 @@ def scan_boxes(
     start = np.array([x, y, KITTI_LIDAR_HEIGHT])
     length = np.where(ray[:, 2] < 0, -start[2] / ray[:, 2], np.inf)
     for box in boxes:
-        # A ray is in the box between the last of the three pairs of faces that it enters and the first that it leaves.
+        # A ray is in the box from the last entry to the first exit through the three pairs of faces.
         first = (np.array([box.x_min, box.y_min, 0]) - start) / ray
         second = (np.array([box.x_max, box.y_max, box.height]) - start) / ray
         enters = np.minimum(first, second).max(axis=1)

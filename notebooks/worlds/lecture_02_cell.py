@@ -1,4 +1,4 @@
-"""One cell by itself: of the log-odds grid, and of CMCDOT, a chain of four states (paper, section 3.2).
+"""A single cell of the log-odds grid, and of CMCDOT, a chain of four states (paper, section 3.2).
 
 A scan enters as virtual evidence (Pearl 1988, section 2.2.2): z_t has two states, "this scan" and "any other", and
 P(z_t = this scan | state) is the pair of likelihoods that the package computes. Only their ratio matters.
@@ -41,11 +41,11 @@ def one_cell(
     Parameters
     ----------
     scans : (T, 2) float
-        P(z | occupied) and P(z | free) of each scan, such as `read_scans` gives; equal where a scan says nothing.
+        P(z | occupied) and P(z | free) of each scan, as from `read_scans`; equal if a scan doesn't observe the cell.
     dt : float
         Time before each scan, seconds.
     world : WorldModel, optional
-        The rates of change, and what UNKNOWN turns out to be at first sight; the defaults when left out.
+        The rates of change, and the probabilities of the states at first sight; the defaults when left out.
     start : (4,) float
         The belief at time 0: FREE, STATIC, DYNAMIC, UNKNOWN.
 
@@ -89,20 +89,20 @@ def one_cell(
 
 
 def looking(world: WorldModel) -> NDArray[np.float64]:
-    """Return P(m | v, prior), (2, 4, 4): UNKNOWN becomes another state when a scan sees the cell, all else stays."""
+    """Return P(m | v, prior), (2, 4, 4): UNKNOWN becomes another state when a scan sees the cell; the others stay."""
     seen = np.eye(4)
     seen[State.UNKNOWN] = [*world.first_sight, 0]
     return np.stack([np.eye(4), seen / seen.sum(axis=1, keepdims=True)])
 
 
 def cell_given(scans: ArrayLike) -> dict[str, int]:
-    """Return what is observed of one cell: v1, v2, ... and z1, z2, .... A scan of equal likelihoods doesn't see it."""
+    """Return the observations of one cell: v1, v2, ... and z1, z2, .... Equal likelihoods mean that it isn't seen."""
     seen = {f"v{t}": int(occupied != free) for t, (occupied, free) in enumerate(scans, start=1)}
     return seen | {f"z{t}": 1 for t in range(1, len(seen) + 1)}
 
 
 class CellBeliefs(NamedTuple):
-    """What is believed of one cell before and after each of T scans: FREE, STATIC, DYNAMIC, UNKNOWN, (T, 4) each."""
+    """Beliefs about one cell before and after each of T scans: FREE, STATIC, DYNAMIC, UNKNOWN, (T, 4) each."""
 
     predicted: NDArray
     updated: NDArray
@@ -173,7 +173,7 @@ def read_scans(letters: str, sensor: SensorModel | None = None) -> NDArray[np.fl
     letters : str
         One per scan: "." for a beam that passes the cell, "#" for an obstacle return, " " for nothing.
     sensor : SensorModel, optional
-        How the scanner errs; the package's default when left out.
+        The scanner's error model; the package's default when left out.
 
     Returns
     -------
@@ -210,7 +210,7 @@ CUT_LOG_ODDS = (
         ("z1", "z2"),
     ),
 )
-"""What the log-odds grid leaves out."""
+"""The edges that the log-odds grid cuts."""
 
 CUT_CELL = (
     CutEdge(
@@ -232,4 +232,4 @@ CUT_CELL = (
         ("z1", "z2"),
     ),
 )
-"""What CMCDOT leaves out in one cell."""
+"""The edges that CMCDOT cuts in one cell."""

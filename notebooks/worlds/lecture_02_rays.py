@@ -12,7 +12,7 @@ from semgrid_edu.occupancy.sensor import likelihoods, prepare_scan
 def walk_ray(
     spec: GridSpec, azimuth: float, length: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """List the cells along a ray from the origin: it enters a new cell wherever it crosses a line of the grid.
+    """List the cells along a ray from the origin: it enters a new cell where it crosses a grid line.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def walk_ray(
     crossings = [
         lines / along for lines, along in zip((lines_x, lines_y), direction, strict=True) if abs(along) > 1e-12
     ]
-    distance = np.unique(np.concatenate([[0.0], *crossings]).round(9))  # a corner is crossed once
+    distance = np.unique(np.concatenate([[0.0], *crossings]).round(9))  # a corner counts as one crossing
     distance = distance[distance >= 0]
     entered = distance[:-1][distance[:-1] < length]
     leaves_at = distance[1 : len(entered) + 1]

@@ -1,8 +1,8 @@
-"""Why walls grow thick in a log-odds grid, and what several rings with one pose error are worth (lecture 02).
+"""Why walls get too thick in a log-odds grid, and how much several rings with one pose error are worth (lecture 02).
 
-Evidence cell by cell takes the cell of a return as occupied and the cells before it as free. When range or pose are off
-by half a cell, some returns of a wall fall into the cell behind it. Exact inference knows that one wall explains all of
-them. And when several rings of a LIDAR hit a wall in the same scan, a wrong pose shifts all their returns together.
+Cell-by-cell evidence treats the cell of a return as occupied and the cells before it as free. If range or pose is off
+by half a cell, some returns of a wall are in the cell behind it. Exact inference knows that one wall explains all of
+them. And if several rings of a LIDAR hit a wall in the same scan, a wrong pose shifts all their returns together.
 """
 
 from collections.abc import Sequence
@@ -31,10 +31,10 @@ CELL = 0.2
 """Side of the paper's cells, metres."""
 
 NEAREST = 3.0
-"""Distance from the LIDAR to the beginning of the row, metres."""
+"""Distance from the LIDAR to the start of the row, metres."""
 
 PARAMS = LogOddsParams(prior=0.2, sensor=SensorModel(ground=None))
-"""The package's defaults on flat ground, with a prior by which most cells are free."""
+"""The package's defaults on flat ground, with a prior that most cells are free."""
 
 
 def same_sensor(noise: float, params: LogOddsParams = PARAMS, n_cells: int = 8) -> BeamWorld:
@@ -86,7 +86,7 @@ def draw_ranges(world: BeamWorld, row: Sequence[int], scans: int, rng: np.random
 
 
 class Walls(NamedTuple):
-    """What is believed after each scan, averaged over many random sequences of scans.
+    """Beliefs after each scan, averaged over many random sequences of scans.
 
     Parameters
     ----------
@@ -107,11 +107,11 @@ def thick_walls(noise: float = 0.5, scans: int = 20, draws: int = 50, wall: int 
 
     By default, the error of range and pose has a standard deviation of half a cell, 10 cm. In 600 draws, after 20
     scans, exact inference finds 1.06 cells occupied, and gives the cell behind the wall P(occupied) = 0.08. The
-    package's grid finds 2.4 cells occupied, and gives that cell 0.74. The smaller part of the difference comes from the
-    cut between cells: with the same beam model as exact inference, but cell by cell, the two numbers are 1.14 cells and
-    0.17. The rest comes from the package's evidence, which differs from that beam model: it takes every range as exact,
-    gives a pass less weight (0.3 / 0.7 instead of 0.2 / 0.95), and keeps the log-odds within bounds. The means of the
-    default 50 draws scatter by about 0.1 cells and 0.04 around these numbers.
+    package's grid finds 2.4 cells occupied, and gives that cell 0.74. The smaller part of the difference comes from
+    treating the cells separately: with the beam model of exact inference, but cell by cell, the two numbers are 1.14
+    cells and 0.17. The rest comes from the package's evidence, which differs from that beam model: it assumes exact
+    ranges, gives a pass less weight (0.3 / 0.7 instead of 0.2 / 0.95), and bounds the log-odds. The means of the
+    default 50 draws vary by about 0.1 cells and 0.04 around these numbers.
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ class Counted(NamedTuple):
     exact : (rings,) float64
         By exact inference, when all rings share one pose error.
     independent : (rings,) float64
-        By exact inference if each ring had an error of its own.
+        By exact inference if each ring had an independent error.
     package : (rings,) float64
         In the package's log-odds grid.
     """
@@ -213,7 +213,7 @@ def count_rings(noise: float = 1.0, rings: int = 3, z: int = 4) -> Counted:
 
     With a pose error of one cell, 20 cm, the package's grid gives the cell P(occupied) = 0.80 after one ring and 0.97,
     its upper bound, after two. The exact probability is 0.40 after one ring and 0.46 after two, and a third ring adds
-    less than 0.001. If each ring had an error of its own, it would be 0.57 after two rings and 0.69 after three.
+    less than 0.001. If each ring had an independent error, it would be 0.57 after two rings and 0.69 after three.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def count_rings(noise: float = 1.0, rings: int = 3, z: int = 4) -> Counted:
 
 @cache
 def shared_pose_error() -> Price:
-    """P(occupied) of the cell of two rings' returns that share a pose error, and if each ring had one of its own."""
+    """P(occupied) of the cell of two rings' returns, with a shared and with independent pose errors."""
     counted = count_rings(rings=2)
     return Price(counted.exact[1], counted.independent[1], "P(occupied) after two rings")
 
@@ -252,4 +252,4 @@ CUT_POSE = (
         shared_pose_error,
     ),
 )
-"""What a grid leaves out."""
+"""The edges that a grid cuts."""

@@ -1,8 +1,8 @@
-"""BOF as a graphical model: joint inference over four cells, and what is lost when each cell is filtered by itself.
+"""BOF as a graphical model: joint inference over four cells, and the loss from filtering each cell separately.
 
-The antecedents of a cell are the cells from which something may come into it. The package's BOF keeps one distribution
-per cell, and combines what may arrive from the antecedents by two rules. The probabilities of arrivals add up, as if at
-most one of them could happen. And whatever arrives is taken as independent of what stands in the cell already.
+The antecedents of a cell are the cells from which something may move into it. The package's BOF keeps one distribution
+per cell, and combines arrivals from the antecedents by two rules. The probabilities of arrivals add up, as if at most
+one of them could happen. And arrivals are assumed independent of what is already in the cell.
 """
 
 from functools import cache
@@ -15,29 +15,29 @@ from worlds.lecture_00_stage_graph import CutEdge, Price, StageGraph
 from worlds.lecture_03_row import DT, SPEED, Cell, CellsInARow, exact_beliefs, row_evidence, row_model
 
 AT_THE_EDGE = CellsInARow(({"left": 0.3, "right": 0.5}, {}, {}, {"static": 0.4}), (".x..", "..x.", "...x"))
-"""Something in cell 1 either leaves the row at once or crosses it, towards something that may stand in cell 4.
+"""A thing in cell 1 either leaves the row at once or crosses it, towards cell 4, which may be STATIC.
 
-BOF is exact here at all three steps: the cells are independent at first, what moves can arrive in only one cell of the
-row, and the cell that it leaves is free whether it was there or not."""
+BOF is exact here at all three steps: the cells are independent at first, the moving thing can arrive in only one cell
+of the row, and the cell that it leaves is free whether it was there or not."""
 
 STANDING_OR_DRIVING = CellsInARow(({"static": 0.5, "right": 0.5}, {}, {}, {}), (".x..", "..x.", "...x"))
-"""One thing in cell 1, which either stands or drives: after a step it is either in cell 1 or in cell 2.
+"""One thing in cell 1, either parked or driving: after a step it is either in cell 1 or in cell 2.
 
-The scans show it driving to the right. After the first one, joint inference gives cell 1 a probability of 0.97 of being
-free. BOF takes the two cells as independent, so it gives 0.70, and expects 1.24 things in the row."""
+The scans show it driving to the right. After the first scan, joint inference gives P(cell 1 is free) = 0.97. BOF
+assumes that the two cells are independent, so it gives 0.70, and expects 1.24 things in the row."""
 
 HEAD_ON = CellsInARow(({"right": 0.5}, {}, {"left": 0.5}, {}), ("????", "????", "????"))
 """Two things, each there with probability 1/2. Both would arrive in cell 2 at once, so at most one of them is there.
 
-Of the four combinations three are left, so cell 2 is occupied with probability 2/3. BOF adds 1/2 and 1/2, and is
-certain that the cell is occupied (0.999, the most that it allows)."""
+Three of the four combinations remain, so cell 2 is occupied with probability 2/3. BOF adds 1/2 and 1/2, and is certain
+that the cell is occupied (0.999, its upper limit)."""
 
 TOWARDS_A_FENCE = CellsInARow(({}, {"static": 0.3, "right": 0.6}, {"static": 0.5}, {}), ("????", "????", "????"))
-"""Cell 2 holds something that stands, or drives into cell 3, where a fence may stand.
+"""A thing in cell 2 is parked, or drives into cell 3, where there may be a fence.
 
-The thing and the fence can't share cell 3. So it is less probable that the thing drives, and the probability that it
-stands in cell 2 rises from 0.3 to 3/7. BOF rules the impossible combination out in cell 3, which is right, but doesn't
-tell cell 2, which keeps 0.3."""
+The thing and the fence can't share cell 3. So the thing is less likely to drive, and the probability that it is parked
+in cell 2 rises from 0.3 to 3/7. BOF correctly rules out the impossible combination in cell 3, but cell 2 doesn't learn
+of it and keeps 0.3."""
 
 
 def bof_beliefs(world: CellsInARow) -> NDArray[np.float64]:
@@ -57,7 +57,7 @@ def bof_beliefs(world: CellsInARow) -> NDArray[np.float64]:
 
 
 def expected_things(beliefs: NDArray) -> NDArray[np.float64]:
-    """Return how many things are expected in the row after each step, (T,): the sum of P(occupied) over all cells."""
+    """Return the expected number of things in the row after each step, (T,): the sum of P(occupied) over all cells."""
     return beliefs[..., [Cell.STATIC, Cell.LEFT, Cell.RIGHT]].sum(axis=(1, 2))
 
 
@@ -93,14 +93,14 @@ def _first_state(world: CellsInARow) -> BofState:
 
 
 def _used(velocities: NDArray) -> list[int]:
-    """Return which velocities of a lattice are those of STATIC, LEFT and RIGHT."""
+    """Return the indices of a lattice's velocities for STATIC, LEFT and RIGHT."""
     wanted = ((0, 0), (0, SPEED), (0, -SPEED))
     return [int(np.flatnonzero((velocities == velocity).all(axis=1))[0]) for velocity in wanted]
 
 
 @cache
 def in_both_places() -> Price:
-    """Count the things that are expected in a row where one thing stands or drives."""
+    """Return the expected number of things in a row where one thing is parked or drives."""
     exact = expected_things(exact_beliefs(STANDING_OR_DRIVING))
     bof = expected_things(bof_beliefs(STANDING_OR_DRIVING))
     return Price(exact[0], bof[0], "things in the row")
@@ -147,4 +147,4 @@ CUT = (
         at=0.33,
     ),
 )
-"""What BOF leaves out."""
+"""The edges that BOF cuts."""

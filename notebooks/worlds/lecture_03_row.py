@@ -1,6 +1,6 @@
 """A few cells in a row in front of the sensor, and joint inference over all of them.
 
-BOF and CMCDOT keep one distribution per cell. Here they can be compared with what they would compute if they kept more.
+BOF and CMCDOT keep one distribution per cell. Here we compare them with joint inference.
 """
 
 from collections.abc import Mapping
@@ -37,7 +37,7 @@ DT = 0.1
 """Time from one step to the next, seconds."""
 
 NO_CHANGE = ((0.0,) * 4,) * 4
-"""Rates of a world in which standing things keep standing and moving things keep moving."""
+"""Rates of a world in which static things stay static and moving things keep moving."""
 
 HIT, PASS, NOT_SEEN = "x.?"
 """The letters of a scan: a return from the cell, a beam that passes it, neither."""
@@ -59,11 +59,11 @@ STATE_OF = (State.FREE, State.STATIC, State.DYNAMIC, State.DYNAMIC, State.UNKNOW
 
 @dataclass(frozen=True, eq=False)
 class CellsInARow:
-    """What is believed of a row of cells at first, each independent of the others, and the scans that follow.
+    """The initial beliefs about a row of cells, independent of each other, and the scans that follow.
 
-    The row is a grid of one row across the view; cell 1 is the leftmost. Things that move have one of two velocities,
-    one cell per step to the left or to the right; things that stand have velocity zero. What leaves the row is gone,
-    and nothing comes in. Nothing is born moving, because its velocity could point out of the row.
+    The row is a grid of one row across the view; cell 1 is the leftmost. Moving things have one of two velocities, one
+    cell per step to the left or to the right; static things have velocity zero. Whatever leaves the row is gone, and
+    nothing comes in. Nothing is born moving, because its velocity could point out of the row.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class CellsInARow:
     rates : 4 x 4 floats
         Rates of change, 1/s, as in `WorldModel`; nothing becomes DYNAMIC.
     first_sight : (float, float, float)
-        What UNKNOWN cells turn out to be when they are first seen: FREE, STATIC and DYNAMIC, the last 0.
+        Probabilities of FREE, STATIC and DYNAMIC when an UNKNOWN cell is first seen; the last one 0.
     clearing_time : float
         How far back and ahead the filters look, seconds, as in `Walls`; exact inference doesn't need it. The
         default reaches five cells far, so it makes no difference in a row of at most five. `DT` reaches the next cell.
@@ -88,7 +88,7 @@ class CellsInARow:
     clearing_time: float = Walls.clearing_time
 
     def __post_init__(self) -> None:
-        """Reject what the joint model doesn't describe."""
+        """Reject worlds that the joint model doesn't cover."""
         if any(row[State.DYNAMIC] for row in self.rates) or self.first_sight[State.DYNAMIC]:
             found = (self.rates, self.first_sight)
             raise ArgumentError("rates, first_sight", "none that makes anything DYNAMIC", found)
@@ -102,7 +102,7 @@ class CellsInARow:
 
     @property
     def params(self) -> BofParams:
-        """What both filters assume: a lattice of zero and four velocities, of which the row uses left and right."""
+        """The assumption of both filters: a lattice of zero and four velocities; the row uses left and right."""
         world = WorldModel(
             rates=self.rates,
             first_sight=self.first_sight,
@@ -157,7 +157,7 @@ def row_model(world: CellsInARow, steps: int | None = None) -> GraphicalModel:
 
 
 def row_evidence(world: CellsInARow, steps: int) -> dict[str, int]:
-    """Return what is known after some steps: the scans of the cells that they see, and that no cell is shared."""
+    """Return the observations after some steps: the scans of the cells that they see, and that no cell is shared."""
     given = {}
     for step, scan in enumerate(world.scans[:steps], start=1):
         for k, letter in enumerate(scan, start=1):
@@ -183,7 +183,7 @@ def exact_beliefs(world: CellsInARow) -> NDArray[np.float64]:
 
 
 def flight() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return what becomes of a cell when everything that moves flies one cell further.
+    """Return a cell's next state when every moving thing flies one cell further.
 
     Returns
     -------

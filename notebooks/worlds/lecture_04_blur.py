@@ -14,11 +14,11 @@ from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, 
 SCHEMES = ("bilinear", "nearest", "scrolling")
 """Ways to move a map by less than a cell, as `measure_blur` explains them."""
 WORLD = GridSpec(-5, 24, -9, 14, 0.2)
-"""A map that still holds the surroundings of the start at the end of `winding_road`."""
+"""A map large enough to contain the surroundings of the start until the end of `winding_road`."""
 SQUARE = 1.0
 """Side of the squares of the chequerboard, metres."""
 MARGIN = 1.5
-"""Distance that drops keep from the map's borders, metres, so that hardly any ink crosses them."""
+"""Least distance of drops from the map's borders, metres, so that hardly any ink crosses them."""
 
 
 class Blur(NamedTuple):
@@ -60,15 +60,15 @@ def winding_road(steps: int = 50, turn: float = 0.013) -> list[PlanarMotion]:
 def measure_blur(scheme: str, motions: Sequence[PlanarMotion], drops: int = 20, seed: int = 0) -> Blur:
     """Move the map of a still world along with a vehicle, and measure how it blurs.
 
-    The map forgets nothing and sees nothing, so it changes only because its cells move. It holds a chequerboard and,
-    each in a separate map, drops of ink: single cells that hold 1.
+    The map neither forgets nor sees anything, so it changes only because its cells move. It contains a chequerboard
+    and, each in a separate map, drops of ink: single cells with value 1.
 
     Parameters
     ----------
     scheme : str
         One of `SCHEMES`. "bilinear": in each step, every cell takes the mean of the four old cells around its centre,
-        weighted by how near they are. "nearest": in each step, every cell takes the value of the old cell that its
-        centre lies in. "scrolling": as `Cmcdot` moves its maps, by whole cells, and turned once per `MAX_YAW`.
+        weighted by how near they are. "nearest": in each step, every cell takes the value of the old cell that contains
+        its centre. "scrolling": as `Cmcdot` moves its maps, by whole cells, and turned once per `MAX_YAW`.
     motions : sequence of PlanarMotion
         Motions of the vehicle, T of them; some of the cells at the start must stay in the map at every step.
     drops : int
@@ -79,7 +79,7 @@ def measure_blur(scheme: str, motions: Sequence[PlanarMotion], drops: int = 20, 
     Returns
     -------
     Blur
-        That of the map itself. To hand a scrolling map out in the vehicle's cells takes one look-up more. It adds a
+        The blur of the map itself. Reading a scrolling map at the vehicle's cells takes one more look-up, which adds a
         displacement of cell / sqrt(6) once, whatever the number of steps.
     """
     held = _always_held(motions)

@@ -1,4 +1,4 @@
-"""Scores of an occupancy filter, cell by cell, on drives whose truth is known (paper, section 3.2)."""
+"""Scores of an occupancy filter, cell by cell, on drives with known truth (paper, section 3.2)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,29 +16,29 @@ from worlds.lecture_04_scenes import KnownScene
 UNDECIDED = 0.05
 """A log-odds grid calls a cell UNKNOWN while P(occupied) differs from the prior, one half, by no more than this."""
 FOUND_AFTER = 1.5
-"""Time in view, seconds, after which a filter should have found that something moves."""
+"""Time in view, seconds, after which a filter should have detected that something moves."""
 SETTLED_AFTER = 1.0
-"""Time since a drive's beginning, seconds, after which what stands is scored."""
+"""Time since the start of a drive, seconds, after which static things are scored."""
 NEAR, FAR = 25.0, 50.0
-"""Distances at which the two ranges end, metres."""
+"""Upper ends of the two ranges of distance, metres."""
 MOVERS = {Kind.CAR: "moving cars", Kind.BICYCLE: "cyclists", Kind.PEDESTRIAN: "walking pedestrians"}
 STANDERS = {Kind.CAR: "standing cars", Kind.BICYCLE: "parked bicycles", Kind.PEDESTRIAN: "standing pedestrians"}
 SCENERY = {Kind.BUILDING: "walls", Kind.FENCE: "fences", Kind.PLANT: "foliage", Kind.POLE: "poles", Kind.SIGN: "signs"}
 
 BANKS = "banks"
-"""Name of the group of cells with free ground that is hit because it rises above the road."""
+"""Name of the group of free cells that are hit because their ground rises above the road."""
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """What a filter says about the cells.
+    """A filter's output for each cell.
 
     Parameters
     ----------
     state : (H, W) int
         The most likely of the four states.
     occupied : (H, W) float
-        Probability that the cell is occupied, by something that moves or stands.
+        Probability that the cell is occupied, by something moving or static.
     moves : (H, W) bool
         Whether the cell is more likely DYNAMIC than STATIC.
     velocity : (2, H, W) float
@@ -88,7 +88,7 @@ class CellScores:
     Attributes
     ----------
     confusion : (4, 4) int64
-        How often each true state (row) is called each state (column); the true state of cells never seen is UNKNOWN.
+        How often each true state (row) is predicted as each state (column); cells never seen count as truly UNKNOWN.
     hits : dict of str to (3,) int64
         For each group of `hit_cell_groups` the numbers of hit cells, of those called moving, and of those called
         occupied.
@@ -112,7 +112,7 @@ class CellScores:
         scene : KnownScene
             What is true.
         estimate : Estimate
-            What the filter says.
+            The filter's output.
         """
         truth = np.where(scene.never_seen, State.UNKNOWN, scene.truth.state)
         scored, occupied = scene.never_seen | scene.observed, estimate.occupied > 0.5
@@ -151,10 +151,10 @@ class CellScores:
 
 
 def hit_cell_groups(scene: KnownScene, spec: GridSpec) -> Iterator[tuple[str, NDArray[np.bool_]]]:
-    """Divide the hit cells of a frame into groups by what is in them.
+    """Divide the hit cells of a frame into groups by their contents.
 
-    Things that move are grouped by kind and range, and count once they have been in view for `FOUND_AFTER`. Things that
-    stand are grouped by kind, and count from `SETTLED_AFTER` on.
+    Moving things are grouped by kind and range, and count once they have been in view for `FOUND_AFTER`. Static things
+    are grouped by kind, and count from `SETTLED_AFTER` on.
 
     Parameters
     ----------
@@ -186,12 +186,12 @@ def hit_cell_groups(scene: KnownScene, spec: GridSpec) -> Iterator[tuple[str, ND
 
 
 def share(part: int, whole: int) -> float | None:
-    """Return a share, 0..1, or None for a share of nothing.
+    """Return a share, 0..1, or None if the total is 0.
 
     Parameters
     ----------
     part, whole : int
-        How many belong to the part, and how many there are.
+        Size of the part and of the whole.
     """
     return float(part / whole) if whole else None
 

@@ -1,4 +1,4 @@
-"""What sampling costs CMCDOT: its beliefs over a row of cells beside exact ones and BOF's.
+"""The cost of sampling in CMCDOT: its beliefs over a row of cells, compared with exact ones and BOF's.
 
 Given where the moving things are, each cell changes independently of the others, so only motion has to be sampled. That
 is the "conditional Monte Carlo" in the filter's name. The sampling error falls like N^-1/2 with the number N of
@@ -20,7 +20,7 @@ FORGETTING = tuple(
     tuple(0.0 if state == State.DYNAMIC else rate for state, rate in zip(State, row, strict=True))
     for row in WorldModel().rates
 )
-"""The filter's default rates, but nothing is born moving."""
+"""The filter's default rates, except that nothing is born moving."""
 
 NO_BIRTHS = 1e-9
 """Share of the particles that is kept for births: practically none, because nothing is born in these worlds."""
@@ -28,10 +28,10 @@ NO_BIRTHS = 1e-9
 LEFT_OR_RIGHT = CellsInARow(
     ({}, {"left": 0.5, "right": 0.5}, {"unknown": 0.5}, {"unknown": 1.0}), ("..x.", "...x"), FORGETTING
 )
-"""One thing that moves to the left or to the right, beside cells of which little is known; the scans see it go right.
+"""One thing that moves left or right, beside uncertain cells; the scans see it go right.
 
-The velocity is uncertain, so particles have something to sample. BOF isn't exact, because it takes cells 1 and 3 as
-independent, although they may hold the same thing."""
+The velocity is uncertain, so particles have something to sample. BOF isn't exact, because it assumes that cells 1 and 3
+are independent, although the same thing may be in either."""
 
 
 class SamplingError(NamedTuple):
@@ -56,7 +56,7 @@ class SamplingError(NamedTuple):
 
     @property
     def slope(self) -> float:
-        """The exponent of N in the error to BOF, fitted to the logarithms; about -1/2 by the central limit theorem."""
+        """The exponent of N in the error to BOF, fitted in log-log axes; about -1/2 by the central limit theorem."""
         return float(np.polyfit(np.log(self.numbers), np.log(self.to_bof), 1)[0])
 
 

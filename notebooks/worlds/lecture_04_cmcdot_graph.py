@@ -21,9 +21,9 @@ FROM_BOTH_SIDES = CellsInARow(
     FORGETTING,
     clearing_time=DT,
 )
-"""Something may come into cell 2 from the left or from the right, and something may already be there.
+"""Something may move into cell 2 from the left or from the right, and something may already be there.
 
-Cell 1 may be STATIC, and cell 3 may be STATIC or UNKNOWN by now. So a share of 0.011 of what comes from cell 1 is
+Cell 1 may be STATIC, and cell 3 may be STATIC or UNKNOWN by now. So a share of 0.011 of the arrivals from cell 1 is
 suspect: cell 2 may be the next piece of a wall."""
 
 ELSEWHERE = 0
@@ -33,17 +33,17 @@ PLACES = [(place, velocity) for place in (-1, 0, 1) for velocity in (-1, 1)]
 """Its other states, from 1: place relative to the cell, cells, and velocity, cells per step; positive to the right."""
 
 HERE = np.array([False, *(place == 0 for place, _ in PLACES)])
-"""For each of its states, whether it is then in the cell."""
+"""For each of its states, whether the thing is in the cell."""
 
 
 def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGraph:
     """Return the graph of two time slices: a cell of four states (m), and a moving thing with place and velocity (q).
 
-    The edge from q1 to wall1: place and velocity of a thing tell where it came from and where it goes. So it may come
-    out of a wall and go on along it (wall1). The edge from wall1 to one1: such a thing doesn't arrive in a cell that is
-    UNKNOWN, because there it only tells that the wall goes on. Two rules aren't in the graph: a hidden cell that
-    something has left is empty (`update`); and a vehicle that drives glimpses what is in the gaps of a wall
-    (`predict`). Here the vehicle doesn't move.
+    The edge from q1 to wall1: the place and velocity of a thing determine where it came from and where it goes. So it
+    may come out of a wall and move along it (wall1). The edge from wall1 to one1: such a thing doesn't arrive in an
+    UNKNOWN cell, because there it only shows that the wall continues. Two rules aren't in the graph: a hidden cell that
+    something has left is empty (`update`); and a moving vehicle glimpses things in the gaps of a wall (`predict`). Here
+    the vehicle doesn't move.
 
     There is at most one moving thing here, so if something arrives from the left, nothing arrives from the right. The
     filter makes the same assumption when it adds up the weights of arriving particles. When the cell itself holds
@@ -130,7 +130,7 @@ def _flight(goes_on: float) -> NDArray[np.float64]:
 
 
 def _along_a_wall(world: CellsInARow, cell: int, M: NDArray) -> NDArray[np.float64]:
-    """P(wall1 | q1): it came from a STATIC cell, `clearing_time` ago, and will be where one may be, too."""
+    """P(wall1 | q1): it was in a STATIC cell `clearing_time` ago, and will be where one may be as well."""
     by_now = world.belief @ np.eye(N_STATES)[list(STATE_OF)] @ M
     last = len(world.belief) - 1
     steps = round(world.clearing_time / DT)
@@ -169,14 +169,14 @@ def left_by_bof() -> Price:
 
 @cache
 def sampling() -> Price:
-    """Measure what sampling adds to that error with 100 particles."""
+    """Measure the additional error from sampling with 100 particles."""
     error = sampling_error(LEFT_OR_RIGHT, [100], seeds=range(40))
     return Price(0.0, float(error.to_bof[0]), "root mean square error, N = 100")
 
 
 @cache
 def out_of_a_wall() -> Price:
-    """Ask whether a thing arrives that leaves a cell in which something may stand."""
+    """Query the arrival of a thing from a cell that may be STATIC."""
     unseen = {"unknown": 1.0}
     world = CellsInARow(({"static": 0.3, "right": 0.5}, unseen, unseen), ("???",), clearing_time=DT)
     found = eliminate(cmcdot_stage(world).model, "m1", {"one1": 1}).normalised().table
@@ -207,4 +207,4 @@ CUT = (
         out_of_a_wall,
     ),
 )
-"""What CMCDOT leaves out."""
+"""The edges that CMCDOT cuts."""

@@ -1,4 +1,4 @@
-"""How CMCDOT approaches the BOF as its particles grow in number, on two cars that pass (paper, section 3.2)."""
+"""How CMCDOT converges to the BOF with more particles, on two cars that pass each other (paper, section 3.2)."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -55,7 +55,7 @@ class Convergence(NamedTuple):
 def measure_convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Convergence:
     """Compare CMCDOT with the exact filter for several numbers of particles.
 
-    Two cars pass each other, and at first nothing is known about their velocities. Particles start anywhere in their
+    Two cars pass each other with unknown initial velocities. Particles start anywhere in their
     cells, with velocities drawn from the lattice's prior, so the BOF is the limit of `predict`, `update` and
     `resample`. By the central limit theorem the error of a mean over N particles falls like N^-1/2.
 
@@ -86,7 +86,7 @@ def measure_convergence(numbers: Sequence[int], seeds: Sequence[int]) -> Converg
 
 
 def passing_cars(step: int) -> list[Box]:
-    """Return where two cars are: one drives ahead at 8 m/s, the other comes towards us at 8 m/s.
+    """Return the positions of two cars: one drives ahead at 8 m/s, the other comes towards us at 8 m/s.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def evidence_of_boxes(boxes: list[Box]) -> occupancy.Evidence:
     Parameters
     ----------
     boxes : list of Box
-        What stands in the grid.
+        The objects in the grid.
 
     Returns
     -------
@@ -120,7 +120,7 @@ def evidence_of_boxes(boxes: list[Box]) -> occupancy.Evidence:
 
 
 def first_belief() -> NDArray[np.float64]:
-    """Return the belief to start from: something probably moves where the cars are, and all else is probably free.
+    """Return the initial belief: cells with the cars are probably DYNAMIC, all others probably FREE.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def run_cmcdot(number: int, seed: int) -> Iterator[tuple[NDArray, NDArray]]:
     number : int
         Number of particles.
     seed : int
-        Seed for everything that is drawn.
+        Seed for all random numbers.
 
     Yields
     ------

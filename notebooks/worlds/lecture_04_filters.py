@@ -1,4 +1,4 @@
-"""Log-odds grid, BOF and CMCDOT compared on simulated drives, whose truth is known (paper, section 3.2).
+"""Compare log-odds grid, BOF and CMCDOT on simulated drives with known truth (paper, section 3.2).
 
 In the folder notebooks, `python -m worlds.lecture_04_filters ../docs/results/occupancy.json --drives 20` measures them.
 """
@@ -23,7 +23,7 @@ from worlds.lecture_04_scenes import known_scenes
 
 GRIDS = {"paper": GridSpec.paper(), "compact": GridSpec.compact()}
 LIDARS = {"HDL-64E": HDL64E, "coarse": Lidar()}
-"""The real scanner at 10 Hz, and that of the small data sets, which looks ahead with a fifth of its columns."""
+"""The real scanner at 10 Hz, and the small data sets' scanner, which looks ahead with a fifth of its columns."""
 FRAMES = 30
 """Number of frames of a drive, 3 s."""
 HELD_OUT = 100
@@ -36,9 +36,9 @@ def compare_filters(
 ) -> dict[str, object]:
     """Run the three filters with their default parameters over simulated drives, and score them.
 
-    Two kinds of cells count. Cells that the present scan observes should be called what they are: FREE, STATIC or
-    DYNAMIC. Cells that no scan of the drive has observed should be called UNKNOWN. All other cells a filter can only
-    remember, so they don't count. The log-odds grid calls everything occupied STATIC, and a cell at its prior UNKNOWN.
+    Two kinds of cells count. Cells that the present scan observes should get their true state: FREE, STATIC or DYNAMIC.
+    Cells that no scan of the drive has observed should be UNKNOWN. All other cells can only be remembered, so they
+    don't count. In the log-odds grid everything occupied counts as STATIC, and a cell at its prior as UNKNOWN.
 
     Parameters
     ----------
@@ -101,10 +101,10 @@ def occupancy_tables(result: dict) -> str:
 def occupancy_table(result: dict, lidar: str = "HDL-64E", grid: str = "paper") -> str:
     """Return the scores of one LIDAR and grid as a Markdown table.
 
-    Its rows are, from top to bottom: the share of the cells in each true state that is called so; the share of the
-    cells called DYNAMIC that is so; the share of the cells which something moving has left that is still called
-    occupied; the share of the hit cells of each kind of thing that is more DYNAMIC than STATIC; the share of the hit
-    cells with free ground that is called occupied; the errors of velocity.
+    Its rows are, from top to bottom: the recall of each true state; the precision of DYNAMIC; the share of the cells
+    recently left by something moving that are still called occupied; for each kind of thing the share of its hit cells
+    that are more DYNAMIC than STATIC; the share of the hit cells with free ground that are called occupied; the errors
+    of velocity.
 
     Parameters
     ----------

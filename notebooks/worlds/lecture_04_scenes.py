@@ -1,6 +1,6 @@
-"""Simulated drives, frame by frame, with all that is needed to score an occupancy filter (section 3.2).
+"""Simulated drives, frame by frame, with everything that scoring an occupancy filter needs (section 3.2).
 
-The truth of each cell, one of the states of section 3.2, is known instead of estimated.
+The true state of each cell (section 3.2) is known instead of estimated.
 """
 
 from collections.abc import Iterator
@@ -25,21 +25,21 @@ FLAT = (Kind.ROAD, Kind.LANE, Kind.SIDEWALK, Kind.GRASS)
 HIGHEST = 1.6
 """Height above flat ground up to which returns count, metres."""
 LEFT_SINCE = 10
-"""Number of frames, 1 s. Cells that something moving has left within them should be free now."""
+"""Number of frames, 1 s. Cells that something moving left within them should be free now."""
 OUT_OF_VIEW = 3
-"""Number of frames without a hit after which something comes into view anew: in shorter gaps a post hid it."""
+"""Number of frames without a hit that count as leaving the view: in shorter gaps a post hid the thing."""
 
 
 @dataclass(frozen=True, eq=False)
 class CellTruth:
-    """What is true of the cells of a grid at one instant.
+    """The truth about the cells of a grid at one instant.
 
     Parameters
     ----------
     state : (H, W) uint8
         FREE, STATIC or DYNAMIC: the truth is never UNKNOWN.
     kind : (H, W) uint8
-        What stands in each cell, a `Kind`; the kind of the ground where nothing does.
+        The `Kind` of the object in each cell; the kind of the ground in cells without an object.
     instance : (H, W) int32
         Number of the car, pedestrian or bicycle in each cell; 0 for all else.
     velocity : (2, H, W) float32
@@ -70,13 +70,13 @@ def true_cells(drive: SimulatedDrive, time: float, spec: GridSpec) -> CellTruth:
 def pool_truth(kinds: NDArray, instances: NDArray, velocities: dict[int, NDArray], spec: GridSpec) -> CellTruth:
     """Pool the truth of 0.1 m cells to a coarser grid.
 
-    A cell takes what covers most of it, bare ground left aside. So a cell in which anything stands isn't free, even if
-    that is a thin pole in a single fine cell.
+    A cell gets the object that covers most of it, ignoring bare ground. So a cell with any object isn't free, even if
+    it is a thin pole in a single fine cell.
 
     Parameters
     ----------
     kinds : (710, 310) uint8
-        What each cell of `LABEL_GRID` holds, members of `Kind`.
+        The contents of each cell of `LABEL_GRID`, members of `Kind`.
     instances : (710, 310) int
         Number of the object in each of these cells, 0 for none.
     velocities : dict of int to (2,) float
@@ -93,7 +93,7 @@ def pool_truth(kinds: NDArray, instances: NDArray, velocities: dict[int, NDArray
     ArgumentError
         When `spec` isn't a coarsening of `LABEL_GRID`.
     """
-    numbers = np.int64(instances) * 256 + kinds  # what is there, as one number
+    numbers = np.int64(instances) * 256 + kinds  # object and kind as one number
     chosen = _most_frequent(blocks(numbers, spec), blocks(np.isin(kinds, FLAT), spec))
     instance, kind = np.divmod(chosen, 256)
     speeds = np.zeros((instance.max() + 1, 2), np.float32)
@@ -119,7 +119,7 @@ def _most_frequent(numbers: NDArray, flat: NDArray) -> NDArray[np.int64]:
 
 @dataclass(frozen=True, eq=False)
 class KnownScene:
-    """One frame of a drive, what is true of its cells, and what its scans have told about them.
+    """One frame of a drive, the truth about its cells, and which of them the scans have observed.
 
     Parameters
     ----------
@@ -128,13 +128,13 @@ class KnownScene:
     motion : PlanarMotion
         Motion of the vehicle since the last frame.
     truth : CellTruth
-        What is true of the cells.
+        The truth about the cells.
     hit : (H, W) bool
         Cells that the scan hits, from `hit_cells`.
     observed : (H, W) bool
-        Cells about which this scan says something: P(z | occupied) and P(z | free) differ (`SensorModel`).
+        Cells that this scan observes: P(z | occupied) and P(z | free) differ (`SensorModel`).
     never_seen : (H, W) bool
-        Cells about which no scan of the drive has said anything so far, so that no filter can know them.
+        Cells that no scan of the drive has observed so far, so that no filter can know them.
     left : (H, W) bool
         Free cells, seen at some time, that something moving covered within the last second.
     in_view : dict of int to int
@@ -172,7 +172,7 @@ def hit_cells(points: NDArray, spec: GridSpec, least: int = 2, low: float = 0.3)
 
 
 def known_scenes(drive: SimulatedDrive, spec: GridSpec, name: str = "drive") -> Iterator[KnownScene]:
-    """Take the scans of a drive, one after the other, with their truth.
+    """Simulate the scans of a drive, one after the other, with their truth.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def known_scenes(drive: SimulatedDrive, spec: GridSpec, name: str = "drive") -> 
     spec : GridSpec
         The grid: the extent of `LABEL_GRID`, a multiple of its cell.
     name : str
-        What the progress bar calls it.
+        Its name in the progress bar.
 
     Yields
     ------
@@ -193,7 +193,7 @@ def known_scenes(drive: SimulatedDrive, spec: GridSpec, name: str = "drive") -> 
 
 
 class SceneHistory:
-    """What the scans of a drive have seen so far, and what moved in it.
+    """What the scans of a drive have seen so far, and which things moved.
 
     Parameters
     ----------
@@ -203,19 +203,19 @@ class SceneHistory:
 
     def __init__(self, spec: GridSpec) -> None:
         self.spec = spec
-        self._around = map_around(spec, MAX_YAW)  # what the trackers remember of the grid's surroundings
+        self._around = map_around(spec, MAX_YAW)  # the surroundings of the grid that the trackers remember
         self._poses, self._observed, self._dynamic = [], [], []  # an array per frame
         self._first_hit, self._last_hit = {}, {}  # frames by number of the object
 
     def add(self, frame: Frame, truth: CellTruth) -> KnownScene:
-        """Make a scene of the next frame, and remember it.
+        """Make a scene from the next frame, and remember it.
 
         Parameters
         ----------
         frame : Frame
             The frame, with its scan.
         truth : CellTruth
-            What is true at that instant.
+            The truth at that instant.
         """
         evidence = scan_evidence(frame.points_grid, self._around, SensorModel())
         pose = frame.T_world_from_lidar
@@ -230,7 +230,7 @@ class SceneHistory:
         return KnownScene(frame, motion, truth, hit, observed, ~seen, left, self._in_view(truth.instance[hit]))
 
     def _any_of(self, masks: list[NDArray], source: GridSpec, skip: int = 0) -> NDArray[np.bool_]:
-        """Return the present cells that lie in any of the masks, one per frame up to the `skip` last ones."""
+        """Return the present cells that are in any of the masks, one per frame without the last `skip` ones."""
         found, outside = np.zeros(self.spec.shape, bool), np.zeros(1, np.float32)
         poses = self._poses[len(self._poses) - skip - len(masks) : len(self._poses) - skip]
         for pose, mask in zip(poses, masks, strict=True):
@@ -239,7 +239,7 @@ class SceneHistory:
         return found
 
     def _in_view(self, hit_instances: NDArray) -> dict[int, int]:
-        """Return for how many frames each object that is hit now has been in view."""
+        """Return the number of frames in view of each object that is hit now."""
         now = len(self._poses) - 1
         for number in map(int, np.unique(hit_instances[hit_instances > 0])):
             if number not in self._last_hit or now - self._last_hit[number] > OUT_OF_VIEW + 1:
@@ -249,7 +249,7 @@ class SceneHistory:
 
 
 def labelled_frame(drive: SimulatedDrive, k: int, birdseye: bool = True) -> Frame:
-    """Take a frame with its image and with labels in KITTI-14, as a data set on disk would hold it.
+    """Simulate a frame with image and KITTI-14 labels, as a data set on disk would contain it.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def labelled_frame(drive: SimulatedDrive, k: int, birdseye: bool = True) -> Fram
     k : int
         Number of the frame.
     birdseye : bool
-        Whether the cells have labels as well as the pixels. Without, those of the cells are 255.
+        Whether the cells have labels as well as the pixels; if not, the cells' labels are 255.
     """
     taken, classes = drive.frame(k, labelled=birdseye), class_of_kind(KITTI_14)
     kinds = taken.truth.kinds if birdseye else np.full(LABEL_GRID.shape, IGNORE, np.uint8)

@@ -1,4 +1,4 @@
-"""Phantoms and found movers counted on one of the named streets: what `lecture_04_suspects` compares."""
+"""Count phantoms and detected movers on one of the named streets, for `lecture_04_suspects`."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from worlds.lecture_04_scenes import KnownScene, hit_cells
 LEAST_DYNAMIC = 0.3
 """A phantom is a static cell that is more DYNAMIC than STATIC, and DYNAMIC with more than this probability."""
 CARS_AFTER = 0.8
-"""Time in view, seconds, after which a filter should have found a moving car."""
+"""Time in view, seconds, after which a filter should have detected a moving car."""
 WALKERS_AFTER = 1.5
 """The same for a pedestrian."""
 _LOW, _AHEAD, _RIGHT = 0.7, (2.0, 40.0), -2.0
@@ -43,7 +43,7 @@ class StreetScores:
         self._moves_since: dict[int, float] = {}  # seconds, by number of the object
 
     def begin_drive(self) -> None:
-        """Forget the moving things of the drive before."""
+        """Forget the moving things of the previous drive."""
         self._moves_since = {}
 
     def add(self, scene: KnownScene, belief: Belief) -> None:
@@ -52,7 +52,7 @@ class StreetScores:
         Parameters
         ----------
         scene : KnownScene
-            What is true.
+            The truth.
         belief : Belief
             The filter's belief.
         """

@@ -1,4 +1,4 @@
-"""Why standing things were called DYNAMIC: what `04_real_streets` and `benchmarks/suspects.py` switch off in turn."""
+"""Suspected causes of static things called DYNAMIC, which `04_real_streets` and `benchmarks/suspects.py` switch off."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -20,24 +20,24 @@ from worlds.lecture_04_scenes import KnownScene, SceneHistory, true_cells
 from worlds.lecture_04_street_scores import StreetScores
 
 BEFORE = CmcdotParams(walls=None, first_sight=(0.93, 0.067, 0.003))
-"""The filter without the two rules against phantoms, with the probabilities of first sight that it had then."""
+"""The filter before the two rules against phantoms, with its `first_sight` of that time."""
 BARRED = "no arrivals in UNKNOWN cells"
 MENDED = "the two rules"
 GROUPS = {"border": ("fences", "walls")} | {
     name: (name,) for name in ("scenery", "moving cars", "walkers, near", "walkers, far", "left")
 }
-"""The groups of cells that are counted here, and the groups of `StreetScores` that each takes together."""
+"""The groups of cells counted here, each with the groups of `StreetScores` that it combines."""
 _OPAQUE = 1e6
 
 
 def opaque(drive: SimulatedDrive) -> None:
-    """Let nothing pass through what is porous: each wire mesh, hedge or pane stops a ray where it meets it."""
+    """Make porous things opaque: each wire mesh, hedge or pane stops every ray that hits it."""
     if drive.porous:
         drive.porous = replace(drive.porous, opacity=np.full_like(drive.porous.opacity, _OPAQUE))
 
 
 def without_pillars(drive: SimulatedDrive) -> None:
-    """Take away the pillars in front of a border, and with them all other poles of the street.
+    """Remove the pillars in front of a border, and with them all other poles of the street.
 
     The truth of the drive keeps the pillars' cells, but no ray meets them.
     """
@@ -48,10 +48,10 @@ def without_pillars(drive: SimulatedDrive) -> None:
 
 
 def arrivals_barred() -> AbstractContextManager:
-    """Return a context in which the filter takes each arrival for one that comes out of something that stands.
+    """Return a context in which the filter treats each arrival as coming out of a static thing.
 
-    So nothing that arrives may claim a cell that hasn't been seen to be free. It replaces the compiled rule of
-    `cellwise.collide`, because no parameter of the filter goes as far.
+    So nothing may arrive in a cell that hasn't been seen to be free. This replaces the compiled rule of
+    `cellwise.collide`, because no parameter of the filter goes so far.
 
     Returns
     -------
@@ -67,7 +67,7 @@ def arrivals_barred() -> AbstractContextManager:
 
 @dataclass(frozen=True)
 class Suspect:
-    """How a suspect is switched off: in the street, the sensors, the filter's parameters, or the code that it runs."""
+    """How to switch off a suspect: in the street, the sensors, the filter's parameters, or its code."""
 
     change: Callable[[SimulatedDrive], None] | None = None
     rig: Rig = KITTI_RIG
@@ -76,7 +76,7 @@ class Suspect:
 
     @property
     def in_the_filter(self) -> bool:
-        """Whether the drive stays as it is and only the filter changes."""
+        """Whether only the filter changes, and not the drive."""
         return self.change is None and self.rig == KITTI_RIG
 
 
@@ -89,7 +89,7 @@ SUSPECTS = {
     BARRED: Suspect(context=arrivals_barred),
     MENDED: Suspect(params=CmcdotParams()),
 }
-"""What is switched off in turn; the first switches nothing off, and the last is the filter as it is now."""
+"""The suspects in turn; the first switches nothing off, and the last is the present filter."""
 
 
 def scenes_of(street: str, number: int, spec: GridSpec, suspect: Suspect) -> tuple[SimulatedDrive, list[KnownScene]]:

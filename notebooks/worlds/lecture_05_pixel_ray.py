@@ -1,7 +1,7 @@
-"""What pixels tell about the cells along their rays, and how the system reads them instead.
+"""The evidence of pixels about the cells along their rays, and how the system reads them instead.
 
-A camera sees the first thing on each ray. Equation (1) gives every cell a pixel, whatever is in front of the cell, and
-a plane gives every pixel one height, whatever height the pixel shows.
+A camera sees the first thing on each ray. Equation (1) gives every cell a pixel, even if something is in front of the
+cell, and a plane gives every pixel a fixed height, whatever the pixel shows.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ class RayWorld:
     prior : float
         P(car) of each cell; otherwise it is road.
     right : float
-        Probability that a pixel's label is that of the first thing on its ray.
+        Probability that a pixel has the label of the first thing on its ray.
     """
 
     n_cells: int = 4
@@ -60,7 +60,7 @@ def pixel_ray(world: RayWorld | None = None) -> StageGraph:
 
 
 def _first_thing(n: int, right: float) -> NDArray[np.float64]:
-    """Return P(a | m1 ... mn): a car in any of the cells is what the pixel shows."""
+    """Return P(a | m1 ... mn): the pixel shows a car if there is one in any of the cells."""
     shows = np.array([any(cells) for cells in every_combination((0, 1), repeat=n)]).reshape((2,) * n)
     car = np.where(shows, right, 1 - right)
     return np.stack([1 - car, car], axis=-1)
@@ -74,7 +74,7 @@ def exact_ray(labels: Sequence[int], world: RayWorld | None = None) -> NDArray[n
 
 
 def cell_by_cell(labels: Sequence[int], world: RayWorld | None = None) -> NDArray[np.float64]:
-    """Return P(car) of each cell given the label of its own pixel, as if nothing could be in front of it, (K,)."""
+    """Return P(car) of each cell given its pixel's label, as if nothing could be in front of it, (K,)."""
     world = world or RayWorld(len(labels))
     likelihood = np.where(np.asarray(labels) == 1, world.right, 1 - world.right)
     car = world.prior * likelihood
@@ -93,7 +93,7 @@ def occlusion_cost(world: RayWorld | None = None) -> NDArray[np.float64]:
 
 
 def pixel_height(height_shares: ArrayLike = CAR_HEIGHTS, prior: float = 0.5) -> StageGraph:
-    """Build the graph pixel - height - place: what a pixel shows has a height, and the height determines where it is.
+    """Build the graph pixel - height - place: the thing in a pixel has a height, which determines its place on the ray.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def behind_a_car() -> Price:
 
 @cache
 def flat_world() -> Price:
-    """Probability that what a car's pixel shows is where the ray meets the ground."""
+    """Probability that a car's pixel shows a point where the ray meets the ground."""
     places = eliminate(pixel_height().model, "x", {"a": 1}).normalised().table
     return Price(places[0], 1.0, "P(a car's pixel shows the ground's place)")
 
@@ -148,7 +148,7 @@ CUT_RAY = (
         behind_a_car,
     ),
 )
-"""What equation (1) leaves out."""
+"""The edges that equation (1) cuts."""
 
 CUT_HEIGHT = (
     CutEdge(
@@ -159,4 +159,4 @@ CUT_HEIGHT = (
         flat_world,
     ),
 )
-"""What the ground plane leaves out."""
+"""The edges that the ground plane cuts."""

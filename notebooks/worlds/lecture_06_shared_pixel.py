@@ -40,7 +40,7 @@ def shared_pixel(readers: int = 4, right: float = 0.8, prior: float = 0.5) -> St
 
 
 def believed_by_readers(readers: int = 4, right: float = 0.8, prior: float = 0.5) -> NDArray[np.float64]:
-    """Return P(car) when all cells read "car": exactly, and as if each reading had an error of its own, (2,)."""
+    """Return P(car) when all cells read "car": exactly, and as if the readings had independent errors, (2,)."""
     model = shared_pixel(readers, right, prior).model
     exact = eliminate(model, "m", {f"x{k}": 1 for k in range(1, readers + 1)}).normalised().table[1]
     car = prior * right**readers
@@ -50,7 +50,7 @@ def believed_by_readers(readers: int = 4, right: float = 0.8, prior: float = 0.5
 
 @cache
 def four_readers() -> Price:
-    """P(car) when four cells read it in one pixel."""
+    """P(car) when four cells read "car" from the same pixel."""
     exact, system = believed_by_readers(4)
     return Price(exact, system, "P(car) when four cells read car")
 
@@ -65,4 +65,4 @@ CUT = (
         at=0.6,
     ),
 )
-"""What is left out when cells are taken as independent."""
+"""The edges that are cut when cells are assumed independent."""

@@ -1,4 +1,4 @@
-"""The pixels along a post have one label, which a soft-max per pixel doesn't know."""
+"""The pixels along a post have the same label, but a soft-max per pixel doesn't know that."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -21,7 +21,7 @@ def post_pixels(pixels: int = 5, stays: float = 0.8, lead: float = 1.0) -> Stage
     stays : float
         Probability that the next pixel has the same label.
     lead : float
-        By how much the larger of the network's two scores leads: it is right with probability 1 / (1 + exp(-lead)).
+        The margin of the larger of the network's two scores: it is right with probability 1 / (1 + exp(-lead)).
 
     Returns
     -------
@@ -45,7 +45,7 @@ def post_pixels(pixels: int = 5, stays: float = 0.8, lead: float = 1.0) -> Stage
 
 
 def believed_of_post(named: Sequence[int], stays: float = 0.8, lead: float = 1.0) -> NDArray[np.float64]:
-    """Return P(post) of each pixel: exactly, and by a soft-max of its own scores alone, (2, K).
+    """Return P(post) of each pixel: exactly, and by a soft-max of the pixel's scores alone, (2, K).
 
     `named` is the class with the larger score in each pixel, 0 something else, 1 post.
     """
@@ -58,7 +58,7 @@ def believed_of_post(named: Sequence[int], stays: float = 0.8, lead: float = 1.0
 
 @cache
 def gap_in_a_post() -> Price:
-    """P(post) of a pixel that the network takes for something else, between four that it names rightly."""
+    """P(post) of a pixel that the network gets wrong, between four that it gets right."""
     exact, alone = believed_of_post([1, 1, 0, 1, 1])[:, 2]
     return Price(exact, alone, "P(post) of a gap in a post")
 
@@ -73,4 +73,4 @@ CUT = (
         gap_in_a_post,
     ),
 )
-"""What a soft-max per pixel leaves out."""
+"""The edges that a soft-max per pixel cuts."""

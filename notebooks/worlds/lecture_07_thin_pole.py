@@ -1,4 +1,4 @@
-"""What pooling indices, skips and atrous convolutions each do to a thin pole, first without learning (section 3.1)."""
+"""The effect of pooling indices, skips and atrous convolutions on a thin pole, first without training (section 3.1)."""
 
 from typing import NamedTuple
 
@@ -51,7 +51,7 @@ def apply_mechanism(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
     Returns
     -------
     (H, W) float64
-        What is left of the image.
+        The image after the mechanism.
 
     Examples
     --------
@@ -122,8 +122,8 @@ def place_and_width(profile: ArrayLike) -> tuple[float, int]:
 def draw_poles(n: int, seed: int) -> tuple[Tensor, Tensor]:
     """Draw noisy images of a pole, one or two pixels wide, beside a wall of the same brightness.
 
-    A bright pixel alone doesn't tell pole from wall. For that, a network must see as far as the wall is wide, 6 to 10
-    pixels.
+    A single bright pixel may be pole or wall. To tell them apart, a network must see the whole width of the wall, 6 to
+    10 pixels.
 
     Parameters
     ----------
@@ -157,12 +157,12 @@ def draw_poles(n: int, seed: int) -> tuple[Tensor, Tensor]:
 
 
 class PoleNet(nn.Module):
-    """Seven 3x3 convolutions that find poles. Networks differ in one mechanism alone.
+    """Seven 3x3 convolutions that find poles. The networks differ only in their mechanism.
 
-    All six have the same layers in the same order, so they have equally many weights, and with one seed the same
-    initial ones. Three layers lead down, one stays at a quarter of the resolution, two lead up, one scores. "strided"
-    scores at a quarter of the resolution and interpolates, which takes 0.4 million multiplications per image. "atrous"
-    stays at full resolution and takes 3.2 million. The others take 1.2 million.
+    All six have the same layers in the same order, so they have the same number of weights, and with the same seed the
+    same initial weights. Three layers lead down, one stays at a quarter of the resolution, two lead up, one scores.
+    "strided" scores at a quarter of the resolution and interpolates, which takes 0.4 million multiplications per image.
+    "atrous" stays at full resolution and takes 3.2 million. The others take 1.2 million.
 
     Parameters
     ----------
@@ -236,18 +236,18 @@ def train_pole_net(mechanism: str, steps: int = 150, seed: int = 0) -> PoleNet:
 
 
 class PoleScores(NamedTuple):
-    """How well poles are found.
+    """How well a network finds poles.
 
     Parameters
     ----------
     iou : float
         Intersection over union of the poles' pixels, all images together, 0..1.
     missed : float
-        Share of the rows with a pole in which no pixel is called pole, 0..1.
+        Share of the rows with a pole in which no pixel is predicted as pole, 0..1.
     width, true_width : float
-        Mean number of pixels called pole, and of pixels of the pole, in a row that isn't missed; NaN where all are.
+        Mean number of pixels predicted as pole, and of the pole's pixels, in a row that isn't missed; NaN if all are.
     offset : float
-        Mean distance between the middles of both, pixels; NaN where all rows are missed.
+        Mean distance between the centres of both, pixels; NaN if all rows are missed.
     """
 
     iou: float
@@ -258,12 +258,12 @@ class PoleScores(NamedTuple):
 
 
 def score_poles(predicted: ArrayLike, truth: ArrayLike) -> PoleScores:
-    """Compare the pixels called pole with the poles.
+    """Compare the predicted pixels with the poles.
 
     Parameters
     ----------
     predicted, truth : (n, H, W) bool or int
-        What is called pole, and what is: 1 for a pixel of a pole, else 0.
+        Prediction and truth: 1 for a pixel of a pole, else 0.
     """
     predicted = np.asarray(predicted, bool)
     truth = np.asarray(truth, bool)

@@ -1,7 +1,7 @@
-"""A cell that camera and LIDAR both see, or that something hides from both: what fusing their answers late costs.
+"""The cost of late fusion, in a cell that camera and LIDAR both see, or that something hides from both.
 
-Where something is in front of a cell, the camera's pixel shows that thing and no beam arrives. Late fusion multiplies
-what pixel and occupancy state each tell about the cell, as if their errors were independent.
+If something is in front of a cell, the camera's pixel shows that thing and no beam arrives. Late fusion multiplies the
+evidence of pixel and occupancy state, as if their errors were independent.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from semgrid_edu.graphical import Factor, eliminate
 from worlds.lecture_00_stage_graph import CutEdge, Price, StageGraph, binary, directed
 
 ROAD, CAR = range(2)
-"""What is in the cell, and what its pixel shows."""
+"""The contents of the cell, and the label of its pixel."""
 
 FREE, OCCUPIED, UNKNOWN = range(3)
 """The occupancy state of the cell."""
@@ -108,4 +108,4 @@ CUT = (
         hidden_from_both,
     ),
 )
-"""What late fusion leaves out."""
+"""The edges that late fusion cuts."""

@@ -1,4 +1,4 @@
-"""Overfitting on purpose: whether the whole network, with each image network, can learn four frames (section 4.1).
+"""Overfitting on purpose: a test of whether the network, with each image network, memorises four frames (section 4.1).
 
 In the folder notebooks, `python -m worlds.lecture_08_overfit ../docs/results/overfit.json` trains and scores them.
 """
@@ -45,8 +45,8 @@ OverfitResult = dict[str, object]
 def overfit(seed: int = 0) -> OverfitResult:
     """Train compact networks, image to grid, on four shipped frames, and score them on the same four.
 
-    A network that can't learn four frames by heart (overfit) is too small, or its gradients are wrong, or a step is too
-    large. A network that scores well in training mode alone has running statistics that aren't those of its data.
+    If a network can't memorise four frames (overfit), it is too small, its gradients are wrong, or its steps are too
+    large. If it scores well only in training mode, its running statistics don't match its data.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def learn_by_heart(net: SemanticGridNet, frames: Sequence[Sample], params: Train
 
 @torch.no_grad()
 def network_accuracy(net: SemanticGridNet, frames: Sequence[Sample], training: bool) -> float:
-    """Return the pixel accuracy of a network's grids. The network stays as it is.
+    """Return the pixel accuracy of a network's grids, without changing the network.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def network_accuracy(net: SemanticGridNet, frames: Sequence[Sample], training: b
     Returns
     -------
     float
-        Share of labelled cells that are called right, 0..1.
+        Share of labelled cells that are predicted correctly, 0..1.
     """
     image, occupancy = (torch.stack(parts) for parts in zip(*((f.image, f.occupancy) for f in frames), strict=True))
     logits = deepcopy(net).train(training)(unit_image(image), occupancy)

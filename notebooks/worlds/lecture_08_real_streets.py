@@ -1,7 +1,7 @@
-"""Ways to train for real streets, scored on labelled returns of a PandaSet scene that were kept apart (section 4).
+"""Ways to train for real streets, scored on held-out labelled returns of a PandaSet scene (section 4).
 
 A scene shows a few seconds of one street corner. Cameras that are left out of training see another side of it; a later
-time shows the same side again. Neither says how a network does in other streets.
+time shows the same side again. Neither shows how well a network does in other streets.
 """
 
 from collections.abc import Iterable
@@ -49,15 +49,15 @@ class WayToTrain(NamedTuple):
     Parameters
     ----------
     architecture : Architecture
-        The network that starts from fresh weights, where it doesn't start from a shipped one.
+        The network to train from fresh weights, if the way doesn't start from a shipped one.
     start : str, optional
         The image network of the shipped compact network to start from.
     mean_of : str, optional
         The way whose image networks, one for each seed, score images together; the fusion network alone learns.
     params : TrainingParams, optional
-        How it learns; left out, it is scored as it starts.
+        How to train it; None to score the initial network.
     with_simulated : bool
-        Whether every other step takes frames of simulated streets.
+        Whether every other training step uses frames of simulated streets.
     """
 
     architecture: Architecture
@@ -68,7 +68,7 @@ class WayToTrain(NamedTuple):
 
 
 def _way(architecture: dict | None = None, training: dict | None = None, **fields) -> WayToTrain:
-    """Return the way that a row of the table beside this file describes."""
+    """Return the way described by a row of the table beside this file."""
     params = None if training is None else TrainingParams(**training)
     return WayToTrain(Architecture(**(architecture or {})), params=params, **fields)
 
@@ -99,8 +99,8 @@ def compare_real(
     """Train networks on one part of a scene in each of `WAYS`, and score them on the other part, for two splits.
 
     The split by camera has a round for each pair of cameras: a network that hasn't learned from them is scored on them.
-    A cell counts when it lies in view of the camera and a labelled return of the frame's own scan lies in it. Networks
-    learn from the returns of the neighbouring scans too.
+    A cell counts if it is in view of the camera and contains a labelled return of the frame's own scan. Networks are
+    trained on the returns of the neighbouring scans too.
 
     Parameters
     ----------

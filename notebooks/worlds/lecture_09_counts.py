@@ -1,7 +1,7 @@
-"""How wrong labels made from LIDAR are: cells counted by class and distance, against the true street (section 4).
+"""Errors of labels made from LIDAR: cells counted by class and distance, against the true street (section 4).
 
-Two things are known of each cell: what stands in it, and whether the camera sees it. A label is right when what it says
-stands there. A cell that the camera sees should have a label.
+We know two things about each cell: its true class, and whether the camera sees it. A label is right if it is the true
+class. A cell that the camera sees should have a label.
 """
 
 from collections.abc import Iterable
@@ -18,13 +18,13 @@ from semgrid_edu.workshop.scoring.counting import distance_bands
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 
 BAND_EDGES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 73.0)
-"""Distances from the LIDAR at which the bands begin and end, metres; the grid's far corners are 72.7 m away."""
+"""Limits of the bands of distance from the LIDAR, metres; the grid's far corners are 72.7 m away."""
 COUNTED = ("seen", "found", "missed", "labelled", "right", "hidden")
-"""What is counted of each class c and each band: cells that the camera sees, in which c stands ("seen"), those of them
-that are labelled c ("found") and those without a label ("missed"); cells that are labelled c ("labelled"), those of
-them in which c stands ("right") and those that the camera doesn't see ("hidden")."""
+"""The counts for each class c and each band: cells of true class c that the camera sees ("seen"), how many of them are
+labelled c ("found") or have no label ("missed"); cells labelled c ("labelled"), and how many of them are truly c
+("right") or unseen by the camera ("hidden")."""
 ABOUT = {"counted": list(COUNTED), "bands": list(BAND_EDGES), "classes": list(KITTI_14.names[: KITTI_14.n_semantic])}
-"""What a file of such counts says of them."""
+"""The description that a file of such counts contains."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +50,9 @@ class TruthCounts:
         labels : (H, W) int
             The labels made from LIDAR.
         truth : (H, W) int
-            From `grid_truth`: what stands in the cells that the camera sees, an unknown class elsewhere.
+            From `grid_truth`: the true class of the cells that the camera sees, an unknown class elsewhere.
         standing : (H, W) int
-            What stands in each cell, seen or not; 255 where not even the simulator says.
+            The true class of each cell, seen or not; 255 if not even the simulator knows it.
         spec : GridSpec
             The grid.
         label_set : LabelSet
@@ -84,7 +84,7 @@ class TruthCounts:
         return TruthCounts(self.cells + other.cells)
 
     def shares(self, axis: int | tuple[int, ...] | None = None) -> dict[str, NDArray[np.float64]]:
-        """Return what the counts say, as shares.
+        """Return the counts as shares.
 
         Parameters
         ----------
@@ -97,7 +97,7 @@ class TruthCounts:
         dict of str to (...) float64
             Shares from 0 to 1, in the order of the tables' columns; NaN where there is nothing to share. "found",
             "mistaken" and "missed": of the cells that the camera sees, those with the right label, with another label,
-            and without a label. "wrong": of the labelled cells, those in which something else stands. "hidden": of the
+            and without a label. "wrong": of the labelled cells, those with another true class. "hidden": of the
             labelled cells, those that the camera doesn't see. "iou": intersection over union of both, among the cells
             that the camera sees.
         """

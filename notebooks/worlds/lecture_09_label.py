@@ -1,4 +1,4 @@
-"""How one cell of the ground truth gets its label, by a vote of returns that share the error of the calibration."""
+"""How one cell of the ground truth gets its label: by a vote of returns that share the calibration error."""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -16,7 +16,7 @@ CONTENTS = tuple(KITTI_14.index(name) for name in ("road", "car"))
 """What may be in the cell, as classes of KITTI-14."""
 
 MADE = (*CONTENTS, *UNKNOWN_OF_STATE)
-"""What the cell may be labelled, as classes of KITTI-14: the states of the variable y."""
+"""The possible labels of the cell, as classes of KITTI-14: the states of the variable y."""
 
 STATE_GIVEN_CONTENT = ((0.80, 0.05, 0.05, 0.10), (0.10, 0.60, 0.20, 0.10))
 """Probability of FREE, STATIC, DYNAMIC and UNKNOWN on road and in a car: an assumption."""
@@ -33,8 +33,8 @@ class LabelWorld:
     outline : float
         Probability that the pixel of a return has the wrong class, because outlines are drawn by hand, 0..1.
     calibration : float
-        Probability that the calibration is off by so much that all returns of the cell fall on the pixels of its
-        neighbour, 0..1.
+        Probability that the calibration error is so large that all returns of the cell fall on its neighbour's pixels,
+        0..1.
     lost : float
         Probability that a return has no labelled pixel, 0..1.
     vote : str
@@ -78,10 +78,9 @@ def lidar_label_stage(world: LabelWorld | None = None) -> StageGraph:
 
 
 def wrong_label(world: LabelWorld, content: int | None = None) -> float:
-    """Return the probability that the cell gets the label of what isn't there, by exact inference.
+    """Return the probability that the cell gets a wrong label, by exact inference.
 
-    `content` is 0 when road is there, 1 when a car is; either is as probable when left out. A cell without a label
-    isn't wrong.
+    `content` is 0 for road, 1 for a car; if left out, both are equally probable. A cell without a label isn't wrong.
     """
     joint = eliminate(lidar_label_stage(world).model, ("m", "y")).table
     joint = joint / joint.sum(axis=1, keepdims=True)
@@ -111,7 +110,7 @@ def _positions(n: int) -> dict[str, tuple[float, float]]:
 
 @cache
 def nine_votes() -> Price:
-    """P(wrong label) with nine votes, and if each vote had an error of its own."""
+    """P(wrong label) with nine votes, and if their errors were independent."""
     world = LabelWorld(returns=9)
     alone = binom.sf(world.returns // 2, world.returns, wrong_label(LabelWorld(returns=1)))
     return Price(wrong_label(world), float(alone), "P(wrong label) with nine votes")
@@ -145,4 +144,4 @@ CUT = (
         ("y", "neighbour"),
     ),
 )
-"""What the ground truth leaves out."""
+"""The edges that the ground truth cuts."""

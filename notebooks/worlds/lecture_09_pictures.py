@@ -1,4 +1,4 @@
-"""Figures of lecture 09: where ground truth made from LIDAR differs from the truth, and its errors by distance."""
+"""Figures of lecture 09: where ground truth from LIDAR differs from the truth, and its errors by distance."""
 
 from collections.abc import Mapping, Sequence
 
@@ -34,9 +34,9 @@ _MARKERS = "osD^vP*Xhp"
 
 
 def difference_kinds(truth: NDArray, labels: NDArray, n_semantic: int) -> NDArray[np.int64]:
-    """Return in which way labels differ from the truth in each cell: numbers of `DIFFERENCES`, (H, W).
+    """Return how labels differ from the truth in each cell: numbers of `DIFFERENCES`, (H, W).
 
-    Two different unknown classes are no difference.
+    Two different unknown classes don't count as a difference.
 
     Parameters
     ----------

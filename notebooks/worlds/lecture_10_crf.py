@@ -1,10 +1,10 @@
 """The dense CRF on a few cells: exact inference, mean field and loopy sum-product as the coupling grows (eq. (3), (4)).
 
-As the pair weights grow, all cells take the same label, but which of the two classes that is stays open: the exact
-probability of class 0 in the centre of `UNDECIDED` is 0.52 at each of the `COUPLINGS`. Mean field and loopy sum-product
-agree with that up to a coupling of 1. At 2 they give 0.94 and 0.92, and at 4 both give 0.998: in between is a phase
-transition. Below it, at 1, the error of loopy sum-product is about half that of mean field. Just above it, at 1.5, ten
-updates have a smaller error than converged mean field, because they stop before it has picked a side.
+As the pair weights grow, all cells take the same label, but either class remains possible: the exact probability of
+class 0 in the centre of `UNDECIDED` is 0.52 at each of the `COUPLINGS`. Mean field and loopy sum-product agree up to a
+coupling of 1. At 2 they give 0.94 and 0.92, and at 4 both give 0.998: in between is a phase transition. Below it, at 1,
+the error of loopy sum-product is about half that of mean field. Just above it, at 1.5, ten updates have a smaller error
+than converged mean field, because they stop before it has picked a side.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ from semgrid_edu.occupancy import N_STATES, State
 from worlds.lecture_00_stage_graph import CutEdge, Price, StageGraph
 
 UNDECIDED = np.array([[0.6, 0.4, 0.6], [0.4, 0.52, 0.4], [0.6, 0.4, 0.6]])
-"""The network's probability of class 0: four cells are for it, four against it, and the centre is slightly for it."""
+"""The network's probability of class 0: four cells favour it, four don't, and the centre slightly favours it."""
 
 
 def coupled(coupling: float) -> CrfParams:
@@ -103,7 +103,7 @@ COUPLINGS = (0.0, 0.5, 1.0, 1.25, 1.5, 1.75, 2.0, 3.0, 4.0)
 
 @dataclass(frozen=True, eq=False)
 class CouplingSweep:
-    """What each way of inference makes of the CRF as the pair weight grows.
+    """The result of each method of inference in the CRF as the pair weight grows.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def coupling_sweep(
 
 
 def critical_coupling(classes: int, values: NDArray) -> float:
-    """Return the coupling beyond which mean field leaves the uniform distribution, although no cell prefers a class.
+    """Return the coupling above which mean field leaves the uniform distribution, although no cell prefers a class.
 
     Near the uniform distribution an update multiplies deviations by K / C, with K the matrix of pair weights. They
     grow when its largest eigenvalue exceeds C. By symmetry the exact marginals stay uniform at every coupling.
@@ -238,4 +238,4 @@ CUT = (
         bend=0.3,
     ),
 )
-"""What mean field leaves out."""
+"""The edges that mean field cuts."""

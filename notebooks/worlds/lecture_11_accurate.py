@@ -1,6 +1,6 @@
 """Mean field with a nearly exact bilateral kernel, pair by pair in a window: lecture 11 asks what the lattice costs.
 
-The window is visited by compiled loops, so this needs numba.
+The loops over the window are compiled, so this needs numba.
 """
 
 from dataclasses import dataclass, replace
@@ -32,10 +32,10 @@ def mean_field_accurate(
 ) -> NDArray[np.float32]:
     """Approximate the CRF's marginals by mean field with nearly exact kernels: the updates of `mean_field_naive`.
 
-    Where `mean_field` asks the permutohedral lattice, this computes the bilateral kernel pair by pair, in a window
-    around each cell (`WindowedGaussian`, which says what the window can cost). The time grows with the number of
-    cells times that of cells in a window, the memory with the number of cells alone.
-    The other Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
+    Where `mean_field` uses the permutohedral lattice, this computes the bilateral kernel pair by pair in a window
+    around each cell (`WindowedGaussian` bounds the error of the window). The time grows with the number of cells times
+    the window's size, the memory only with the number of cells. The other Parameters are those of `mean_field_naive`,
+    and so are errors, but the grid may be of any size.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def mean_field_accurate(
 def filtered(
     unary: NDArray, params: CrfParams, bilateral: object, iterations: int, tolerance: float
 ) -> NDArray[np.float32]:
-    """Run mean field with some filter in place of the lattice.
+    """Run mean field with a given filter in place of the lattice.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class WindowedGaussian:
         return sums.transpose(0, 2, 1).reshape(values.shape)
 
 
-# Threads share out rows; each cell's sum is computed by one of them, in one order, so their number changes nothing.
+# One thread computes each cell's sum in a fixed order, so the number of threads doesn't change the result.
 # The inner loops run along slices of rows, because these vectorise.
 @njit(cache=True, parallel=True, fastmath=True)
 def _window_sums(state, taps, values):

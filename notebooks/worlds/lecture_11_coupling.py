@@ -38,9 +38,9 @@ WAYS: Mapping[str, Inference] = {
     "loopy sum-product": potts_messages,
     "loopy max-product": partial(potts_messages, best=True),
 }
-"""What is compared with exact inference."""
+"""The methods that are compared with exact inference."""
 ONLY_LABELS = ("loopy max-product",)
-"""Ways that don't say how probable a class is, so that only their labels are compared."""
+"""Methods that don't give probabilities, so that only their labels are compared."""
 
 
 def random_crf(shape: tuple[int, int, int], seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -81,7 +81,7 @@ def measure_coupling(
     seed : int
         Seed for the first.
     name : str
-        What the progress bar says.
+        The text of the progress bar.
 
     Returns
     -------

@@ -55,7 +55,7 @@ of crops, one ahead of the other, the first at the vehicle."""
 
 
 class CrfProblem(NamedTuple):
-    """What the CRF is given.
+    """The inputs of the CRF.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def crf_scenes(seed: int = 0) -> dict[str, list[CrfProblem]]:
     """Return the grids of the shipped drive, each with the default parameters for the size of its cells.
 
     The shipped network was trained on the compact grid. It is convolutional, so that it takes the paper's grid as well.
-    Its labels there are worse, but what is compared is inference.
+    Its labels there are worse, but we compare only inference.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def crf_scenes(seed: int = 0) -> dict[str, list[CrfProblem]]:
 
 
 def sample_problem(spec: GridSpec, seed: int = 0) -> CrfProblem:
-    """Return what the shipped SegNet and the filter make of frame `FRAME` of the shipped drive and all before it.
+    """Return the results of the shipped SegNet and the filter at frame `FRAME` of the shipped drive.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def measure_scene(problems: Sequence[CrfProblem], seed: int = 0, name: str = "")
     seed : int
         Seed for the landmarks of the low-rank kernels.
     name : str
-        What the progress bars say.
+        The text of the progress bars.
 
     Returns
     -------

@@ -27,7 +27,7 @@ class LatticeFrame(NamedTuple):
     title : str
         The step it shows.
     places : (M, 2) float
-        Where the marks lie, in features.
+        Positions of the marks, in features.
     values : (M,) float
         What is there: a weighted mean of the values of points.
     weights : (M,) float
@@ -41,7 +41,7 @@ class LatticeFrame(NamedTuple):
 
 
 def vertex_places(vertices: ArrayLike) -> NDArray[np.float64]:
-    """Return where vertices lie in the plane of the two features, (M, 2).
+    """Return the positions of vertices in the plane of the two features, (M, 2).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Inference in the CRF by ways that the package measures beside its own (eq. (3), (4)).
+"""Other methods of inference in the CRF, for comparison with the package's (eq. (3), (4)).
 
 Exactly, by visiting every labelling; by loopy messages, all at once; and by mean field with a low-rank kernel, which
 compares every cell with a few landmarks only (Nystroem's method).
@@ -100,7 +100,7 @@ def potts_messages(unary: NDArray, values: NDArray, params: CrfParams, best: boo
     """
     unary, values = check_inputs(unary, values)
     phi, weights = unary.reshape(len(unary), -1).T, pair_weights(values, params)[:, :, None]
-    messages = np.zeros((*weights.shape[:2], phi.shape[1]))  # [i, j, l]: what i tells j about class l, a logarithm
+    messages = np.zeros((*weights.shape[:2], phi.shape[1]))  # [i, j, l]: log of the message from i to j about class l
     for _ in range(ITERATIONS):
         from_others = (messages.sum(axis=0) - phi)[:, None] - messages.swapaxes(0, 1)  # all that i knows but from j
         new = log_softmax(_across(from_others, weights, best), axis=2)

@@ -1,4 +1,4 @@
-"""What every drive should pass before it is used: time stamps, calibration, the ground, its own motion."""
+"""Checks that every drive should pass before use: time stamps, calibration, the ground, the vehicle's motion."""
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
@@ -53,7 +53,7 @@ def time_gaps(times: ArrayLike, factor: float = 1.5) -> NDArray[np.int64]:
 
 
 def sensor_delays(drive: KittiRawDrive) -> dict[str, NDArray[np.float64]]:
-    """Return how much later than its scan each sensor took each frame.
+    """Return each sensor's delay after the scan, for each frame.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class GroundPlane(NamedTuple):
 
 
 def ground_plane(points: NDArray, height: float) -> GroundPlane:
-    """Fit a plane to the ground of the vehicle's own lane, by least squares, leaving out what stands on it.
+    """Fit a plane to the ground of the vehicle's lane by least squares, without the objects on it.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def ground_plane(points: NDArray, height: float) -> GroundPlane:
 
 
 def _robust_plane(a: NDArray, b: NDArray, c: NDArray, rounds: int, least: float) -> tuple[NDArray, NDArray]:
-    """Fit c = p0 + p1 a + p2 b, leaving out what lies far off; return p and the distances of all."""
+    """Fit c = p0 + p1 a + p2 b without outliers; return p and the distances of all points."""
     columns, kept = np.column_stack([np.ones(len(a)), a, b]), np.ones(len(a), np.bool_)
     for _ in range(rounds):
         plane = np.linalg.lstsq(columns[kept], c[kept])[0]
@@ -139,7 +139,7 @@ def _robust_plane(a: NDArray, b: NDArray, c: NDArray, rounds: int, least: float)
 
 
 def wall_lean(frame: Frame, box: tuple[float, float, float, float]) -> float:
-    """Fit a plane to a wall beside the road, and return by how much the LIDAR leans if the wall is upright.
+    """Fit a plane to a wall beside the road, and return the LIDAR's tilt, assuming that the wall is vertical.
 
     The ground seems to rise to the left both when the street does and when the LIDAR leans to the right. A wall leans
     in the second case alone, by the same angle.
@@ -149,7 +149,7 @@ def wall_lean(frame: Frame, box: tuple[float, float, float, float]) -> float:
     frame : Frame
         Its scan is used, from 1 to 8 m above the ground.
     box : (float, float, float, float)
-        Where the wall stands: least and largest x, least and largest y, metres.
+        The box around the wall: least and largest x, least and largest y, metres.
 
     Returns
     -------
@@ -184,9 +184,9 @@ def with_scan(frames: Sequence[Frame]) -> list[Frame]:
 
 
 def overlay_error(before: Frame, now: Frame, T_before_from_now: NDArray) -> float:
-    """Lay one scan over another and return how far apart they are: the median distance to the nearest return.
+    """Overlay two scans and return the median distance to the nearest return.
 
-    Most of what stands up doesn't move, so a wrong motion makes the median large, and a few moving things don't.
+    Most upright things don't move, so a wrong motion makes the median large, but a few moving things don't.
 
     Parameters
     ----------
@@ -220,11 +220,11 @@ AXES: dict[str, Callable[[NDArray], NDArray]] = {
     "a quarter turn": _in_axes([[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
     "no motion": lambda T: np.eye(4),
 }
-"""What a motion becomes by mistakes that one makes with axes, (4, 4) -> (4, 4), by name."""
+"""Common mistakes with axes, by name: each maps a motion to the wrong one, (4, 4) -> (4, 4)."""
 
 
 def axes_errors(frames: Sequence[Frame], apart: int = 5) -> dict[str, float]:
-    """Lay scans over each other by the motion of the poses, and by what mistakes with axes turn it into.
+    """Overlay scans by the motion of the poses, and by the wrong motions that mistakes with axes give.
 
     Parameters
     ----------

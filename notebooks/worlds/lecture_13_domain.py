@@ -1,6 +1,6 @@
-"""The domain gap of images: how far they are from those that a network learned from, and what it says of them.
+"""The domain gap of images: how far they are from a network's training images, and how well it does on them.
 
-Nobody has labelled them. So what a network says is measured by its confidence, and by whether the LIDAR agrees.
+The images have no labels. So we measure a network by its confidence, and by its agreement with the LIDAR.
 """
 
 from collections.abc import Callable, Sequence
@@ -51,7 +51,7 @@ def image_histograms(image: NDArray) -> dict[str, NDArray[np.float64]]:
 
 
 def image_statistics(image: NDArray) -> dict[str, float]:
-    """Return four numbers that say what an image looks like.
+    """Return four numbers that describe the look of an image.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def colour_distance(a: dict[str, NDArray], b: dict[str, NDArray]) -> float:
 
 
 def distances(images: Sequence[NDArray], known: Sequence[NDArray]) -> dict[str, float]:
-    """Return how far images are from those that a network learned from.
+    """Return how far images are from a network's training images.
 
     Parameters
     ----------
@@ -156,14 +156,14 @@ def normalised_entropy(probability: NDArray) -> NDArray[np.float64]:
 
 
 class Agreement(NamedTuple):
-    """How often a network's pixels say what the LIDAR knows without any label.
+    """How often a network's pixels agree with what the LIDAR knows without labels.
 
     Parameters
     ----------
     lane : float
         Share of the returns from the ground of the vehicle's own lane whose pixel is called road.
     standing : float
-        Share of the returns from things that stand up whose pixel is called something that stands up.
+        Share of the returns from upright things whose pixel is predicted as something upright.
     """
 
     lane: float
@@ -171,7 +171,7 @@ class Agreement(NamedTuple):
 
 
 def agrees_with_lidar(frame: Frame, labels: NDArray) -> Agreement:
-    """Compare labels of pixels with what the LIDAR knows: what is flat, and what stands up.
+    """Compare labels of pixels with what the LIDAR knows: what is flat, and what is upright.
 
     Parameters
     ----------

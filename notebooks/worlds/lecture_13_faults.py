@@ -1,4 +1,4 @@
-"""Faults of recorded drives, each made on purpose, so that one can see which check notices which."""
+"""Faults of recorded drives, injected on purpose to see which check detects which fault."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -30,7 +30,7 @@ def _turn(degrees: ArrayLike) -> NDArray[np.float64]:
 
 
 def camera_turned(frame: Frame) -> Frame:
-    """Let the calibration say that the camera looks 2 degrees further to the right than it does.
+    """Turn the camera by 2 degrees to the right in the calibration alone.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def camera_turned(frame: Frame) -> Frame:
 
 
 def lidar_tilted(frame: Frame) -> Frame:
-    """Let the LIDAR lean back by 2 degrees, which the calibration doesn't know.
+    """Tilt the LIDAR back by 2 degrees without changing the calibration.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ FAULTS: dict[str, Fault] = {
 
 
 def drive_readings(frames: Sequence[Frame], known: dict[str, NDArray], every: int = 4) -> dict[str, float]:
-    """Read off every check of a drive.
+    """Return the reading of every check on a drive.
 
     Parameters
     ----------

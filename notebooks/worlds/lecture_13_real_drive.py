@@ -1,4 +1,4 @@
-"""Real drives put through every check beside the shipped drive: numbers only, never a picture (section 4).
+"""Every check on real drives and on the shipped drive: numbers only, never a picture (section 4).
 
 In the folder notebooks, `python -m worlds.lecture_13_real_drive ../docs/results/real_drive.json FIRST SECOND` measures
 two stretches of a drive of KITTI.

@@ -68,7 +68,7 @@ def border_verdict(contrast: NDArray, turns: NDArray) -> bool | None:
 
 
 def motion_verdict(errors: dict[str, float]) -> bool | None:
-    """Judge the motion of the poses by what else was tried.
+    """Judge the motion of the poses against the other motions that were tried.
 
     Parameters
     ----------
@@ -78,7 +78,8 @@ def motion_verdict(errors: dict[str, float]) -> bool | None:
     Returns
     -------
     bool or None
-        None when another motion fits as well, within 5 cm: a vehicle that stands, or drives straight on for the mirror.
+        None if another motion fits equally well, within 5 cm: a stopped vehicle, or for the mirror one that drives
+        straight.
     """
     margin = min(error for name, error in errors.items() if name != "as the poses say") - errors["as the poses say"]
     return None if abs(margin) <= SHIFTED else margin > 0

@@ -1,4 +1,4 @@
-"""Borders of things in a scan and in its image: with the right calibration they fall on each other."""
+"""Borders of things in a scan and in its image: with the right calibration they coincide."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

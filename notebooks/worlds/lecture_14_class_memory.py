@@ -1,4 +1,4 @@
-"""The class of one cell over time: what earlier images are worth when a network that errs once errs again (section 3).
+"""The class of one cell over time: the value of earlier images when a network repeats its errors (section 3).
 
 The paper forgets classes at every frame: the edge g0 -> g1 of the whole system. Here it is put back, exactly, for one
 cell of the toy street. Its contents change by the filter's own rates, so a parked car stays, a moving one takes its
@@ -23,7 +23,7 @@ from worlds.lecture_00_street import CLASS_OF, CLASSES, STATE_OF, STREET, System
 
 @dataclass(frozen=True)
 class MemoryWorld:
-    """One cell that a LIDAR and a camera look at again and again.
+    """One cell that a LIDAR and a camera observe repeatedly.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def exact_classes(world: MemoryWorld, named: Sequence[int], stopped: Sequence[in
 def factored_classes(
     world: MemoryWorld, named: NDArray, stopped: NDArray, exponent: float = 1.0, memory: bool = True
 ) -> NDArray[np.float64]:
-    """Filter the class with what a real system can afford: one belief per cell, and no chain of errors.
+    """Filter the class as a real system can afford to: one belief per cell, without the chain of errors.
 
     Each frame multiplies the belief by P(l | content) P(z | content)^w. With w below 1, several frames together count
     for less than as many independent ones, because they share errors.
@@ -191,7 +191,7 @@ def memory_price(world: MemoryWorld | None = None) -> MemoryPrice:
 
 
 def frames_worth(frames: int, repeats: float) -> float:
-    """Return how many independent frames are worth as much as these, whose errors follow each other.
+    """Return the number of independent frames that are worth as much as these, whose errors are correlated.
 
     For Gaussian errors with the correlation r = `repeats` from each frame to the next, an autoregressive series, the
     textbook's answer is 1 + (T - 1) (1 - r) / (1 + r). Each of T frames then has the exponent worth / T.
@@ -244,4 +244,4 @@ CUT = (
         bend=0.3,
     ),
 )
-"""What the memory of classes leaves out."""
+"""The edges that the memory of classes cuts."""

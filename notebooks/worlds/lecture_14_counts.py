@@ -27,7 +27,7 @@ from semgrid_edu.workshop.scoring.score_with_interval import (
 GROUPS = ("in view", "seen before", "never seen", "seen later")
 """The cells that the camera sees now, those that it saw before, the others, and those of them that it sees later."""
 ONE, LAST_LOOK, MEMORY, SMOOTHED = "one frame", "last look", "memory", "whole drive"
-"""What memory is compared with, its own name, and that of `smooth_drive`."""
+"""The two baselines, the memory, and `smooth_drive`, by their names in the tables."""
 TIMES = ((1, 1), (2, 5), (6, 10), (11, 20))
 """Parts of the cells in view: by the number of frames that saw them, from and to."""
 GAINS = {"gain": (MEMORY, ONE), "gain over the last look": (MEMORY, LAST_LOOK), "gain of smoothing": (SMOOTHED, MEMORY)}
@@ -51,7 +51,7 @@ def frames_in_view(frames: Sequence[Frame], spec: GridSpec) -> NDArray[np.int64]
 
 
 def last_looks(frames: Sequence[Frame], maps: Sequence[NDArray], since: NDArray, spec: GridSpec) -> list[NDArray]:
-    """Return what one frame said of each cell when the camera last saw it, (C, H, W) for each frame.
+    """Return each cell's distribution from the frame in which the camera last saw it, (C, H, W) for each frame.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def last_looks(frames: Sequence[Frame], maps: Sequence[NDArray], since: NDArray,
 
 
 class CellCounts(NamedTuple):
-    """What is counted of some cells and one method.
+    """The counts for some cells and one method.
 
     Parameters
     ----------

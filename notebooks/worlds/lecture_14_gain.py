@@ -1,4 +1,4 @@
-"""What the memory of classes gains, in cells that are in view, were seen before, or were never seen (section 3).
+"""The gain from the memory of classes, in cells that are in view, were seen before, or were never seen (section 3).
 
 Simulated streets have true labels in every cell; the labelled returns of a real scene are scored beside them. The
 second part measures what one more frame is worth at each distance from the vehicle (`worth_by_distance`). In the folder
@@ -53,7 +53,7 @@ FAINTEST = 1e-4
 
 
 def last_maps(views: Iterable[View], spec: GridSpec, join: Callable, moved: bool = True) -> Iterator[NDArray]:
-    """Join the last maps, as one would try first.
+    """Combine the last maps: a simple baseline.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def last_maps(views: Iterable[View], spec: GridSpec, join: Callable, moved: bool
     join : callable
         What to make of the last maps, (K, C, H, W), in the cells of now; NaN where a map didn't reach.
     moved : bool
-        Whether each is looked up where the vehicle was then. Otherwise cell number by cell number, as if it stood.
+        Whether to compensate the vehicle's motion. Otherwise maps are combined cell by cell, as if it were stopped.
     """
     last: deque[View] = deque(maxlen=LAST)
     for view in views:
@@ -80,14 +80,14 @@ def _product(maps: NDArray) -> NDArray:
 
 
 CRF = " + CRF"
-"""What is added to the name of a method when the CRF comes after it."""
+"""The suffix of a method's name when the CRF comes after it."""
 
 FIRST = {
     "mean of five maps, not moved": partial(last_maps, join=partial(np.nanmean, axis=0), moved=False),
     "mean of five maps": partial(last_maps, join=partial(np.nanmean, axis=0)),
     "product of five maps": partial(last_maps, join=_product),
 }
-"""What one would try first, by name."""
+"""Simple baselines, by name."""
 
 
 def grids_of(frames: Sequence[Frame], weights: Path) -> tuple[list[View], list[dict[str, NDArray]]]:

@@ -1,4 +1,4 @@
-"""The fully connected CRF that refines the semantic grid: energy, exact inference, mean field two ways."""
+"""The fully connected CRF that refines the semantic grid: energy, exact inference, and mean field in two versions."""
 
 from semgrid_edu.crf.exact import crf_model, energy, exact_marginals, free_energy, log_partition, most_likely
 from semgrid_edu.crf.kernel import gram_matrix, pair_weights

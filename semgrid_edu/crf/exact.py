@@ -1,4 +1,4 @@
-"""The CRF with every pair of cells written out: energies, and on tiny grids exact answers (eq. (3), (4))."""
+"""The CRF with every pair of cells written out: energies, and exact inference on tiny grids (eq. (3), (4))."""
 
 from itertools import combinations
 
@@ -15,8 +15,8 @@ from semgrid_edu.graphical import Factor, GraphicalModel, eliminate, log_total, 
 def energy(labels: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfParams) -> float:
     """Compute the energy of a labelling, E(x) of eq. (3) with the pair term of eq. (4).
 
-    The pair term carries `params.normalization`, so this is the energy whose mean field `mean_field_naive` finds; it
-    is eq. (4) as printed with "none".
+    The pair term includes `params.normalization`, so `mean_field_naive` approximates the distribution of this energy;
+    with "none" it is eq. (4) as printed.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def free_energy(Q: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
     Returns
     -------
     float
-        F(Q) in nats; infinite when Q gives an impossible class a probability.
+        F(Q) in nats; infinite if Q gives an impossible class a positive probability.
 
     Raises
     ------
@@ -108,10 +108,10 @@ def free_energy(Q: ArrayLike, unary: ArrayLike, values: ArrayLike, params: CrfPa
 
 
 MAX_ENERGY = 700
-"""The largest energy of the best labelling: exp(-745) is 0, so beyond it all labellings would look impossible."""
+"""The largest energy of the best labelling: exp(-745) is 0, so with more all labellings would look impossible."""
 
 MAX_LABELLINGS = 10**7
-"""The largest number of labellings: as every cell is coupled to every other, elimination needs a table of them all."""
+"""The largest number of labellings: all cells are coupled, so elimination needs a table of all labellings."""
 
 
 def crf_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> GraphicalModel:
@@ -138,7 +138,7 @@ def crf_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> Graphic
 
 
 def exact_marginals(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
-    """Compute the distribution of every cell, summed over all labellings.
+    """Compute the marginal distribution of every cell by a sum over all labellings.
 
     Parameters
     ----------
@@ -175,14 +175,14 @@ def exact_marginals(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> N
 
 
 def most_likely(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> NDArray[np.int64]:
-    """Find the labelling of least energy, the exact minimum of eq. (3).
+    """Find the labelling with the lowest energy, the exact minimum of eq. (3).
 
     Parameters are those of `exact_marginals`, and so are errors.
 
     Returns
     -------
     (H, W) int64
-        The class of each cell; one of them when several labellings share the least energy.
+        The class of each cell; if several labellings share the lowest energy, one of them.
     """
     model, shape = _tiny_model(unary, values, params)
     best = max_product(model)
@@ -197,7 +197,7 @@ def log_partition(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> flo
     Returns
     -------
     float
-        In nats. `free_energy` of a Q plus this is KL(Q || P).
+        In nats. The `free_energy` of Q plus log Z is KL(Q || P).
     """
     unary, _ = check_inputs(unary, values)
     model, _ = _tiny_model(unary, values, params)
@@ -212,7 +212,7 @@ def _tiny_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> tuple
         expected = f"at most {MAX_LABELLINGS:,} labellings; mean_field takes more"
         raise ArgumentError("unary", expected, f"{classes} classes in {cells} cells, {classes}^{cells}")
     phi = unary.astype(np.float64)
-    phi -= phi.min(axis=0)  # so exp(-phi) neither overflows nor vanishes
+    phi -= phi.min(axis=0)  # so that exp(-phi) neither overflows nor vanishes
     candidates = [np.full(phi.shape[1:], label) for label in range(classes)] + [phi.argmin(axis=0)]
     least = min(energy(labels, phi, values, params) for labels in candidates)
     if least > MAX_ENERGY:

@@ -1,4 +1,4 @@
-"""The kernels of eq. (4): how strongly distance in place and in occupancy lets two cells influence each other."""
+"""The kernels of eq. (4): how strongly two cells influence each other, by their distance in place and occupancy."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,10 +61,10 @@ def kernels(
 
 
 def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
-    """Compute the bracket of eq. (4) for every two cells, a cell and itself included.
+    """Compute the bracket of eq. (4) for all pairs of cells, including each cell with itself.
 
     Gaussians of distances are inner products in some space, so this matrix has no negative eigenvalue, whatever the
-    weights, widths and normalisation. This is what lets `damping` keep mean field from oscillating.
+    weights, widths and normalisation. `damping` relies on this to keep mean field from oscillating.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     Returns
     -------
     (H W, H W) float64
-        Symmetric and positive semidefinite; `pair_weights` everywhere but on the diagonal.
+        Symmetric and positive semidefinite; equal to `pair_weights` except on the diagonal.
 
     Raises
     ------
@@ -94,14 +94,14 @@ def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     if params.normalization == "symmetric":
         normalise(bilateral)
         normalise(spatial)
-    bilateral *= params.w_bilateral  # in place, as these matrices may be large
+    bilateral *= params.w_bilateral  # in place, because these matrices may be large
     spatial *= params.w_spatial
     bilateral += spatial
     return bilateral
 
 
 def normalise(kernel: NDArray[np.float64]) -> None:
-    """Make D^-1/2 K D^-1/2 of K, in place, with D its row sums.
+    """Replace K by D^-1/2 K D^-1/2, in place, where D holds its row sums.
 
     Parameters
     ----------
@@ -119,8 +119,8 @@ def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
     Returns
     -------
     (H W, H W) float64
-        The cost of different labels in two cells, counted row by row. Zero on the diagonal, since a cell is no pair
-        with itself.
+        The cost of different labels in two cells, counted row by row. Zero on the diagonal, because a cell forms no
+        pair with itself.
     """
     weights = gram_matrix(values, params)
     np.fill_diagonal(weights, 0)

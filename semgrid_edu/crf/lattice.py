@@ -1,12 +1,12 @@
 """The permutohedral lattice: a Gaussian filter in many dimensions as three sparse matrices (Adams, Baek, Davis 2010).
 
 Simplices fill the space of features; where points are dense, many of them share corners. A filter is *splat*, *blur*,
-*slice*: each point gives its value to the d + 1 corners of its simplex, the corners are blurred with (1/4, 1/2, 1/4)
+*slice*: each point adds its value to the d + 1 corners of its simplex, the corners are blurred with (1/4, 1/2, 1/4)
 along each of the d + 1 directions of the lattice, and each point takes the weighted mean of its corners.
 
 The d features of a point are written as d + 1 numbers that sum to zero. A vertex of the lattice is then d + 1 integers
-that sum to zero and have the same remainder modulo d + 1. A step in direction j adds 1 to all of them but the j-th,
-from which it takes d.
+that sum to zero and have the same remainder modulo d + 1. A step in direction j adds 1 to all of them except the j-th,
+from which it subtracts d.
 """
 
 from dataclasses import dataclass, replace
@@ -20,11 +20,11 @@ from scipy.sparse import csr_array, diags_array, eye_array
 from semgrid_edu.errors import ArgumentError
 
 FARTHEST = 2**30
-"""The largest coordinate of a point in the space of the lattice, which `fast` counts in 32 bits."""
+"""The largest coordinate of a point in lattice space; `fast` stores it in 32 bits."""
 
 
 def elevation(d: int) -> NDArray[np.float64]:
-    """Return the matrix that takes d features to d + 1 numbers that sum to zero.
+    """Return the matrix that maps d features to d + 1 numbers that sum to zero.
 
     Its scale gives the whole filter unit variance: splat and slice have variance (d + 1)^2 / 12 along each axis, the
     blur (d + 1)^2 / 2 (Adams 2010, section 3.1).
@@ -49,7 +49,7 @@ def elevation(d: int) -> NDArray[np.float64]:
 def peak(d: int) -> float:
     """Return the factor that gives the filter of d features the integral of the Gaussian, (2 pi)^(d/2).
 
-    Without it the integral is the volume of feature space that belongs to one vertex, (3/2)^(d/2) / sqrt(d + 1).
+    Without it the integral is the volume of feature space per vertex, (3/2)^(d/2) / sqrt(d + 1).
 
     Parameters
     ----------
@@ -85,12 +85,12 @@ def elevated(features: ArrayLike) -> NDArray[np.float64]:
     features = np.asarray(features, dtype=np.float64)
     if features.ndim != 2 or 0 in features.shape or not np.isfinite(features).all():
         raise ArgumentError("features", "finite numbers of shape (N, d)", f"shape {features.shape}")
-    # einsum, not @, so that no thread of BLAS changes the last bit: a point on a border falls to the same side always.
+    # einsum, not @: BLAS's threads could change the last bit, and with it the side on which a border point falls.
     return np.einsum("nd,jd->nj", features, elevation(features.shape[1]))
 
 
 def enclosing_simplices(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Find the simplex around each point, and the weights with which the point is a mean of its corners.
+    """Find the simplex around each point, and the weights that make the point the mean of its corners.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def enclosing_simplices(points: NDArray[np.float64]) -> tuple[NDArray[np.int64],
     steps = np.rint(points / size).astype(np.int64)  # the nearest point whose coordinates are multiples of d + 1
     residual = points - size * steps
     rank = np.argsort(np.argsort(-residual, axis=1, kind="stable"), axis=1)  # 0 for the largest residual
-    # Rounding may leave the hyperplane of zero sum by some steps: those rounded the farthest are rounded the other way.
+    # Rounding may leave the zero-sum hyperplane by some steps: round the largest residuals the other way instead.
     rank += steps.sum(axis=1, keepdims=True)
     other_way = (rank < 0).astype(np.int64) - (rank >= size)
     steps += other_way
@@ -132,16 +132,16 @@ def enclosing_simplices(points: NDArray[np.float64]) -> tuple[NDArray[np.int64],
 class PermutohedralLattice:
     """Sums over points, weighted by a Gaussian of the distance between their features (eq. (4)).
 
-    A lattice is built once for the features and then filters any number of values. Its kernel approximates
-    ``exp(-|f_i - f_j|^2 / 2)``: the blur has the Gaussian's variance and integral but a finite reach, and what it
-    moves to a corner without points is lost.
+    A lattice is built once for the features and then filters any number of values. Its kernel approximates ``exp(-|f_i
+    - f_j|^2 / 2)``: the blur has the Gaussian's variance and integral but a finite reach, and it loses what it moves to
+    a corner without points.
 
     Parameters
     ----------
     vertices : (M, d + 1) int64
         The corners of all simplices around points, each once.
     shares : (N, M) sparse
-        The weights with which points give to their corners and take from them, d + 1 in a row.
+        The weights of splatting and slicing between points and corners, d + 1 in a row.
     blurs : tuple of d + 1 (M, M) sparse
         The blur along each direction.
     """
@@ -177,8 +177,8 @@ class PermutohedralLattice:
         corners, weights = enclosing_simplices(points)
         n_points, size = weights.shape
         corners = corners.reshape(-1, size)
-        # Coordinates become the digits of one integer, so a step along the lattice adds a number to it. The last one
-        # needs no digit, because it follows from the others.
+        # Coordinates become the digits of one integer, so a step along the lattice adds a constant to it. The last #
+        # coordinate needs no digit, because it follows from the others.
         digits = np.append(np.cumprod([1, *spans[:-2]]), 0).astype(np.int64)
         numbers, first, members = np.unique(corners @ digits, return_index=True, return_inverse=True)
         ends = np.arange(0, corners.shape[0] + 1, size)
@@ -188,10 +188,10 @@ class PermutohedralLattice:
 
     @property
     def diagonal(self) -> NDArray[np.float64]:
-        """k_ii, the share of its own value that each point gets back, (N,)."""
+        """k_ii: how much of its value each point gets back, (N,)."""
         half = len(self.blurs) // 2
-        given = reduce(matmul, self.blurs[:half], self.shares)  # what a point gives, after half of the blurs
-        taken = reduce(matmul, self.blurs[: half - 1 : -1], self.shares)  # what it takes, from before the other half
+        given = reduce(matmul, self.blurs[:half], self.shares)  # what a point splats, after half of the blurs
+        taken = reduce(matmul, self.blurs[: half - 1 : -1], self.shares)  # what it slices, from before the other half
         return peak(len(self.blurs) - 1) * (given * taken).sum(axis=1)
 
     def scaled(self, scale: NDArray) -> "PermutohedralLattice":

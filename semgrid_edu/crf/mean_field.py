@@ -20,13 +20,13 @@ from semgrid_edu.errors import check_whole
 class SeparableGaussian:
     """Sums over all cells of a grid, weighted by ``exp(-|c_i - c_j|^2 / (2 sigma^2))``.
 
-    ``exp(-(a^2 + b^2)) = exp(-a^2) exp(-b^2)``, so the kernel between cells is a product of one between rows and one
-    between columns. So are its row sums, and each axis is normalised by itself.
+    ``exp(-(a^2 + b^2)) = exp(-a^2) exp(-b^2)``, so the kernel between cells is a kernel between rows times a kernel
+    between columns. Its row sums factorise too, so each axis is normalised separately.
 
     Parameters
     ----------
     rows, columns : (H, H), (W, W) float64
-        The kernel between rows, which holds the weight, and between columns.
+        The kernel between rows, which includes the weight, and between columns.
     """
 
     rows: NDArray[np.float64]
@@ -55,7 +55,7 @@ class SeparableGaussian:
 
     @property
     def diagonal(self) -> NDArray[np.float64]:
-        """k_ii, the share of its own value that each cell gets back, (H W,)."""
+        """k_ii: how much of its value each cell gets back, (H W,)."""
         return np.outer(np.diag(self.rows), np.diag(self.columns)).ravel()
 
     def __call__(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -74,7 +74,7 @@ def _between(size: int, sigma: float) -> NDArray[np.float64]:
 
 _ZERO_SUM_STATES = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
 """An orthonormal basis of the space orthogonal to (1, 1, 1, 1). The four probabilities sum to one, so three numbers in
-this basis keep every distance between the states of two cells."""
+this basis preserve the distance between two cells' states."""
 
 
 def mean_field(
@@ -83,15 +83,16 @@ def mean_field(
     """Approximate the CRF's marginals by mean field with filters (eq. (3), (4)): the updates of `mean_field_naive`.
 
     The sum over all pairs becomes two filters. The spatial one is exact (`SeparableGaussian`). The bilateral one is
-    the permutohedral lattice, whose kernel is only nearly Gaussian. Filters include the cell itself, which is no
-    pair, so its own contribution is subtracted.
-    The other Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
+    the permutohedral lattice, whose kernel is only nearly Gaussian. Filters include the cell itself, which forms no
+    pair, so its own contribution is subtracted. The other Parameters are those of `mean_field_naive`, and so are
+    errors, but the grid may be of any size.
 
     Parameters
     ----------
     pad : int
-        Number of border cells to repeat outward before the CRF and to cut off afterwards. At the edge of the grid a
-        cell has neighbours on one side only; with 8, sidewalks at the edge of real streets come back.
+        Number of cells by which the border is padded (with its own values) before the CRF; cut off afterwards. At the
+        edge of the grid a cell has neighbours on one side only; a pad of 8 recovers sidewalks at the edge of real
+        streets. => If states differ
 
     Returns
     -------
@@ -132,7 +133,7 @@ def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice
     Raises
     ------
     ArgumentError
-        When states differ by, or the grid measures, more widths than the lattice can count.
+        If the states differ, or the grid extends, by more kernel widths than the lattice can count.
     """
     lattice = PermutohedralLattice.build(bilateral_features(values, params))
     degree = np.ones(values[0].size)
@@ -149,12 +150,12 @@ def bilateral_features(values: NDArray, params: CrfParams) -> NDArray[np.float64
     values : (4, H, W) float
         o_i, the occupancy probabilities of each cell: they sum to one.
     params : CrfParams
-        The widths. When the kernel has no weight, any features do, and all are zero.
+        The widths. If the kernel has weight zero, the features don't matter, and all are zero.
 
     Returns
     -------
     (H W, 5) float64
-        Row, column, and three numbers for the state: as far apart as the four probabilities are.
+        Row, column, and three numbers for the state, with the same distances as the four probabilities.
     """
     place = np.indices(values.shape[1:]) / max(params.sigma_alpha, NARROWEST)
     state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta

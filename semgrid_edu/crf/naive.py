@@ -18,15 +18,15 @@ def mean_field_naive(
 ) -> NDArray[np.float64]:
     """Approximate the CRF's marginals by mean field, every pair of cells written out (eq. (3), (4)).
 
-    Among all distributions in which cells are independent, mean field looks for the one closest to exp(-E(x)) / Z, by
-    making the free energy small (`free_energy`). At a minimum, with k_ij the bracket of eq. (4), each cell satisfies
+    Among all distributions with independent cells, mean field looks for the one closest to exp(-E(x)) / Z by minimising
+    the free energy (`free_energy`). At a minimum, with k_ij the bracket of eq. (4), each cell satisfies
 
         Q_i(l) = exp(-phi_u(l) - sum_{j != i} k_ij (1 - Q_j(l))) / Z_i
 
-    All cells are updated at once, from Q_i(l) = exp(-phi_u(l)) / Z_i on, as in Kraehenbuehl and Koltun 2011, algorithm
-    1. They take the right-hand side as the new Q_i; here log Q_i moves only part of the way to it, see `damping`.
-    Then no update raises the free energy. Without damping, two cells that attract each other strongly but have
-    different labels swap them for ever.
+    All cells are updated at once, starting from Q_i(l) = exp(-phi_u(l)) / Z_i, as in Kraehenbuehl and Koltun 2011,
+    algorithm 1. They take the right-hand side as the new Q_i; here log Q_i moves only part of the way to it (see
+    `damping`), so that no update raises the free energy. Without damping, two cells that attract each other strongly
+    but have different labels swap them for ever.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def mean_field_naive(
         Weights, widths and normalisation.
     iterations : int
         The largest number of updates of all cells. With the default parameters nearly all labels have settled after
-        ten, though probabilities of single cells still change.
+        ten, although the probabilities of some cells still change.
     tolerance : float
         Stop as soon as an update changes no probability by more than this.
 
@@ -57,7 +57,7 @@ def mean_field_naive(
 
 
 def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> Iterator[NDArray[np.float64]]:
-    """Yield Q of `mean_field_naive` at first and after each update, without end.
+    """Yield the initial Q of `mean_field_naive` and the Q after each update, without end.
 
     Parameters are those of `mean_field_naive`.
 
@@ -79,14 +79,14 @@ def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -
     unary, values = check_inputs(unary, values)
     weights = gram_matrix(values, params)
     self_coupling = np.diag(weights).copy()
-    np.fill_diagonal(weights, 0)  # a cell is no pair with itself
+    np.fill_diagonal(weights, 0)  # a cell forms no pair with itself
     return updates(unary, lambda Q: (1 - Q) @ weights, self_coupling)
 
 
 def updates(
     unary: NDArray, disagreement: Callable[[NDArray], NDArray], self_coupling: NDArray
 ) -> Iterator[NDArray[np.floating]]:
-    """Yield Q at first and after each update of all cells at once, without end: the one rule of mean field.
+    """Yield the initial Q and the Q after each simultaneous update, without end: the update rule of mean field.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def settled(states: Iterator[NDArray], iterations: int, tolerance: float) -> NDArray:
-    """Update until the number of updates is reached, or one changes no probability by more than the tolerance.
+    """Update until the number of updates is reached, or an update changes no probability by more than the tolerance.
 
     Parameters
     ----------
@@ -162,9 +162,9 @@ def damping(self_coupling: NDArray) -> NDArray:
         F(Q) = sum_i Q_i . phi_i - 1/2 sum_ij k_ij Q_i . Q_j + 1/2 sum_i k_ii |Q_i|^2 - H(Q) + constant
 
     The first sum over pairs has a positive semidefinite matrix, so with its minus sign it is concave, and nowhere above
-    its tangent at the present Q. The next sum is above its tangent by ``k_ii / 2 |Q'_i - Q_i|^2``, which is at most
-    ``k_ii / 2 KL(Q'_i || Q_i)`` by Pinsker's inequality. Tangents and bound together are nowhere below F and touch it
-    at Q; so the Q' that makes them smallest has no larger F than Q. Setting the derivative to zero gives::
+    its tangent at the present Q. The next sum exceeds its tangent by ``k_ii / 2 |Q'_i - Q_i|^2``, which is at most
+    ``k_ii / 2 KL(Q'_i || Q_i)`` by Pinsker's inequality. Tangents plus bound are nowhere below F and equal it at Q. So
+    F at their minimum Q' is no larger than at Q. Setting the derivative to zero gives::
 
         log Q'_i = (1 - p_i) log Q_i + p_i (-phi_i - sum_{j != i} k_ij (1 - Q_j)) + constant,   p_i = 1 / (1 + k_ii / 2)
 
@@ -178,8 +178,8 @@ def damping(self_coupling: NDArray) -> NDArray:
     Returns
     -------
     (N,) float
-        p_i, above 0 and at most 1. With the default parameters and many neighbours it is near 1, so damping costs
-        nothing; with `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
+        p_i, 0 < p_i <= 1. With the default parameters and many neighbours it is near 1, so damping costs nothing; with
+        `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
     """
     return 1 / (1 + self_coupling / 2)
 
@@ -190,8 +190,7 @@ def mean_field_sequential(
     """Approximate the CRF's marginals by mean field, one cell after the other.
 
     Each update minimises the free energy over the distribution of one cell, so it can't raise it, and needs no damping.
-    But cells have to wait for each other.
-    Parameters are those of `mean_field_naive`, and so are errors.
+    But the cells can't be updated in parallel. Parameters are those of `mean_field_naive`, and so are errors.
 
     Returns
     -------

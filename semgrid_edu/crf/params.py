@@ -13,8 +13,9 @@ LARGEST_WEIGHT = 1e30
 """The largest weight of a kernel. `fast.mean_field` computes in float32, whose largest number is 3e38."""
 
 NARROWEST = 0.15
-"""The narrowest kernel that the filters compute, cells. At this width neighbours are 6.7 widths apart, out of reach of
-the lattice, and the Gaussian is 2e-10. A narrower kernel couples no cells either, so the filters use this width."""
+"""The narrowest kernel that the filters compute, cells. At this width neighbours are 6.7 widths apart, out of the
+lattice's reach, and the Gaussian is 2e-10. A narrower kernel doesn't couple cells either, so the filters use this
+width."""
 
 PAPER_CELL = 0.2
 """Side of a cell in the paper, metres (section 4.1)."""
@@ -22,20 +23,20 @@ PAPER_CELL = 0.2
 
 @dataclass(frozen=True)
 class CrfParams:
-    """What eq. (4) leaves open. The paper gives no values.
+    """The parameters of eq. (4). The paper gives no values.
 
     Parameters
     ----------
     w_bilateral, w_spatial : float
         w1 and w2, the weights of the two kernels. The defaults are 4 and 3. Kraehenbuehl and Koltun's published code
-        uses 10 and 3 for images; occupancy gets less weight here than colour does there, because many classes share
-        a state.
+        uses 10 and 3 for images; occupancy gets less weight here than colour does there, because many classes have the
+        same state.
     sigma_alpha : float
         Width of the bilateral kernel in space, cells: 8 cells are 1.6 m in the paper's grid, the width of a car.
     sigma_beta : float
-        Width of the bilateral kernel in state probability. Two different states, both certain, are sqrt(2) apart,
-        seven times 0.2, so such cells hardly influence each other. A cell that is 90 % free is still influenced by one
-        that is certainly free.
+        Width of the bilateral kernel in state probability. Two cells that are certain of different states are sqrt(2)
+        apart, seven times 0.2, so they hardly influence each other. A cell that is certainly free still influences one
+        that is 90 % free.
     sigma_gamma : float
         Width of the spatial kernel, cells: 3, as in Kraehenbuehl and Koltun's published code, removes single wrong
         cells.
@@ -77,7 +78,7 @@ class CrfParams:
 
     @types_named
     def __post_init__(self) -> None:
-        """Raise when a number is one for which eq. (4) has no meaning."""
+        """Raise an error for numbers that make no sense in eq. (4)."""
         weights = f"a weight of at least 0 and at most {LARGEST_WEIGHT:g}"
         check_fields(self, weights, lambda weight: 0 <= weight <= LARGEST_WEIGHT, "w_bilateral", "w_spatial")
         widths = "sigma_alpha", "sigma_beta", "sigma_gamma"
@@ -133,7 +134,7 @@ def unary_from_log_probability(log_probability: NDArray) -> NDArray:
 
 
 def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Check what the CRF is given, and return both arrays as float32 or float64.
+    """Check the CRF's inputs, and return both arrays as float32 or float64.
 
     Parameters
     ----------
@@ -171,12 +172,12 @@ def _floats(name: str, argument: ArrayLike) -> NDArray[np.floating]:
         if array.dtype in (np.float32, np.float64):
             return array
         return array.astype(np.float64, casting="unsafe" if array.dtype == object else "same_kind")
-    except (RuntimeError, TypeError, ValueError) as error:  # RuntimeError: a tensor that carries gradients
+    except (RuntimeError, TypeError, ValueError) as error:  # RuntimeError: a tensor that requires gradients
         raise ArgumentError(name, "an array of real numbers", error) from error
 
 
 def check_stop(iterations: int, tolerance: float = 0.0) -> None:
-    """Check when mean field is to stop.
+    """Check the stopping rule of mean field.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Calibration: how often a network is right, by its confidence, and which temperature corrects it (eq. (3))."""
+"""Calibration: a network's accuracy by its confidence, and the temperature that corrects it (eq. (3))."""
 
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ COLDEST, HOTTEST = 0.01, 100.0
 
 
 class Reliability(NamedTuple):
-    """How often a classifier is right, by its confidence: the columns of a reliability diagram.
+    """A classifier's accuracy by its confidence: the columns of a reliability diagram.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Reliability(NamedTuple):
 def at_temperature(log_probability: ArrayLike, temperature: float) -> NDArray:
     """Make a distribution less confident (temperature above 1) or more (below 1): soft-max of log p / T.
 
-    The order of the classes stays as it is, so the most probable class does too.
+    The order of the classes doesn't change, so the most probable class is the same.
 
     Parameters
     ----------
@@ -78,13 +78,13 @@ def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = 
     Returns
     -------
     float
-        T, between 0.01 and 100.
+        T, from 0.01 to 100.
 
     Raises
     ------
     ArgumentError
-        When the shapes don't fit, a label is no class, no cell is labelled, a probability is 0, or the best
-        temperature lies outside: when every cell is right, or log p has nothing to do with the truth.
+        When the shapes don't fit, a label is no class, no cell is labelled, a probability is 0, or the best temperature
+        is outside this range: when every cell is right, or log p has nothing to do with the truth.
 
     Examples
     --------
@@ -112,7 +112,7 @@ def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = 
 
 
 def reliability(probability: ArrayLike, truth: ArrayLike, n_bins: int = 15, ignore: int = IGNORE) -> Reliability:
-    """Sort cells by the probability of their most probable class, and count how often it is right.
+    """Bin cells by the probability of their most probable class, and count how often it is right.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def reliability(probability: ArrayLike, truth: ArrayLike, n_bins: int = 15, igno
     truth : (...) int
         The class of each cell.
     n_bins : int
-        B, the number of bins, equally wide between 0 and 1; each contains its upper end.
+        B, the number of bins of equal width between 0 and 1; each includes its upper end.
     ignore : int
         Class number of what is unlabelled, which counts nowhere.
 
@@ -163,7 +163,7 @@ def expected_calibration_error(diagram: Reliability) -> float:
 
 
 def _labelled(name: str, columns: ArrayLike, truth: ArrayLike, ignore: int) -> tuple[NDArray, NDArray[np.int64]]:
-    """Return the columns (C, N) and the classes (N,) of the labelled cells, once they are known to fit."""
+    """Return the columns (C, N) and the classes (N,) of the labelled cells, after checking that they fit."""
     columns, truth = np.asarray(columns), np.asarray(truth)
     if columns.ndim == 0 or columns.shape[1:] != truth.shape:
         raise ArgumentError(name, f"shape (C, {', '.join(map(str, truth.shape))})", f"shape {columns.shape}")

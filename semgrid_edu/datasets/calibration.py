@@ -14,16 +14,16 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.reading import parse_numbers, read_text
 
 ROTATION_TOLERANCE = 1e-4
-"""The largest entry of R R^T - I that passes: KITTI prints seven digits, which leaves about 1e-6."""
+"""The largest accepted entry of R R^T - I: KITTI prints seven digits, which leaves about 1e-6."""
 
 
 def read_camera(folder: Path, name: str = "image_02") -> Camera:
-    """Read the calibration of a camera; image_02 is the left one of the two that take colours, image_03 the right one.
+    """Read the calibration of a camera; image_02 is the left colour camera, image_03 the right one.
 
     A LIDAR point x appears on the rectified image at K (T_baseline R_rect_00 T_camera0_from_lidar x). Rectified cameras
-    look in one direction and differ by a shift along their x axis, which P_rect_0N holds as fx times metres. Its last
-    column has a z term as well, 3 mm in KITTI. It is left out here, as in pykitti: beyond 10 m it moves no pixel by
-    more than 0.35.
+    look in the same direction and differ by a shift along their x axis, which P_rect_0N stores as fx times metres. Its
+    last column also has a z term, 3 mm in KITTI. We ignore it, as pykitti does: beyond 10 m it moves no pixel by more
+    than 0.35.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def camera_from(
     """
     height, width = size
     principal_point = np.asarray(K)[:2, 2]
-    # `Camera` itself allows that, because an image may be cropped from a larger one.
+    # `Camera` allows that, because an image may be cropped from a larger one.
     if not ((principal_point >= -0.5) & (principal_point <= (width - 0.5, height - 0.5))).all():
         expected = f"in K a principal point within the image of {width} x {height} pixels"
         raise DataError(path, expected, principal_point.tolist())
@@ -170,7 +170,7 @@ def read_calibration(path: Path) -> dict[str, str]:
 
 
 def entry_of(path: Path, calibration: dict[str, str], key: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return the numbers of one key in the shape they should have.
+    """Return the numbers of one key in a given shape.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def _rotation(path: Path, calibration: dict[str, str], key: str) -> NDArray[np.f
 
 
 def check_rotation(path: Path, R: NDArray[np.float64], what: str) -> NDArray[np.float64]:
-    """Check that a matrix is a rotation and return it.
+    """Check that a matrix is a rotation, and return it.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def read_benchmark_calibration(path: Path) -> BenchmarkCalibration:
 
 
 def parse_pose(path: Path, text: str, what: str) -> NDArray[np.float64]:
-    """Return the rigid transform that twelve numbers give, the three upper rows of its matrix.
+    """Return the rigid transform from twelve numbers, the three upper rows of its matrix.
 
     Parameters
     ----------

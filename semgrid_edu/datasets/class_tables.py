@@ -1,4 +1,4 @@
-"""Tables that translate the classes of other data sets into those of a label set of this package (section 4)."""
+"""Tables that translate the classes of other data sets into a label set of this package (section 4)."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,7 @@ from semgrid_edu.labels import IGNORE, LabelSet
 
 @dataclass(frozen=True)
 class ClassTable:
-    """The class of a label set for each number in another data set's files.
+    """A table from the class numbers in another data set's files to the classes of a label set.
 
     Parameters
     ----------

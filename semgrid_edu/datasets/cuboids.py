@@ -1,4 +1,4 @@
-"""Labelled scans of several instants merged: moving objects move with their cuboids, so that they don't smear."""
+"""Merge labelled scans of several instants: returns of moving objects move with their cuboids, so they don't smear."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import invert_rigid, transform_points
 
 MARGIN = 0.1
-"""Metres by which a return may be outside of its object's cuboid: cuboids are drawn by hand."""
+"""Metres by which a return may be outside its object's cuboid, because cuboids are drawn by hand."""
 
 ANY_LIDAR = -1
-"""Instead of a LIDAR's number: the cuboid is valid for all of them."""
+"""In place of a LIDAR's number: the cuboid is valid for all LIDARs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +25,13 @@ class Cuboids:
     names : (B,) str
         Identifies an object at all instants.
     T_world_from_box : (B, 4, 4) float64
-        Pose of each box, whose frame has its origin in the middle of the box, metres.
+        Pose of each box, metres. The origin of a box's frame is at its centre.
     sizes : (B, 3) float
-        Lengths of the edges along the box's own axes, metres.
+        Lengths of the edges along the box's axes, metres.
     moving : (B,) bool
         Whether the object moves at any time.
     lidars : (B,) int
-        Number of the LIDAR whose returns are in the box, since two LIDARs see a moving object in two places;
+        Number of the LIDAR whose returns are in the box, because two LIDARs see a moving object in two places;
         `ANY_LIDAR` for all.
     """
 
@@ -42,7 +42,7 @@ class Cuboids:
     lidars: NDArray[np.int64]
 
     def holding(self, points: NDArray, lidars: NDArray) -> NDArray[np.int64]:
-        """Return the number of the box that contains each point, (N,); -1 where none does.
+        """Return the number of the box that contains each point, (N,); -1 if none does.
 
         Parameters
         ----------
@@ -59,7 +59,7 @@ class Cuboids:
         return holder
 
     def poses(self) -> dict[str, NDArray[np.float64]]:
-        """Return T_world_from_box of each object by name; of its two boxes, that of the lower LIDAR number."""
+        """Return T_world_from_box of each object by name; with two boxes, the one with the lower LIDAR number."""
         return {self.names[b]: self.T_world_from_box[b] for b in np.argsort(-self.lidars, kind="stable")}
 
 
@@ -90,8 +90,9 @@ class LabelledScan(NamedTuple):
 def put_together(now: LabelledScan, others: Sequence[LabelledScan]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
     """Merge the returns of several scans at one instant.
 
-    Returns from a moving object go where its cuboid is at that instant. In the other scans they are left out if it has
-    none then, and so are returns from a movable object outside all cuboids, because it isn't known whether it moved.
+    Returns from a moving object are moved to its cuboid at that instant. If it has no cuboid then, its returns in the
+    other scans are left out. Returns from movable objects outside all cuboids are left out too, because we don't know
+    whether they moved.
 
     Parameters
     ----------
@@ -116,7 +117,7 @@ def put_together(now: LabelledScan, others: Sequence[LabelledScan]) -> tuple[NDA
 def _carried(
     scan: LabelledScan, places: dict[str, NDArray[np.float64]], own: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """Return the returns of a scan; moving objects are put where `places` has them."""
+    """Return the returns of a scan, with moving objects at their poses in `places`."""
     points = scan.points.copy()
     kept = np.ones(len(scan.points), bool)
     boxes = scan.cuboids

@@ -20,11 +20,11 @@ from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.storage.reading import read_bytes
 
 LIDAR_RANGE = 250.0
-"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so anything twice as far is no measurement."""
+"""Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so anything twice as far isn't a measurement."""
 
 
 class LabelledDrive(Protocol):
-    """What training and scoring need of a drive: frames, and the truth of some of them.
+    """What training and scoring need from a drive: frames, and the truth of some of them.
 
     Derive a reader from `FrameSequence`, which implements most of it.
 
@@ -62,7 +62,7 @@ class LabelledDrive(Protocol):
     def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
         """Return the cells in view of the camera when the labels have gaps, (H, W); no cell when they have none.
 
-        In these cells 255 in `truth` means that what the camera may see is unlabelled, so training ignores it. The
+        In these cells 255 in `truth` means that the camera may see something unlabelled, so training ignores them. The
         other unlabelled cells become unknown classes, even where a LIDAR saw more. Parameters are those of
         `LabelledDrive.truth`.
         """
@@ -79,15 +79,15 @@ class LabelledDrive(Protocol):
         """
 
     def files(self) -> list[Path]:
-        """Return the files that the frames are read from: when one changes, cached arrays of the drive are stale."""
+        """Return the files of the drive: when one of them changes, its cached arrays are stale."""
 
 
 class FrameSequence(Sequence[Frame]):
-    """The frames of a drive. Each is read, and checked, when it is asked for.
+    """The frames of a drive, each read and checked on access.
 
     `drive[k]` is frame k, `drive[-1]` the last one, `drive[2:5]` a list of three. A reader derives from this class and
-    defines `__len__`, `_frame`, `name`, and `folder`, which holds the files of the drive; for a `LabelledDrive` also
-    `camera` and `label_set`. If the licence of the data asks for attribution, `credit` is its text.
+    defines `__len__`, `_frame`, `name`, and `folder`, which contains the drive's files; for a `LabelledDrive` also
+    `camera` and `label_set`. If the data's licence requires attribution, `credit` is its text.
     """
 
     name: str
@@ -113,12 +113,12 @@ class FrameSequence(Sequence[Frame]):
         Returns
         -------
         list of str
-            One line for each problem, which names the file or folder; empty when every frame can be read.
+            One line per problem, which names the file or folder; empty if every frame can be read.
         """
         return [error for error in dict.fromkeys(map(error_of, self._readers())) if error]
 
     def _readers(self) -> Iterator[Callable[[], object]]:
-        """Return functions that read the drive piece by piece (here: by frame), so that no error hides another."""
+        """Return functions that read the drive in pieces (here: by frame), so that no error hides another."""
         return (partial(self._frame, k) for k in range(len(self)))
 
     def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
@@ -141,7 +141,7 @@ class FrameSequence(Sequence[Frame]):
         return resize_labels(labels.image, size, sparse=labels.undecided is not None)
 
     def _labels_of(self, k: int) -> FrameLabels:
-        """Return the labels of a frame, or raise an error when it has none."""
+        """Return the labels of a frame, or raise an error if it has none."""
         labels = self[k].labels
         if labels is None:
             raise DataError(self.folder, f"labels of the frame {k}", "none")
@@ -213,7 +213,7 @@ def frame_numbers(folder: Path, what: str, suffix: str, digits: int = 6) -> tupl
 
 
 def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int], sparse: bool = False) -> NDArray[np.uint8]:
-    """Give each larger pixel the class that covers most of it; if two cover the same area, the smaller number.
+    """Give each larger pixel the class that covers most of it; of two equal ones, the smaller number.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int], sparse: bool
     size : (int, int)
         The new height and width, pixels.
     sparse : bool
-        Whether 255 doesn't count: a larger pixel takes its class from the labelled ones, and is 255 if there are none.
+        Whether to ignore 255: a larger pixel gets its class from labelled pixels, and is 255 only if there are none.
 
     Returns
     -------
@@ -256,7 +256,7 @@ def visible_labels(labels: FrameLabels, spec: GridSpec) -> NDArray[np.uint8]:
 
 
 def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabels:
-    """Return empty labels; a reader then replaces the fields that its data set knows.
+    """Return empty labels, in which a reader replaces the fields that its data set provides.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabe
     Returns
     -------
     FrameLabels
-        Unlabelled everywhere, without depth, and with nothing visible.
+        Labels that are unlabelled everywhere, without depth, and with nothing visible.
     """
     return FrameLabels(
         label_set=label_set,
@@ -280,17 +280,17 @@ def nothing_known(label_set: LabelSet, image_size: tuple[int, int]) -> FrameLabe
 
 
 def error_of(read: Callable[[], object]) -> str:
-    """Return the text of the error that a reader raises.
+    """Return the message of the error that a reader raises.
 
     Parameters
     ----------
     read : callable
-        Reads something, and raises `DataError` when it is missing or damaged.
+        Reads something, and raises `DataError` if it is missing or damaged.
 
     Returns
     -------
     str
-        Empty when there is none.
+        Empty if there is no error.
     """
     try:
         read()

@@ -1,4 +1,4 @@
-"""The truth to learn from: the class of cells that the camera sees, and unknown classes elsewhere (section 4)."""
+"""The truth for training: the class of cells that the camera sees, and unknown classes elsewhere (section 4)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10, UNKNOWN_OF_STATE, L
 
 
 def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
-    """Return the true class of each cell, such as a network learns from.
+    """Return the true class of each cell, for training.
 
     A cell that the camera sees has the class of its label; `fill_unlabelled` decides about the others.
 
@@ -78,11 +78,11 @@ def truth_to_learn(drive: LabelledDrive, k: int, belief_probability: NDArray, sp
 
 
 def fill_unlabelled(truth: NDArray[np.uint8], belief_probability: NDArray, label_set: LabelSet) -> NDArray[np.uint8]:
-    """Give the cells without a label a class.
+    """Give unlabelled cells a class.
 
-    With KITTI-14 they are, as in the paper, unknown-free, unknown-static, unknown-dynamic or unknown-unobserved: their
-    most probable occupancy state decides. SYNTHIA-10 has no such classes; there they are void, as in the paper's Table
-    3, where void is the most frequent class by far.
+    With KITTI-14 they become unknown-free, unknown-static, unknown-dynamic or unknown-unobserved, by their most
+    probable occupancy state, as in the paper. SYNTHIA-10 has no such classes; there they become void, as in the paper's
+    Table 3, where void is the most frequent class by far.
 
     Parameters
     ----------

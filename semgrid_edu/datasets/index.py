@@ -1,4 +1,4 @@
-"""The index of a data set: its labelled frames, split into those for training and those for testing (section 4)."""
+"""The index of a data set: its labelled frames, split into training and test frames (section 4)."""
 
 import os
 import re
@@ -63,7 +63,7 @@ class LabelledFrame(NamedTuple):
 
 @dataclass(frozen=True)
 class DatasetIndex:
-    """The contents of a data set. `load_index` reads it from disk; any other drives can be listed in Python.
+    """The contents of a data set. `load_index` reads it from disk; other drives can be listed in Python.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class DatasetIndex:
     label_set : LabelSet
         The classes of its labels.
     splits : dict of str to tuple of LabelledFrame
-        Labelled frames by split, such as "train" and "test"; no drive is in two of them.
+        Labelled frames by split, such as "train" and "test"; no drive is in two splits.
     reader : callable
         ``(root, *drive)`` -> `LabelledDrive`: opens a drive. Worker processes must be able to import it.
     folder : Path, optional
@@ -121,7 +121,7 @@ class DatasetIndex:
         ArgumentError
             When there is no such split.
         DataError
-            When a drive is missing, is shorter than in the index, or has labels of another label set: the same numbers
+            If a drive is missing, is shorter than in the index, or has another label set, in which the same numbers
             would mean other classes.
         """
         by_drive = self.frames_by_drive(split).items()
@@ -142,7 +142,7 @@ class DatasetIndex:
 def load_index(dataset_dir: str | Path) -> DatasetIndex:
     """Read the index of a data set, dataset.json.
 
-    The drives are in the same folder, or in the folder that is named there as "root".
+    The drives are in the same folder, or in the folder that it names as "root".
 
     Parameters
     ----------
@@ -173,12 +173,12 @@ def load_index(dataset_dir: str | Path) -> DatasetIndex:
 
 
 def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_cameras: Sequence[str] = ()) -> Path:
-    """Write a dataset.json of the labelled frames of a scene, apart from the scene itself.
+    """Write a dataset.json of the labelled frames of a scene, outside the scene's folder.
 
     Parameters
     ----------
     folder : path-like
-        The folder of the data set, which is made when missing.
+        The folder of the data set; created if missing.
     root : path-like
         The folder that holds the scenes.
     scene : str
@@ -235,7 +235,7 @@ def _frame(path: Path, entry: Any, keys: tuple[str, ...]) -> LabelledFrame:
 
 
 def _check_leaks(path: Path, splits: dict[str, tuple[LabelledFrame, ...]]) -> None:
-    """Check that no frame is listed twice and no drive is in two splits: tests need frames that weren't learnt."""
+    """Check that no frame is listed twice and no drive is in two splits, so that test frames are never trained on."""
     split_of: dict[tuple[str, ...], str] = {}
     for split, frames in splits.items():
         if len(set(frames)) != len(frames):

@@ -14,7 +14,7 @@ KINDS = ("image", "depth", "birdseye", "visible")
 """The four files of a labelled frame, each in a folder of this name."""
 
 WITH_GAPS = "with gaps"
-"""The second line of label_set.txt when part of the view is unlabelled, for example everything but LIDAR returns."""
+"""The second line of label_set.txt if part of the view is unlabelled, for example all but LIDAR returns."""
 
 DEPTH_UNIT = 1 / 256
 """One step of a depth PNG, metres (KITTI's convention); 0 means none."""
@@ -44,7 +44,7 @@ def read_labels(folder: Path, name: str, image_size: tuple[int, int]) -> FrameLa
 
 
 def is_labelled(folder: Path, name: str) -> bool:
-    """Return whether any of a frame's four label files is there.
+    """Return whether any of a frame's four label files exists.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def read_label(folder: Path, kind: str, name: str, image_size: tuple[int, int] |
     name : str
         File name of the frame, such as 0000000009.png.
     image_size : (int, int) or None
-        Height and width that image and depth must have, pixels; None where any size will do.
+        Height and width that image and depth must have, pixels; None if any size will do.
 
     Returns
     -------
@@ -111,12 +111,12 @@ def read_label_set(path: Path) -> LabelSet:
 
 
 def _metres(steps: NDArray[np.uint16]) -> NDArray[np.float32]:
-    """Turn a depth image into metres, NaN where there is none."""
+    """Convert a depth image to metres, NaN where there is no depth."""
     return np.where(steps > 0, steps.astype(np.float32) * np.float32(DEPTH_UNIT), np.float32(np.nan))
 
 
 def _classes(path: Path, classes: NDArray[np.uint8], label_set: LabelSet) -> NDArray[np.uint8]:
-    """Check that all numbers in a map are classes, and return it."""
+    """Check that all numbers in a map are classes, and return the map."""
     strange = classes[(classes >= len(label_set)) & (classes != IGNORE)]
     if strange.size:
         raise DataError(path, f"classes 0 to {len(label_set) - 1} or {IGNORE}", f"{strange[0]}")

@@ -29,10 +29,10 @@ from semgrid_edu.labels import LabelSet
 from semgrid_edu.storage.reading import read_png
 
 VIEWS = ("image_02", "image_03")
-"""The folders of the cameras that take colours."""
+"""The folders of the colour cameras."""
 
 SAME_INSTANT = np.timedelta64(500, "ms")
-"""How much the sensors' times of one frame may differ; at 10 Hz they should be within 0.1 s."""
+"""How much the sensors' times of one frame may differ; at 10 Hz they should differ by less than 0.1 s."""
 
 _FRAME_FILE = re.compile(r"(\d{10})\.(bin|png|txt)")
 
@@ -58,11 +58,11 @@ def drive_folder(root: str | Path, date: str, drive: str) -> Path:
 
 
 class KittiRawDrive(FrameSequence):
-    """The frames of a drive. Each is read, and checked, when it is asked for.
+    """The frames of a drive, each read and checked on access.
 
     `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last one, `drive[2:5]` a list of three. Some of KITTI's
-    drives have gaps, such as 0009, which lacks the scans 177 to 180. A frame in a gap keeps its number, time and image;
-    it has no points, so that the filter only predicts. `gaps` lists these frames.
+    drives have gaps, such as 0009, which lacks the scans 177 to 180. A frame in a gap keeps its number, time and image,
+    but has no points, so the filter only predicts. `gaps` lists these frames.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class KittiRawDrive(FrameSequence):
     drive : str
         Number of the drive, such as "0013".
     images : bool
-        Whether to read the images. Without them reading is quicker.
+        Whether to read the images; reading is faster without them.
     view : str
         The folder of the images: "image_02" for the left camera, "image_03" for the right one. Labels of simulated
         drives belong to the left one.
@@ -111,7 +111,7 @@ class KittiRawDrive(FrameSequence):
             raise DataError(self.folder, "frames in velodyne_points/data", "none")
 
     def __len__(self) -> int:
-        """Return the number of frames, including those whose scans were never recorded."""
+        """Return the number of frames, including frames whose scans were never recorded."""
         return self._length
 
     @property
@@ -165,7 +165,7 @@ class KittiRawDrive(FrameSequence):
                 yield partial(read_label, labels, kind, name, size)
 
     def file(self, sensor: str, k: int, suffix: str) -> Path:
-        """Return where a sensor's file of a frame is, whether it exists or not.
+        """Return the path of a sensor's file of a frame, whether it exists or not.
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ class KittiRawDrive(FrameSequence):
 
     @cached_property
     def _times(self) -> dict[str, NDArray[np.datetime64]]:
-        """When each sensor took each frame, (frames,) datetime64[ns] by sensor."""
+        """Time of each frame, (frames,) datetime64[ns] by sensor."""
         return {sensor: read_timestamps(self.folder / sensor / "timestamps.txt", len(self)) for sensor in self._sensors}
 
     def _time(self, k: int) -> float:
@@ -255,7 +255,7 @@ def _existing(root: Path, date: str, drive: str) -> tuple[Path, Path]:
 
 
 def _instead(root: Path, parent: Path, what: str, pattern: str) -> str:
-    """List the dates or drives that exist, and name the layout that the whole folder seems to have."""
+    """List the existing dates or drives, and name the layout that the folder seems to have."""
     there = sorted(path.name for path in parent.glob(pattern) if path.is_dir())
     layout = what_is(root)
     names = f"only the {what} {', '.join(there)}" if there else f"no {what}"
@@ -263,6 +263,6 @@ def _instead(root: Path, parent: Path, what: str, pattern: str) -> str:
 
 
 def _last_frame(folder: Path) -> int:
-    """Return the highest frame number among the files of a folder, -1 without any."""
+    """Return the highest frame number among the files of a folder, -1 if there are none."""
     names = (path.name for path in folder.iterdir()) if folder.is_dir() else ()
     return max((int(match[1]) for match in map(_FRAME_FILE.fullmatch, names) if match), default=-1)

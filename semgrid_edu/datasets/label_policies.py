@@ -1,7 +1,7 @@
 """Labels of cells made from image labels and LIDAR: named policies, and the loop over a drive (section 4).
 
-`cached_labels` keeps the labels until the code of this module, or of what it imports, changes. So this module holds
-only what makes labels.
+Changing this module, or anything it imports, invalidates the labels that `cached_labels` keeps. So it contains only the
+code that makes labels.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from semgrid_edu.frame import Frame
 
 ACCUMULATED = TruthPolicy(past=9, vote="majority")
 """The labelled scan and the nine before it (0.9 s), all labelled by the one labelled image, as in KITTI. Most cells
-then have many returns, so that a majority can decide."""
+then have many returns, enough for a majority vote."""
 
 POLICIES = {
     "lidar": TruthPolicy(),
@@ -30,8 +30,8 @@ POLICIES = {
     "camera-mask": TruthPolicy(visible_to="camera"),
     "de-skewed": TruthPolicy(deskew=True),
 }
-"""The policies that networks learn from, by name; "lidar" is the paper's, as far as it is described. Each of the others
-changes one thing, except that the accumulated ones also take the majority's class."""
+"""The policies for training labels, by name; "lidar" is the paper's, as far as it is described. Each of the others
+changes one thing, except that the accumulated ones also use a majority vote."""
 
 
 class FrameErrors(Protocol):
@@ -53,14 +53,15 @@ class FrameErrors(Protocol):
 
 @dataclass(frozen=True)
 class LidarTruth:
-    """How the labels of a data set's cells are made from its image labels and scans.
+    """How to make the labels of a data set's cells from its image labels and scans.
 
     Parameters
     ----------
     policy : TruthPolicy
-        What `lidar_truth` does.
+        The policy of `lidar_truth`.
     flaws : FrameErrors, optional
-        Errors that image labels, calibration and scans get first, because simulated data have none. None for real data.
+        Errors to add first to image labels, calibration and scans, because simulated data have none. None for real
+        data.
     seed : int
         Seed for these errors. The calibration error is the same in the whole data set.
     """

@@ -1,4 +1,4 @@
-"""Folders that are mistaken for KITTI's raw layout, and what to do about each."""
+"""Folder layouts that are mistaken for KITTI's raw layout, and what to do about each."""
 
 from pathlib import Path
 
@@ -20,20 +20,20 @@ LAYOUTS = {
     "data_3d_raw": "KITTI-360, which keeps calibration and times in other files: it has no reader here",
     "v1.0-*": "nuScenes, which keeps scans and calibration in other files: it has no reader here",
 }
-"""What to do about a folder that matches a pattern of `Path.glob`; the surest sign comes first."""
+"""Advice for a folder that matches a pattern of `Path.glob`; the surest sign comes first."""
 
 
 def what_is(folder: Path) -> str:
-    """Tell which other layout a folder has, when no drives in KITTI's raw layout were found in it, and what to do.
+    """Identify the layout of a folder without drives in KITTI's raw layout, and say what to do about it.
 
     Parameters
     ----------
     folder : Path
-        The folder that was given instead of the one that holds the dates.
+        The folder that was given instead of the folder with the dates.
 
     Returns
     -------
     str
-        One of the texts of `LAYOUTS`; empty when none fits.
+        One of the texts of `LAYOUTS`; empty if none fits.
     """
     return next((advice for pattern, advice in LAYOUTS.items() if any(folder.glob(pattern))), "")

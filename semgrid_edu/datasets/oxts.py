@@ -19,7 +19,7 @@ EARTH_RADIUS = 6378137.0
 """Radius of the Earth at the equator, metres (WGS 84), as the KITTI development kit takes it."""
 
 PACKET_FIELDS = 30
-"""How many numbers a packet has; dataformat.txt of a drive names them."""
+"""Number of values in a packet; a drive's dataformat.txt names them."""
 
 
 def read_timestamps(path: Path, n_frames: int) -> NDArray[np.datetime64]:
@@ -30,7 +30,7 @@ def read_timestamps(path: Path, n_frames: int) -> NDArray[np.datetime64]:
     path : Path
         timestamps.txt of the sensor.
     n_frames : int
-        Number of frames, and so of lines.
+        Number of frames, and therefore of lines.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def read_packet(path: Path) -> NDArray[np.float64]:
     Returns
     -------
     (30,) float64
-        Latitude and longitude (degrees), altitude (m), roll, pitch and yaw (rad), and 24 numbers more.
+        Latitude and longitude (degrees), altitude (m), roll, pitch and yaw (rad), and 24 further numbers.
     """
     return parse_packet(path, read_text(path))
 
@@ -102,7 +102,7 @@ def parse_packet(path: Path, text: str) -> NDArray[np.float64]:
 
 
 def mercator_scale(packet: NDArray) -> float:
-    """Return the cosine of a packet's latitude, by which Mercator's metres become true metres around there.
+    """Return the cosine of a packet's latitude, which scales Mercator's metres to true metres nearby.
 
     Parameters
     ----------
@@ -138,12 +138,12 @@ def mercator_pose(packet: NDArray, scale: float) -> NDArray[np.float64]:
 
 
 def imu_pose(first: NDArray, packet: NDArray) -> NDArray[np.float64]:
-    """Return the pose of the IMU in the frame that it had at a drive's first packet.
+    """Return the pose of the IMU relative to its pose at a drive's first packet.
 
     Parameters
     ----------
     first, packet : (30,) float
-        The first packet, and the one whose pose is asked for, from `read_packet`.
+        The first packet, and the packet whose pose is wanted, from `read_packet`.
 
     Returns
     -------

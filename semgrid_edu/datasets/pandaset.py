@@ -31,26 +31,26 @@ IMAGE_SIZE = (1080, 1920)
 """Height and width of PandaSet's images, pixels."""
 
 ROWS = slice(216, 796)
-"""The rows of an image that are kept. They have KITTI's aspect; sky above and the vehicle's bonnet below are cut."""
+"""The image rows to keep. They have KITTI's aspect ratio; the sky above and the vehicle's bonnet below are cropped."""
 
 LIDAR_HEIGHT = 2.13
-"""Height of the Pandar64 above the ground where no labels show the ground, metres: as measured on scene 002."""
+"""Height of the Pandar64 above the ground if no labels show the ground, metres; measured on scene 002."""
 
 _WINDOW = 20
-"""Scans that are kept in memory, 7 MB each: a frame's own, and nine before and after it."""
+"""Number of scans kept in memory, 7 MB each: a frame's scan, and nine before and after it."""
 
 
 class PandasetScene(FrameSequence):
-    """The frames of a scene as one of its cameras sees them. Each is read, and checked, when it is asked for.
+    """The frames of a scene as one of its cameras sees them, each read and checked on access.
 
     There is a frame for each image of the camera on disk; `numbers` has their numbers in the published scene. Frames
-    have KITTI's form: x ahead is the direction in which the camera looks, along the ground, and the LIDAR is the
-    Pandar64 at the instant of the image, which is when it looks that way. Only its returns are in `Frame.points`; the
-    labels use both LIDARs. The vehicle sways, so each frame has its own camera. The world is PandaSet's.
+    have KITTI's form: the x axis points where the camera looks, along the ground, and the LIDAR is the Pandar64 at the
+    instant of the image, when it faces the same way. Only its returns are in `Frame.points`; the labels use both
+    LIDARs. The vehicle sways, so each frame has its own camera. The world is PandaSet's.
 
-    In a `Frame`, `labels` are those of its own scan: the class and the depth of the pixels on which a return falls that
-    the camera sees, the class of the cells with a return, and which of these cells the camera sees. `truth`, `visible`
-    and `image_labels` take other scans too.
+    The `labels` of a `Frame` come from its own scan: class and depth of the pixels with a return that the camera sees,
+    the class of the cells with a return, and which of these cells the camera sees. `truth`, `visible` and
+    `image_labels` use other scans too.
 
     Parameters
     ----------
@@ -101,12 +101,12 @@ class PandasetScene(FrameSequence):
         return len(self.numbers)
 
     def __reduce__(self) -> tuple:
-        """Pickle the arguments: another process opens the scene again and reads the scans itself."""
+        """Pickle only the arguments: another process opens the scene and reads the scans itself."""
         return type(self), self._opened
 
     @cached_property
     def gaps(self) -> tuple[int, ...]:
-        """Published numbers at which an image is missing: the others keep a constant spacing."""
+        """Published numbers of missing images; the others have a constant spacing."""
         spacing = min(np.diff(self.numbers), default=1)
         return tuple(sorted(set(range(self.numbers[0], self.numbers[-1], spacing)) - set(self.numbers)))
 
@@ -127,7 +127,7 @@ class PandasetScene(FrameSequence):
         return float(eye[2] - np.median(points[near, 2])) if near.any() else LIDAR_HEIGHT
 
     def truth(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.uint8]:
-        """Return the class of each cell in which there is a labelled return, seen by the camera or not.
+        """Return the class of each cell with a labelled return, seen by the camera or not.
 
         Objects outvote the ground below them (`birdseye_votes`). Returns of moving objects in other scans are moved
         with their cuboids to where the objects are at this frame.
@@ -157,14 +157,14 @@ class PandasetScene(FrameSequence):
         return birdseye_votes(self._in_grid(points), classes, spec, KITTI_14)
 
     def visible(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.bool_]:
-        """Return in which cells the camera sees a return (`unhidden`), (H, W). It doesn't see what is in the others.
+        """Return the cells in which the camera sees a return (`unhidden`), (H, W).
 
         Parameters and errors are those of `PandasetScene.truth`.
         """
         return self._visible(*self._cloud(k, before, after), self._camera(k), spec)
 
     def image_labels(self, k: int, size: tuple[int, int], before: int = 0, after: int = 0) -> NDArray[np.uint8]:
-        """Return the class of each pixel of the resized image: that of the closest return on it that the camera sees.
+        """Return the class of each pixel of the resized image, from the closest return there that the camera sees.
 
         Labels of single pixels can't be resized like an image, so the returns are projected again for each size.
         Parameters not named here are those of `LabelledDrive.image_labels`.
@@ -182,7 +182,7 @@ class PandasetScene(FrameSequence):
         return _painted(*self._cloud(k, before, after), self._camera(k).resized(size))[0]
 
     def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
-        """Return the cells in view of the camera, (H, W). Only some of them hold a labelled return.
+        """Return the cells in view of the camera, (H, W); only some of them have a labelled return.
 
         Parameters are those of `LabelledDrive.truth`.
         """
@@ -243,7 +243,7 @@ class PandasetScene(FrameSequence):
         return labelled
 
     def _camera(self, k: int) -> Camera:
-        """Return the calibration of the kept rows at a frame."""
+        """Return a frame's calibration for the cropped rows."""
         path = self.view / "intrinsics.json"
         K = files.read_intrinsics(path)
         K[1, 2] -= ROWS.start
@@ -251,7 +251,7 @@ class PandasetScene(FrameSequence):
         return camera_from(path, K, T, (ROWS.stop - ROWS.start, IMAGE_SIZE[1]), self.lidar_height)
 
     def _T_world_from_lidar(self, k: int) -> NDArray[np.float64]:
-        """Return the pose of the Pandar64 at the instant of the image, turned to where the camera looks."""
+        """Return the pose of the Pandar64 at the instant of the image, turned in the camera's direction."""
         number = self.numbers[k]
         poses = self._poses
         times = self._times
@@ -263,7 +263,7 @@ class PandasetScene(FrameSequence):
 
     @cached_property
     def _poses(self) -> NDArray[np.float64]:
-        # A velocity takes two poses, even at a single frame.
+        # A velocity needs two poses, even for a single frame.
         return files.read_poses(self.folder / "lidar" / "poses.json", max(self.numbers[-1] + 1, 2))
 
     @cached_property
@@ -280,7 +280,7 @@ class PandasetScene(FrameSequence):
 
 
 def _standing(classes: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """Return which returns may hide something from a camera: all but those of the ground."""
+    """Return which returns may hide something from a camera: all except the ground's."""
     return ~np.isin(classes, [KITTI_14.index(name) for name in ("road", "sidewalk")])
 
 

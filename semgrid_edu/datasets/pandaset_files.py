@@ -24,22 +24,22 @@ CREDIT = "PandaSet by Hesai and Scale AI, CC BY 4.0 (creativecommons.org/license
 """The credit to show with data of PandaSet."""
 
 TURNING = 0
-"""The number d of the Pandar64, the only LIDAR that the occupancy filter gets."""
+"""The number d of the Pandar64, the only LIDAR that the occupancy filter uses."""
 
 LIDAR_IN_POSE = np.array([0.0, 0.79, 1.86])
 """Position of the Pandar64 in the frame of lidar/poses.json (x right, y ahead, z up), metres. Measured on scene 002 as
-the point from which the returns of each laser have one elevation; the published extrinsics of the cameras agree within
-2 cm. The poses themselves are those of a point near the ground."""
+the point from which each laser's returns have the same elevation; the published extrinsics of the cameras agree within
+2 cm. The poses themselves refer to a point near the ground."""
 
 ROOF = (-0.9, -1.7), (0.9, 1.4)
-"""Least and most metres to the right and ahead of the Pandar64 of returns from the vehicle itself: on scene 002 some
-630 in each scan come from the roof, 1.6 to 2 m above the ground."""
+"""Bounds of the vehicle's roof, metres to the right and ahead of the Pandar64: on scene 002 about 630 returns in each
+scan come from the roof, 1.6 to 2 m above the ground."""
 
 FIRST_THING = 5
-"""Below this number are smoke, exhaust, spray and reflections: returns from where nothing is."""
+"""Classes below this number are smoke, exhaust, spray and reflections: returns without an object."""
 
 MOVABLE = range(13, 34)
-"""The numbers of the classes of things that may move: vehicles, people, animals."""
+"""The class numbers of things that may move: vehicles, people, animals."""
 
 PANDASET_CLASSES = ClassTable(
     KITTI_14,
@@ -61,13 +61,13 @@ PANDASET_CLASSES = ClassTable(
         **dict.fromkeys((34, 37, 40, 42), None),  # pylon, cone, rolling container, other static object
     },
 )
-"""KITTI-14's class of each number in annotations/semseg; the numbers are those of PandaSet's classes.json.
+"""KITTI-14's class of each number in annotations/semseg; the numbers come from PandaSet's classes.json.
 
-What could be several classes stays unlabelled: an "other static object" is a pole, a wall or a hydrant."""
+Ambiguous classes stay unlabelled: an "other static object" may be a pole, a wall or a hydrant."""
 
 
 class PandasetScan(NamedTuple):
-    """What the files of one scan hold.
+    """The contents of one scan's files.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class PandasetScan(NamedTuple):
     lidars : (N,) int
         Number of the LIDAR of each return.
     labelled : LabelledScan or None
-        The returns with their classes, without those from where nothing is (`FIRST_THING`); None in a scene without
+        The returns with their classes, without returns that have no object (`FIRST_THING`); None in a scene without
         labels.
     """
 
@@ -89,7 +89,7 @@ class PandasetScan(NamedTuple):
 
 
 def semseg_folder(scene: Path) -> Path:
-    """Return where a scene keeps the classes of its returns; scenes without labels have no such folder.
+    """Return the folder with the classes of a scene's returns; scenes without labels don't have it.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def semseg_folder(scene: Path) -> Path:
 
 
 def on_the_roof(points: NDArray[np.float64], T_world_from_vehicle: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which returns come from the vehicle itself, whose heading only the front camera's grid shares.
+    """Return which returns come from the vehicle itself; only the front camera's grid has the vehicle's heading.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def read_poses(path: Path, least: int) -> NDArray[np.float64]:
     path : Path
         The file poses.json.
     least : int
-        How many poses there have to be at least.
+        The least number of poses.
     """
     entries = read_json(path, list)
     if len(entries) < least:
@@ -207,7 +207,7 @@ def read_intrinsics(path: Path) -> NDArray[np.float64]:
 
 
 def _table(path: Path, numbers: Sequence[str], others: Sequence[str] = ()) -> dict[str, NDArray]:
-    """Read a table that has to have some columns, of finite numbers and of other things."""
+    """Read a table, and check that it has some columns of finite numbers and some of other things."""
     table = read_pickled_table(path)
     columns = [*numbers, *others]
     if not set(columns) <= set(table):

@@ -1,4 +1,4 @@
-"""LIDAR returns that the camera sees, the class that labelled points give a cell, and points of depth images (4)."""
+"""LIDAR returns that the camera sees, the class of a cell by its labelled points, and depth images (section 4)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,10 @@ from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.planes import plane_heights
 
 HIDING_ANGLE = 0.2
-"""Angle between two neighbouring returns of a scanner with 64 lasers, about, degrees."""
+"""Approximate angle between two neighbouring returns of a scanner with 64 lasers, degrees."""
 
 HIDING_BLOCKS = (5, 3)
-"""Rows and columns of blocks, `HIDING_ANGLE` wide, in which a standing point in the middle one hides what is behind it.
+"""Rows and columns of blocks, `HIDING_ANGLE` wide, in which an object's point in the middle one hides what is behind.
 
 There are more rows because the lasers are farther apart than the returns of one laser."""
 
@@ -22,8 +22,8 @@ There are more rows because the lasers are farther apart than the returns of one
 def closest_returns(frame: Frame) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Find the returns that the camera sees: the closest one at each pixel.
 
-    The LIDAR is above the camera, so it sees over objects that occlude the view of the camera. An occluded return is
-    dropped when it shares its pixel with a closer return. With few returns most share no pixel, and are kept.
+    The LIDAR is above the camera, so it sees over objects that block the camera's view. An occluded return is dropped
+    if a closer return has the same pixel. With few returns most don't share a pixel, and are kept.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def closest_returns(frame: Frame) -> tuple[NDArray[np.int64], NDArray[np.int64]]
     returns : (N,) int64
         Numbers of the points that are seen.
     uv : (N, 2) int64
-        The pixel of each, u to the right and v down, at the camera's own resolution.
+        The pixel of each, u to the right and v down, at the camera's resolution.
     """
     in_camera = transform_points(frame.camera.T_camera_from_lidar, frame.points[:, :3])
     uv, visible = project(in_camera, frame.camera)
@@ -88,7 +88,7 @@ def cells_in_view(camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
     centers = spec.centers()
     in_view = np.zeros(spec.shape, np.bool_)
     for height in plane_heights():
-        points = np.insert(centers[~in_view], 2, height, axis=1)  # not again where a lower point is in the image
+        points = np.insert(centers[~in_view], 2, height, axis=1)  # skip cells of which a lower point is in the image
         in_view[~in_view] = project(transform_points(camera.T_camera_from_grid, points), camera)[1]
     return in_view
 
@@ -96,11 +96,11 @@ def cells_in_view(camera: Camera, spec: GridSpec) -> NDArray[np.bool_]:
 def unhidden(points: NDArray, hiding: NDArray[np.bool_], camera: Camera) -> NDArray[np.bool_]:
     """Return which points the camera sees: those in its image that no object occludes.
 
-    The LIDAR isn't where the camera is, and other scans were taken from other places. So some points are occluded,
-    but most of these share no pixel with a point of the occluding object, as `closest_returns` would need. Therefore
-    objects are assumed to have no gaps between their points: the image is divided into blocks, and a point is hidden
-    if a point of an object is 0.5 m and 3 % closer in its block or in a block around it (`HIDING_BLOCKS`). This also
-    hides a narrow strip of what the camera sees just above an object.
+    The LIDAR and the camera are in different places, and other scans were taken from elsewhere. So some points are
+    occluded, but most of these don't share a pixel with a point of the occluding object, as `closest_returns` would
+    need. So we assume that objects have no gaps between their points: the image is divided into blocks, and a point is
+    hidden if a point of an object is 0.5 m and 3 % closer in the same block or in a block around it (`HIDING_BLOCKS`).
+    This also hides a narrow visible strip just above an object.
 
     Parameters
     ----------
@@ -127,14 +127,14 @@ def unhidden(points: NDArray, hiding: NDArray[np.bool_], camera: Camera) -> NDAr
 
 
 CLEARANCE = 2.5
-"""Metres. A point this far above the lowest point of its cell overhangs it, as branches do: the height of a vehicle,
-up to which `SensorModel` counts returns as obstacles too."""
+"""Metres. A point this far above the lowest point of its cell overhangs it, as branches do. It is a vehicle's height,
+and also the height up to which `SensorModel` counts returns as obstacles."""
 
 
 def birdseye_votes(
     points_grid: NDArray, classes: NDArray[np.uint8], spec: GridSpec, label_set: LabelSet
 ) -> NDArray[np.uint8]:
-    """Let labelled points vote on the class of their cells.
+    """Compute the class of each cell by a vote of its labelled points.
 
     Branches and signs that hang over a road don't make it vegetation or signage: points more than `CLEARANCE` above the
     lowest labelled point in their cell have no vote. Among the others `LabelSet.most_voted` decides: an object
@@ -171,13 +171,13 @@ LIDAR_ROW_STEP, LIDAR_COL_STEP = 4, 2
 """Every fourth row and every second column makes a depth image about as sparse as a LIDAR scan."""
 
 DEPTH_RANGE = 80.0
-"""Metres up to which a depth image is used: what a LIDAR reaches on most surfaces."""
+"""Metres up to which a depth image is used: the range of a LIDAR on most surfaces."""
 
 
 def points_from_depth(
     depth: NDArray, camera: Camera, row_step: int = 1, col_step: int = 1
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the points in space that the pixels of a depth image show, up to `DEPTH_RANGE`.
+    """Return the points in space of the pixels of a depth image, up to `DEPTH_RANGE`.
 
     Parameters
     ----------
@@ -208,8 +208,8 @@ def depth_scan(
 ) -> NDArray[np.float32]:
     """Return a depth image thinned to a LIDAR's sparsity, in the form of a scan.
 
-    As the paper says, this doesn't make it LIDAR data; it only reduces the amount of depth. By default every fourth row
-    and every second column is kept, up to 80 m. The reflectance is 0, because a depth image has none.
+    As the paper says, this doesn't turn it into LIDAR data; it only reduces the amount of depth. By default every
+    fourth row and every second column is kept, up to 80 m. The reflectance is 0, because a depth image has none.
 
     Parameters are those of `points_from_depth`.
 

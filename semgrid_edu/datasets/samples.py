@@ -1,6 +1,7 @@
 """The shipped samples: a simulated drive and a real one, a few labelled frames and trained weights (section 4).
 
-What needs torch is imported where it is used: torch takes seconds, and those who only read the drive don't need it.
+Modules that need torch are imported where they are used, because torch takes seconds and reading the drive doesn't need
+it.
 """
 
 from pathlib import Path
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def samples_dir() -> Path:
-    """Return the folder of the samples. A wheel holds the drive and SegNet alone, a clone all of them."""
+    """Return the folder of the samples. A wheel has only the drive and SegNet, a clone has all samples."""
     return shipped_folder("data_samples")
 
 
@@ -39,7 +40,7 @@ def real_weights() -> Path:
 
 
 def trained_segmenters() -> list[str]:
-    """Return the names of the image networks in `SEGMENTERS` whose trained compact networks are shipped."""
+    """Return the names in `SEGMENTERS` for which a trained compact network is shipped."""
     from semgrid_edu.networks import SEGMENTERS
 
     return [name for name in SEGMENTERS if _trained_folder(name).is_dir()]
@@ -59,7 +60,7 @@ def sample_weights(segmenter: str = "segnet") -> Path:
 
 
 def sample_image_stage(segmenter: str = "segnet") -> Path:
-    """Return the file of the same network after its first stage, which learns from labelled images but not from grids.
+    """Return the file of the same network after its first stage, which is trained on labelled images but not on grids.
 
     Parameters
     ----------

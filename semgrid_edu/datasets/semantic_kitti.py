@@ -43,22 +43,22 @@ SEMANTIC_KITTI_CLASSES = ClassTable(
         **dict.fromkeys((48,), "sidewalk"),
         **dict.fromkeys((70, 71, 72), "vegetation"),  # vegetation, trunk, terrain
         **dict.fromkeys((10, 13, 16, 18, 20), "car"),  # car, bus, on rails, truck, other vehicle
-        **dict.fromkeys((252, 256, 257, 258, 259), "car"),  # the same that move: car, on rails, bus, truck, other
+        **dict.fromkeys((252, 256, 257, 258, 259), "car"),  # the same, moving: car, on rails, bus, truck, other
         **dict.fromkeys((30, 254), "pedestrian"),
-        **dict.fromkeys((11, 15, 31, 32, 253, 255), "bicycle"),  # bicycle, motorcycle, and who rides them
+        **dict.fromkeys((11, 15, 31, 32, 253, 255), "bicycle"),  # bicycle, motorcycle, and their riders
         **dict.fromkeys((50,), "building"),
         **dict.fromkeys((80, 81), "signage"),  # pole, traffic sign
         **dict.fromkeys((51,), "fence"),
         **dict.fromkeys((0, 1, 49, 52, 99), None),  # unlabelled, outlier, other ground, other structure, other object
     },
 )
-"""KITTI-14's class of each number in the labels, which is that of the data set's own semantic-kitti.yaml.
+"""KITTI-14's class of each number in the labels; the numbers come from the data set's semantic-kitti.yaml.
 
-As in the rest of the package, poles are signage, whoever rides a bicycle belongs to it, and grass is vegetation.
-KITTI-14 has no classes for larger vehicles and for motorcycles, so they become cars and bicycles."""
+As in the rest of the package, poles are signage, a rider belongs to the bicycle, and grass is vegetation. KITTI-14 has
+no classes for larger vehicles and for motorcycles, so they become cars and bicycles."""
 
 FIRST_MOVING = 252
-"""Classes with this number or a higher one are of moving objects."""
+"""Classes with this number or a higher one are moving objects."""
 
 
 def read_point_labels(path: Path, n_points: int) -> NDArray[np.int64]:
@@ -86,12 +86,12 @@ def read_point_labels(path: Path, n_points: int) -> NDArray[np.int64]:
 
 
 class SemanticKittiSequence(FrameSequence):
-    """The frames of a sequence. Each is read, and checked, when it is asked for.
+    """The frames of a sequence, each read and checked on access.
 
     Scans and their labels (`scan`, `classes`, `moving`, and `truth` of a single scan) need neither calibration nor
-    poses. In a `Frame`, `labels` hold the bird's-eye truth of this single scan, visible where the camera sees a return;
-    the image is not labelled. Without the folder image_2 frames have no image. The world is the LIDAR's frame at the
-    first scan.
+    poses. The `labels` of a `Frame` are the bird's-eye truth of this single scan, visible where the camera sees a
+    return; the image isn't labelled. Without the folder image_2 frames have no image. The world is the LIDAR's frame at
+    the first scan.
 
     Parameters
     ----------
@@ -162,9 +162,9 @@ class SemanticKittiSequence(FrameSequence):
     def truth(self, k: int, spec: GridSpec, before: int = 0, after: int = 0) -> NDArray[np.uint8]:
         """Return the bird's-eye truth of one frame, from its own scan or accumulated over several by their poses.
 
-        Of the other scans only static points are used: what moves was elsewhere then. Scans that the sequence
-        doesn't have are left out. To fill the rest of the grid as the paper does, take
-        `np.where(truth == IGNORE, unknown_classes(belief.probability), truth)`.
+        Only the static points of the other scans are used, because moving things were elsewhere then. Scans that the
+        sequence doesn't have are left out. To fill the rest of the grid as the paper does, take `np.where(truth ==
+        IGNORE, unknown_classes(belief.probability), truth)`.
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ class SemanticKittiSequence(FrameSequence):
         return birdseye_votes(points, classes, spec, KITTI_14)
 
     def _labelled_points(self, j: int, k: int) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-        """Return scan j in the grid frame of frame k, and its classes, without what has moved between them."""
+        """Return scan j in the grid frame of frame k, and its classes, without things that moved in between."""
         points = self.scan(j)[:, :3].astype(np.float64)
         classes = self.classes(j)
         if j != k:

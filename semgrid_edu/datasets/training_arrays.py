@@ -1,7 +1,7 @@
-"""The arrays that a network learns from: images with fewer pixels, occupancy, and the truth of each cell (section 4.1).
+"""The arrays that a network is trained on: resized images, occupancy, and the truth of each cell (section 4.1).
 
-`cached_arrays` keeps them until the code of this module, or of what it imports, changes. So this module holds only what
-makes arrays.
+Changing this module, or anything it imports, invalidates the arrays that `cached_arrays` keeps. So it contains only the
+code that makes arrays.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,11 +20,11 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, track_drive
 
 SEED = 0
-"""Seed for the particles of the occupancy filter, in each drive."""
+"""Seed for the occupancy filter's particles, the same for each drive."""
 
 
 class ArrayRecipe(NamedTuple):
-    """How the arrays are made.
+    """How to make the arrays.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a network learns from, computed once per data set and kept: arrays, and labels from LIDAR (section 4)."""
+"""The training data, computed once per data set and cached: arrays, and labels from LIDAR (section 4)."""
 
 import hashlib
 import inspect
@@ -21,7 +21,7 @@ from semgrid_edu.storage.provenance import code_hash
 from semgrid_edu.storage.tensors import read_arrays
 
 WORKERS = 2
-"""Number of processes that work on the drives, each on one drive at a time."""
+"""Number of worker processes, each of which works on one drive at a time."""
 
 RAGGED = ("return_pixels", "return_cells")
 """Arrays whose length differs from frame to frame: they are concatenated, and `return_ends` says where each ends."""
@@ -32,9 +32,9 @@ def cached_arrays(
 ) -> dict[str, NDArray]:
     """Return the arrays of a split's labelled frames, which are computed on first use.
 
-    They are kept in `cache_folder`, in files named by a hash of everything that decides them: the recipe, the code, the
-    labelled frames, and the drives' files by name, size and time of the last change. (Hashing the contents of these
-    files, about a gigabyte, at every start would take longer than reading the arrays.)
+    They are cached in `cache_folder`, in files named by a hash of everything that determines them: the recipe, the
+    code, the labelled frames, and the drives' files by name, size and time of the last change. (Hashing the contents of
+    these files, about a gigabyte, at every start would take longer than reading the arrays.)
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def cached_arrays(
     -------
     dict of str to array
         For N frames "image" (N, 3, h, w) uint8, "labels" (N, h, w) uint8, "occupancy" (N, 4, H, W) float32, "truth" and
-        "true" (N, H, W) uint8: what `truth` makes, and what the data set itself says. From `seen_returns`
+        "true" (N, H, W) uint8: the result of `truth`, and the data set's own truth. From `seen_returns`
         "return_pixels" and "return_cells", whose entries from return_ends[k] to return_ends[k + 1] belong to frame k,
         and "return_ends" (N + 1,).
 
@@ -88,7 +88,7 @@ def cached_arrays(
 def _cached(
     folder: Path, name: str, decided_by: Sequence[str], make: Callable[[], dict[str, NDArray]]
 ) -> dict[str, NDArray]:
-    """Read the arrays that were kept under a name and the hash of what decides them, or make and keep them."""
+    """Read the arrays cached under a name and the hash of what determines them, or make and cache them."""
     key = hashlib.sha256("\n".join(decided_by).encode()).hexdigest()[:16]
     path = folder / f"{name}-{key}.npz"
     if not path.exists():
@@ -133,7 +133,7 @@ def _code_and_files(
     index: DatasetIndex, drives: Sequence[tuple[LabelledDrive, list[int]]], recipe: ArrayRecipe
 ) -> list[str]:
     """Describe the code that makes the arrays, and the drives' files by name, size and time of the last change."""
-    readers = {type(drive) for drive, _ in drives}  # these, and the sensor model, may be outside of the package
+    readers = {type(drive) for drive, _ in drives}  # these, and the sensor model, may be outside the package
     parts_of_others = {*readers, type(recipe.params.sensor), recipe.track}
     modules = [Path(training_arrays.__file__), *map(_file_of, parts_of_others)]
     parts = [code_hash(modules)]

@@ -24,11 +24,11 @@ from semgrid_edu.occupancy import CmcdotParams, track_drive
 from semgrid_edu.storage.tensors import read_tensors
 
 FRAMES = "frames.safetensors"
-"""Name of the file that holds an excerpt: a few labelled frames, such as the shipped ones."""
+"""Name of the file with an excerpt: a few labelled frames, such as the shipped ones."""
 
 
 class Sample(NamedTuple):
-    """One labelled frame, as a network takes it.
+    """One labelled frame, in the form that a network takes.
 
     Parameters
     ----------
@@ -51,8 +51,8 @@ class Sample(NamedTuple):
 class TrainingSet(Dataset[Sample]):
     """The labelled frames of a split.
 
-    The first use runs the occupancy filter over every drive up to its labelled frames and keeps the result in `cache/`
-    of the data set, see `cached_arrays`. Later uses read it from there, until data, recipe or code change.
+    The first use runs the occupancy filter over every drive up to its labelled frames and stores the result in the data
+    set's `cache/`, see `cached_arrays`. Later uses read it from there, until data, recipe or code change.
 
     Parameters
     ----------
@@ -66,10 +66,10 @@ class TrainingSet(Dataset[Sample]):
     image_size : (int, int)
         Height and width to which the images are resized, pixels; the compact network's size when left out.
     params : CmcdotParams, optional
-        Parameters of the occupancy filter; the package's own when left out.
+        Parameters of the occupancy filter; the package's defaults when left out.
     truth : LidarTruth, optional
-        How to make the truth from image labels and LIDAR, as one must with real data. When left out, the truth is what
-        that of the data set (`LabelledDrive.truth`).
+        How to make the truth from image labels and LIDAR, which real data need. By default the truth comes from the
+        data set (`LabelledDrive.truth`).
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class TrainingSet(Dataset[Sample]):
         The name of the drive of each frame, such as "2026_01_01 0143". Frames of one drive look alike, so they aren't
         independent.
     arrays : dict of str to array
-        All frames at once, as `cached_arrays` returns them. The labels of pixels are always the data set's own.
+        All frames at once, as `cached_arrays` returns them. The labels of pixels always come from the data set.
 
     Raises
     ------
@@ -100,7 +100,7 @@ class TrainingSet(Dataset[Sample]):
     """
 
     track = staticmethod(track_drive)
-    """Runs the occupancy filter over a drive; `semgrid_edu.fast.TrainingSet` has the compiled one."""
+    """Runs the occupancy filter over a drive; `semgrid_edu.fast.TrainingSet` uses the compiled filter."""
 
     def __init__(
         self,
@@ -170,9 +170,9 @@ class TrainingSet(Dataset[Sample]):
 
 
 class Mixture(Sequence[Sample]):
-    """Training sets that take turns in training, such as simulated and real ones, each with its own camera.
+    """Training sets that take turns, such as simulated and real ones, each with its own camera.
 
-    Each step takes its frames from the next data set, however many frames each has, and from its next camera.
+    Each step takes its frames from the next data set, whatever its size, and from that set's next camera.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ class Mixture(Sequence[Sample]):
     Raises
     ------
     ArgumentError
-        When there is no data set, one without a camera, or one with other classes than the first.
+        If there is no data set, if one has no camera, or if one has other classes than the first.
     """
 
     def __init__(self, data_sets: Sequence[Sequence[TrainingSet]]) -> None:
@@ -217,12 +217,12 @@ class Mixture(Sequence[Sample]):
         raise IndexError(f"no such frame of {len(self)}")
 
     def turn(self, iteration: int) -> tuple[TrainingSet, int]:
-        """Return the part whose turn it is at a step of training, from 0, and how many turns it has had before.
+        """Return the part whose turn it is at a training step, and how many turns it has had before.
 
         Parameters
         ----------
         iteration : int
-            Number of the step.
+            Number of the step, from 0.
         """
         round_, data_set = divmod(iteration, len(self._data_sets))
         cameras = self._data_sets[data_set]
@@ -231,7 +231,7 @@ class Mixture(Sequence[Sample]):
 
 
 def _shared_camera(drives: Sequence[tuple[LabelledDrive, list[int]]]) -> Camera:
-    """Return the camera of a split's drives; it must be the same for all, because one sampler serves them."""
+    """Return the camera of a split's drives, which must all have the same one, because they share a sampler."""
     (first, _), *others = drives
     camera = first.camera
     for drive, _ in others:

@@ -1,4 +1,4 @@
-"""Keeping freed memory, so that large buffers needn't be cleared by the system again and again."""
+"""Keep freed memory in the process, so that the system doesn't clear the pages of every large buffer again."""
 
 import ctypes
 import sys
@@ -13,7 +13,7 @@ def keep_freed_memory() -> None:
     On Linux, glibc returns freed buffers above 32 MB to the system at once, and the system clears every page of the
     next such buffer when it is touched. The twenty planes of a batch are larger than that. On the paper's grid,
     sampling them took 30 ms with glibc's defaults and 12 ms with kept memory. The price is that the process never
-    shrinks below its peak. On systems other than Linux with glibc nothing changes.
+    shrinks below its peak. Without Linux and glibc this function does nothing.
     """
     if sys.platform == "linux" and hasattr(libc := ctypes.CDLL(None), "mallopt"):
         libc.mallopt(M_MMAP_MAX, 0)

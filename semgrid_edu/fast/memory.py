@@ -54,7 +54,7 @@ def _seen_classes(grid, n):
 def carry_classes(
     memory: MemoryState, moving: NDArray, velocity: NDArray, cell: float, dt: float, params: MemoryParams
 ) -> MemoryState:
-    """Predict: what moves takes its class along. Parameters and result are those of `carry_classes`."""
+    """Predict: a moving thing takes its class along. Parameters and result are those of `carry_classes`."""
     check_shape("moving", moving, memory.weight.shape[1:])
     check_shape("velocity", velocity, (2, *moving.shape))
     carried = memory.copy()
@@ -72,7 +72,7 @@ def _moving_planes(memory: MemoryState) -> tuple[NDArray, NDArray, NDArray, NDAr
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _carry(before, moving, velocity, cell, dt, least, after):
-    """Few cells hold something that moves, so each looks back by itself."""
+    """Look up the origin of each moving cell: there are few, so one by one."""
     evidence, weight, seen, offset = before
     to_evidence, to_weight, to_seen, to_offset = after
     to_evidence[:], to_weight[:], to_seen[:], to_offset[:] = 0, 0, 0, 0
@@ -93,7 +93,7 @@ def _carry(before, moving, velocity, cell, dt, least, after):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _behind(r, c, x, y, cell, height, width):
-    """Return the cell that something came from: x points to row 0, y to column 0."""
+    """Return the cell that a moving thing came from: x points to row 0, y to column 0."""
     r0, c0 = r + int(np.rint(x / cell)), c + int(np.rint(y / cell))
     return min(max(r0, 0), height - 1), min(max(c0, 0), width - 1)
 
@@ -115,7 +115,7 @@ def recall_classes(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _recall(evidence, weight, seen, places, o, classes, log_class, sees, exponent, most, movable, laser, recalled):
-    """Row by row, without branches in the inner loops, so that the compiler takes several cells at once."""
+    """Work row by row, without branches in the inner loops, so that the compiler vectorises over cells."""
     n, height, width = log_class.shape
     recalled[:n] = 0
     old, new, mass, alone = np.empty((4, width), np.float32)
@@ -144,7 +144,7 @@ def _recall(evidence, weight, seen, places, o, classes, log_class, sees, exponen
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _scores(evidence, places, log_class, old, new, movable, laser, here):
-    """Return the logarithm of what memory and frame say together of a row of cells, up to a number in each cell."""
+    """Return the log of memory times frame for a row of cells, up to a constant in each cell."""
     r, first, last = here
     scores, place, beam = np.empty((len(evidence), len(old)), np.float32), places[r][first:last], laser[r][first:last]
     for c in range(len(old)):
@@ -159,7 +159,7 @@ def _scores(evidence, places, log_class, old, new, movable, laser, here):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_beliefs(scores, mass, classes, sees, movable, recalled, here):
-    """Share the mass of each cell of a row: the frame says, as far as it sees, what comes and goes (`movable`)."""
+    """Distribute the mass of each cell in a row; where the frame sees, it decides about `movable` classes."""
     (n, width), (r, first, last) = scores.shape, here
     top, sums = np.full((2, width), np.float32(-1e30)), np.zeros((2, width), np.float32)  # others, movable
     look, seen, parts = sees[r][first:last], np.zeros(width, np.float32), np.empty((2, width), np.float32)
@@ -177,7 +177,7 @@ def _add_beliefs(scores, mass, classes, sees, movable, recalled, here):
     for c in range(width):
         most = max(top[0, c], top[1, c])
         others, movers = sums[0, c] * np.exp(top[0, c] - most), np.exp(top[1, c] - most)
-        each = (1 - look[c]) * movers / (others + sums[1, c] * movers)  # what one unit of the movable ones is worth
+        each = (1 - look[c]) * movers / (others + sums[1, c] * movers)  # scale of the movable classes
         there = seen[c] + each * sums[1, c]
         parts[0, c], parts[1, c] = mass[c] * (1 - there) / max(sums[0, c], np.float32(1e-12)), mass[c] * each
     for k in range(n):
@@ -187,7 +187,7 @@ def _add_beliefs(scores, mass, classes, sees, movable, recalled, here):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _parts(weight, sees, exponent, most):
-    """Return what the old evidence is worth now, and what the new is."""
+    """Return the weights of the old and of the new evidence."""
     new = max(exponent * sees, sees - weight)
     return (min(weight, most - new), new) if new > 0 else (weight, np.float32(0))
 
@@ -204,7 +204,7 @@ def learn_classes(memory: MemoryState, places: NDArray, look: Look, params: Memo
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _learn(evidence, weight, seen, places, log_class, sees, exponent, moving, most):
-    """Change the arrays in place where the camera sees something, with a class in the inner loops."""
+    """Change the arrays in place where the camera sees something; the inner loops run over a row for one class."""
     height, width = places.shape
     old, new = np.zeros(width, np.float32), np.zeros(width, np.float32)
     for r in range(height):

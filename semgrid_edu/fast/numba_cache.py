@@ -1,4 +1,4 @@
-"""Where numba keeps the functions that it compiled, also when the installation is read-only."""
+"""Where numba caches compiled functions, also when the installation is read-only."""
 
 import os
 import sys
@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
-"""The folder of the package, in which numba keeps what it compiles if it can."""
+"""The package's folder: numba caches compiled functions there if it can write to it."""
 
 NUMBA_VARIABLE = "NUMBA_CACHE_DIR"
 """The environment variable that names numba's cache folder."""
@@ -15,8 +15,8 @@ NUMBA_VARIABLE = "NUMBA_CACHE_DIR"
 def keep_compiled_functions() -> str:
     """Give numba a temporary folder if it can write to none of its usual ones.
 
-    Without a folder to write to, numba raises an error when a compiled function is defined. The environment variable
-    has to be set before numba is imported; worker processes inherit it.
+    Without a writable folder, numba raises an error when a compiled function is defined. The environment variable must
+    be set before numba is imported; worker processes inherit it.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def _usual_folders() -> list[Path]:
 
 
 def user_cache() -> Path:
-    """Return the user's cache folder, as numba does; it need not exist."""
+    """Return the user's cache folder, found as numba finds it; it need not exist."""
     home = Path(os.path.expanduser("~"))  # noqa: PTH111 (Path.home raises an error for a user without a home)
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", home / "AppData" / "Local"))
@@ -47,7 +47,7 @@ def user_cache() -> Path:
 
 
 def takes_files(folder: Path) -> bool:
-    """Return whether files can be written to a folder, which is created when missing.
+    """Return whether files can be written to a folder; create it if missing.
 
     Parameters
     ----------

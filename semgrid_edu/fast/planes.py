@@ -1,7 +1,7 @@
 """Equation (2) as a product with a sparse matrix that never changes (section 3.3).
 
 For a fixed calibration the four pixels around each point and their weights never change. So equation (2) is one sparse
-matrix that maps pixels to points, and its transpose brings gradients back.
+matrix that maps pixels to points, and its transpose maps gradients back.
 """
 
 from collections.abc import Callable
@@ -40,7 +40,7 @@ class PlaneSampler(nn.Module):
         self._hold(PlaneOperator.build(self.pixels, self.visible, self.image_size))
 
     def _hold(self, operator: "PlaneOperator") -> None:
-        """Use this operator from now on, and forget that of the last batch."""
+        """Use this operator from now on, and forget the last batch's operator."""
         self.operator = self._of_batch = operator
 
     @property
@@ -54,14 +54,14 @@ class PlaneSampler(nn.Module):
         Returns
         -------
         (B, C, D, H, W) float
-            p, in the type of `scores`. In memory all scores of a cell are together, (B, H, W, D, C), the order in
-            which the 1x1 convolution that follows reads them.
+            p, in the type of `scores`. In memory all scores of a cell are together, (B, H, W, D, C), because the 1x1
+            convolution that follows reads them in this order.
         """
         check_scores(scores, self.image_size)
         return self._operator_for(len(scores))(scores)
 
     def _operator_for(self, n_images: int) -> "PlaneOperator":
-        """Return the operator for this many images at once: that of the last batch, if it was as large."""
+        """Return the operator for this many images at once: the last batch's operator, if it was as large."""
         if n_images == 1:
             return self.operator
         if self._of_batch.n_images != n_images:
@@ -88,7 +88,7 @@ class PlaneOperator:
         One row per point, one column per pixel. The D points of a cell follow each other, so that its scores are next
         to each other in memory. The rows of points that aren't visible are empty and cost nothing.
     transpose : SparseMatrix
-        The same weights, one row per pixel and one column per point.
+        The transposed matrix: one row per pixel, one column per point.
     image_size : (int, int)
         Height h and width w of the scores, pixels.
     planes_shape : (int, int, int)
@@ -144,7 +144,7 @@ class PlaneOperator:
         return planes.unflatten(0, (self.n_images, *shape, n_planes)).permute(0, 4, 3, 1, 2)
 
     def __deepcopy__(self, memo: dict) -> "PlaneOperator":
-        """Return the operator itself: nothing in it changes, so copies of a network share it."""
+        """Return the operator itself: it never changes, so copies of a network share it."""
         return self
 
     @property
@@ -180,7 +180,7 @@ def _corners(points: NDArray, image_size: tuple[int, int]) -> tuple[NDArray[np.i
     u, v = points.T
     left, top = np.floor(u), np.floor(v)
     right_weight, lower_weight = u - left, v - top
-    # On the last column or row the far neighbour has no weight, but it must exist.
+    # On the last column or row the far neighbour has weight zero, but it must exist.
     right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
     rows = (top, 1 - lower_weight), (bottom, lower_weight)
     columns = (left, 1 - right_weight), (right, right_weight)
@@ -220,7 +220,7 @@ class SparseMatrix(NamedTuple):
     def multiply(self, rows: Tensor) -> Tensor:
         """Return the product with a dense matrix, (rows, C).
 
-        PyTorch's bag of embeddings computes just that, a weighted sum of gathered rows, and on a CPU it is several
+        PyTorch's embedding bag computes a weighted sum of gathered rows, which is this product. On a CPU it is several
         times faster than PyTorch's sparse matrices.
 
         Parameters
@@ -241,7 +241,7 @@ class SparseMatrix(NamedTuple):
         n_blocks : int
             How often this matrix is repeated along the diagonal: once per image.
         n_columns : int
-            The number of columns of this matrix. Its entries don't tell, because its last columns may be empty.
+            The number of columns of this matrix. Its entries don't determine it, because its last columns may be empty.
         """
         block = torch.arange(n_blocks, dtype=self.offsets.dtype, device=self.offsets.device)[:, None]
         n_weights = self.offsets[-1:]
@@ -256,8 +256,8 @@ class SparseMatrix(NamedTuple):
 class SparseProduct(torch.autograd.Function):
     """The product y = A x with the gradient A^T dL/dy.
 
-    The transpose is given, so that the backward pass gathers rows as the forward pass does; scattering them into the
-    pixels would be slower.
+    The transpose is passed in so that the backward pass gathers rows, as the forward pass does; scattering them into
+    the pixels would be slower.
     """
 
     @staticmethod

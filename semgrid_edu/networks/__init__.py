@@ -1,4 +1,4 @@
-"""The networks: i -> s and (p, o) -> g, each by itself and joined (paper, sections 3.1 and 3.4)."""
+"""The networks: i -> s and (p, o) -> g, separately and end to end (paper, sections 3.1 and 3.4)."""
 
 from semgrid_edu.networks.build import build_net, with_mean_scores
 from semgrid_edu.networks.deeplab import DeepLab

@@ -23,7 +23,7 @@ def build_net(
     architecture : Architecture
         What to build.
     camera : Camera
-        The camera as it took its images; the network sees them at `architecture.image_size`.
+        The camera at its original image size; the network sees images at `architecture.image_size`.
     seed : int
         Seed for the initial weights.
     sampler : type
@@ -32,7 +32,7 @@ def build_net(
     Returns
     -------
     SemanticGridNet
-        The network, in training mode, as PyTorch's modules are when they are new.
+        The network, in training mode, like any new PyTorch module.
     """
     if architecture.label_set not in LABEL_SETS:
         raise ArgumentError("label_set", f"one of {', '.join(LABEL_SETS)}", repr(architecture.label_set))
@@ -47,17 +47,17 @@ def build_net(
 
 
 def plane_sampler(architecture: Architecture, camera: Camera, sampler: type[nn.Module] = PlaneSampler) -> nn.Module:
-    """Return what samples a network's scores on its planes. Parameters are those of `build_net`."""
+    """Return the module that samples a network's scores on its planes. Parameters are those of `build_net`."""
     camera = camera.resized(architecture.image_size)
     pixels, visible = plane_pixels(architecture.grid, architecture.heights, camera)
     return sampler(pixels, visible, camera.size)
 
 
 class MeanSegmenter(nn.Module):
-    """Several image networks that score an image together: s is the mean of their scores.
+    """An ensemble of image networks: s is the mean of their scores.
 
-    Networks that learned from the same few frames make different mistakes, so their mean makes fewer. The shipped real
-    network is such a mean of three.
+    Networks trained on the same few frames make different mistakes, so their mean makes fewer. The shipped real network
+    is such a mean of three.
 
     Parameters
     ----------
@@ -81,13 +81,13 @@ def with_mean_scores(nets: Sequence[SemanticGridNet]) -> SemanticGridNet:
     Parameters
     ----------
     nets : sequence of SemanticGridNet
-        At least one; of the same architecture and for one camera. Their parts aren't copied.
+        At least one, all with the same architecture and camera. Their parts aren't copied.
 
     Returns
     -------
     SemanticGridNet
-        It has the fusion network of the first, which hasn't learned from mean scores yet: train it on them. One
-        network is returned as it is.
+        It has the first one's fusion network, which must still be trained on mean scores. A single network is returned
+        unchanged.
     """
     first = nets[0]
     if len(nets) == 1:

@@ -1,7 +1,7 @@
-"""The conv-deconv network: down by max-pooling, up by the indices it kept (paper, sections 3.1 and 3.4, Fig. 5).
+"""The conv-deconv network: max-pooling down, unpooling by the same indices up (paper, sections 3.1 and 3.4, Fig. 5).
 
-The image network SegNet and the fusion network are both built from it. `fresh_weights` draws the first weights of
-every network of the package from a seed.
+SegNet and the fusion network are both built from it. `fresh_weights` seeds the initial weights of every network in the
+package.
 """
 
 from collections.abc import Iterator
@@ -32,13 +32,13 @@ def conv_bn_relu(n_in: int, n_out: int) -> nn.Sequential:
 
 
 class ConvDeconv(nn.Module):
-    """Encode a map by convolutions and max-pooling; decode it by unpooling to where the maxima were, and convolutions.
+    """Encode a map by convolutions and max-pooling; decode it by convolutions and unpooling to where the maxima were.
 
     Each of the S stages halves the map on the way down and restores it on the way up. The decoder has as many
     layers as the encoder, in reverse order, and its last layer gives the result, without normalisation or ReLU.
-    A pooled map no longer shows where in its 2x2 window each maximum was. The indices, kept from the way down, put the
-    values back there, so that borders stay sharp without any weights (Badrinarayanan, Kendall and Cipolla, SegNet,
-    PAMI 2017).
+    A pooled map no longer shows where in its 2x2 window each maximum was. The encoder keeps these indices, and the
+    decoder puts the values back there, so that borders stay sharp without any weights (Badrinarayanan, Kendall and
+    Cipolla, SegNet, PAMI 2017).
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class ConvDeconv(nn.Module):
         smallest = 2 ** len(self.encoder)
         if min(x.shape[2:]) < smallest:
             raise ArgumentError("x", f"maps of {smallest} x {smallest} or larger", tuple(x.shape))
-        # Channels last in memory: half the time on a CPU, the same numbers.
+        # Channels last in memory: takes half the time on a CPU, with the same result.
         x = x.contiguous(memory_format=torch.channels_last)
         levels = []
         for encode in self.encoder:
@@ -107,11 +107,10 @@ def _layers(channels: list[int], plain_end: bool = False) -> list[nn.Module]:
 
 @contextmanager
 def fresh_weights(net: nn.Module, seed: int) -> Iterator[None]:
-    """Make the first weights of the layers that are created in the block depend only on the seed.
+    """Make the initial weights of the layers created in the block depend only on the seed.
 
-    PyTorch's layers draw their first weights from the CPU's global generator when they are created. Inside the block
-    that generator starts from the seed; afterwards it is as it was before. Then `initialise` draws the convolutions'
-    weights again.
+    PyTorch's layers draw their initial weights from the CPU's global generator. Inside the block that generator starts
+    from the seed; afterwards its state is restored. Then `initialise` redraws the weights of the convolutions.
 
     Parameters
     ----------
@@ -127,12 +126,12 @@ def fresh_weights(net: nn.Module, seed: int) -> Iterator[None]:
 
 
 def initialise(net: nn.Module, seed: int) -> None:
-    """Draw new weights for all convolutions, such that signals keep their size from layer to layer.
+    """Draw new weights for all convolutions, scaled so that signals keep their size from layer to layer.
 
     The weights are normal and the biases zero. The variance of convolutions is 2 / fan-in, because the ReLU after them
     halves the power of its input (He et al., 2015). The variance of up-convolutions is 1 / (number of input channels):
     no ReLU follows them, and their strides leave no overlap, so each pixel of the result is a sum over the channels of
-    one input pixel. Other layers are left as they are.
+    one input pixel. Other layers are unchanged.
 
     Parameters
     ----------

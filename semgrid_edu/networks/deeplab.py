@@ -16,7 +16,7 @@ EXPANSION = 4
 
 
 class DeepLab(Segmenter):
-    """Segment an image by a ResNet that halves the map only three times, and classifiers that look near and far.
+    """Segment an image by a ResNet that halves the map only three times, and classifiers with short and long reach.
 
     The classifiers are atrous spatial pyramid pooling (ASPP): 3x3 convolutions with four dilation rates score the same
     map in parallel, each with a different reach, and their scores are summed. Bilinear interpolation enlarges the sum
@@ -79,13 +79,13 @@ class DeepLab(Segmenter):
         return interpolate(self.scale * summed, OUTPUT_STRIDE, x.shape[2:])
 
     def imagenet_tensors(self) -> dict[str, Tensor]:
-        """Return all of ResNet before its classifier, with the running statistics of its batch normalisation."""
+        """Return all of ResNet before its classifier, including the running statistics of its batch normalisation."""
         state = self.backbone.state_dict()
         return {name: tensor for name, tensor in state.items() if not name.endswith("num_batches_tracked")}
 
 
 def interpolate(scores: Tensor, stride: int, size: tuple[int, int]) -> Tensor:
-    """Interpolate a map whose cell i is on pixel stride x i, bilinearly; past the last cell the result is constant.
+    """Interpolate bilinearly a map whose cell i is on pixel stride x i; past the last cell the result is constant.
 
     Parameters
     ----------
@@ -107,11 +107,11 @@ def interpolate(scores: Tensor, stride: int, size: tuple[int, int]) -> Tensor:
 
 
 class ResNet(nn.Module):
-    """Compute a feature map by a stem and four stages of bottlenecks, the last of which dilate instead of striding.
+    """Compute a feature map by a stem and four stages of bottlenecks; the last stages dilate instead of striding.
 
-    A stage with stride 2 halves the map. The atrous algorithm leaves out the stride and instead dilates every later
-    kernel by it. The result still has all values of the strided network, unchanged, and the values between them.
-    Parameters are named as in torchvision's `resnet101`, whose strides are in the 3x3 convolutions.
+    A stage with stride 2 halves the map. The atrous algorithm omits the stride and dilates every later kernel by it
+    instead. The result contains all values of the strided network, unchanged, and the values between them. Parameters
+    are named as in torchvision's `resnet101`, whose strides are in the 3x3 convolutions.
 
     He, Zhang, Ren, Sun: Deep Residual Learning for Image Recognition. CVPR 2016.
 
@@ -138,7 +138,7 @@ class ResNet(nn.Module):
         rate = 1
         for stage, depth in enumerate(depths):
             stride = 1 if stage == 0 else 2
-            # The kernel whose stride is left out keeps its rate: it still sees the map before the halving.
+            # The kernel whose stride is omitted keeps its rate: it still sees the map before the halving.
             first_rate = rate
             if total_stride * stride > output_stride:
                 rate *= stride
@@ -173,7 +173,7 @@ class Bottleneck(nn.Module):
     Parameters
     ----------
     n_in, width : int
-        Number of channels of the input, and between the convolutions; the result has 4 width channels.
+        Number of channels of the input, and between the convolutions; the result has 4 x width channels.
     stride, rate : int
         Stride and dilation of the 3x3 convolution.
     """

@@ -10,7 +10,7 @@ from semgrid_edu.networks.vgg import Vgg, conv_relu, vgg16_tensors
 
 
 class Fcn(Segmenter):
-    """Segment an image by a fully convolutional VGG16, and skip connections that add the scores of finer stages.
+    """Segment an image by a fully convolutional VGG16 with skip connections that add the scores of finer stages.
 
     The two hidden layers of VGG16's classifier become a 7x7 convolution, conv6, and a 1x1 convolution, conv7. A 1x1
     convolution then scores the classes at 1/32 of the resolution. These scores are upsampled twofold and added to the
@@ -22,7 +22,7 @@ class Fcn(Segmenter):
     Parameters
     ----------
     preset : str
-        "paper" is VGG16 with 4096 channels in conv6 and conv7; "compact" has the same layers, narrow, with batch
+        "paper" is VGG16 with 4096 channels in conv6 and conv7; "compact" has the same layers, but narrow, and batch
         normalisation, without which a network this deep hardly learns from random weights.
 
     Notes
@@ -79,9 +79,9 @@ class Fcn(Segmenter):
 
 
 def enlarge(scores: Tensor, factor: int, size: tuple[int, int]) -> Tensor:
-    """Upsample a map whose cell i covers pixels factor i .. factor (i + 1) - 1, bilinearly, and crop it to `size`.
+    """Upsample bilinearly a map whose cell i covers pixels factor i .. factor (i + 1) - 1, and crop it to `size`.
 
-    The value of a cell is that of the middle of its pixels. Beyond the outermost middles the result is constant.
+    A cell's value is at the centre of its pixels. Beyond the outermost centres the result is constant.
 
     Parameters
     ----------

@@ -8,21 +8,21 @@ from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights
 from semgrid_edu.occupancy import N_STATES, State
 
 N_REDUCED = 16
-"""Number of planes after the reduction. The paper gives none; with 16 of 280 the reduction costs less than the network
-after it."""
+"""Number of planes after the reduction. The paper doesn't give it; with 16 of 280 the reduction costs less than the
+network after it."""
 
 
 class FusionNet(nn.Module):
     """Fuse the image's scores on D planes with the occupancy grid: (p, o) -> g.
 
-    A 1x1 convolution reduces the D x C planes to a few. It weighs heights and classes in the same way in every cell.
+    A 1x1 convolution reduces the D x C planes to a few. It weights heights and classes in the same way in every cell.
     Then the four planes of the occupancy grid are appended, and a small conv-deconv network with skip connections
     scores the classes.
 
     Parameters
     ----------
     n_scores : int
-        Number of classes that the planes hold scores of.
+        Number of classes scored on the planes.
     n_planes : int
         D, the number of planes.
     n_classes : int
@@ -32,11 +32,11 @@ class FusionNet(nn.Module):
     seed : int
         Seed for the initial weights.
     uses_occupancy : bool
-        Whether the network sees the occupancy grid. Otherwise each cell is UNKNOWN to it, see `Architecture`.
+        Whether the network sees the occupancy grid. Otherwise it sees UNKNOWN in every cell, see `Architecture`.
     """
 
     WIDTHS, DEPTHS = (32, 48, 64), (1, 1, 2)
-    """Three stages instead of VGG16's five: Fig. 5 shows a reduced number of layers and no widths."""
+    """Three stages instead of VGG16's five: Fig. 5 shows fewer layers, and gives no widths."""
 
     def __init__(
         self,
@@ -106,8 +106,8 @@ class FusionNet(nn.Module):
 class PlaneConvolution(nn.Conv3d):
     """The 1x1 convolution of all D x C planes: on (B, C, D, H, W), a D x 1 x 1 kernel.
 
-    It is computed as a product of two matrices, with one row of D x C scores per cell. This is the order in which
-    `fast.PlaneSampler` leaves the planes in memory, so nothing is copied.
+    It is computed as a matrix product with one row of D x C scores per cell. `fast.PlaneSampler` leaves the planes in
+    memory in this order, so nothing is copied.
     """
 
     def forward(self, planes: Tensor) -> Tensor:

@@ -11,7 +11,7 @@ from semgrid_edu.networks.conv_deconv import fresh_weights
 
 IMAGENET_MEAN, IMAGENET_STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Mean and standard deviation of red, green and blue over ImageNet's images, 0..1. Weights learnt on ImageNet expect
-inputs that are normalised by them."""
+inputs normalised by them."""
 
 
 def unit_image(image: Tensor) -> Tensor:
@@ -30,7 +30,7 @@ def unit_image(image: Tensor) -> Tensor:
     Raises
     ------
     ArgumentError
-        When the image isn't bytes: it may have been scaled already.
+        If the image isn't uint8: it may have been scaled already.
 
     Examples
     --------
@@ -93,12 +93,12 @@ class Segmenter(nn.Module, ABC):
         if not image.is_floating_point():
             raise ArgumentError("image", "floats in 0..1", image.dtype)
         normalised = (image - self.mean) / self.std
-        # Channels last in memory: half the time on a CPU, the same numbers.
+        # Channels last in memory: takes half the time on a CPU, with the same result.
         return self.scores(normalised.contiguous(memory_format=torch.channels_last))
 
     @abstractmethod
     def build(self, n_classes: int, **preset: Any) -> None:
-        """Make the layers of one preset; their first weights are drawn afterwards by `fresh_weights`.
+        """Make the layers of one preset; `fresh_weights` draws their initial weights afterwards.
 
         Parameters
         ----------
@@ -124,5 +124,5 @@ class Segmenter(nn.Module, ABC):
         """
 
     def imagenet_tensors(self) -> dict[str, Tensor]:
-        """Return the encoder's tensors that published weights fill, not copies, by their names in torchvision."""
+        """Return the encoder's tensors (not copies) that published weights replace, by their names in torchvision."""
         return {}

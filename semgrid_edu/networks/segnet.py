@@ -15,7 +15,7 @@ class SegNet(Segmenter):
 
     The encoder halves the maps by max-pooling and remembers where in each 2x2 window the maximum was. The decoder
     mirrors the encoder: each of its stages puts the values back in these places, then convolves. The last convolution
-    gives the scores. `ConvDeconv` is this network; here it takes the three channels of an image.
+    gives the scores. All of this is `ConvDeconv`, here with the three channels of an image as input.
 
     The other Parameters are those of `Segmenter`.
 
@@ -23,8 +23,8 @@ class SegNet(Segmenter):
     ----------
     preset : str
         "paper" has VGG16's thirteen convolutions on the way down and thirteen on the way up; "compact" is narrower and
-        shallower, for two cores. Both have two convolutions at full resolution: after unpooling
-        three pixels in four are empty, and a single convolution leaves them speckled.
+        shallower, for two cores. Both have two convolutions at full resolution: unpooling leaves three pixels in four
+        empty, and a single convolution isn't enough to fill them without speckles.
 
     References
     ----------

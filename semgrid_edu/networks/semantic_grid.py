@@ -13,15 +13,15 @@ from semgrid_edu.planes import PlaneSampler, plane_heights
 
 MOST_PIXELS, MOST_POINTS = 2**22, 2**24
 """Limits for the pixels of an image and for the points of all planes together: nine and fifteen times the published
-sizes. Anything larger is a mistake or a damaged file, and would use up all memory."""
+sizes. Anything larger is a mistake or a damaged file, and would exhaust the memory."""
 
 MOST_SEGMENTERS = 9
-"""Limit for the image networks of one network: nine of the published size take one gigabyte (SegNet) to five (FCN)."""
+"""Limit for the number of image networks: nine of the published size take one gigabyte (SegNet) to five (FCN)."""
 
 
 @dataclass(frozen=True)
 class Architecture:
-    """Everything that decides the shapes of a network's weights and where its planes lie.
+    """Everything that determines the shapes of a network's weights and the heights of its planes.
 
     The camera isn't part of it: one trained network fits every calibration, because only its planes move.
 
@@ -34,19 +34,19 @@ class Architecture:
     label_set : str
         Name of the label set, a key of `LABEL_SETS`, whose classes both the scores and the grid have.
     image_size : (int, int)
-        Height h and width w that every image is scaled to, pixels. (96, 320) is the aspect of KITTI's images at a
-        fifteenth of their pixels.
+        Height h and width w that every image is scaled to, pixels. (96, 320) has the aspect ratio of KITTI's images and
+        a fifteenth of their pixels.
     grid : GridSpec
         The cells of the semantic grid, (H, W) of them.
     heights : (D,) float
         delta_i, the heights of the planes above the ground, metres.
     uses_occupancy : bool
-        Whether the fusion network sees the occupancy grid. Otherwise each cell is UNKNOWN to it. Everything else, the
-        initial weights included, is the same as with occupancy, so that the two can be compared.
+        Whether the fusion network sees the occupancy grid. Otherwise it sees UNKNOWN in every cell. Everything else,
+        including the initial weights, is the same as with occupancy, so that the two can be compared.
     reduces : bool
         Whether the 1x1 convolution reduces the planes. Otherwise the conv-deconv network takes all D x C of them.
     n_segmenters : int
-        How many image networks score an image, 1 to 9; their mean counts, see `MeanSegmenter`.
+        How many image networks score an image, 1 to 9; s is the mean of their scores, see `MeanSegmenter`.
     """
 
     segmenter: str = "segnet"
@@ -114,7 +114,7 @@ class SemanticGridNet(nn.Module):
         Seed for the initial weights of the fusion network.
     architecture : Architecture, optional
         The description that the parts were built from; `build_net` passes it. A network without one can be used, but
-        neither saved nor trained, because nothing tells how to build it again.
+        not saved or trained, because it couldn't be rebuilt.
     """
 
     def __init__(
@@ -163,7 +163,7 @@ class SemanticGridNet(nn.Module):
         mirrored : bool
             Whether the learnt parts see image and grid with left and right exchanged, as in half of the training
             batches. Every result is mirrored back. The planes are always sampled unmirrored: the camera isn't quite
-            symmetric, so in a mirrored image equation (1) would look at wrong pixels.
+            symmetric, so in a mirrored image equation (1) would give the wrong pixels.
         sampler : PlaneSampler, optional
             s -> p for the camera that took these images; the network's own sampler when left out.
 
@@ -179,7 +179,7 @@ class SemanticGridNet(nn.Module):
         sampler = sampler or self.sampler
         scores = self.image_scores(image, mirrored)
         planes = sampler(scores)
-        # The 1x1 convolution looks at one cell at a time, so mirroring can wait until there is less to move.
+        # The 1x1 convolution sees one cell at a time, so we mirror after it, when there is less data to move.
         reduced = _flip(self.fusion.reduce(planes), mirrored)
         logits = self.fusion.fuse(reduced, _flip(occupancy, mirrored))
         return NetOutputs(scores, planes, _flip(logits, mirrored))

@@ -1,4 +1,4 @@
-"""U-Net: whole feature maps go across, where SegNet carries only indices (Ronneberger et al., 2015)."""
+"""U-Net: skip connections carry whole feature maps, where SegNet passes only indices (Ronneberger et al., 2015)."""
 
 from itertools import pairwise
 from typing import ClassVar
@@ -13,7 +13,7 @@ from semgrid_edu.networks.segmenter import Segmenter
 
 
 class UNet(Segmenter):
-    """Segment an image by an encoder, and a decoder that also sees each of the encoder's maps.
+    """Segment an image by an encoder and a decoder that also sees each of the encoder's maps.
 
     Every stage has two 3x3 convolutions. The encoder halves the map between stages by max-pooling; the decoder doubles
     it by a learnt up-convolution and appends the encoder's map of that size as further channels (the skip connection).

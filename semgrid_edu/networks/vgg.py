@@ -12,7 +12,7 @@ DEPTHS = (2, 2, 3, 3, 3)
 class Vgg(nn.Module):
     """Compute feature maps by five stages of 3x3 convolutions with ReLU, each followed by 2x2 max-pooling.
 
-    Pooling rounds up, as in Caffe, in which the network was published: a last odd row or column is kept, and cell i of
+    Pooling rounds up, as in Caffe, for which the network was published: a last odd row or column is kept, and cell i of
     a pooled map covers pixels 2 i and 2 i + 1, whatever the size. Parameters are named as in
     torchvision's `vgg16` (`vgg16_bn` with batch normalisation).
 
@@ -53,7 +53,7 @@ class Vgg(nn.Module):
 
 
 def conv_relu(n_in: int, n_out: int, kernel: int, batch_norm: bool) -> list[nn.Module]:
-    """Return a convolution that keeps the size, batch normalisation where wanted, and ReLU.
+    """Return a convolution that keeps the size, batch normalisation if wanted, and ReLU.
 
     Parameters
     ----------
@@ -79,13 +79,13 @@ def vgg16_tensors(layers: Iterable[nn.Module]) -> dict[str, Tensor]:
     Parameters
     ----------
     layers : iterable of Module
-        The thirteen convolutions in order, then those that replace the two hidden layers of the classifier, if the
+        The thirteen convolutions in order, then the two that replace the hidden layers of the classifier, if the
         network has them.
 
     Returns
     -------
     dict of str to Tensor
-        The layers' own tensors under names such as "features.0.weight".
+        The layers' tensors (not copies) under names such as "features.0.weight".
     """
     named = zip(_layer_names(), layers, strict=False)
     return {f"{name}.{part}": tensor for name, layer in named for part, tensor in layer.named_parameters()}

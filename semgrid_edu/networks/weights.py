@@ -30,19 +30,19 @@ def save_net(net: SemanticGridNet, path: str | Path) -> None:
     Parameters
     ----------
     net : SemanticGridNet
-        A network with an architecture, from `build_net` or `load_net`. The camera's calibration isn't written: it
-        belongs to the drive.
+        A network with an architecture, from `build_net` or `load_net`. The camera's calibration isn't saved: it belongs
+        to the drive.
     path : path-like
         The safetensors file to write.
 
     Raises
     ------
     ArgumentError
-        When the network has no architecture, so that nothing tells how to build it again.
+        If the network has no architecture, because it couldn't be rebuilt from the file.
     """
     description = asdict(net.need_architecture())
     for name in ("uses_occupancy", "reduces", "n_segmenters"):
-        # Files from before these fields existed keep their checksums when they are written again.
+        # Omit defaults, so that files older than these fields keep their checksums when they are rewritten.
         if description[name] == getattr(Architecture, name):
             del description[name]
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in net.state_dict().items()}
@@ -95,7 +95,7 @@ def read_architecture(path: str | Path) -> Architecture:
 
 @contextmanager
 def _named(path: str | Path, header: dict) -> Iterator[None]:
-    """Turn any error about the architecture into one that names the file."""
+    """Turn any error about the architecture into an error that names the file."""
     try:
         yield
     except (KeyError, TypeError, ValueError, OverflowError) as error:
@@ -111,7 +111,7 @@ def _architecture(path: str | Path, header: dict) -> Architecture:
 
 
 def weights_doubts(path: str | Path) -> list[str]:
-    """List what is doubtful about a file of weights that will be used as a whole network, i and o -> g.
+    """List doubts about a weights file that will be used as a whole network, i and o -> g.
 
     Parameters
     ----------
@@ -121,15 +121,15 @@ def weights_doubts(path: str | Path) -> list[str]:
     Returns
     -------
     list of str
-        One line for each doubtful thing.
+        One line per doubt.
 
     Raises
     ------
     DataError
-        When the file is missing or damaged, or is a network of the image stage, whose fusion hasn't learnt yet.
+        If the file is missing or damaged, or is from the image stage, so that its fusion network is untrained.
     """
     _, tensors = read_tensors(path)
-    # Batch normalisation counts the batches that it has learnt from.
+    # Batch normalisation counts its training batches.
     learnt = {name: bool((count > 0).any()) for name, count in tensors.items() if name.endswith("num_batches_tracked")}
     fusion = [has_learnt for name, has_learnt in learnt.items() if name.startswith("fusion.")]
     if fusion and not any(fusion) and any(learnt.values()):
@@ -147,7 +147,7 @@ def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str
     Parameters
     ----------
     path : path-like
-        The file that they come from.
+        The file that the tensors come from.
     found, expected : dict of str to Tensor
         The tensors of the file and those of the network; names and shapes are compared.
     """
@@ -172,7 +172,7 @@ def load_imagenet(segmenter: Segmenter, path: str | Path) -> None:
         or not at all if the file doesn't fit.
     path : path-like
         A safetensors file with the names and shapes of that network in torchvision: `vgg16` for SegNet and FCN,
-        `resnet101` for DeepLab. Tensors of other layers, such as ImageNet's own classifier, are not used.
+        `resnet101` for DeepLab. Tensors of other layers, such as ImageNet's classifier, are not used.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def load_imagenet(segmenter: Segmenter, path: str | Path) -> None:
     the classifier, with scales, shifts and running statistics of its batch normalisation. Decoders and score layers
     keep their weights.
 
-    Pickled files (`.pth`) are rejected, because reading one can run any code in it. Convert a file from a trusted
+    Pickled files (`.pth`) are rejected, because reading one can run arbitrary code. Convert a file from a trusted
     source once::
 
         tensors = torch.load("vgg16.pth", map_location="cpu", weights_only=True)
@@ -207,5 +207,5 @@ def load_imagenet(segmenter: Segmenter, path: str | Path) -> None:
 
 
 def _as_published(name: str, tensor: Tensor) -> Tensor:
-    """Return a tensor in the shape that it has in the file, where fully connected layers have no rows and columns."""
+    """Return a tensor in the file's shape, in which fully connected layers have no kernel rows and columns."""
     return tensor.flatten(1) if name.startswith("classifier") and tensor.ndim == 4 else tensor

@@ -1,1 +1,1 @@
-"""What is kept on disk, and how safely: files, tensors, provenance, and the worker processes that write them."""
+"""Safe storage on disk: atomic writes, checked reading, tensors and provenance."""

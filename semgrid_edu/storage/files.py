@@ -25,10 +25,10 @@ CACHE_VARIABLE = "SEMGRID_EDU_CACHE"
 
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path`, which is renamed to `path` when the block ends well.
+    """Yield a temporary path beside `path`, which is renamed to `path` when the block ends without an error.
 
-    Readers see the old file or the new one, never half of one. When the block raises an error or the process is killed,
-    the old file stays as it was.
+    Readers see the old file or the new one, never half of one. If the block raises an error or the process is killed,
+    the old file is unchanged.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def named_errors(path: str | Path) -> Iterator[None]:
-    """Add the name of a file to system errors that lack one, such as that of a full disk.
+    """Add the name of a file to system errors that lack one, such as "disk full".
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def named_errors(path: str | Path) -> Iterator[None]:
 
 
 def check_writable(path: str | Path) -> None:
-    """Check that a file can be written, before long work starts whose result would be lost.
+    """Check that a file can be written, before starting long work whose result would otherwise be lost.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def check_writable(path: str | Path) -> None:
     Raises
     ------
     DataError
-        When a folder, a pipe or a device is in its place.
+        If the path is a folder, a pipe or a device.
     OSError
         When its folder can't be made or written to.
     """
@@ -102,10 +102,10 @@ def check_writable(path: str | Path) -> None:
 
 
 def check_ours(mark: str, *paths: str | Path, force: bool | None = None) -> None:
-    """Check that files can be written and that no other program's would be lost; every command does so before its work.
+    """Check that files are writable and that no other program's file would be lost; every command does so first.
 
-    A file is ours when it holds the mark that its writer puts into it, such as the command in a result. Empty files may
-    be replaced too.
+    A file is ours if it contains the mark that its writer puts into it, such as the command in a result. Empty files
+    may be replaced too.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def check_ours(mark: str, *paths: str | Path, force: bool | None = None) -> None
     *paths : path-like
         The files. The first one contains the mark, and the others belong to it.
     force : bool, optional
-        Whether to replace other files all the same; left out where the command has no such option.
+        Whether to replace other files anyway; None if the command has no such option.
 
     Raises
     ------
@@ -184,14 +184,14 @@ def sha256(path: str | Path) -> str:
 
 
 def table_beside(module: str, name: str | None = None) -> dict[str, Any]:
-    """Read a table of the package, a TOML file in the folder of a module; its lists become tuples.
+    """Read one of the package's tables, a TOML file beside a module; its lists become tuples.
 
     Parameters
     ----------
     module : str
         The `__file__` of the module.
     name : str, optional
-        The name of the table's file without its suffix, if it isn't that of the module.
+        The name of the table's file without its suffix; the module's name by default.
     """
     path = Path(module)
     return _with_tuples(tomllib.loads(path.with_name(f"{name or path.stem}.toml").read_text(encoding="utf-8")))
@@ -215,17 +215,17 @@ def named_rows(table: dict[str, dict]) -> dict[str, SimpleNamespace]:
 
 
 LOCK = ".lock"
-"""Name of the file that is locked. It is empty; a killed process leaves it behind, which does no harm."""
+"""Name of the lock file. It is empty; a killed process leaves it behind, which does no harm."""
 
 PATIENCE = 1.0
-"""Seconds to wait for a lock: when a command is killed, its worker processes end a moment later."""
+"""Seconds to wait for a lock: after a command is killed, its worker processes take a moment to end."""
 
 
 @contextmanager
 def sole_writer(folder: str | Path) -> Iterator[None]:
     """Keep other processes from writing to a folder while the block runs.
 
-    When a process is killed its lock is free at once, so that the next one can resume.
+    When a process is killed, its lock is released at once, so that the next one can resume.
 
     Parameters
     ----------
@@ -256,9 +256,9 @@ def sole_writer(folder: str | Path) -> Iterator[None]:
     try:
         yield
     finally:
-        with suppress(OSError):  # Windows keeps files that are open
+        with suppress(OSError):  # Windows doesn't delete open files
             (folder / LOCK).unlink()
-        lock.release()  # only now: `filelock` refuses a file that was removed while it waited
+        lock.release()  # after unlinking: `filelock` rejects a file that was removed while it waited
 
 
 def shipped_folder(name: str) -> Path:
@@ -272,7 +272,7 @@ def shipped_folder(name: str) -> Path:
     Returns
     -------
     Path
-        The folder inside the package where there is one, as in a wheel; else the one beside the package.
+        The folder inside the package if there is one, as in a wheel; else the folder beside the package.
 
     Examples
     --------
@@ -284,7 +284,7 @@ def shipped_folder(name: str) -> Path:
 
 
 def cache_folder(dataset_dir: Path) -> Path:
-    """Return the folder that keeps what is computed from a data set.
+    """Return the folder for caching what is computed from a data set.
 
     Parameters
     ----------

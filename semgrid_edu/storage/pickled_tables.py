@@ -1,7 +1,7 @@
-"""Tables that pandas pickled and gzip compressed, read without running what a hostile pickle asks for.
+"""Read tables that pandas pickled and gzip compressed, without running code from a hostile pickle.
 
-A pickle is a program: it names functions, and whoever loads it calls them. Here it may only name what pandas needs to
-rebuild a table (`_ALLOWED`).
+A pickle is a program: it names functions, and loading it calls them. Here it may only name what pandas needs to rebuild
+a table (`_ALLOWED`).
 """
 
 import gzip
@@ -20,7 +20,7 @@ MOST_BYTES = 256 * 2**20
 """Largest uncompressed size of a table: thirty times a scan of 170,000 returns."""
 
 MOST_OPERATIONS = 10**6
-"""Largest number of operations in a table's pickle: a column of text takes two for each row."""
+"""Largest number of operations in a table's pickle: a text column takes two per row."""
 
 _EXPECTED = "a gzipped pickle of a pandas table"
 
@@ -48,11 +48,11 @@ _MOVED = {
     ("numpy.core.multiarray", "_reconstruct"): ("numpy._core.multiarray", "_reconstruct"),
     ("numpy.core.numeric", "_frombuffer"): ("numpy._core.numeric", "_frombuffer"),
 }
-"""Where today's pandas and numpy hold names that have moved."""
+"""The modules of today's pandas and numpy that define names which have moved."""
 
 
 class _TableUnpickler(pickle.Unpickler):
-    """Looks up only the names that a table needs."""
+    """An unpickler that looks up only the names that a table needs."""
 
     def find_class(self, module: str, name: str) -> object:
         if module not in _ALLOWED.get(name, ()):
@@ -71,7 +71,7 @@ def read_pickled_table(path: Path) -> dict[str, NDArray]:
     Returns
     -------
     dict of str to (N,) array
-        The columns by name, all of one length: numbers, booleans, or objects such as text.
+        The columns by name, all of the same length: numbers, booleans, or objects such as text.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def read_pickled_table(path: Path) -> dict[str, NDArray]:
 
 
 def _column(values: NDArray) -> NDArray:
-    """Check that a column has one value for each row: two columns of one name would have more."""
+    """Check that a column has one value per row: two columns with the same name would have more."""
     if values.ndim != 1 or values.dtype.kind not in "fiubO":
         raise pickle.UnpicklingError(f"a column of the shape {values.shape} and the type {values.dtype}")
     return values
@@ -116,9 +116,9 @@ def _uncompressed(path: Path) -> bytes:
 
 
 def _check_operations(content: bytes) -> None:
-    """Reject a pickle of too many operations before any is run: one byte can ask for an object of 200 bytes.
+    """Reject a pickle with too many operations before any is run: one byte can create an object of 200 bytes.
 
-    Five bytes can ask for a memo, the list of objects to come back to, of tens of gigabytes.
+    Five bytes can create a memo (the list of objects to refer back to) of tens of gigabytes.
     """
     for done, (operation, argument, _) in enumerate(pickletools.genops(content)):
         memo_size = argument if operation.name in ("PUT", "LONG_BINPUT") else 0

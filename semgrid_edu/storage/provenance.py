@@ -15,7 +15,7 @@ from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.reading import read_json
 
 ROOT = Path(__file__).parents[2]
-"""The folder that holds the package, by the path that Python imports it from."""
+"""The folder that contains the package, by the path that Python imports it from."""
 
 PROVENANCE = "provenance.json"
 """Name of the file in a folder of results that records how they were made."""
@@ -43,7 +43,7 @@ def versions(*packages: str) -> dict[str, str]:
 
 
 def made_by(command: str, *packages: str) -> dict[str, object]:
-    """Return how a result was made: the command that repeats it, today's date, and versions.
+    """Return how a result was made: the command that reproduces it, today's date, and versions.
 
     Parameters
     ----------
@@ -85,16 +85,16 @@ def write_provenance(folder: str | Path, command: str, seed: int, packages: tupl
     Parameters
     ----------
     folder : path-like
-        The folder. All files below it are recorded with their SHA-256, except those in `cache/`, which can be computed
-        again, and hidden files and folders, which a killed writer may leave.
+        The folder. All files below it are recorded with their SHA-256, except files in `cache/`, which can be
+        recomputed, and hidden files and folders, which a killed writer may leave.
     command : str
         The command that made the files.
     seed : int
-        The seed that the command ran with.
+        The command's seed.
     packages : tuple of str
         Names of the packages whose versions can change the result.
     **details
-        What else a reader should know, such as a date, a duration or scores: anything that JSON can hold.
+        Further facts for a reader, such as a date, a duration or scores: anything that JSON can hold.
     """
     folder = Path(folder)
     record = {"command": command, "seed": seed, "versions": versions(*packages), **details}
@@ -136,7 +136,7 @@ def _checksums(folder: Path) -> dict[str, str]:
 
 
 def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
-    """Hash the code of modules and of all that they import from the package, without comments and docstrings.
+    """Hash the code of modules and of everything that they import from the package, without comments and docstrings.
 
     Parameters
     ----------
@@ -156,20 +156,20 @@ def code_hash(modules: Iterable[Path], root: Path = ROOT) -> str:
 def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, str]:
     """Follow the import statements of modules, and of what they import, through the package.
 
-    A name that a package passes on in its `__init__.py` leads to the module that defines it, so that one function of
-    `semgrid_edu.occupancy` doesn't bring all of its modules. Imports of other packages aren't followed.
+    A name re-exported by an `__init__.py` leads to the module that defines it, so that importing one function of
+    `semgrid_edu.occupancy` doesn't include all of its modules. Imports of other packages aren't followed.
 
     Parameters
     ----------
     modules : iterable of Path
-        The files to begin with; they may be outside of the package.
+        The files to start from; they may be outside the package.
     root : Path
         The folder that holds the package.
 
     Returns
     -------
     dict of Path to str
-        The syntax trees of these modules and of all that they lead to, printed without docstrings.
+        The syntax trees of these modules and of all that they import, printed without docstrings.
     """
     trees: dict[Path, str] = {}
     waiting = list(modules)
@@ -181,9 +181,9 @@ def import_closure(modules: Iterable[Path], root: Path = ROOT) -> dict[Path, str
     return trees
 
 
-@cache  # by the text: whatever changes in a file is seen, and what doesn't is parsed once
+@cache  # keyed by the text: a changed file is parsed again, an unchanged one only once
 def _tree_and_imports(text: str) -> tuple[str, list[tuple[str, str, str]]]:
-    """Return a module's syntax tree, printed, and from where it imports which names, and what it calls them."""
+    """Return a module's syntax tree, printed, and its imports: module, name and local name."""
     tree = _without_docstrings(ast.parse(text))
     imports = []
     for node in ast.walk(tree):
@@ -195,7 +195,7 @@ def _tree_and_imports(text: str) -> tuple[str, list[tuple[str, str, str]]]:
 
 
 def _origin(module: str, name: str, root: Path) -> Path | None:
-    """Return the file that defines a name which is imported from a module; None outside of the package."""
+    """Return the file that defines a name imported from a module; None outside the package."""
     place = root.joinpath(*module.split("."))
     init = place / "__init__.py"
     for path in (place / f"{name}.py", place / name / "__init__.py", place.with_suffix(".py")):

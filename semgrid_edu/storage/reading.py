@@ -12,7 +12,7 @@ from PIL import Image
 from semgrid_edu.errors import DataError
 
 PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
-"""The chunk that ends every PNG. Decoders don't notice when it is missing, so a file that was cut short would pass."""
+"""The chunk that ends every PNG. Decoders don't notice when it is missing, so a truncated file would pass."""
 
 
 def read_bytes(path: Path) -> bytes:
@@ -80,7 +80,7 @@ def parse_json(path: str | Path, text: str | bytes, kind: type = dict) -> Any:
         content = json.loads(text)
     except RecursionError:
         raise DataError(path, expected, "brackets nested too deeply") from None
-    except ValueError as error:  # also numbers of thousands of digits, and bytes that aren't UTF-8
+    except ValueError as error:  # includes numbers with thousands of digits, and bytes that aren't UTF-8
         raise DataError(path, expected, f"no JSON: {error}"[:300]) from error
     if not isinstance(content, kind):
         raise DataError(path, expected, repr(content)[:200])
@@ -95,7 +95,7 @@ def parse_numbers(path: Path, text: str, what: str) -> NDArray[np.float64]:
     path : Path
         Where the text comes from, for the error.
     text : str
-        Numbers with spaces between them.
+        Numbers separated by spaces.
     what : str
         What the numbers are, for the error.
 
@@ -115,7 +115,7 @@ def parse_numbers(path: Path, text: str, what: str) -> NDArray[np.float64]:
 def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     """Return the pixels of a PNG.
 
-    The checksum of every chunk is verified, because a decoder alone may return half a picture without an error.
+    The checksum of every chunk is verified, because a decoder may return half a picture without an error.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     mode : str
         The pixel format: Pillow's "RGB", "L" (8 bits) and "I;16", or "RGB;16" for three channels of 16 bits.
     size : (int, int) or None
-        Height and width that the image must have, pixels; None where any size will do.
+        Height and width that the image must have, pixels; None if any size will do.
 
     Returns
     -------
@@ -133,7 +133,7 @@ def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     Raises
     ------
     DataError
-        When the file isn't a sound PNG of this format and size.
+        If the file isn't a valid PNG of this format and size.
     """
     content = read_bytes(path)
     try:
@@ -165,7 +165,7 @@ def read_jpeg(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
     Raises
     ------
     DataError
-        When the file isn't a sound JPEG of this size.
+        If the file isn't a valid JPEG of this size.
     """
     content = read_bytes(path)
     try:
@@ -182,7 +182,7 @@ def _open_png(content: bytes) -> Image.Image:
 
 
 def _sixteen_bits(content: bytes) -> NDArray[np.uint16]:
-    """Decode three channels of 16 bits, of which Pillow keeps 8: the upper ones, or the lower ones if asked."""
+    """Decode three 16-bit channels. Pillow keeps only 8 bits: the upper ones, or the lower ones on request."""
     upper = _open_png(content)
     lower = _open_png(content)
     lower.tile = [(*lower.tile[0][:3], "RGB;16L")]

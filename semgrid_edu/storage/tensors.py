@@ -20,7 +20,7 @@ from semgrid_edu.storage.reading import read_bytes
 def write_arrays(path: str | Path, arrays: dict[str, NDArray]) -> None:
     """Write arrays to one compressed file, atomically.
 
-    The same arrays give the same bytes, because the members of an npz file carry no date.
+    The same arrays give the same bytes, because the members of an npz file have no date.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def read_arrays(path: str | Path) -> dict[str, NDArray]:
 
 
 def write_tensors(path: str | Path, tensors: dict[str, Tensor], header: dict[str, str] | None = None) -> None:
-    """Write tensors, and what a reader should know about them, to one file, atomically.
+    """Write tensors and a header to one file, atomically.
 
     Parameters
     ----------
@@ -70,8 +70,8 @@ def write_tensors(path: str | Path, tensors: dict[str, Tensor], header: dict[str
     tensors : dict of str to Tensor
         Tensors by name, contiguous and on the CPU.
     header : dict of str to str, optional
-        What a reader should know. With more than one entry, the same tensors may give other bytes, because safetensors
-        doesn't fix the order of the entries.
+        What a reader should know. With more than one entry, the same tensors may give different bytes, because
+        safetensors doesn't fix the order of the entries.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Learning the weights: batches, loss, loop, checkpoints, devices and processes (paper, section 4.1)."""
+"""Training: batches, loss, loop, checkpoints, devices and processes (paper, section 4.1)."""
 
 from semgrid_edu.training.checkpoint import CHECKPOINT
 from semgrid_edu.training.loop import train

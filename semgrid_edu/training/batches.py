@@ -24,7 +24,7 @@ class Batch(NamedTuple):
         Whether left and right are exchanged for the network. `image_scores` and `grid_logits` mirror their results
         back, so that they fit the labels of `frames`.
     sampler : PlaneSampler, optional
-        Equation (2) for the camera that took these images; the network's own when left out.
+        Equation (2) for the camera that took these images; by default the network's sampler.
     """
 
     frames: Sample
@@ -43,13 +43,12 @@ def draw_batch(
 ) -> Batch:
     """Draw the frames of a step, with jittered brightness and contrast, mirrored at random (data augmentation).
 
-    Each pass over the data takes the frames in a new order. Batches are never incomplete, so a pass may leave a few
-    frames out.
+    Each pass over the data shuffles the frames. Batches are always complete, so a pass may leave out a few frames.
 
     Parameters
     ----------
     dataset : sequence of Sample
-        The frames to learn from; of a `Mixture`, those whose turn it is.
+        The frames to learn from; a `Mixture` takes its data sets in turn.
     size : int
         B, the number of frames in a batch.
     jitter : float
@@ -61,7 +60,7 @@ def draw_batch(
     mirror : bool
         Whether a random half of the batches is mirrored.
     tint : float
-        How far each colour of an image varies independently, as a fraction.
+        How much each colour channel of an image varies independently, as a fraction.
 
     Returns
     -------
@@ -80,7 +79,7 @@ def draw_batch(
 
 
 def frames_of_step(n_frames: int, size: int, iteration: int, seed: int) -> NDArray[np.int64]:
-    """Return the numbers of the frames in the batch of a step: each pass over the data takes them in a new order.
+    """Return the numbers of the frames in the batch of a step: each pass over the data shuffles them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Checkpoints, from which an interrupted training run resumes as if nothing had happened (paper, section 4.1)."""
+"""Checkpoints: an interrupted training run resumes as if nothing had happened (paper, section 4.1)."""
 
 import json
 from pathlib import Path
@@ -17,7 +17,7 @@ from semgrid_edu.storage.tensors import read_tensors, write_tensors
 from semgrid_edu.training.log import HEADER, LOG
 
 CHECKPOINT = "checkpoint.safetensors"
-"""Name of the file, in the folder of a run, from which an interrupted run resumes."""
+"""Name of the file in a run's folder from which an interrupted run resumes."""
 
 
 def check_folder(folder: Path, resume: bool) -> None:
@@ -28,12 +28,12 @@ def check_folder(folder: Path, resume: bool) -> None:
     folder : Path
         The folder of the new training run.
     resume : bool
-        Whether it continues an interrupted one.
+        Whether it continues an interrupted run.
 
     Raises
     ------
     DataError
-        When the folder holds a run that would be lost, a data set, or other files.
+        If the folder contains a run that would be lost, a data set, or other files.
     """
     if (folder / INDEX_FILE).exists():
         raise DataError(folder, "a folder for the training run alone", "a data set")
@@ -48,7 +48,7 @@ def check_folder(folder: Path, resume: bool) -> None:
 
 
 def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimiser: SGD, iteration: int) -> None:
-    """Write weights, momenta and the number of the next step to one file, so that they can't disagree.
+    """Write weights, momenta and the number of the next step to one file, so that they always match.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
     """
     tensors = {f"net.{name}": tensor for name, tensor in net.state_dict().items()}
     for name, parameter in net.named_parameters():
-        if parameter in optimiser.state:  # not before its first gradient
+        if parameter in optimiser.state:  # only after its first gradient
             tensors[f"momentum.{name}"] = optimiser.state[parameter]["momentum_buffer"]
     write_tensors(path, tensors, {"run": json.dumps(run), "iteration": str(iteration)})
 

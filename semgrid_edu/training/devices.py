@@ -1,4 +1,4 @@
-"""What a training run computes on: a device, its precision, or several processes, by Lightning Fabric (section 4.1)."""
+"""Where a training run computes: device, precision and processes, by Lightning Fabric (section 4.1)."""
 
 import os
 import re
@@ -20,7 +20,7 @@ def choose_device(name: str = "auto", process: int = 0) -> torch.device:
     name : str
         "cpu", "cuda", "cuda:N" for the GPU with that number, or "auto": a GPU when there is one, else the CPU.
     process : int
-        Number of this process on its machine, from 0: with "cuda" and "auto" each process has a GPU for itself.
+        Number of this process on its machine, from 0: with "cuda" and "auto" each process gets its own GPU.
 
     Returns
     -------
@@ -54,8 +54,8 @@ def choose_device(name: str = "auto", process: int = 0) -> torch.device:
 def open_fabric(device: str = "auto") -> "Fabric":
     """Join the processes that torchrun started, if it started this one, and choose device and precision.
 
-    A GPU convolves in bfloat16 where it can (since NVIDIA's Ampere), which has half the bits of float32 and the same
-    range, so that gradients need no scaling. Weights, sums and losses stay float32. A CPU computes in float32.
+    A GPU convolves in bfloat16 if it can (since NVIDIA's Ampere). This type has half the bits of float32 and the same
+    range, so gradients need no scaling. Weights, sums and losses stay float32. A CPU computes in float32.
 
     Parameters
     ----------
@@ -65,9 +65,9 @@ def open_fabric(device: str = "auto") -> "Fabric":
     Returns
     -------
     lightning_fabric.Fabric
-        What `train` takes.
+        The `fabric` argument of `train`.
     """
-    Fabric = needed("lightning_fabric").Fabric  # here, because it takes seconds to import
+    Fabric = needed("lightning_fabric").Fabric  # imported here, because it takes seconds
 
     processes = int(os.environ.get("WORLD_SIZE", 1))
     on_this_machine = int(os.environ.get("LOCAL_WORLD_SIZE", 1))

@@ -60,7 +60,7 @@ class TrainingLog(NamedTuple):
 
 
 def begin_log(path: Path, start: int) -> None:
-    """Begin a log, or continue one from the step `start` on; later steps, which aren't in the checkpoint, are dropped.
+    """Begin a log, or continue one from step `start`; later steps, which aren't in the checkpoint, are dropped.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def begin_log(path: Path, start: int) -> None:
     Raises
     ------
     DataError
-        When a step before `start` is missing, or its line isn't one of a log; the message gives the number of the line.
+        If a step before `start` is missing or its line is malformed; the message gives the line number.
     """
     lines = [HEADER]
     if start:
@@ -84,14 +84,14 @@ def begin_log(path: Path, start: int) -> None:
 
 
 def append_step(path: Path, step: Step) -> None:
-    """Append a line to a log; it is in the file at once, so that training can be watched.
+    """Append a line to a log; it is written at once, so that training can be watched.
 
     Parameters
     ----------
     path : Path
         The file to add to.
     step : Step
-        The step just made.
+        The latest step.
 
     Raises
     ------

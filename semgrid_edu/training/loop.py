@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from lightning_fabric import Fabric
 
 CHECKPOINT_EVERY = 100
-"""Iterations between checkpoints: an interruption costs about twenty seconds of work at most."""
+"""Iterations between checkpoints: an interruption loses at most about twenty seconds of work."""
 
 
 def train(
@@ -40,14 +40,14 @@ def train(
     resume: bool = False,
     fabric: "Fabric | None" = None,
 ) -> None:
-    """Train a network, leaving a log of every step and a checkpoint to resume from.
+    """Train a network, and write a log of every step and a checkpoint to resume from.
 
     Everything random is a function of the seed and the number of the step. So a run that was killed and resumed
     ends with the same weights as one that wasn't, bit for bit on a CPU.
 
-    With several processes, each takes its share of every batch. The loss and the gradients are those of the whole
-    batch. Batch normalisation is over the whole batch on GPUs, and over each process's share on CPUs. All processes
-    must see the same data and the same folder.
+    With several processes, each takes its share of every batch. Loss and gradients are computed over the whole batch.
+    Batch normalisation is over the whole batch on GPUs, and over each process's share on CPUs. All processes must see
+    the same data and the same folder.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def train(
     seed : int
         Seed for the order of the frames and for their jitter.
     resume : bool
-        Whether to go on from the folder's checkpoint; if there is none, the run begins.
+        Whether to resume from the folder's checkpoint; if there is none, the run starts from the beginning.
     fabric : lightning_fabric.Fabric, optional
         Device, precision and processes, from `open_fabric`; the CPU if left out.
 
@@ -90,7 +90,7 @@ def train(
 
     check_folder(folder, resume)
     with sole_writer(folder) if fabric.is_global_zero else nullcontext(), _freezing(net) as learnable:
-        check_folder(folder, resume)  # again: until now another process could write to it
+        check_folder(folder, resume)  # check again: until now another process could write to it
         net.to(fabric.device)
         if fabric.world_size > 1 and fabric.device.type == "cuda":
             nn.SyncBatchNorm.convert_sync_batchnorm(net)
@@ -140,7 +140,7 @@ def learn(fabric: "Fabric", objective: nn.Module, optimiser: torch.optim.Optimiz
     objective : Module
         An `Objective` that `fabric.setup_module` has set up.
     optimiser : Optimizer
-        The optimiser of the weights that learn.
+        The optimiser of the trainable weights.
     batch : Batch
         This process's share of the batch, on the device.
 
@@ -157,7 +157,7 @@ def learn(fabric: "Fabric", objective: nn.Module, optimiser: torch.optim.Optimiz
 
 
 def _begin_stage(net: SemanticGridNet, stage: str, end_to_end: bool, learnable: Sequence[nn.Parameter]) -> None:
-    """Let those weights learn that the stage teaches, and no others."""
+    """Make the weights of this stage trainable, and freeze all others."""
     net.train()
     segmenter_learns = stage == "image" or end_to_end
     if not segmenter_learns:
@@ -169,7 +169,7 @@ def _begin_stage(net: SemanticGridNet, stage: str, end_to_end: bool, learnable: 
 
 @contextmanager
 def _freezing(net: nn.Module) -> Iterator[list[nn.Parameter]]:
-    """Yield the weights that can learn; after the block they can learn again."""
+    """Yield the trainable weights; after the block they are trainable again."""
     learnable = [parameter for parameter in net.parameters() if parameter.requires_grad]
     try:
         yield learnable
@@ -179,7 +179,7 @@ def _freezing(net: nn.Module) -> Iterator[list[nn.Parameter]]:
 
 
 def _check_finite(step: Step, learning_rate: float) -> None:
-    """Stop after a loss that is infinite or NaN: nothing can be learnt any more."""
+    """Stop after an infinite or NaN loss, because training can't recover from it."""
     if not math.isfinite(step.loss):
         found = f"{learning_rate}, with which it is {step.loss} in iteration {step.iteration}"
         raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)

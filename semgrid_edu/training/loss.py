@@ -30,8 +30,7 @@ def class_frequencies(maps: Iterable[NDArray], n_classes: int) -> NDArray[np.flo
     Parameters
     ----------
     maps : iterable of (...) int
-        Grids or images of classes. Unlabelled cells, 255, count neither in the numerator nor in the
-        denominator.
+        Grids or images of classes. Unlabelled cells, 255, are counted neither in the numerator nor in the denominator.
     n_classes : int
         C, the number of classes.
 
@@ -122,8 +121,7 @@ def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike
     """Compute the loss of section 4.1: cross-entropy of the labelled pixels or cells, weighted by class.
 
     L = sum_j alpha[c_j] (-log g_j[c_j]) / sum_j alpha[c_j], where j runs over the labelled cells, c_j is the true class
-    of cell j, and g_j the soft-max of its scores. It is a weighted mean of -log g, in which rare classes have more
-    weight.
+    of cell j, and g_j the soft-max of its scores. It is a mean of -log g in which rare classes have more weight.
 
     Parameters
     ----------
@@ -142,7 +140,7 @@ def weighted_cross_entropy(scores: ArrayLike, truth: ArrayLike, alpha: ArrayLike
     Raises
     ------
     ArgumentError
-        When the shapes don't agree, or `truth` holds anything but classes and 255.
+        If the shapes don't match, or `truth` contains anything but classes and 255.
 
     Examples
     --------
@@ -209,8 +207,8 @@ def cross_entropy_sums(scores: Tensor, truth: Tensor, alpha: Tensor) -> tuple[Te
 def process_loss(fabric: "Fabric", losses: Tensor, weights: Tensor) -> Tensor:
     """Return this process's part of the loss, such that the mean over processes is the loss of the whole batch.
 
-    The mean over processes is what distributed training takes of the gradients. With one process the part is the loss
-    itself, losses / weights.
+    Distributed training averages the gradients over the processes. With one process the part is the loss itself, losses
+    / weights.
 
     Parameters
     ----------
@@ -224,7 +222,7 @@ def process_loss(fabric: "Fabric", losses: Tensor, weights: Tensor) -> Tensor:
     Returns
     -------
     () float
-        0 when no process has any weight: such a batch teaches nothing, and 0/0 would stop the run.
+        0 if no process has any weight: nothing can be learnt from such a batch, and 0/0 would stop the run.
     """
     total = fabric.all_reduce(weights.clone(), reduce_op="sum")
     return fabric.world_size * losses / total.clamp_min(torch.finfo(total.dtype).tiny)

@@ -8,7 +8,7 @@ from semgrid_edu.errors import check_fields, types_named
 
 @dataclass(frozen=True)
 class TrainingParams:
-    """How the network learns: first the image network from image labels, then the whole network from grids.
+    """How the network is trained: first the image network on image labels, then the whole network on grids.
 
     The first stage replaces the paper's ImageNet weights.
 
@@ -20,7 +20,7 @@ class TrainingParams:
         Frames per step; 6 in the paper.
     learning_rate : float
         The rate at the start of each stage, from which it falls to zero along half a cosine. The paper's 1e-3
-        fine-tunes ImageNet weights. Our networks begin with random weights and normalise in every layer, so they allow
+        fine-tunes ImageNet weights. Our networks start from random weights and normalise in every layer, so they allow
         much larger steps.
     momentum : float
         The fraction of the last step that is added to the next; 0.9 in the paper.
@@ -28,10 +28,11 @@ class TrainingParams:
         Largest weight of a class, see `median_frequency_weights`. Without a limit, a cell of signage counts three
         hundred times as much as a cell of unknown-unobserved in minikitti, and a handful of cells decides the loss.
     jitter : float
-        How far brightness and contrast of the images vary, as a fraction of their range (data augmentation): 142 frames
-        show few kinds of light.
+        How much brightness and contrast of the images vary, as a fraction of their range (data augmentation), because
+        142 frames show few kinds of light.
     tint : float
-        How far red, green and blue vary independently, as a fraction: light and cameras differ from street to street.
+        How much red, green and blue vary independently, as a fraction, because light and cameras differ between
+        streets.
     end_to_end : bool
         Whether the loss on the grid teaches the image network too. If not, training has two separate stages, as in the
         authors' earlier work, and the second stage doesn't change the image network.
@@ -52,7 +53,7 @@ class TrainingParams:
 
     @types_named
     def __post_init__(self) -> None:
-        """Check that something can be learnt with these numbers."""
+        """Check that a network can be trained with these numbers."""
         check_fields(self, "0 or more", lambda steps: steps >= 0, "image_iterations", "grid_iterations")
         check_fields(self, "at least one frame", lambda frames: frames >= 1, "batch_size")
         check_fields(self, "a positive number", lambda rate: 0 < rate < math.inf, "learning_rate")

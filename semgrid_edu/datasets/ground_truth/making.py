@@ -1,4 +1,4 @@
-"""A semantic grid made from image labels and LIDAR scans by a policy: the paper's ground truth, and others (4)."""
+"""Semantic grids from image labels and LIDAR scans by a policy: the paper's ground truth, and others (section 4)."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,10 +21,10 @@ SIGHT_COLUMNS = 100
 
 
 def in_sight(frame: Frame, spec: GridSpec) -> NDArray[np.bool_]:
-    """Return which cells lie in the sight of the camera.
+    """Return which cells are in the camera's sight.
 
-    The image is divided into upright strips. In each strip the camera sees as far as the farthest of the returns that
-    the camera sees (`seen_returns`).
+    The image is divided into vertical strips. In each strip the camera sees as far as the farthest return that it sees
+    (`seen_returns`).
 
     Parameters
     ----------
@@ -60,9 +60,9 @@ def lidar_truth(
 ) -> NDArray[np.uint8]:
     """Make the ground truth of a frame from its image labels, as the paper does.
 
-    Each pixel that a return falls on takes the depth of that return, or of the closest if there are several. So it has
-    a place in space, and its label goes to the cell there. Then gaps are closed, and what has no label is unknown-free,
-    -static, -dynamic or -unobserved by its most probable occupancy state. (In the paper a human also corrects the
+    Each pixel with a return gets its depth (of several returns, the closest one's). This gives the pixel a point in
+    space, and the cell there gets its label. Then gaps are closed, and cells without a label become unknown-free,
+    -static, -dynamic or -unobserved by their most probable occupancy state. (In the paper a human also corrects the
     result.)
 
     Parameters
@@ -74,10 +74,10 @@ def lidar_truth(
     spec : GridSpec
         The grid.
     policy : TruthPolicy, optional
-        What is done differently; the paper's way when left out.
+        The choices to make; by default the paper's.
     before, after : sequence of Moment
-        The frames before and after this one, in the order of time, for policies that need them. When there are fewer
-        than the policy asks for, those that exist are used.
+        The frames before and after this one, in the order of time, for policies that need them. There may be fewer than
+        the policy asks for.
 
     Returns
     -------
@@ -128,13 +128,13 @@ def drive_truth(
     Parameters
     ----------
     moments : sequence of Moment
-        The frames of the drive in the order of time, each with what the filter believes after it.
+        The frames of the drive in the order of time, each with the filter's belief after it.
     k : int
         Number of the frame.
     spec : GridSpec
         The grid of the beliefs.
     policy : TruthPolicy, optional
-        How to make it; the paper's way when left out.
+        The choices to make; by default the paper's.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The choices behind a ground truth made from LIDAR, on which people disagree (section 4)."""
+"""The choices behind ground truth from LIDAR, on which people disagree (section 4)."""
 
 from dataclasses import dataclass
 
@@ -13,38 +13,37 @@ CLEANUPS = ("none", "spread", "close")
 
 @dataclass(frozen=True)
 class TruthPolicy:
-    """How to make a semantic grid from image labels and LIDAR scans. By default as in the paper, as far as it tells.
+    """How to make a semantic grid from image labels and LIDAR scans; by default as in the paper, where it is specific.
 
     Parameters
     ----------
     past, future : int
-        Numbers of scans before and after the labelled one that are added to it, moved by the vehicle's poses. The
-        paper uses the one scan.
+        Numbers of scans before and after the labelled one that are added to it, moved by the vehicle's poses. The paper
+        uses only the labelled scan.
     labels : str
-        Which image labels the returns of these other scans. "present": that of the labelled frame, so that one labelled
-        image is enough, as in KITTI, where one image in ten has labels. What the camera doesn't see at that instant
-        takes the label of what hides it, unless that has a return on the same pixel. "own": the image of the scan's
-        own instant, so that all frames of the window need labels.
+        Which image labels the returns of these other scans. "present": the labelled frame's, so that one labelled image
+        is enough, as in KITTI, where one image in ten has labels. A point that is hidden at that instant gets the label
+        of whatever hides it, unless that has a return on the same pixel. "own": the image taken with the scan, so that
+        all frames of the window need labels.
     movers : str
-        What happens to returns from moving things in these other scans. "smeared": nothing, so that they stay where
-        the thing was. "carved": they are removed. "carried": they are moved to where the thing is now, by the velocity
-        of their cell. What moves, and how fast, is what the occupancy filter believes: nothing else is known of a real
-        drive.
+        What happens to returns from moving things in these other scans. "smeared": nothing, so that they stay where the
+        thing was. "carved": they are removed. "carried": they are moved to where the thing is now, by the velocity of
+        their cell. The occupancy filter decides what moves, and how fast, because a real drive has no better source.
     deskew : bool
-        Whether to undo the motion of the vehicle within a turn of the LIDAR (`deskew_scan`). It is for scans as a
-        scanner records them, such as KITTI's raw ones and those of the simulated data sets. Scans of one instant, such
-        as the sample drive's, it would bend, unless `TruthFlaws.skewed` has bent them first.
+        Whether to undo the motion of the vehicle within a turn of the LIDAR (`deskew_scan`). Use it for scans as a
+        scanner records them, such as KITTI's raw ones and the simulated data sets. Scans of one instant, such as the
+        sample drive's, would be distorted by it, unless `TruthFlaws.skewed` has skewed them first.
     vote : str
-        Which class a cell takes when its returns have several. "standing": the most frequent one of those that stand,
-        the ground's only if none does, as in the true grids (`LabelSet.most_voted`); a thin pole then keeps its cell,
-        but so does one wrong return. "majority": the most frequent one.
+        The class of a cell whose returns have several. "standing": the most frequent class that isn't ground, and a
+        ground class only if there is no other, as in the true grids (`LabelSet.most_voted`); a thin pole then keeps its
+        cell, but so does one wrong return. "majority": the most frequent class.
     visible_to : str
-        Which cells may keep a label. "any": all. "camera": those in the sight of the camera, as far as this scan shows
-        (`in_sight`). "lidar": those about which the LIDAR has said something: their most probable state isn't UNKNOWN.
+        Which cells may keep a label. "any": all. "camera": cells in the camera's sight, as far as this scan shows
+        (`in_sight`). "lidar": cells that the LIDAR has observed, whose most probable state isn't UNKNOWN.
     cleanup : str
-        How the gaps between the rings are closed. "none": not. "spread": all classes alike spread into them
-        (`close_gaps`). "close": what stands is closed, and only the ground spreads (`close_and_spread`). The paper says
-        that it uses morphological methods, not which.
+        How the gaps between the rings are closed. "none": not at all. "spread": all classes spread into them
+        (`close_gaps`). "close": objects are closed, and only the ground spreads (`close_and_spread`). The paper uses
+        morphological methods, but doesn't specify which.
 
     Examples
     --------

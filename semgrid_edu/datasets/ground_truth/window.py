@@ -1,8 +1,8 @@
-"""Scans before and after the labelled one, moved to its frame: denser where nothing moves, smeared where it does (4).
+"""Scans around the labelled one, moved to its frame: denser for static things, smeared for moving ones (section 4).
 
-A spinning scanner measures one direction after the other, for a tenth of a second, in which the vehicle moves on. A
-return that was measured t seconds after the camera took its image is given in the frame of the LIDAR as it stood at
-that time t. To de-skew is to give all returns in the frame of one instant, that of the image.
+A spinning scanner takes a tenth of a second for one turn, during which the vehicle moves. A return measured t seconds
+after the image is given in the LIDAR's frame at that time t. De-skewing expresses all returns in the LIDAR's frame at
+the instant of the image.
 """
 
 from collections.abc import Sequence
@@ -24,14 +24,14 @@ from semgrid_edu.occupancy.cmcdot import LIDAR_PERIOD
 
 
 class Moment(NamedTuple):
-    """A frame of a drive, and what the occupancy filter believes after it.
+    """A frame of a drive, and the occupancy filter's belief after it.
 
     Parameters
     ----------
     frame : Frame
         The frame.
     belief : Belief or None
-        From `track_drive`; a policy that leaves moving things as they are needs none.
+        From `track_drive`; not needed by a policy that leaves moving things as they are.
     """
 
     frame: Frame
@@ -39,7 +39,7 @@ class Moment(NamedTuple):
 
 
 class LabelledReturns(NamedTuple):
-    """Returns of one or several scans, with the class of the pixel that each one falls on.
+    """Returns of one or several scans, each with the class of its pixel.
 
     Parameters
     ----------
@@ -56,17 +56,17 @@ class LabelledReturns(NamedTuple):
 def gather_returns(
     frame: Frame, before: Sequence[Moment], after: Sequence[Moment], spec: GridSpec, policy: TruthPolicy
 ) -> LabelledReturns:
-    """Label the returns of a frame, and those of the scans around it that a policy adds.
+    """Label the returns of a frame, and of the scans around it that a policy adds.
 
-    At each pixel only the closest return is labelled (`closest_returns`): of all scans together when one image labels
-    them all, of each scan when each has its own.
+    At each pixel only the closest return is labelled (`closest_returns`): the closest of all scans if one image labels
+    them all, or of each scan if each has its own image.
 
     Parameters
     ----------
     frame : Frame
         The labelled frame.
     before, after : sequence of Moment
-        What came before it and after it, in the order of time; the nearest are used. There may be fewer than the policy
+        The frames before and after it, in the order of time; the nearest are used. There may be fewer than the policy
         asks for.
     spec : GridSpec
         The grid of the beliefs.
@@ -94,7 +94,7 @@ def gather_returns(
             T_now_from_then = invert_rigid(frame.T_world_from_lidar) @ frames[k].T_world_from_lidar
             points = np.column_stack([transform_points(T_now_from_then, points[:, :3]), points[:, 3:]])
         scans.append(points)
-    # The labelled frame's own returns come first: of two that are equally close its own one wins.
+    # The labelled frame's returns come first, so that they win ties in distance.
     scans.insert(0, scans.pop(min(now, policy.past)))
     gathered = np.concatenate(scans).astype(np.float32)
     labelled = gathered if own else _with_classes(frame, gathered)
@@ -102,7 +102,7 @@ def gather_returns(
 
 
 def _with_classes(frame: Frame, points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the points that the camera of a frame sees, each with the class of its pixel in place of reflectance."""
+    """Return the points that a frame's camera sees, each with the class of its pixel in place of the reflectance."""
     if frame.labels is None:
         raise ArgumentError("before, after", "image labels of every frame of the window", f"none at {frame.time:g} s")
     labels = frame.labels
@@ -113,7 +113,7 @@ def _with_classes(frame: Frame, points: NDArray[np.float32]) -> NDArray[np.float
 
 
 def _scan(frames: list[Frame], k: int, deskew: bool) -> NDArray[np.float32]:
-    """Return the scan of a frame; de-skewed, if asked for, by the motion since the frame before or to the one after."""
+    """Return a frame's scan, de-skewed if wanted by the motion since the frame before or to the frame after."""
     if not deskew:
         return frames[k].points
     if len(frames) < 2:
@@ -124,7 +124,7 @@ def _scan(frames: list[Frame], k: int, deskew: bool) -> NDArray[np.float32]:
 def _without_smear(
     moment: Moment, points: NDArray[np.float32], now: float, spec: GridSpec, movers: str
 ) -> NDArray[np.float32]:
-    """Leave, remove or carry on the returns in cells that are rather DYNAMIC than STATIC."""
+    """Leave, remove or move the returns in cells that are more DYNAMIC than STATIC."""
     if movers == "smeared":
         return points
     if moment.belief is None:
@@ -139,7 +139,7 @@ def _without_smear(
 
 
 class EgoVelocity(NamedTuple):
-    """The velocity of the vehicle along its own axes.
+    """The velocity of the vehicle in its own frame.
 
     Parameters
     ----------
@@ -172,9 +172,9 @@ def ego_velocity(frame: Frame, other: Frame) -> EgoVelocity:
 
 
 def sweep_times(points: NDArray) -> NDArray[np.float64]:
-    """Return when each return was measured, if the scanner turns clockwise and looks ahead when the image is taken.
+    """Return when each return was measured, if the scanner turns clockwise and faces forward at the image.
 
-    KITTI's scanner does (Geiger et al., 2013: it triggers the cameras when it faces forward).
+    KITTI's scanner does: it triggers the cameras when it faces forward (Geiger et al., 2013).
 
     Parameters
     ----------
@@ -196,16 +196,15 @@ def sweep_times(points: NDArray) -> NDArray[np.float64]:
 
 
 def deskew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:
-    """Move all returns of a scan to the frame that the LIDAR had at the instant of the image.
+    """Move all returns of a scan to the LIDAR's frame at the instant of the image.
 
-    In t seconds the vehicle moves by v t and turns by w t, so a return p becomes R(w t) p + v t. What moves by itself
-    stays skewed: its motion isn't known.
+    In t seconds the vehicle moves by v t and turns by w t, so a return p becomes R(w t) p + v t. Moving things stay
+    skewed, because their motion isn't known.
 
     Parameters
     ----------
     points : (N, 3+) float
-        Returns as they were recorded: x forward, y left, z up in the frame of the LIDAR as it stood when each was
-        measured, metres.
+        Returns as recorded: x forward, y left, z up in the LIDAR's frame when each was measured, metres.
     velocity : EgoVelocity
         Velocity of the vehicle.
 
@@ -222,7 +221,7 @@ def deskew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:
 def skew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:
     """Skew a scan that was taken at one instant, as if a scanner on a moving vehicle had recorded it.
 
-    The inverse of `deskew_scan` but for a small error: a return gets the time of its direction before it is skewed.
+    It inverts `deskew_scan` up to a small error, because a return gets the time of its direction before skewing.
 
     Parameters
     ----------
@@ -234,7 +233,7 @@ def skew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:
     Returns
     -------
     (N, 3+) float
-        Each return in the frame of the LIDAR as it stood when it was measured, in the type of `points`.
+        Each return in the LIDAR's frame at the time of its measurement, in the type of `points`.
     """
     t = sweep_times(points)
     xy = _turned(points[:, :2] - t[:, None] * np.array(velocity[:2]), -velocity.turn * t)

@@ -1,29 +1,29 @@
-"""Arithmetic of the compiled loops: what the compiler may change about it, and an exponential."""
+"""Arithmetic of the compiled loops: the compiler's fast-math flags, and an exponential."""
 
 import numpy as np
 from numba import njit
 
 FAST = {"contract", "nnan", "nsz"}
-"""What the compiler may do: round x y + z once, and take for granted that no number is NaN.
+"""What the compiler may do: round x y + z once, and assume that no number is NaN.
 
-It may not change the order of a sum, as `fastmath=True` would let it: the order decides the last bits, and they should
-be the same in every process.
+It may not reorder a sum, as `fastmath=True` would allow: the order decides the last bits, which should be the same in
+every process.
 """
 
 HALF = np.float32(0.5)
-"""A factor of 0.5 alone would make the compiler compute in double precision."""
+"""A literal 0.5 would make the compiler compute in double precision."""
 
 
 @njit(cache=True, fastmath=FAST, inline="always")
 def exponential(x):
-    """Compute exp(x) of a number that isn't positive, to 6 digits: the 64th power of the series of exp(x / 64).
+    """Compute exp(x) for x <= 0 to 6 digits: the 64th power of the series of exp(x / 64).
 
-    Unlike the exponential of the mathematical library, the compiler does this for many numbers at once.
+    The compiler vectorises this, unlike the math library's exponential.
 
     Parameters
     ----------
     x : float32
-        The number; below -80 its exponential counts as 0.
+        The number; below -80 the result is 0.
 
     Returns
     -------

@@ -1,9 +1,9 @@
 """The permutohedral lattice: Gaussian filtering in many dimensions at the cost of a blur (Adams, Baek, Davis 2010).
 
-Every point lies in one simplex of a lattice; where points are dense, many of them share its corners. The values of
-the points are splatted onto the d + 1 corners of their simplices, the values of the corners are blurred with
-(1/4, 1/2, 1/4) along each of the d + 1 lattice directions, and the result is sliced, that is interpolated, at the
-points. The module `simplices` holds the geometry, `vertices` the bookkeeping.
+Every point is in one simplex of a lattice; where points are dense, many share its corners. The filter splats each
+point's value onto the d + 1 corners of its simplex, blurs the corners with (1/4, 1/2, 1/4) along each of the d + 1
+lattice directions, and slices the result, which means that it interpolates at the points. The module `simplices` holds
+the geometry, `vertices` the bookkeeping.
 """
 
 from dataclasses import dataclass, replace
@@ -23,24 +23,24 @@ from semgrid_edu.fast.crf.vertices import number_vertices, sort_by_vertex
 class PermutohedralLattice:
     """Sums over points, weighted by a Gaussian of the distance between their features (eq. (4)).
 
-    A lattice is built once for the features and then filters any number of values. Its kernel approximates
-    ``exp(-|f_i - f_j|^2 / 2)``: the blur has the Gaussian's variance and integral but a finite reach, and what it
-    moves to a corner without points is lost.
+    A lattice is built once for the features and then filters any number of values. Its kernel approximates ``exp(-|f_i
+    - f_j|^2 / 2)``: the blur has the Gaussian's variance and integral but a finite reach, and it loses what it moves to
+    a corner without points.
 
     Parameters
     ----------
     corners : (N, d + 1) int32
         The numbers of the M lattice vertices at the corners of each point's simplex.
     slices : (N, d + 1) float32
-        The weight with which a point takes the value of each of its corners.
+        The interpolation weight of each of a point's corners.
     neighbours : (d + 1, 2, M) int32
         The vertex one step forward and one step backward along each direction; M where there is none.
     starts : (M + 1,) int32
         Where each vertex's part of `points` and `splats` begins, and where the last one ends.
     points, splats : (N (d + 1),) int32, float32
-        The points around each vertex, vertex after vertex, and the weights with which they add to it.
+        The points around each vertex, vertex after vertex, and their splatting weights.
     diagonal : (N,) float32
-        The share of its own value that each point gets back: k(f_i, f_i) of this lattice.
+        k(f_i, f_i) of this lattice: how much of its value each point gets back.
     """
 
     corners: NDArray[np.int32]
@@ -68,7 +68,7 @@ class PermutohedralLattice:
         Raises
         ------
         ArgumentError
-            When `features` isn't a table of finite numbers, or they are too large for the lattice's integers.
+            If `features` isn't a table of finite numbers, or they are too large for the lattice's integers.
         """
         points = elevated(features)
         if np.abs(points).max() > FARTHEST:
@@ -143,18 +143,17 @@ def _scaled(slices, splats, points, scale):
     """Return both weights of each point times its scale."""
     scaled_slices, scaled_splats = np.empty_like(slices), np.empty_like(splats)
     for i in prange(len(slices)):
-        for corner in range(slices.shape[1]):  # a row at a time, numba would make an array of each product
+        for corner in range(slices.shape[1]):  # not row by row: numba would allocate an array for each product
             scaled_slices[i, corner] = scale[i] * slices[i, corner]
     for n in prange(len(splats)):
         scaled_splats[n] = scale[points[n]] * splats[n]
     return scaled_slices, scaled_splats
 
 
-# Threads share out vertices or points; each of these is summed by one thread, in one order, so their number changes
-# nothing.
+# Each vertex or point is summed by one thread in a fixed order, so the number of threads doesn't change the result.
 @njit(cache=True, parallel=True, fastmath=FAST)
 def _splat(values, starts, points, weights, out):
-    """Sum at each vertex what its points add, (M + 1, K); the last row stays zero, for missing neighbours."""
+    """Sum the contributions of each vertex's points, (M + 1, K); the last row stays zero, for missing neighbours."""
     for v in prange(len(starts) - 1):
         for i in range(starts[v], starts[v + 1]):
             for k in range(values.shape[1]):

@@ -12,20 +12,20 @@ from semgrid_edu.fast.crf.lattice import PermutohedralLattice
 from semgrid_edu.fast.crf.spatial import SeparableGaussian
 
 LANES = 16
-"""Filters take a cell's classes side by side, padded to a multiple of this number: 16 floats fill a cache line."""
+"""A cell's classes are contiguous and padded to a multiple of this number: 16 floats fill a cache line."""
 
 
 def mean_field(
     unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10, tolerance: float = 0.0, pad: int = 0
 ) -> NDArray[np.float32]:
-    """Approximate the CRF's marginals by mean field in milliseconds (eq. (3), (4)): the twin of the book's.
+    """Approximate the CRF's marginals by mean field in milliseconds (eq. (3), (4)): the book's fast twin.
 
-    The other Parameters are those of `mean_field_naive`, and so are errors, but the grid may be of any size.
+    The other Parameters are those of `mean_field_naive`, and so are the errors, but the grid may have any size.
 
     Parameters
     ----------
     pad : int
-        Number of border cells to repeat outward before the CRF and to cut off afterwards.
+        Number of cells by which the border is padded (with its own values) before the CRF; cut off afterwards.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def iterate(
     iterations : int
         The largest number of updates of all cells.
     tolerance : float
-        Stop as soon as an update changes no probability by more than this.
+        Stop when an update changes no probability by more than this.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def iterate(
 
 
 def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
-    """Build the first kernel of eq. (4), including its weight and normalisation: the twin of the book's.
+    """Build the first kernel of eq. (4), including its weight and normalisation: the book's fast twin.
 
     Parameters are those of `bilateral_features`.
     """
@@ -95,7 +95,7 @@ def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice
 # The twin of `above_best` in one pass: at the paper's size 0.2 ms on one core, where numpy's passes take 0.8 ms.
 @njit(cache=True, parallel=True)
 def _above_best(unary):
-    """Return how far each cost lies above that of the cell's best class, as float32 and at most `NEVER`."""
+    """Return each cost minus the cost of the cell's best class, as float32, at most `NEVER`."""
     n_classes, height, width = unary.shape
     phi = np.empty(unary.shape, np.float32)
     for r in prange(height):
@@ -109,13 +109,13 @@ def _above_best(unary):
     return phi
 
 
-# Classes, rows and columns lie in this order wherever cells don't add up: all loops then run along a row of the grid,
-# and the compiler takes many cells at once.
+# Outside the filters, arrays have the axes (class, row, column): all loops then run along a row of the grid, and the #
+# compiler vectorises over its cells.
 @njit(cache=True, parallel=True, fastmath=FAST)
 def _update(rewards, phi, own, part, logits, Q, cells):
     """Update all cells, and return the largest change of a probability; `cells` gets a copy of Q in the filters' order.
 
-    The reward of a cell contains the cell's own part, which is subtracted. Its log Q, up to a constant, goes a part
+    A cell's reward contains the cell's own contribution, which is subtracted. Its log Q moves, up to a constant, part
     of the way to the reward minus the unary term, see `updates`.
     """
     n_classes, height, width = phi.shape
@@ -123,7 +123,7 @@ def _update(rewards, phi, own, part, logits, Q, cells):
     rewards, cells = rewards.reshape(height, width, -1), cells.reshape(height, width, -1)
     for r in prange(height):
         fresh, moved = np.empty((n_classes, width), np.float32), np.zeros(width, np.float32)
-        for c in range(width):  # here the filters' order is left, and below taken again: cell after cell is faster
+        for c in range(width):  # transpose from the filters' order, and back below: cell by cell is faster
             for k in range(n_classes):
                 fresh[k, c] = rewards[r, c, k]
         for k in range(n_classes):
@@ -168,7 +168,7 @@ def _softmax(logits, r, out):
 
 @njit(cache=True, fastmath=FAST, inline="always")
 def _replace(old, new, largest):
-    """Overwrite old numbers, and keep the largest change of each cell."""
+    """Overwrite the old numbers, and keep each cell's largest change."""
     for c in range(len(old)):
         largest[c] = max(largest[c], abs(new[c] - old[c]))
         old[c] = new[c]

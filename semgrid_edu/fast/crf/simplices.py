@@ -1,8 +1,8 @@
-"""Points in the permutohedral lattice: the simplex around each, and what comes back to it (Adams, Baek, Davis 2010).
+"""Points in the permutohedral lattice: each one's simplex and its response to itself (Adams, Baek, Davis 2010).
 
-The lattice lies in the hyperplane of d + 1 dimensions in which the coordinates sum to zero. A vertex is d + 1 integers
-that sum to zero and have the same remainder modulo d + 1; a step in direction j adds one to all of them except the
-j-th, from which it takes d.
+The lattice is in the hyperplane of d + 1 dimensions where the coordinates sum to zero. A vertex is d + 1 integers that
+sum to zero and have the same remainder modulo d + 1. A step in direction j adds one to all of them except the j-th,
+from which it subtracts d.
 """
 
 import numpy as np
@@ -11,10 +11,10 @@ from numba import njit, prange
 from semgrid_edu.fast.crf.arithmetic import HALF
 
 FORWARD, BACKWARD = 0, 1
-"""Index of the vertex one step forward, and of the one a step back, on the second axis of `neighbours`."""
+"""Indices on the second axis of `neighbours`: the vertex one step forward, and the vertex one step back."""
 
 
-# The book's `enclosing_simplices`, point after point: no step needs an array over all points.
+# The book's `enclosing_simplices`, point by point, without arrays over all points in between.
 @njit(cache=True, parallel=True)
 def origins_and_ranks(elevated):
     """Find the simplex around each point.
@@ -29,7 +29,7 @@ def origins_and_ranks(elevated):
     origins : (N, d + 1) int32
         The corner of the simplex whose coordinates have remainder 0 modulo d + 1.
     ranks : (N, d + 1) int32
-        The rank of each coordinate's distance from that corner, 0 for the largest; it names the simplex at the corner.
+        The rank of each coordinate's distance from that corner, 0 for the largest; the ranks identify the simplex.
     weights : (N, d + 1) float64
         The barycentric weights of the corners with remainders 0 .. d; they sum to 1.
     """
@@ -49,7 +49,7 @@ def origins_and_ranks(elevated):
                 later = distances[k] < distances[j]
                 rank[k] += later
                 rank[j] += not later
-        # Rounding left the hyperplane of zero sum: move the coordinates that were rounded the farthest.
+        # Rounding left the zero-sum hyperplane: correct the coordinates with the largest rounding error.
         for j in range(size):
             rank[j] += excess
             moved = size if rank[j] < 0 else -size if rank[j] >= size else 0
@@ -66,12 +66,12 @@ def origins_and_ranks(elevated):
 
 @njit(cache=True, parallel=True)
 def responses(simplices, ranks, neighbours):
-    """Compute how much of a value that is put on one corner of a simplex the blur brings to each of its corners.
+    """Compute the blur's response inside each simplex: how much of a value at one corner reaches each corner.
 
-    A value travels by one step forward, one step back, or none, along each direction in turn. Corner a + 1 of a simplex
-    lies one step from corner a, in the direction whose rank is d - a; after corner d follows corner 0 again. So a value
-    goes from corner a to corner b along the directions between them, forward or back. It is lost where a vertex on its
-    way doesn't exist.
+    Along each direction in turn, a value moves one step forward, one step back, or not at all. Corner a + 1 of a
+    simplex is one step from corner a, in the direction whose rank is d - a, and corner 0 follows corner d. So a value
+    goes from corner a to corner b along the directions between them, forward or back. It is lost if a vertex on the way
+    doesn't exist.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def responses(simplices, ranks, neighbours):
     Returns
     -------
     (S, d + 1, d + 1) float32
-        From the corner of the row to that of the column.
+        From the row's corner to the column's corner.
     """
     n_simplices, size = simplices.shape
     alive = survivors(neighbours, FORWARD), survivors(neighbours, BACKWARD)
@@ -111,7 +111,7 @@ def responses(simplices, ranks, neighbours):
 
 @njit(cache=True, parallel=True)
 def survivors(neighbours, sign):
-    """Tell for each vertex and each set of directions whether all vertices on the way along them exist.
+    """Check, for each vertex and each set of directions, whether all vertices on that path exist.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def survivors(neighbours, sign):
     Returns
     -------
     (M, 2^(d + 1)) bool
-        Bit j of the column says whether direction j is taken; steps follow in the order of the directions.
+        Bit j of the column is set if the path uses direction j; the steps are in the order of the directions.
     """
     size, _, n_vertices = neighbours.shape
     alive = np.zeros((n_vertices, 1 << size), np.bool_)
@@ -139,7 +139,7 @@ def survivors(neighbours, sign):
 
 @njit(cache=True, parallel=True)
 def self_responses(members, weights, response):
-    """Compute what share of its own value the filter gives back to each point, without the factor `peak`.
+    """Compute how much of its value the filter gives back to each point, without the factor `peak`.
 
     Parameters
     ----------

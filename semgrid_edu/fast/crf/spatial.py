@@ -18,9 +18,9 @@ class SeparableGaussian:
     Parameters
     ----------
     taps : (R + 1,) float32
-        The Gaussian at distances of 0 to R cells. R is 5 sigma; less than a millionth of the weight lies beyond.
+        The Gaussian at distances of 0 to R cells. R is 5 sigma, which leaves out less than a millionth of the weight.
     row_scale, column_scale : (H,), (W,) float32
-        Normalisation and weight: k_ij is the Gaussian times both scales of cell i and both scales of cell j.
+        Normalisation and weight: k_ij is the Gaussian times both scales of cells i and j.
     """
 
     taps: NDArray[np.float32]
@@ -29,10 +29,9 @@ class SeparableGaussian:
 
     @classmethod
     def build(cls, shape: tuple[int, int], sigma: float, weight: float, normalization: str) -> "SeparableGaussian":
-        """Compute the taps, and the scales that hold weight and normalisation.
+        """Compute the taps and the scales, which contain weight and normalisation.
 
-        The row sums of the whole kernel are products of the row sums of the two axes, so each axis is normalised by
-        itself.
+        The row sums of the whole kernel are products of the row sums of the two axes, so each axis is normalised alone.
 
         Parameters
         ----------
@@ -56,7 +55,7 @@ class SeparableGaussian:
 
     @property
     def diagonal(self) -> NDArray[np.float32]:
-        """k_ii, the share of its own value that each cell gets back, (H W,)."""
+        """k_ii: how much of its value each cell gets back, (H W,)."""
         return np.outer(self.row_scale**2, self.column_scale**2).ravel()
 
     def __call__(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -66,7 +65,7 @@ class SeparableGaussian:
         return out
 
     def filter(self, values: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-        """Filter values on the grid into an array that exists.
+        """Filter values on the grid into an existing array.
 
         Parameters
         ----------
@@ -74,8 +73,8 @@ class SeparableGaussian:
             One row per cell, cells counted row by row; `out` is overwritten.
         """
         grid, filtered = (array.reshape(len(self.row_scale), -1) for array in (np.ascontiguousarray(values), out))
-        # Zeros give rows beyond the grid no weight, and make the number of taps even. The tap at distance 0 is halved,
-        # because the loops add it twice, forward and backward.
+        # A zero tap makes their number even, and zero scales exclude rows beyond the grid. The tap at distance 0 is
+        # halved, because the loops add it twice, forward and backward.
         taps = np.append(self.taps, np.zeros(len(self.taps) % 2, np.float32))
         taps[0] /= 2
         row_scale = np.pad(self.row_scale, len(taps))
@@ -89,10 +88,10 @@ def _row_sums(size: int, sigma: float) -> NDArray[np.float64]:
     return to_one_side + to_one_side[::-1] - 1
 
 
-# Loops, though BLAS has matrix products: its threads would compete with numba's for the same cores.
+# Loops instead of BLAS's matrix products, because its threads would compete with numba's for the same cores.
 @njit(cache=True, parallel=True, fastmath=FAST)
 def _convolve(values, lanes, taps, row_scale, column_scale, out):
-    """Convolve (H, W K) values, K per cell: add up rows, then what lies left and right in the sum.
+    """Convolve (H, W K) values, K per cell: add up rows, then the neighbours left and right in the sum.
 
     The number of taps is even, and the first one is half of what it should be, since it is added forward and backward.
     """
@@ -107,7 +106,7 @@ def _convolve(values, lanes, taps, row_scale, column_scale, out):
         out[r] *= column_scale
 
 
-# Two taps, so four rows, at a time: thus the sum is read and written half as often.
+# Two taps, so four rows, at a time: the sum is read and written half as often.
 @njit(cache=True, fastmath=FAST, inline="always")
 def _add_rows(values, r, taps, row_scale, total):
     """Add up rows around row r; rows beyond the grid have scale 0."""
@@ -123,7 +122,7 @@ def _add_rows(values, r, taps, row_scale, total):
 
 @njit(cache=True, fastmath=FAST, inline="always")
 def _add_neighbours(padded, lanes, taps, total):
-    """Add up what lies to the left and right in a row with a margin."""
+    """Add up the neighbours on the left and right in a padded row."""
     for t in range(0, len(taps), 2):
         left, right = padded[(len(taps) - 1 - t) * lanes :], padded[(len(taps) - 1 + t) * lanes :]
         left_2, right_2 = padded[(len(taps) - 2 - t) * lanes :], padded[(len(taps) + t) * lanes :]

@@ -1,8 +1,7 @@
 """The vertices of the permutohedral lattice that carry points: numbered, with their neighbours (Adams et al. 2010).
 
-A vertex has coordinates (d + 1) q_j + r, with one remainder r for all of them. It is kept as one integer, in which r
-and the q_j stand side by side in fields of their own. A step along the lattice then adds a number to it that depends
-only on r and on the direction.
+A vertex has coordinates (d + 1) q_j + r with a common remainder r. It is packed into one integer with a field for r and
+one for each q_j. A step along the lattice then adds a number that depends only on r and on the direction.
 """
 
 from typing import NamedTuple
@@ -15,11 +14,11 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast.crf.simplices import BACKWARD, FORWARD
 
 MOST_DIMENSIONS = 8
-"""The largest number of features of a point: with 8, `survivors` holds 2^9 answers for each vertex."""
+"""The largest number of features of a point: with 8, `survivors` has 2^9 entries per vertex."""
 
 
 class Vertices(NamedTuple):
-    """The vertices around points, and how points, simplices and vertices belong together.
+    """The vertices around points, and which points, simplices and vertices belong together.
 
     Parameters
     ----------
@@ -40,7 +39,7 @@ class Vertices(NamedTuple):
 
 
 def number_vertices(origins: NDArray[np.int32], ranks: NDArray[np.int32]) -> Vertices:
-    """Give a number to each distinct simplex and to each distinct corner, which makes it a vertex.
+    """Assign numbers to the distinct simplices and to their distinct corners, the vertices.
 
     Parameters
     ----------
@@ -55,8 +54,8 @@ def number_vertices(origins: NDArray[np.int32], ranks: NDArray[np.int32]) -> Ver
     Raises
     ------
     ArgumentError
-        When the points lie so far apart that a vertex doesn't fit into one integer, or have more than
-        `MOST_DIMENSIONS` dimensions.
+        If the points are so far apart that a vertex doesn't fit into one integer, or have more than `MOST_DIMENSIONS`
+        dimensions.
     """
     size = origins.shape[1]
     if size > MOST_DIMENSIONS + 1:
@@ -69,9 +68,9 @@ def number_vertices(origins: NDArray[np.int32], ranks: NDArray[np.int32]) -> Ver
 
 
 def _fields(origins: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the smallest q_j that may occur, (d,), and what a q_j counts in the integer, (d + 1,).
+    """Return the smallest possible q_j, (d,), and the place value of each q_j in the integer, (d + 1,).
 
-    The last coordinate has no field: it follows from the others, since all of them sum to zero.
+    The last coordinate has no field: it follows from the others, because they sum to zero.
     """
     size = origins.shape[1]
     # A corner has q_j up to 1 smaller than the origin, and its neighbours 1 smaller or larger than that.
@@ -96,7 +95,7 @@ def _extent(origins):
 
 @njit(cache=True, parallel=True)
 def _pack(origins, ranks, lowest, units):
-    """Return two integers per point, which identify its simplex: its corner with remainder 0, and the order there."""
+    """Return two integers that identify each point's simplex: its corner with remainder 0, and the ranks."""
     keys, orders = np.zeros(len(origins), np.int64), np.zeros(len(origins), np.int64)
     size = origins.shape[1]
     for i in prange(len(origins)):
@@ -109,7 +108,7 @@ def _pack(origins, ranks, lowest, units):
 
 @njit(cache=True)
 def _capacity(most):
-    """Return the size of a hash table that stays half empty, a power of two."""
+    """Return the size of a hash table that stays half empty: a power of two."""
     capacity = 2
     while capacity < 2 * most:
         capacity *= 2
@@ -118,7 +117,7 @@ def _capacity(most):
 
 @njit(cache=True, inline="always")
 def _hash(key):
-    """Scatter keys that differ by little: multiply by 2^64 / golden ratio, and take the upper bits (Knuth)."""
+    """Scatter similar keys: multiply by 2^64 / golden ratio, and take the upper bits (Knuth)."""
     return np.int64((np.uint64(key) * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32))
 
 
@@ -154,7 +153,7 @@ def _slot(key, keys, slots):
 
 @njit(cache=True, inline="always")
 def _forward(key, remainder, direction, units):
-    """Return the vertex one step forward: all coordinates gain one but that of the direction, which loses d."""
+    """Return the vertex one step forward: coordinate `direction` loses d, all others gain one."""
     if remainder < len(units) - 1:
         return key + 1 - units[direction]
     return key - remainder + units.sum() - units[direction]

@@ -1,6 +1,6 @@
-"""What `Cmcdot.step` needs from the machine: a second core, an undo after errors, memory that is kept.
+"""What `Cmcdot.step` needs from the machine: a second core, an undo after errors, and kept memory.
 
-Nothing here changes a number.
+Nothing here changes a result.
 """
 
 import ctypes
@@ -12,12 +12,12 @@ from contextlib import contextmanager
 import numpy as np
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
-"""Numbers of glibc's `mallopt`, from malloc.h."""
+"""Options of glibc's `mallopt`, as numbered in malloc.h."""
 
 
 @contextmanager
 def on_another_core(function: Callable, *arguments: object) -> Iterator[Future]:
-    """Run a function in a thread while the body of `with` runs, and hand out its future result.
+    """Run a function in a thread while the body of `with` runs, and yield its future.
 
     Evidence doesn't depend on `move` and `predict`, and takes about as long. Both spend their time in compiled
     loops, which release Python's lock, so a thread is enough to use two cores.
@@ -25,7 +25,7 @@ def on_another_core(function: Callable, *arguments: object) -> Iterator[Future]:
     Parameters
     ----------
     function, arguments : callable, objects
-        What to call, and with what.
+        The function and its arguments.
     """
     with ThreadPoolExecutor(1) as thread:
         yield thread.submit(function, *arguments)
@@ -33,10 +33,10 @@ def on_another_core(function: Callable, *arguments: object) -> Iterator[Future]:
 
 @contextmanager
 def undo_after_errors(rng: np.random.Generator) -> Iterator[None]:
-    """Put the generator back when the body of `with` fails.
+    """Restore the generator's state if the body of `with` fails.
 
-    `predict` has drawn random numbers by the time a sensor or a resampling fails. If these were lost, the same seed
-    would give another drive after an error that was caught.
+    When a sensor or a resampling fails, `predict` has already drawn random numbers. Without the undo, a drive that goes
+    on after a caught error would differ from one without the error.
 
     Parameters
     ----------
@@ -52,12 +52,12 @@ def undo_after_errors(rng: np.random.Generator) -> Iterator[None]:
 
 
 def keep_memory() -> None:
-    """Let the memory of one step serve the next.
+    """Reuse the memory of one step in the next.
 
-    On Linux, glibc hands idle memory back to the system as soon as it is more than `M_TRIM_THRESHOLD`, and a buffer
-    larger than `M_MMAP_THRESHOLD` as soon as it is freed. The system clears each page before it lends it again: up to
-    5 ms a step. Larger thresholds keep what a step frees. By itself glibc raises them only after a large buffer was
-    freed, and never where the environment sets one of them. Other allocators are left as they are.
+    On Linux, glibc returns idle memory to the system when it exceeds `M_TRIM_THRESHOLD`, and a buffer above
+    `M_MMAP_THRESHOLD` as soon as it is freed. The system clears each page before it hands it out again, which takes up
+    to 5 ms a step. Larger thresholds keep what a step frees. By itself glibc raises them only after a large buffer was
+    freed, and never if the environment sets one of them. Other allocators are left alone.
     """
     if mallopt := getattr(ctypes.CDLL(None) if sys.platform == "linux" else None, "mallopt", None):
         mallopt(M_MMAP_THRESHOLD, 2**25)

@@ -1,4 +1,4 @@
-"""The cell that contains a place, for compiled loops."""
+"""The cell that contains a point, for compiled loops."""
 
 import numpy as np
 from numba import njit
@@ -8,12 +8,12 @@ from semgrid_edu.occupancy.state import OUTSIDE
 
 @njit(cache=True, inline="always", error_model="numpy")
 def cell_of(x, y, shape, x_max, y_max, cell):
-    """Return the cell that contains a place, as an index into the flattened grid.
+    """Return the cell that contains a point, as an index into the flattened grid.
 
     Parameters
     ----------
     x, y : float
-        The place, in the frame of the grid, metres.
+        The point, in the frame of the grid, metres.
     shape : (int, int)
         H, W of the grid.
     x_max, y_max, cell : float
@@ -22,8 +22,8 @@ def cell_of(x, y, shape, x_max, y_max, cell):
     Returns
     -------
     int32
-        row * W + column; `OUTSIDE` for a place outside the grid.
+        row * W + column; `OUTSIDE` for a point outside the grid.
     """
     row, col = np.floor((x_max - x) / cell), np.floor((y_max - y) / cell)
-    inside = (row >= 0) & (row < shape[0]) & (col >= 0) & (col < shape[1])  # `and` would branch, and be slower
+    inside = (row >= 0) & (row < shape[0]) & (col >= 0) & (col < shape[1])  # `and` would branch, which is slower
     return np.int32(row * shape[1] + col if inside else OUTSIDE)

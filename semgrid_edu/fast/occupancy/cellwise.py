@@ -1,7 +1,6 @@
-"""What the filter's steps do in each cell by itself, in compiled loops over cells.
+"""What the filter's steps do in each cell, independently of its neighbours, in compiled loops.
 
-The loops compute with plain numbers, and choose between values without branching, so that the compiler can process
-several cells at a time.
+The loops compute with plain numbers and select values without branching, so that the compiler can vectorise them.
 """
 
 import numpy as np
@@ -14,19 +13,19 @@ FREE, STATIC, DYNAMIC, UNKNOWN = (int(state) for state in State)
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def renormalise(probability, claimed):
-    """Set P(DYNAMIC) to what the particles of a cell carry; the other states share the rest in their old proportions.
+    """Set P(DYNAMIC) to the weight of a cell's particles; the other states share the rest in their old proportions.
 
     Parameters
     ----------
     probability : (4, H, W) float32
         The four states; P(DYNAMIC) is ignored.
     claimed : (H, W) float32
-        Sum of the weights of the particles in each cell; it may be above 1 where particles crowd.
+        Sum of the weights of the particles in each cell; it may exceed 1 where particles crowd.
 
     Returns
     -------
     probability : (4, H, W) float32
-        The four states, with P(DYNAMIC) = min(claimed, 1). Where no other state was possible, the rest is UNKNOWN.
+        The four states, with P(DYNAMIC) = min(claimed, 1). If no other state had any mass, the rest is UNKNOWN.
     factor : (H, W) float32
         Factor of the weights of the cell's particles.
     """
@@ -35,7 +34,7 @@ def renormalise(probability, claimed):
         for c in range(claimed.shape[1]):
             dynamic = min(claimed[r, c], np.float32(1))
             others = probability[FREE, r, c] + probability[STATIC, r, c] + probability[UNKNOWN, r, c]
-            share = (1 - dynamic) / others if others > 0 else 0.0  # others are 1 - P(DYNAMIC), with more digits
+            share = (1 - dynamic) / others if others > 0 else 0.0  # others: 1 - P(DYNAMIC), with more digits
             shared[FREE, r, c] = share * probability[FREE, r, c]
             shared[STATIC, r, c] = share * probability[STATIC, r, c]
             shared[DYNAMIC, r, c] = dynamic
@@ -55,7 +54,7 @@ def mix(probability, newborn, going, M):
     newborn : (H, W) float32
         The part of P(DYNAMIC) that no particle carries.
     going : (H, W) float32
-        Sum of the weights in each cell after the matrix and after some of them have stopped. What stopped is STATIC.
+        Sum of the weights in each cell after the matrix and after some particles stopped; what stopped is STATIC.
     M : (4, 4) float
         Transition matrix, M[i, j] = P(state j now | state i before).
 
@@ -64,10 +63,10 @@ def mix(probability, newborn, going, M):
     probability : (4, H, W) float32
         The four states now, with all particles still in their cells.
     newborn : (H, W) float32
-        The part of P(DYNAMIC) that no particle carries, with what has become DYNAMIC of the other states.
+        The part of P(DYNAMIC) that no particle carries, including what the other states turned into DYNAMIC.
     """
     mixed, born = np.empty_like(probability), np.empty_like(newborn)
-    for j in range(4):  # outermost, so that the compiler takes several cells at a time: four times as fast
+    for j in range(4):  # outermost, so that the compiler vectorises over cells: four times as fast
         from_free, from_static, from_dynamic, from_unknown = M[FREE, j], M[STATIC, j], M[DYNAMIC, j], M[UNKNOWN, j]
         for r in range(newborn.shape[0]):
             for c in range(newborn.shape[1]):
@@ -76,7 +75,8 @@ def mix(probability, newborn, going, M):
                 mixed[j, r, c] = others + from_dynamic * dynamic + from_unknown * probability[UNKNOWN, r, c]
     for r in range(newborn.shape[0]):
         for c in range(newborn.shape[1]):
-            # Of what particles carry and the matrix leaves DYNAMIC, a part goes on; the rest has stopped.
+            # The matrix leaves this much of the particles' weight DYNAMIC. A part of it keeps moving; the rest has
+            # stopped.
             carried = M[DYNAMIC, DYNAMIC] * (probability[DYNAMIC, r, c] - newborn[r, c])
             born[r, c] = mixed[DYNAMIC, r, c]
             mixed[DYNAMIC, r, c] += going[r, c]
@@ -86,10 +86,10 @@ def mix(probability, newborn, going, M):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def open_space(mixed):
-    """Return how much of each cell is open space: to most of what moves, and to what keeps pace with the vehicle.
+    """Return how much of each cell is open space: for most particles, and for those that keep pace with the vehicle.
 
-    What stands is ragged and often porous. So beams pass through cells of its face, and yet it is there: once the
-    vehicle looks in from another place, these cells are hit.
+    Static things are ragged and often porous, so beams pass through some cells of their surface. These cells are hit
+    later, when the vehicle sees them from another place.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def open_space(mixed):
     Returns
     -------
     (2, H, W) float32
-        P(FREE) + P(DYNAMIC); and the same with P(FREE) times 1 - the largest P(STATIC) of the four neighbours.
+        P(FREE) + P(DYNAMIC); and the same with P(FREE) times (1 - the largest P(STATIC) of the four neighbours).
     """
     room, (height, width) = np.empty((2, *mixed.shape[1:]), np.float32), mixed.shape[1:]
     for r in range(height):
@@ -116,7 +116,7 @@ def open_space(mixed):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def collide(mixed, newborn, going, stays, arrives, doubtful):
-    """Let the dynamic mass that arrives in a cell meet what the cell holds, and strike out what can't both be true.
+    """Combine the dynamic mass that arrives in a cell with the cell's states, and remove contradictions.
 
     Parameters
     ----------
@@ -125,19 +125,19 @@ def collide(mixed, newborn, going, stays, arrives, doubtful):
     newborn : (H, W) float32
         The part of P(DYNAMIC) that no particle carries.
     going, stays, arrives : (H, W) float32
-        Sums of weights in each cell: of the particles that were there before they flew, of those that are still there,
-        and of those that have come in.
+        Sums of weights in each cell: of the particles that were there before they flew, that are still there, and that
+        have come in.
     doubtful : (H, W) float32
-        The part of `arrives` that comes out of a wall and goes on along it.
+        The part of `arrives` that comes out of a wall and moves along it.
 
     Returns
     -------
     probability : (4, H, W) float32
-        With a = min(arrives, CERTAIN), b the doubtful part of it, s = P(STATIC), u = P(UNKNOWN) plus what has left, and
-        d the mass that is newborn or stays, P(DYNAMIC) is [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u), and every
-        other state (1 - a) P / (1 - a s - b u). What has left is FREE.
+        Let a = min(arrives, CERTAIN), b its doubtful part, s = P(STATIC), u = P(UNKNOWN) plus what has left, and d the
+        mass that is newborn or stays. P(DYNAMIC) is [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u), and every other
+        state is (1 - a) P / (1 - a s - b u). What has left becomes FREE.
     newborn : (H, W) float32
-        Scaled like everything that was in the cell.
+        Scaled like everything else that was in the cell.
     factor : (2, H, W) float32
         Factors of the weights of the particles that stay, and of those that arrive.
     less : (2, H, W) float32
@@ -179,14 +179,14 @@ def bayes(prior, occupied, free):
     Returns
     -------
     posterior : (4, H, W) float32
-        The four states given the scan. Where nothing that was held possible explains the scan, all is UNKNOWN.
+        The four states given the scan. If no state with any mass explains the scan, the cell is UNKNOWN.
     factor : (H, W) float64
         P(DYNAMIC | z) / P(DYNAMIC), the factor of the weights of the cell's particles.
     """
     posterior, factor = np.empty_like(prior), np.empty(prior.shape[1:])
     for r in range(prior.shape[1]):
         for c in range(prior.shape[2]):
-            best = max(occupied[r, c], free[r, c])  # however small both are, the better explanation counts as 1
+            best = max(occupied[r, c], free[r, c])  # scale so that the better explanation is 1, however small both are
             if_occupied = occupied[r, c] / best if best > 0 else 0.0
             if_free = free[r, c] / best if best > 0 else 0.0
             empty = np.float64(prior[FREE, r, c]) + prior[UNKNOWN, r, c]
@@ -204,7 +204,7 @@ def bayes(prior, occupied, free):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def clear_wakes(probability, left, hidden):
-    """Strike out that something stands where a moving thing has been, in cells of which the scan says nothing.
+    """Remove STATIC where a moving thing has just been, in cells that the scan doesn't observe.
 
     Parameters
     ----------
@@ -213,13 +213,13 @@ def clear_wakes(probability, left, hidden):
     left : (H, W) float32
         Sum of the weights of the particles that have left each cell.
     hidden : (H, W) bool
-        Whether the scan says nothing of the cell.
+        Whether the scan doesn't observe the cell.
 
     Returns
     -------
     (4, H, W) float32
         In hidden cells, with a = min(left, CERTAIN) and s = P(STATIC): STATIC is (1 - a) s / (1 - a s), and FREE gets
-        what it loses. All other cells are as they were.
+        what STATIC loses. All other cells are unchanged.
     """
     cleared = probability.copy()
     for r in range(left.shape[0]):
@@ -232,7 +232,7 @@ def clear_wakes(probability, left, hidden):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def rescale_weights(probability, carried):
-    """Make the particles of each cell carry its dynamic probability; without particles it turns UNKNOWN.
+    """Scale the weights in each cell to sum to P(DYNAMIC); where no particle is, this mass becomes UNKNOWN.
 
     Parameters
     ----------

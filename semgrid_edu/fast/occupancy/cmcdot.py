@@ -1,4 +1,4 @@
-"""CMCDOT with compiled steps; the evidence of a scan is computed on another core meanwhile."""
+"""CMCDOT with compiled steps; another core computes the evidence of the scan at the same time."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -23,8 +23,8 @@ from semgrid_edu.occupancy.world import CmcdotParams
 class Cmcdot(cmcdot.Cmcdot):
     """The book's filter with compiled steps. Parameters are those of `Cmcdot`.
 
-    The package's own sensor and resampling are replaced by their compiled twins; any other is called as it is, the
-    sensor in a separate thread. After an error, the random numbers start where they were before the step, too.
+    The package's sensor and resampling are replaced by their compiled twins; others are called unchanged, a sensor in a
+    separate thread. After an error, the random generator is back where it was before the step.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Cmcdot(cmcdot.Cmcdot):
         scan = observe, self.params.sensor, points_grid, pose, self.map_spec, self.spec  # called on another core below
         steps: dict[str, NDArray[np.float32]] = {}
         with undo_after_errors(self._rng), on_another_core(*scan) as seen:
-            # One name for what is between two steps: its memory, as large as the filter's state, is then used again.
+            # One name for all intermediate states, so that the memory of each is freed and reused.
             state = self._noted(steps, "move", move(self._state, self.map_spec, shift), pose)
             state = predict(state, self.map_spec, self.params, dt, self._rng, motion.dx)
             state = self._noted(steps, "predict", state, pose)
@@ -62,7 +62,7 @@ class Cmcdot(cmcdot.Cmcdot):
         return replace(belief, steps=steps)
 
     def _noted(self, steps: dict[str, NDArray], name: str, state: FilterState, pose: PlanarMotion) -> FilterState:
-        """Return the state; when steps are kept, note its probabilities at the centres of the vehicle's own cells."""
+        """Return the state; when steps are kept, note its probabilities at the centres of the vehicle's cells."""
         if self.keep_steps:
             steps[name] = look_up(state.probability, NOTHING_KNOWN, self.map_spec, self.spec, pose)
         return state

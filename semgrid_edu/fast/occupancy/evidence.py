@@ -20,7 +20,7 @@ def check_points(points: NDArray) -> NDArray:
 
 @njit(cache=True, nogil=True)
 def _all_finite(points):
-    """Tell whether every x, y and z is finite; numpy, which writes arrays of truth values, takes five times as long."""
+    """Return whether every x, y and z is finite; five times as fast as numpy, which writes boolean arrays."""
     finite = True
     for i in range(len(points)):
         finite &= np.isfinite(points[i, 0]) & np.isfinite(points[i, 1]) & np.isfinite(points[i, 2])

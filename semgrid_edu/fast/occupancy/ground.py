@@ -25,9 +25,9 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
 
 @njit(cache=True, nogil=True)
 def _lowest_returns(x, y, z, sector, sectors, bin_, bins):
-    """Find the place of each return, sector * bins + bin; and at each place the lowest return and the greatest height.
+    """Find the place of each return, sector * bins + bin, and the lowest and highest return of each place.
 
-    Returns beyond the last bin belong to it. Where there is no return, the heights are infinite.
+    Returns beyond the last bin count as in it. Where there is no return, the heights are infinite.
     """
     place, distance = np.empty(len(x), np.int32), np.empty(sectors * bins)
     low, high = np.full(sectors * bins, np.inf, z.dtype), np.full(sectors * bins, -np.inf, z.dtype)
@@ -44,7 +44,7 @@ def _lowest_returns(x, y, z, sector, sectors, bin_, bins):
 def _walk_all(distances, low, high, sectors, bin_, step, slope, rise, grade, gap):
     """Walk all sectors: the height of the ground in each bin, and whether the sector holds returns.
 
-    Each sector is walked as in `walk_sector`. The profile is filled on the way, up to the last place of ground.
+    Each sector is walked as in `walk_sector`. The profile is filled on the way, up to the last bin with ground.
     """
     bins = len(low) // sectors
     profile, seen = np.empty((sectors, bins), np.float32), np.zeros(sectors, np.bool_)
@@ -76,7 +76,7 @@ def _median_of_neighbours(profile, seen, neighbours):
         n = 0
         for k in range(s - neighbours, s + neighbours + 1):
             if seen[k % sectors]:
-                for b in range(bins):  # loops over bins take less than half the time of whole rows
+                for b in range(bins):  # loops over bins take less than half the time of row operations
                     beside[n, b] = profile[k % sectors, b]
                 n += 1
         if n > 0:
@@ -98,7 +98,7 @@ def _sort_each_bin(rows):
 
 @njit(cache=True, nogil=True)
 def _heights(z, place, ground):
-    """Subtract the ground at its place from the height of each return (numpy's indexing takes 1.7 ms more)."""
+    """Subtract from each return's height the ground at its place (1.7 ms faster than numpy's indexing)."""
     height, ground = np.empty(len(z), z.dtype), ground.ravel()
     for i in range(len(z)):
         height[i] = z[i] - ground[place[i]]

@@ -1,4 +1,4 @@
-"""The belief that is handed out, in compiled loops and single precision."""
+"""The belief that the filter returns, in compiled loops and single precision."""
 
 import math
 
@@ -38,7 +38,7 @@ def local_belief(
     spec: GridSpec,
     world: WorldModel,
 ) -> Belief:
-    """Look the map up in the vehicle's cells and update those. Parameters are those of `local_belief`."""
+    """Look up the map at the vehicle's cells and update them. Parameters are those of `local_belief`."""
     here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, seen.pose)
     prior = FilterState(here, Particles.none(), np.zeros(spec.shape, np.float32))
     probability = update(prior, spec, seen.in_grid, world).probability
@@ -62,7 +62,7 @@ def velocity_moments(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _moments(velocity, weight, cells, n_cells):
-    """Add up in double precision, and twice: the covariance from differences to the mean, which keep their digits."""
+    """Sum in double precision, in two passes: the covariance from differences to the mean, to keep its digits."""
     first, second = np.zeros((n_cells, 3)), np.zeros((n_cells, 3))
     for i in range(len(cells)):
         c = cells[i]

@@ -1,7 +1,7 @@
 """What particles do, in compiled loops and single precision.
 
-Loops that only compute take the pairs of coordinates (N, 2) end to end, as (2 N,). Then the compiler knows how far
-apart the numbers are, and processes several particles at a time.
+Loops that only compute get the coordinates (N, 2) flattened, as (2 N,). The compiler then knows that they are
+contiguous and vectorises over particles.
 """
 
 import math
@@ -19,7 +19,7 @@ from semgrid_edu.occupancy.state import OUTSIDE, Particles
 from semgrid_edu.occupancy.walls import Walls
 
 SLOW = np.float32(16)
-"""Beside 1, exp(-16) hardly counts in single precision, so exponentials beyond it needn't be computed."""
+"""exp(-16) is negligible beside 1 in single precision, so smaller exponentials needn't be computed."""
 
 
 class Pace(NamedTuple):
@@ -32,7 +32,7 @@ class Pace(NamedTuple):
     least : float
         The least speed at which something has left its cells after `halt`, m/s. Slower things can't keep pace.
     halt : float
-        How long ago a particle's place is looked up a second time, seconds.
+        How long ago a particle's past position is checked a second time, seconds.
     """
 
     speed: float
@@ -41,7 +41,7 @@ class Pace(NamedTuple):
 
     @property
     def matters(self) -> bool:
-        """Whether anything can keep pace: not with a vehicle that stands or creeps."""
+        """Whether anything can keep pace: nothing can if the vehicle is stopped or crawls."""
         return 2 * abs(self.speed) >= self.least and self.speed != 0
 
 
@@ -53,7 +53,7 @@ def pace_of(walls: Walls, driven: float, dt: float, cell: float) -> Pace:
     walls : Walls
         How far the filter looks back.
     driven, dt : float
-        How far the vehicle has driven, metres, in which time, seconds.
+        How far the vehicle has driven, metres, and in what time, seconds.
     cell : float
         Side of a cell, metres.
     """
@@ -118,7 +118,7 @@ def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[
 
 @njit(cache=True, nogil=True)
 def by_origin(before: NDArray, after: NDArray, n_cells: int) -> NDArray[np.int32]:
-    """Return the cell of each particle, plus `n_cells` if it has come in from another cell.
+    """Return each particle's cell, plus `n_cells` if it came from another cell.
 
     Parameters
     ----------
@@ -130,8 +130,8 @@ def by_origin(before: NDArray, after: NDArray, n_cells: int) -> NDArray[np.int32
     Returns
     -------
     (N,) int32
-        Indices into a flattened array (2, H, W), whose first plane is for particles that have stayed and whose second
-        is for those that have arrived; `OUTSIDE` for particles that have left the map.
+        Indices into a flattened array (2, H, W): the first plane is for particles that stayed, the second for particles
+        that arrived; `OUTSIDE` for particles that left the map.
     """
     origin = after.copy()
     for i in range(len(after)):
@@ -141,7 +141,7 @@ def by_origin(before: NDArray, after: NDArray, n_cells: int) -> NDArray[np.int32
 
 
 def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float, fewest: float) -> NDArray[np.int32]:
-    """Return the cell in which each particle was or will be at another time, if it is another cell than now.
+    """Return the cell of each particle at another time, if it isn't the cell of now.
 
     Parameters
     ----------
@@ -152,9 +152,9 @@ def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float, 
     spec : GridSpec
         The cells, (H, W).
     time : float
-        Seconds from now, negative for the past: a particle at x with velocity v is taken to be at x + v time.
+        Seconds from now, negative for the past: a particle at x with velocity v is assumed to be at x + v time.
     fewest : float
-        Number of cells by which a particle moves at least: a slow one is given more than `time`, unless that is 0.
+        Least number of cells that a particle moves: a slow one gets more than `time`, unless that is 0.
 
     Returns
     -------
@@ -179,16 +179,16 @@ def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
 
 
 def keeps_pace(vx: NDArray, vy: NDArray, pace: Pace) -> NDArray[np.bool_]:
-    """Tell which velocities differ from the vehicle's by no more than that of a standing thing does, (N,).
+    """Return which velocities differ from the vehicle's by at most the vehicle's speed, (N,).
 
-    So the difference may be as large as the vehicle's speed.
+    A static thing differs by exactly this much.
 
     Parameters
     ----------
     vx, vy : (N,) float
         Velocities along the axes of the map, m/s; in compiled loops those of one particle.
     pace : Pace
-        How fast the vehicle drives, and from which speed on anything counts. Nothing keeps pace with one that stands.
+        How fast the vehicle drives, and the least speed that counts. Nothing keeps pace with a stopped vehicle.
     """
     slip, speed = (vx - pace.speed) ** 2 + vy**2, vx**2 + vy**2
     return (slip <= pace.speed**2) & (speed >= pace.least**2) & (pace.speed != 0)
@@ -200,7 +200,7 @@ _keeps_pace = njit(cache=True, nogil=True)(keeps_pace)
 def doubt_arrivals(
     particles: Particles, cells: NDArray, doubt: NDArray, ahead: NDArray, mixed: NDArray, spec: GridSpec, pace: Pace
 ) -> NDArray[np.float32]:
-    """Return which part of each weight comes out of a wall and goes on along it, beside a vehicle that drives, (N,).
+    """Return the part of each weight that comes out of a wall and moves along it at the vehicle's pace, (N,).
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def doubt_arrivals(
     cells, ahead : (N,) int32
         The cell that each is in now, from `cells_of`, and will be in, from `cells_at`.
     doubt : (N,) float32
-        The part of each weight that comes out of a wall, by its origin alone.
+        The part of each weight that comes out of a wall, judged by its origin alone.
     mixed : (4, H, W) float32
         The four states before particles flew.
     spec : GridSpec

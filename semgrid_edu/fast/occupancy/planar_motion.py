@@ -20,7 +20,7 @@ def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpe
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _look_up(values, outside, source_x, source_y, source_cell, x_max, y_max, cell, shape, dx, dy, dyaw):
-    """Find the places of a row of cells once, then copy all K values from them."""
+    """Find the source cells of a row once, then copy all K values from them."""
     found = np.empty((len(values), *shape), np.float32)
     flat, place = values.reshape(len(values), -1), np.empty(shape[1], np.int32)
     cos, sin, size = np.cos(dyaw), np.sin(dyaw), values.shape[1:]

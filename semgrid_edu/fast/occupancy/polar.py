@@ -1,4 +1,4 @@
-"""A scan in polar coordinates, by loops that read each return once and need no arrays in between."""
+"""A scan in polar coordinates, by loops that read each return once and need no intermediate arrays."""
 
 import math
 
@@ -9,12 +9,12 @@ from semgrid_edu.fast.occupancy.cells import cell_of
 from semgrid_edu.occupancy.state import OUTSIDE
 
 ROUGH = 3e-5
-"""Radians that `rough_azimuth` may err by; it errs by less than half of that (Abramowitz and Stegun, 4.4.47)."""
+"""Error bound of `rough_azimuth`, radians; the error is less than half of it (Abramowitz and Stegun, 4.4.47)."""
 
 
 @njit(cache=True, inline="always")
 def beam_of(x, y, beams):
-    """Return the beam whose sector contains a point, from 0 to B - 1; beam 0 begins straight behind the vehicle.
+    """Return the beam whose sector contains a point, 0 to B - 1; beam 0 begins straight behind the vehicle.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ def rough_azimuth(x, y):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def beams_of(x, y, beams):
-    """Return the beam of each of many points: exactly that of `beam_of`, seven times as fast.
+    """Return the beam of each of many points: the same as `beam_of`, seven times as fast.
 
-    Each azimuth is first computed roughly, which the compiler does for several points at a time. The arctangent itself
-    is computed only for points too close to the border between two beams for a rough azimuth to decide. Parameters are
-    those of `beams_of`.
+    Each azimuth is first approximated, in a loop that the compiler vectorises. The arctangent itself is computed only
+    for points too close to the border between two beams for the approximation to decide. Parameters are those of
+    `beams_of`.
     """
     x, y = np.ascontiguousarray(x), np.ascontiguousarray(y)
     per_radian, unsure = beams / (2 * np.pi), np.empty(len(x), np.bool_)

@@ -1,4 +1,4 @@
-"""Particles drawn again by compiled loops."""
+"""Resampling in compiled loops."""
 
 import math
 
@@ -35,13 +35,13 @@ def compiled_resampling(how: Resampling) -> Resampling:
 def systematic_resample(weight, count, offset):
     """Draw indices in proportion to the weights. Parameters and result are those of `systematic_resample`."""
     total = 0.0
-    for w in weight:  # in the same order as `below`, so that both end at the same number
+    for w in weight:  # summed in the same order as `below`, so that both end at the same number
         total += w
     points = (np.arange(count) + offset) / count * total
     chosen = np.zeros(count + 1, np.int64)
     first, below = 0, 0.0
     for i in range(len(weight)):
-        chosen[first] = i  # a weight on which no point lies is overwritten by the next
+        chosen[first] = i  # a weight that no point hits is overwritten by the next
         below += weight[i]
         first = _points_below(below, points, below / total * count - offset)
     for m in range(1, count):
@@ -51,7 +51,7 @@ def systematic_resample(weight, count, offset):
 
 @njit(cache=True, nogil=True)
 def _points_below(weight, points, expected):
-    """Return how many points lie below a weight: about `expected`, which rounding may have made wrong by one."""
+    """Return how many points are below a weight: `expected`, corrected by one if rounding made it wrong."""
     n = min(max(math.ceil(expected), 0), len(points))
     while n > 0 and points[n - 1] >= weight:
         n -= 1
@@ -79,7 +79,7 @@ def draw_newborn(
 
 @njit(cache=True, nogil=True)
 def _positions(cells, part, width, x_max, y_max, cell):
-    """Return the places, (M, 2), at given parts of cells, (M, 2) from 0 to 1, from their corner of largest x and y."""
+    """Return positions, (M, 2), from fractions of a cell, (M, 2), counted from its corner of largest x and y."""
     position = np.empty_like(part)
     for m in range(len(cells)):
         row, col = divmod(cells[m], width)
@@ -89,5 +89,5 @@ def _positions(cells, part, width, x_max, y_max, cell):
 
 
 def equal_weights(weight: NDArray, count: int) -> NDArray[np.float32]:
-    """Return equal weights with the same sum as given ones. Parameters are those of `equal_weights`."""
+    """Return equal weights with the same sum as the given ones. Parameters are those of `equal_weights`."""
     return np.full(count, weight.sum(dtype=np.float64) / max(count, 1), np.float32)

@@ -47,7 +47,7 @@ def compiled_twin(model: Sensor) -> Sensor:
     Parameters
     ----------
     model : Sensor
-        The sensor. A subclass of the book's that processes scans in its own way counts as another.
+        The sensor. A subclass of the book's that overrides how scans are processed counts as another sensor.
     """
     if type(model) is not sensor.SensorModel:
         return model

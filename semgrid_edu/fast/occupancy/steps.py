@@ -117,7 +117,7 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
 
 
 def _single_precision(state: FilterState) -> FilterState:
-    """Return a state in float32, for which the loops are compiled; those of `fast` are already."""
+    """Return a state in float32, for which the loops are compiled; states of `fast` already are."""
     if state.probability.dtype == state.newborn.dtype == state.particles.weight.dtype == np.float32:
         return state
     p = state.particles
@@ -127,7 +127,7 @@ def _single_precision(state: FilterState) -> FilterState:
 
 
 def _walls_of(world: WorldModel) -> Walls:
-    """Return the walls whose rules are compiled; without any, the filter looks neither back nor ahead."""
+    """Return the walls whose rules are compiled; without walls, the filter looks neither back nor ahead."""
     if world.walls is None:
         return Walls(clearing_time=0)
     if type(world.walls) is not Walls:

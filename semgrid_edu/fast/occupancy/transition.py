@@ -12,8 +12,8 @@ def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
 
     With r the largest rate at which a state is left, A = (R + r I) dt has no negative entry, and exp(R dt) is the sum
     of A^k / k! with its rows scaled to 1. The sum is taken over a small part of the time step, which is then doubled.
-    `scipy.linalg.expm` wakes the threads of its BLAS, which go on spinning on the core on which the scan is processed:
-    a step took 28 ms with it instead of 18. Parameters and result are those of `transition_matrix`.
+    `scipy.linalg.expm` wakes the threads of its BLAS, which keep spinning on the core that processes the scan: a step
+    took 28 ms with it instead of 18. Parameters and result are those of `transition_matrix`.
     """
     if not not_negative(dt):
         raise ArgumentError("dt", "seconds, not negative", dt)

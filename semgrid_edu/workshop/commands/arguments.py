@@ -1,4 +1,4 @@
-"""What every command asks first: whether its arguments are given, which drive, and what is doubtful about its data."""
+"""What every command checks first: its arguments, which drive to use, and doubts about its data."""
 
 import os
 import re
@@ -15,10 +15,10 @@ if TYPE_CHECKING:  # a command that needs no drive starts faster without numpy
     from semgrid_edu.datasets.frames import FrameSequence
 
 LARGEST = 2**63 - 1
-"""The largest whole number that a command takes: PyTorch's generators take no larger seed."""
+"""The largest integer that a command accepts, because PyTorch's generators accept no larger seed."""
 
 TOLD = 20
-"""Most doubtful things of a kind that are shown one by one."""
+"""Largest number of doubts of a kind that are shown one by one."""
 
 
 class Commands(TyperGroup):
@@ -35,7 +35,7 @@ class Commands(TyperGroup):
         ctx : typer.Context
             The group's context.
         args : list of str
-            What was typed after the group's name.
+            The arguments after the group's name.
         """
         name, command, rest = super().resolve_command(ctx, args)
         Commands.asked = " ".join(["semgrid-edu", *ctx.command_path.split()[1:], str(name)])
@@ -59,7 +59,7 @@ def check_arguments(arguments: Sequence[str]) -> None:
     Parameters
     ----------
     arguments : sequence of str
-        What the user has typed, without the program's name.
+        The user's arguments, without the program's name.
 
     Raises
     ------
@@ -88,12 +88,12 @@ def check_arguments(arguments: Sequence[str]) -> None:
 
 
 def tell(doubts: Iterable[str]) -> None:
-    """Write what is doubtful to the standard error stream, one line each; of several processes the first one does.
+    """Write doubts to standard error, one line each; of several processes only the first one does.
 
     Parameters
     ----------
     doubts : iterable of str
-        What `drive_doubts`, `dataset_doubts` or `weights_doubts` return.
+        Doubts from `drive_doubts`, `dataset_doubts` or `weights_doubts`.
     """
     doubts = list(doubts) if os.environ.get("RANK", "0") == "0" else []
     for doubt in doubts[:TOLD]:
@@ -112,7 +112,7 @@ def chosen_drive(kitti: dict[str, object], pandaset: dict[str, object], camera: 
     pandaset : dict of str to object
         The values of --pandaset and --scene.
     camera : str or None
-        The camera, by the name that the data set gives it; its first one when left out.
+        The data set's name for the camera; the first camera when left out.
 
     Raises
     ------

@@ -114,14 +114,14 @@ def real_excerpt(
 
 
 def report(problems: list[str], success: str) -> None:
-    """Print every problem on a line of its own and exit with 1, or print something else when there is none.
+    """Print one problem per line and exit with 1, or print a message if there is none.
 
     Parameters
     ----------
     problems : list of str
         One line for each problem.
     success : str
-        What to print when there is no problem.
+        The message if there is no problem.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What is doubtful about a data set; every command that uses one reports it before hours of work begin."""
+"""Doubts about a data set, which every command that uses one reports before hours of work begin."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from semgrid_edu.workshop.doubts import drive_doubts
 
 
 def dataset_doubts(dataset_dir: str | Path, *splits: str) -> list[str]:
-    """List what is doubtful about the drives of some splits.
+    """List the doubts about the drives of some splits.
 
     Parameters
     ----------

@@ -32,16 +32,16 @@ PANDASET_LICENCE = (
     "a scene so that FOLDER/002 holds lidar, camera and annotations, then run "
     "`semgrid-edu demo --pandaset FOLDER --scene 002`."
 )
-"""What a user has to know to get PandaSet, which no program can fetch for them."""
+"""Instructions for getting PandaSet, which a program can't download for the user."""
 
 REGISTRY = "registry.txt"
-"""The file beside the archives that holds their SHA-256, in pooch's form: a line `name sha256` for each."""
+"""The file beside the archives with their SHA-256 in pooch's format: a line `name sha256` for each."""
 
 ATTEMPTS = 5
-"""How often a connection is made before giving up; what has arrived is kept, also for the next call."""
+"""How often to connect before giving up; partial downloads are kept, also for the next call."""
 
 CHUNK = 2**16
-"""Bytes that are read at once. When a connection breaks off, at most one such piece is lost."""
+"""Bytes to read at once. If a connection breaks, at most one such piece is lost."""
 
 _CALIBRATION = ("calib_cam_to_cam.txt", "calib_velo_to_cam.txt", "calib_imu_to_velo.txt")
 

@@ -39,7 +39,7 @@ def answer_array(result: Any, name: str = "it", dtype: type = float) -> NDArray:
     try:
         return np.array(result, dtype=dtype)
     except (TypeError, ValueError):
-        kind = type(result).__name__  # raised below, so that the student sees one error and not numpy's as well
+        kind = type(result).__name__  # raised below, so that the student doesn't see numpy's error as well
     hint = ": are its rows equally long?" if isinstance(result, list | tuple) else ""
     raise AssertionError(f"{name} returned no array of numbers but a {kind} that holds something else{hint}")
 
@@ -93,13 +93,13 @@ def answer_number(result: Any, name: str = "it") -> float:
         When the result is None or not exactly one number.
     """
     numbers = answer_array(result, name)
-    # How many might tell a hidden input: this sentence is also that of hidden tests.
+    # The number of values might reveal a hidden input, because hidden tests show this message too.
     assert numbers.size == 1, f"{name} returned {'several numbers' if numbers.size else 'nothing'} instead of one"
     return numbers.item()
 
 
 def peak_megabytes(function: Callable, *arguments: Any) -> tuple[Any, float]:
-    """Call a function, and measure the largest amount of memory that it holds at any time.
+    """Call a function, and measure its peak memory.
 
     Parameters
     ----------
@@ -107,14 +107,14 @@ def peak_megabytes(function: Callable, *arguments: Any) -> tuple[Any, float]:
         The function. When it works in another process, as a student's answer does while it is graded, it has a method
         `peak_megabytes` that measures there.
     *arguments
-        What it is called with.
+        Its arguments.
 
     Returns
     -------
     result
         What the function returns.
     megabytes : float
-        The most that Python's own allocators, numpy's among them, held in 10^6 bytes beyond what they held before.
+        The increase of the memory held by Python's allocators (numpy's included) to its peak, in 10^6 bytes.
     """
     if hasattr(function, "peak_megabytes"):
         return function.peak_megabytes(*arguments)

@@ -24,10 +24,10 @@ from semgrid_edu.workshop.course.notebooks.build import (
 from semgrid_edu.workshop.course.notebooks.rules import RULES, WAIVERS, Rule, rule_problems
 
 MAX_LINES = 25
-"""Most lines of a code cell, so that a student can take it in at once."""
+"""Largest number of lines of a code cell, so that a student can take it in at a glance."""
 
 MAX_TEST_LINES = 32
-"""Most lines of an exercise's test cell: its function, and a hint for each of many mistakes."""
+"""Largest number of lines of an exercise's test cell: its function, and a hint for each of many mistakes."""
 
 MAX_BYTES = 2_000_000
 """Largest size of a lecture or companion, bytes: it has room for figures and one or two animations."""
@@ -182,7 +182,7 @@ def _problems(source: Path, parts: dict[str, str], rules: dict[str, Rule]) -> It
 
 
 def _run_problems(cell: NotebookNode, number: int) -> Iterator[str]:
-    """List the signs that a code cell didn't run in its turn, or raised an error, or gave a warning."""
+    """List the signs that a code cell ran out of order, raised an error or gave a warning."""
     if cell.execution_count != number:
         yield f"has execution count {cell.execution_count}; execute the whole notebook in order"
     for output in cell.outputs:
@@ -207,5 +207,5 @@ def _shown(cell: NotebookNode) -> str:
 
 
 def _inputs(notebook: NotebookNode) -> list[tuple]:
-    """Return what comes from the source of a notebook: kind, id, text and metadata of every cell."""
+    """Return the parts of a notebook that come from its source: kind, id, text and metadata of every cell."""
     return [(cell.cell_type, cell.id, cell.source, dict(cell.metadata)) for cell in notebook.cells]

@@ -1,7 +1,7 @@
-"""What lectures 13 and 14 share with their exercises and hidden tests: measurements on a labelled street.
+"""Measurements on a labelled street, shared by lectures 13 and 14 with their exercises and hidden tests.
 
-A score on one street has an interval if its cells are counted by pieces of street. Students have no `worlds` folder,
-so what an exercise imports is here.
+A score on one street has an interval if its cells are counted by pieces of street. Students don't have the `worlds`
+folder, so the code that exercises import is here.
 """
 
 from collections.abc import Iterator, Sequence

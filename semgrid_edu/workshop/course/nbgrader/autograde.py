@@ -14,7 +14,7 @@ from semgrid_edu.workshop.course.nbgrader import build
 from semgrid_edu.workshop.course.nbgrader.build import MARKER
 
 PATIENCE = 10
-"""How often a submission is tried while another process blocks the gradebook."""
+"""How often to try a submission while another process blocks the gradebook."""
 
 
 class UnfitError(Exception):
@@ -22,7 +22,7 @@ class UnfitError(Exception):
 
 
 class UngradedError(Exception):
-    """Grading failed for a reason that isn't the submission's: it has no grade, and can be graded another time."""
+    """Grading failed, but not because of the submission: it has no grade, and can be graded again later."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ CLEARED = steps.LockCells, steps.ClearSolutions, steps.ClearOutput, steps.ClearH
 """The steps that remove from an exercise what students must not see."""
 
 RELEASE_STEPS = *CLEARED, steps.ComputeChecksums, steps.CheckCellMetadata
-"""What nbgrader's generate_assignment does to a notebook, without its gradebook."""
+"""The steps of nbgrader's generate_assignment on a notebook, without its gradebook."""
 
 MARKER = "semgrid_course.json"
 """The file that marks a folder as a course that `build_course` wrote."""
@@ -81,7 +81,7 @@ def build_exercise(source: Path) -> Path:
 
 @dataclass(frozen=True)
 class BuiltCourse:
-    """What `build_course` has written.
+    """The results of `build_course`.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
 
 
 def _refuse_other_folders(directory: Path) -> None:
-    """Raise when a folder holds anything but a course that `build_course` wrote."""
+    """Raise an error if a folder contains anything but a course that `build_course` wrote."""
     if directory.is_file():
         raise DataError(directory, "a folder", "a file")
     if directory.exists() and any(directory.iterdir()) and not (directory / MARKER).is_file():
@@ -152,7 +152,7 @@ def _course_files(folder: Path, sources: list[Path], lectures: str) -> dict[str,
 
 
 def _source_text(source: Path, lectures: str) -> str:
-    """Return an exercise as the instructor gets it: with solutions, and links that students can follow."""
+    """Return the instructor's version of an exercise: with solutions, and links that work for students."""
     notebook = read_percent(source)
     for cell in notebook.cells:
         if cell.cell_type == "markdown":
@@ -258,12 +258,12 @@ def caught_errors(log: logging.Logger) -> Iterator[list[BaseException]]:
 
 
 def failure_reason(result: dict, errors: list[BaseException]) -> str:
-    """Return in one line why nbgrader failed.
+    """Return the reason why nbgrader failed, in one line.
 
     Parameters
     ----------
     result : dict
-        What nbgrader's API returned.
+        The return value of nbgrader's API.
     errors : list of BaseException
         What `caught_errors` collected. The last one counts; without any, the last line of nbgrader's message.
     """

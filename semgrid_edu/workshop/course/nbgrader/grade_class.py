@@ -38,7 +38,7 @@ UNREADABLE = "unreadable"
 def grade_course(
     course: Path, settings: GradeSettings, assignments: Sequence[str] = (), again: bool = False, workers: int = 1
 ) -> Iterator[Graded]:
-    """Grade what was handed in and isn't graded yet; after an interruption, a second call goes on.
+    """Grade the submissions that aren't graded yet; after an interruption, a second call continues.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def grade_course(
 
 
 def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int, failed: dict) -> Iterator[Graded]:
-    """Yield results; what was in progress when a process died is graded again alone, to find out whose fault it was."""
+    """Yield results; if a process died, grade its submissions again one by one, to find the culprit."""
     with _pool(workers) as pool:
         failed |= _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
         ready = [one for one in wanted if one[0] not in failed]

@@ -1,4 +1,4 @@
-"""What was handed in, whether it can be graded and has been graded, and its result in the gradebook."""
+"""Submissions: which there are, whether they can be or have been graded, and their results in the gradebook."""
 
 import csv
 import io
@@ -173,7 +173,7 @@ def unfinished(course: Path, assignment: str, student: str) -> Iterator[None]:
 
 
 def forget(course: Path, assignment: str, student: str) -> None:
-    """Delete what an unfinished grading has left, so that nbgrader doesn't consider the submission graded.
+    """Delete the files of an unfinished grading, so that nbgrader doesn't consider the submission graded.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What this course adds to nbgrader's autograde: submissions are completed, and run apart from their tests."""
+"""Additions of this course to nbgrader's autograde: submissions are completed, and run apart from their tests."""
 
 import re
 import sys
@@ -34,7 +34,7 @@ CRASHES = "crashes"
 """The name under which `ExecuteApart` tells `NoteCrashes` what ended a student's process."""
 
 PATIENCE = 600.0
-"""How many seconds a cell of the reference may take: it compiles functions, which submissions then needn't."""
+"""Time limit of a reference cell, seconds: it compiles functions that submissions then reuse."""
 
 FONTS = "import matplotlib.pyplot"
 """Makes matplotlib look for the system's fonts, which takes seconds."""
@@ -108,7 +108,7 @@ def _defined(source: str) -> set[str]:
 
 
 def _mark(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> None:
-    """Give the last cell of each name the exercise's metadata, and all other cells none."""
+    """Set the exercise's metadata on the last cell of each name, and none on all other cells."""
     left = dict(blanks)
     for cell in reversed(cells):
         blank = left.pop(cell_name(cell), None)

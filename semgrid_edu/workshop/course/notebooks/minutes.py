@@ -31,7 +31,7 @@ SECTION = re.compile(r"^(?=## )", re.MULTILINE)
 
 @dataclass(frozen=True)
 class ReadingTime:
-    r"""How much a notebook, or a part of it, gives to read, to look at and to think about.
+    r"""How much there is to read, to look at and to think about in a notebook or a part of it.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class ReadingTime:
         return sum(self.parts.values())
 
     def __add__(self, other: "ReadingTime") -> "ReadingTime":
-        """Return what two pieces of a notebook give together."""
+        """Return the sum over two pieces of a notebook."""
         return ReadingTime(*(a + b for a, b in zip(astuple(self), astuple(other), strict=True)))
 
 

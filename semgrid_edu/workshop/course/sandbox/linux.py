@@ -18,7 +18,7 @@ LIBRARY = ctypes.CDLL(None, use_errno=True) if sys.platform == "linux" else None
 """The C library, looked up once: in a process that has loaded torch, a look-up takes milliseconds."""
 
 NO_NEW_PRIVILEGES = 38
-"""The argument of prctl that the kernel requires before either."""
+"""The prctl option that the kernel requires before Landlock and seccomp."""
 
 CREATE, ADD, RESTRICT = 444, 445, 446
 """Numbers of Landlock's three system calls, the same on every processor."""
@@ -34,7 +34,7 @@ FILE_RIGHTS = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 4: (1 << 15
 """All rights to files by version of Landlock; later versions have those of version 5."""
 
 PROCESSORS = table_beside(__file__)
-"""By processor: the code of its native calls ("audit"), and the calls that seccomp refuses or ignores, by name."""
+"""By processor: the code of its native calls ("audit"), and the calls that seccomp denies or ignores, by name."""
 
 NEWER = 467
 """Calls from this number on fail as if the system didn't know them: x86_64 has all calls a second time from 2^30."""

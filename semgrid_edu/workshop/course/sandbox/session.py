@@ -23,7 +23,7 @@ class AnswerTimeoutError(Exception):
 
 
 class AnswerEndedError(Exception):
-    """An answer has ended its own process."""
+    """An answer has ended its process."""
 
 
 class AnswerError(Exception):
@@ -165,7 +165,7 @@ class Session:
             found = _standard_error(error | {"kind": "", "says": says, "line": ""})
             found.secret = says
             return found
-        # A line that is in no cell was forged to say something else.
+        # A line number outside all cells was forged to smuggle out a value.
         known = any(error["line"] in cell for cell in self.cells)
         return _standard_error(error | {"line": error["line"] if known else ""})
 

@@ -1,4 +1,4 @@
-"""What a student's process and its folder use of the machine, measured from outside."""
+"""The resources that a student's process and its folder use, measured from outside."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""Plain values as bytes: what may pass between a student's process and the grader's. Never a pickle.
+"""Plain values as bytes, which may pass between a student's process and the grader's. Never a pickle.
 
 A message is one line of JSON, followed by the bytes of its arrays. Reading it creates numbers, texts, containers,
 arrays and a few of the package's records, and runs nothing that the sender wrote.
@@ -221,7 +221,7 @@ def _record(path: str, values: list) -> Any:
 
 
 def put_back(original: Any, changed: Any) -> Any:
-    """Apply to an argument what a function in another process did to its copy; return the result.
+    """Apply the changes that a function in another process made to its copy of an argument; return the result.
 
     Parameters
     ----------
