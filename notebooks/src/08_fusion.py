@@ -65,6 +65,8 @@ from semgrid_edu.training.batches import Batch, grid_logits
 from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.training.loss import class_frequencies, class_weights, median_frequency_weights
 from semgrid_edu.workshop.scoring import score_with_interval
+
+# %% jupyter={"source_hidden": true}
 from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_08_late_fusion import car_by_both, late_fusion
 

@@ -50,6 +50,8 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import Stages, network_image
+
+# %% jupyter={"source_hidden": true}
 from worlds.lecture_10_crf import crf_stage
 from worlds.lecture_11_accurate import mean_field_accurate
 from worlds.lecture_11_lattice import draw_lattice_frame, draw_triangles, lattice_story, vertex_places

@@ -22,14 +22,13 @@ from semgrid_edu.fast import TrainingSet, build_net, load_net
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, with_mean_scores
-from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import check_writable, sha256, table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.devices import open_fabric
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, reliability_of_sums
-from semgrid_edu.workshop.scoring.grids import NETWORK, majority_by_state, network_grids
+from semgrid_edu.workshop.scoring.grids import NETWORK, crf_refinement, majority_by_state, network_grids
 from semgrid_edu.workshop.scoring.score_with_interval import (
     compared,
     markdown_table,
@@ -225,7 +224,7 @@ def _count(name: str, weights: Path, test: list[Part]) -> Counted:
     counts: Counted = {}
     for frames in (_Subset(*part) for part in test):
         net = load_net(weights, frames.camera)
-        found = count_grids(network_grids(net, frames, {"CRF": Stages.of(net).refine}), frames)
+        found = count_grids(network_grids(net, frames, {"CRF": crf_refinement(frames.spec.cell)}), frames)
         for method in found.methods:
             counts.setdefault(method.replace(NETWORK, name), []).append((method, found))
     return counts

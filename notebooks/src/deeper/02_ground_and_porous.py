@@ -34,6 +34,7 @@ from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
+# %% jupyter={"source_hidden": true}
 sys.path.append("..")  # for worlds/, in the folder above
 from worlds.lecture_02_boxes import Box, scan_boxes
 from worlds.lecture_02_rays import evidence_by_rays

@@ -31,6 +31,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.occupancy import CmcdotParams, PlanarMotion, State, VelocityLattice
 
+# %% jupyter={"source_hidden": true}
 sys.path.append("..")  # for worlds/, in the folder above
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 from worlds.lecture_04_blur import SCHEMES, measure_blur, winding_road

@@ -32,6 +32,7 @@ from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_image_
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import load_net
 
+# %% jupyter={"source_hidden": true}
 sys.path.append("..")  # for worlds/, in the folder above
 from worlds.lecture_13_domain import (
     agrees_with_lidar, class_probabilities, colour_distance, image_statistics, match_colours, mean_histograms, mean_over,

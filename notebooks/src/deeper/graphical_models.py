@@ -30,6 +30,7 @@ from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eli
 from semgrid_edu.graphical import max_product, mean_field_graph, min_fill_order, product, sum_product, why_dependent
 from semgrid_edu.grid import GridSpec
 
+# %% jupyter={"source_hidden": true}
 sys.path.append("..")  # for worlds/, in the folder above
 from worlds.lecture_00_system import whole_system
 from worlds.lecture_01_line import bayes_on_a_line

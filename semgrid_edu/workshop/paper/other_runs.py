@@ -18,7 +18,6 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.networks import SemanticGridNet, unit_image
-from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
@@ -28,7 +27,7 @@ from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.score_runs import CONFUSIONS
 from semgrid_edu.workshop.paper.training_runs import GridStageRun, NetworkRun, seconds_per_step
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions
-from semgrid_edu.workshop.scoring.grids import learned_log_g
+from semgrid_edu.workshop.scoring.grids import crf_refinement, learned_log_g
 from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval
 
 OVERTURNED = "overturned cars"
@@ -220,7 +219,7 @@ class FigureRun(NetworkRun):
         """Make the grids. Parameters are those of `Run.work`."""
         frames = self.frames.frames(root)
         net = self.network.trained(root, frames.camera)
-        refine = Stages.of(net).refine
+        refine = crf_refinement(frames.spec.cell)
         numbers = [int(share * len(frames)) for share in SHOWN]
         log_g = [learned_log_g(net, frames[k]) for k in numbers]
         refined = [refine(g, frames.arrays["occupancy"][k]) for k, g in zip(numbers, log_g, strict=True)]

@@ -11,12 +11,11 @@ from semgrid_edu.fast import TrainingSet, load_net
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet
-from semgrid_edu.pipeline import Stages
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, save_confusions
 from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, truths_of_frames
-from semgrid_edu.workshop.scoring.grids import Refine, baseline_grids, network_grids
+from semgrid_edu.workshop.scoring.grids import Refine, baseline_grids, crf_refinement, network_grids
 from semgrid_edu.workshop.scoring.score_with_interval import every_metric, markdown_table, score_with_interval, shown
 from semgrid_edu.workshop.scoring.statistics import Metric
 
@@ -110,7 +109,7 @@ def count_methods(
     refine : callable, optional
         Refines the network's grids, as in `evaluate`.
     """
-    learned = network_grids(net, test, {_name(refine): refine or Stages.of(net).refine})
+    learned = network_grids(net, test, {_name(refine): refine or crf_refinement(test.spec.cell)})
     baselines = baseline_grids(training, test, segmenters)
     return count_grids(lambda k: learned(k) | baselines(k), test)
 

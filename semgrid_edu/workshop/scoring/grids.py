@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from torch import nn
 
 from semgrid_edu.camera import Camera
+from semgrid_edu.crf import CrfParams, unary_from_log_probability
 from semgrid_edu.datasets.ground_truth import carry_labels, close_gaps
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import mean_field
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.networks import SemanticGridNet, unit_image
 from semgrid_edu.occupancy import N_STATES
@@ -46,7 +48,7 @@ def network_grids(net: SemanticGridNet, frames: TrainingSet, refinements: Mappin
     frames : TrainingSet
         The frames.
     refinements : mapping of str to callable, optional
-        Refinements of the network's grids by name, such as `{"CRF": Stages.of(net).refine}`.
+        Refinements of the network's grids by name, such as `{"CRF": crf_refinement(0.5)}`.
 
     Returns
     -------
@@ -86,6 +88,22 @@ def learned_log_g(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
         The frame.
     """
     return net(unit_image(sample.image)[None], sample.occupancy[None])[0].log_softmax(dim=0).numpy()
+
+
+def crf_refinement(cell: float) -> Refine:
+    """Return the fast CRF with the default parameters.
+
+    Parameters
+    ----------
+    cell : float
+        Side of a cell, metres.
+    """
+    params = CrfParams.for_cells(cell)
+
+    def refine(log_g: NDArray, o: NDArray) -> NDArray[np.float32]:
+        return mean_field(unary_from_log_probability(log_g), o, params)
+
+    return refine
 
 
 @torch.inference_mode()
