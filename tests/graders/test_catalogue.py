@@ -180,5 +180,6 @@ for exercise in exercises():
 
 def test_a_wrong_jackknife_costs_nothing_in_task_4():
     """A right answer to task 4 of exercise 12 that builds on task 3 is graded beside a wrong answer to task 3."""
-    beside = [own for own in pack(entries_of("12_experiments")) if "jackknife that is wrong" in own["paired"].title]
+    packs = [own for own in pack(entries_of("12_experiments")) if "paired" in own]  # the last ones lack some tasks
+    beside = [own for own in packs if "jackknife that is wrong" in own["paired"].title]
     assert [own["towns"].loses > 0 for own in beside] == [True]
