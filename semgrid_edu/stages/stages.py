@@ -205,7 +205,7 @@ class Stages:
         return stages.over(cls.fast(load_net(sample_weights(), camera), **options))
 
     def started(self) -> "Stages":
-        """Return the stages for one drive: with a tracker and a memory of their own, and with their results checked."""
+        """Return the stages for one drive: with fresh copies of tracker and memory, and with their results checked."""
         if missing := set(STAGES) - set(self.given):
             raise ArgumentError("stages", f"all of {', '.join(STAGES)}", f"no {', '.join(sorted(missing))}")
         architecture = self.architecture or Architecture()
