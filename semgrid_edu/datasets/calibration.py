@@ -222,6 +222,13 @@ def check_rotation(path: Path, R: NDArray[np.float64], what: str) -> NDArray[np.
     return R
 
 
+TRACKING_KEYS = ("R_rect", "Tr_velo_cam", "Tr_imu_velo")
+"""The tracking benchmark's keys of the rectification, of the LIDAR in camera 0, and of the IMU in the LIDAR."""
+
+OBJECT_KEYS = ("R0_rect", "Tr_velo_to_cam", "Tr_imu_to_velo")
+"""The object benchmark's names of the same three."""
+
+
 class BenchmarkCalibration(NamedTuple):
     """The calibration of the left colour camera, and the poses of the other sensors.
 
@@ -248,7 +255,7 @@ def read_benchmark_calibration(path: Path) -> BenchmarkCalibration:
 
     The odometry benchmark has the keys P0 to P3 and Tr, the LIDAR in the rectified camera 0. The tracking benchmark has
     P0 to P3, R_rect, Tr_velo_cam (the LIDAR in camera 0 before it is rectified) and Tr_imu_velo, the last three without
-    a colon.
+    a colon. The object benchmark calls these three R0_rect, Tr_velo_to_cam and Tr_imu_to_velo.
 
     Parameters
     ----------
@@ -261,9 +268,13 @@ def read_benchmark_calibration(path: Path) -> BenchmarkCalibration:
         T_camera0_from_lidar = _rigid(path, entries, "Tr")
         T_lidar_from_imu = None
     else:
-        R = check_rotation(path, entry_of(path, entries, "R_rect", (3, 3)), "R_rect")
-        T_camera0_from_lidar = rigid_transform(R, np.zeros(3)) @ _rigid(path, entries, "Tr_velo_cam")
-        T_lidar_from_imu = _rigid(path, entries, "Tr_imu_velo")
+        rectify, from_lidar, from_imu = OBJECT_KEYS if OBJECT_KEYS[0] in entries else TRACKING_KEYS
+        if rectify not in entries:
+            expected = f"the key Tr of the odometry benchmark, or {rectify} and {from_lidar} of the tracking benchmark"
+            raise DataError(path, expected, ", ".join(entries)[:200] or "no key")
+        R = check_rotation(path, entry_of(path, entries, rectify, (3, 3)), rectify)
+        T_camera0_from_lidar = rigid_transform(R, np.zeros(3)) @ _rigid(path, entries, from_lidar)
+        T_lidar_from_imu = _rigid(path, entries, from_imu)
     T_camera_from_lidar = T_camera_from_rectified @ T_camera0_from_lidar
     return BenchmarkCalibration(K, T_camera_from_lidar, T_camera0_from_lidar, T_lidar_from_imu)
 

@@ -1,6 +1,5 @@
 """The index of a data set: its labelled frames, split into training and test frames (section 4)."""
 
-import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from semgrid_edu.datasets.pandaset_files import semseg_folder
 from semgrid_edu.datasets.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14, LABEL_SETS, LabelSet
-from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.files import relative_path, write_json
 from semgrid_edu.storage.reading import read_json
 
 INDEX_FILE = "dataset.json"
@@ -211,7 +210,7 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
         raise DataError(semseg_folder(Path(root) / scene), "the classes of the returns", "no folder")
     if not splits["train"]:
         raise ArgumentError("test_cameras", "at least one camera less", ", ".join(test_cameras))
-    place = os.path.relpath(Path(root).resolve(), Path(folder).resolve())
+    place = relative_path(Path(root).resolve(), Path(folder).resolve())
     index = {"name": f"pandaset-{scene}", "reader": "pandaset", "root": place}
     index |= {"label_set": KITTI_14.name, "splits": {split: frames for split, frames in splits.items() if frames}}
     write_json(path, index)

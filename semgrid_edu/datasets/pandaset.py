@@ -19,7 +19,7 @@ from semgrid_edu.datasets.calibration import camera_from
 from semgrid_edu.datasets.cuboids import LabelledScan, put_together
 from semgrid_edu.datasets.frames import FrameSequence, frame_numbers, nothing_known
 from semgrid_edu.datasets.project_lidar import birdseye_votes, cells_in_view, closest_returns, unhidden
-from semgrid_edu.errors import ArgumentError, DataError, check_whole
+from semgrid_edu.errors import ArgumentError, DataError, check_text, check_whole
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -69,7 +69,7 @@ class PandasetScene(FrameSequence):
     Raises
     ------
     ArgumentError
-        When there is no such camera.
+        When `scene` isn't text, or there is no such camera.
     DataError
         When there is no such scene, or no image. `scene[k]` raises it when a file that the frame needs is missing or
         damaged.
@@ -84,6 +84,7 @@ class PandasetScene(FrameSequence):
     credit = files.CREDIT
 
     def __init__(self, root: str | Path, scene: str, camera: str = CAMERAS[0]) -> None:
+        check_text(scene=(scene, "002"))
         if camera not in CAMERAS:
             raise ArgumentError("camera", f"one of {', '.join(CAMERAS)}", repr(camera))
         self.folder = Path(root) / scene
@@ -121,7 +122,9 @@ class PandasetScene(FrameSequence):
         number = self.numbers[0]
         if self._scan(number).labelled is None:
             return LIDAR_HEIGHT
-        points, classes, *_ = self._labelled_scan(number)
+        labelled = self._labelled_scan(number)
+        points = labelled.points
+        classes = labelled.classes
         eye = self._T_world_from_lidar(0)[:3, 3]
         near = (classes == KITTI_14.index("road")) & (np.hypot(*(points[:, :2] - eye[:2]).T) < 12)
         return float(eye[2] - np.median(points[near, 2])) if near.any() else LIDAR_HEIGHT

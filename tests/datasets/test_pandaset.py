@@ -263,7 +263,7 @@ def written(name, content):
 
 def column(name, key, values):
     """Write a table again, with other values in one column."""
-    return lambda folder: write_table(folder / name, read_pickled_table(folder / name) | {key: values})
+    return lambda folder: write_table(folder / name, read_pickled_table(folder / name).columns | {key: values})
 
 
 def shortened(name):
@@ -272,7 +272,7 @@ def shortened(name):
 
 def relabelled(folder):
     path = folder / "annotations/semseg/02.pkl.gz"
-    write_table(path, {"class": read_pickled_table(path)["class"] + 92})
+    write_table(path, {"class": read_pickled_table(path).columns["class"] + 92})
 
 
 BAD = {
