@@ -109,7 +109,7 @@ def recall_classes(
     flat = memory.evidence.reshape(2, n, -1), memory.weight.reshape(2, -1), memory.seen.reshape(2, -1)
     movable = np.isin(np.arange(n), params.movable)
     beam = np.log(something_there(occupancy)).astype(np.float32)
-    _recall(*flat, places, occupancy, *look[:-1], np.float32(params.most), movable, beam, recalled)
+    _recall(*flat, places, occupancy, *look[:-1], np.float32(params.max_weight), movable, beam, recalled)
     return recalled
 
 
@@ -198,7 +198,7 @@ def learn_classes(memory: MemoryState, places: NDArray, look: Look, params: Memo
     learnt = memory.copy()
     n = len(look.log_class)
     flat = look.log_class.reshape(n, -1), *(part.ravel() for part in look[2:])
-    _learn(learnt.evidence, learnt.weight, learnt.seen, places, *flat, np.float32(params.most))
+    _learn(learnt.evidence, learnt.weight, learnt.seen, places, *flat, np.float32(params.max_weight))
     return learnt
 
 

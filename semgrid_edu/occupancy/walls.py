@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import check_fields, not_negative, types_named
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.particles import at_cells, cells_of, weight_in_cells
-from semgrid_edu.occupancy.state import CERTAIN, OUTSIDE, Particles, State, ratio
+from semgrid_edu.occupancy.state import CERTAIN, OUTSIDE, Particles, State, at_cells, cells_of, ratio, weight_in_cells
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 

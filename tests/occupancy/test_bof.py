@@ -32,7 +32,7 @@ from semgrid_edu.occupancy import (
     transition_matrix,
     update,
 )
-from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
+from semgrid_edu.occupancy.state import cells_of, weight_in_cells
 from semgrid_edu.occupancy.resampling import draw_velocities
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State

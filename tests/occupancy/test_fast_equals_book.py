@@ -32,8 +32,8 @@ from semgrid_edu.occupancy import (
     Walls,
     WorldModel,
 )
-from semgrid_edu.occupancy.local_belief import velocity_moments
-from semgrid_edu.occupancy.particles import cells_of
+from semgrid_edu.occupancy.cmcdot import velocity_moments
+from semgrid_edu.occupancy.state import cells_of
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.occupancy.polar import GroundParams, height_above_ground
 from semgrid_edu.occupancy.resampling import systematic_resample
@@ -194,7 +194,7 @@ def test_heights_and_evidence(corners, pitch, roll, dtype, seed):
     boxes = [Box(x, x + long, y, y + long, high) for x, y, long, high in corners]
     points = scan_boxes(boxes, columns=180, rings=24, noise=0.02, rng=rng).astype(dtype)
     points[:, 2] += pitch * points[:, 0] + roll * points[:, 1] - (rng.random(len(points)) < 0.01) * rng.uniform(0, 3)
-    coarse = GroundParams(sectors=40, bin=1.0, farthest=40.0, neighbours=2)
+    coarse = GroundParams(sectors=40, bin_length=1.0, farthest=40.0, neighbours=2)
     compiled = fast.height_above_ground(points, coarse)
     np.testing.assert_allclose(compiled, height_above_ground(points, coarse), rtol=0, atol=1e-5)
 

@@ -14,7 +14,7 @@ from semgrid_edu.occupancy.polar import GroundParams, height_above_ground, walk_
 from semgrid_edu.occupancy.sensor import prepare_scan
 
 PARAMS = GroundParams()
-MIDDLES = (np.arange(PARAMS.bins) + 0.5) * PARAMS.bin
+MIDDLES = (np.arange(PARAMS.bins) + 0.5) * PARAMS.bin_length
 SCENE = [Box.around(12, 2, 4, 1.8, 1.5), Box.around(20, -4, 1, 8, 2.4), Box.around(7, -3, 0.5, 0.5, 1.8)]
 
 
@@ -154,7 +154,7 @@ def test_what_is_no_scan_is_refused_by_name(heights, points):
 
 @pytest.mark.parametrize(
     "bad",
-    [{"sectors": 0}, {"sectors": 4.5}, {"neighbours": -1}, {"neighbours": 180}, {"bin": 0.0}, {"bin": 100.0}]
+    [{"sectors": 0}, {"sectors": 4.5}, {"neighbours": -1}, {"neighbours": 180}, {"bin_length": 0.0}, {"bin_length": 100.0}]
     + [{name: value} for name in ("step", "slope", "rise", "grade", "gap") for value in (-0.1, np.nan)],
 )
 def test_impossible_ground_is_refused_by_name(bad):

@@ -5,8 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from semgrid_edu.occupancy import Particles, PlanarMotion
-from semgrid_edu.occupancy.local_belief import turn_moments, velocity_moments
-from semgrid_edu.occupancy.particles import transform
+from semgrid_edu.occupancy.cmcdot import velocity_moments
+from semgrid_edu.occupancy.planar_motion import turn_moments
+from semgrid_edu.occupancy.state import transform
 from semgrid_edu.occupancy.state import OUTSIDE
 
 SHAPE = (2, 3)

@@ -4,8 +4,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.crf.mean_field import bilateral_features, with_border, without_border
-from semgrid_edu.crf.naive import NEVER, damping
+from semgrid_edu.crf.lattice import bilateral_features
+from semgrid_edu.crf.mean_field import NEVER, damping, with_border, without_border
 from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
 from semgrid_edu.fast.crf.arithmetic import FAST, exponential
 from semgrid_edu.fast.crf.lattice import PermutohedralLattice
