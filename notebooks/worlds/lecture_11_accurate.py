@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from semgrid_edu.crf import CrfParams, SeparableGaussian
 from semgrid_edu.crf.mean_field import settled, updates
 from semgrid_edu.crf.params import check_inputs, check_stop
-from semgrid_edu.fast.crf.arithmetic import HALF, exponential
+from semgrid_edu.fast.crf import HALF, exponential
 
 RADIUS = 4.0
 """Reach of the window, in widths `sigma_alpha`: cells further up, down, left or right are left out."""

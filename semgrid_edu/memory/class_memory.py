@@ -53,6 +53,8 @@ def carry_classes(
     for part in (carried.evidence[MOVES], carried.weight[MOVES], carried.seen[MOVES], carried.offset):
         part[:] = 0
 
+    dtype = memory.planes.dtype
+    cell = float(dtype.type(cell))  # rounded as the planes are: in `fast` to single precision
     now = np.stack(np.nonzero(moving >= params.least_moving))  # rows and columns, (2, N)
     displacement = np.nan_to_num(velocity[:, *now]) * dt
     # Where in its cell a thing was is known only when that cell is found, so the search is done twice.
@@ -64,7 +66,7 @@ def carry_classes(
     rest = displacement + memory.offset[:, *before] - (before - now) * cell
     carried.offset[:, *now] = np.clip(rest, -cell / 2, cell / 2)
 
-    kept = params.kept(dt)[:, None, None]
+    kept = params.kept(dt).astype(dtype)[:, None, None]
     carried.weight[:] *= kept
     carried.seen[:] *= kept
     return carried

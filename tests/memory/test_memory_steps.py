@@ -61,17 +61,6 @@ def assert_same(compiled: MemoryState, book: MemoryState) -> None:
 
 
 @TWINS
-@given(SEEDS, PARAMS, st.floats(0, 1), st.sampled_from([0.0, 0.3, 8.0]))
-def test_both_carry_alike(seed, params, dt, speed):
-    rng = np.random.default_rng(seed)
-    memory, moving = memories(rng, params), rng.random(GRID.shape).astype(np.float32) ** 3
-    velocity = (speed * rng.normal(0, 1, (2, *GRID.shape))).astype(np.float32)
-    velocity[:, rng.random(GRID.shape) < 0.2] = np.nan
-    given_all = moving, velocity, GRID.cell, dt, params
-    assert_same(fast.carry_classes(memory, *given_all), carry_classes(doubled(memory), *given_all))
-
-
-@TWINS
 @given(SEEDS, PARAMS)
 def test_both_recall_and_learn_alike(seed, params):
     rng = np.random.default_rng(seed)

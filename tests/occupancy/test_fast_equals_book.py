@@ -18,7 +18,7 @@ from worlds.lecture_02_boxes import Box, scan_boxes
 from semgrid_edu import fast, occupancy
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.fast.occupancy import local_belief as fast_local_belief
+from semgrid_edu.fast.occupancy import cmcdot as fast_cmcdot
 from semgrid_edu.fast.occupancy import particles as fast_particles
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
@@ -33,10 +33,10 @@ from semgrid_edu.occupancy import (
     WorldModel,
 )
 from semgrid_edu.occupancy.cmcdot import velocity_moments
-from semgrid_edu.occupancy.state import cells_of
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.occupancy.polar import GroundParams, height_above_ground
 from semgrid_edu.occupancy.resampling import systematic_resample
+from semgrid_edu.occupancy.state import cells_of
 
 GRID = GridSpec(0, 6, -2, 2, 1)
 SEEDS = st.integers(0, 10**6)
@@ -126,8 +126,9 @@ def test_predict(state, dt, world, driven, seed):
 def looks_alike(compiled: Particles, book: Particles, walls: Walls, driven: float, dt: float) -> bool:
     """Say whether rounding leaves each particle's other places in the same cells, and its pace the same."""
     speed = driven / dt if dt > 0 else 0.0
-    pace = fast_particles.pace_of(walls, driven, dt, GRID.cell)
-    keeps = fast_particles.keeps_pace(*compiled.velocity.T, pace)
+    halt = walls.second_look * walls.clearing_time
+    least = walls.clearing_cells * GRID.cell / halt if halt > 0 else np.inf
+    keeps = fast_particles.keeps_pace.py_func(*compiled.velocity.T, speed, least)
     alike = np.array_equal(keeps, walls.keeps_pace(book.velocity, speed, GRID.cell))
     cells = fast_particles.cells_of(compiled.position, GRID)
     for fraction in (-1, -walls.second_look, 1):
@@ -215,7 +216,7 @@ def test_look_up_and_moments(seed, motion):
     particles = Particles(*(a.astype(np.float32) for a in (position, velocity, rng.random(50))))
     cells = fast_particles.cells_of(particles.position, GRID)
     for ours, theirs in zip(
-        fast_local_belief.velocity_moments(particles, cells, GRID.shape),
+        fast_cmcdot.velocity_moments(particles, cells, GRID.shape),
         velocity_moments(particles, cells, GRID.shape),
         strict=True,
     ):

@@ -138,23 +138,10 @@ def test_neither_order_nor_type_nor_further_columns_matter():
 TWINS = pytest.mark.parametrize("heights", [height_above_ground, fast.height_above_ground], ids=["book", "fast"])
 
 
-@TWINS
-def test_whole_numbers_and_lists_are_points_too(heights):
-    points = [[10, 0, 0], [10, 0, 1], [12, 3, 0]]
-    np.testing.assert_array_equal(heights(points, PARAMS), [0, 1, 0])
-    np.testing.assert_array_equal(heights(np.array(points), PARAMS), [0, 1, 0])
-
-
-@TWINS
-@pytest.mark.parametrize("points", [np.array([[1.0, np.nan, 0.0]]), np.array([[np.inf, 0, 0]]), np.zeros((3, 2))])
-def test_what_is_no_scan_is_refused_by_name(heights, points):
-    with pytest.raises(ArgumentError, match=r"^points: expected"):
-        heights(points, PARAMS)
-
-
 @pytest.mark.parametrize(
     "bad",
-    [{"sectors": 0}, {"sectors": 4.5}, {"neighbours": -1}, {"neighbours": 180}, {"bin_length": 0.0}, {"bin_length": 100.0}]
+    [{"sectors": 0}, {"sectors": 4.5}, {"neighbours": -1}, {"neighbours": 180}]
+    + [{"bin_length": 0.0}, {"bin_length": 100.0}]
     + [{name: value} for name in ("step", "slope", "rise", "grade", "gap") for value in (-0.1, np.nan)],
 )
 def test_impossible_ground_is_refused_by_name(bad):
