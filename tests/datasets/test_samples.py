@@ -75,11 +75,6 @@ def test_a_missing_or_damaged_excerpt_is_named(tmp_path, content):
         read_excerpt(tmp_path)
 
 
-def test_no_samples_at_all_is_an_error(tmp_path):
-    with pytest.raises(DataError, match="found none"):
-        samples_problems(tmp_path)
-
-
 @pytest.mark.parametrize("segmenter", trained_segmenters())
 def test_the_shipped_networks_know_the_shipped_frames(segmenter):
     """They come from their training split; a frame's commonest class fills at most six cells in ten."""

@@ -149,7 +149,7 @@ def test_nothing_is_lost_but_over_the_border_and_nothing_comes_in():
     state = predicted(movers(dict.fromkeys(range(10), (8.0, 0.5))), 2)
     assert np.allclose(state.probability[DYNAMIC, :, 0], 0.5 * (np.arange(10) < 6))
     assert_sound(predicted(state, 1, dt=1000.0))
-    assert predicted(state, 1, dt=1000.0).occupied[1:].max() == 0
+    assert predicted(state, 1, dt=1e30).occupied[1:].max() == 0
 
 
 def test_acceleration_spreads_velocities_with_the_variance_of_particles():
@@ -208,6 +208,24 @@ def test_update_is_that_of_cmcdot_and_leaves_velocities_alone(seed):
     before, after = (s.occupied[1:] / np.maximum(s.probability[DYNAMIC], 1e-9) for s in (state, given_scan))
     worth = np.minimum(state.probability[DYNAMIC], given_scan.probability[DYNAMIC]) > 1e-3
     assert np.allclose(before[:, worth], after[:, worth], atol=1e-3)
+
+
+@pytest.mark.parametrize("certain", ["free", "occupied"])
+def test_contradiction_leaves_nothing_known(certain):
+    state = movers({})
+    if certain == "occupied":
+        state.free[:], state.occupied[0] = 0, 1
+    impossible = np.full(LINE.shape, float(certain == "free"))
+    state = bof_update(state, LINE, Evidence(impossible, 1 - impossible), PARAMS)
+    assert (state.unknown == 1).all()
+    assert_sound(state)
+
+
+def test_no_time_no_change():
+    state = random_state(3)
+    after = bof_predict(replace(state, remainder=state.remainder * 0.9), GRID, PARAMS, 0.0)
+    assert np.allclose(after.occupied, state.occupied, atol=1e-6)
+    assert np.allclose(after.free, state.free, atol=1e-6)
 
 
 def test_what_is_born_takes_the_prior_velocities():
@@ -320,6 +338,16 @@ def test_what_stands_stays_static(street_seen, box):
     """But for the end of the wall as it comes into view: velocities 2 m/s apart always hold one that fits it."""
     hit, dynamic = np.array([hit_and_dynamic(box, seen) for seen in street_seen[5:]]).sum(axis=(0, 2, 3))
     assert dynamic / hit <= 0.1
+
+
+def test_the_belief_is_whole(street_seen):
+    for _, _, belief in street_seen:
+        assert belief.probability.dtype == belief.velocity.dtype == belief.velocity_covariance.dtype == np.float32
+        assert np.abs(belief.probability.sum(axis=0) - 1).max() < 1e-5
+        known = np.isfinite(belief.velocity).all(axis=0)
+        assert np.array_equal(known, np.isfinite(belief.velocity_covariance).all(axis=(0, 1)))
+        assert not known[belief.probability[DYNAMIC] == 0].any()
+        assert np.linalg.eigvalsh(np.moveaxis(belief.velocity_covariance[:, :, known], -1, 0)).min() > -1e-4
 
 
 def test_a_turning_vehicle_sees_a_car_move_straight_on():

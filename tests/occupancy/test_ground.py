@@ -135,7 +135,10 @@ def test_neither_order_nor_type_nor_further_columns_matter():
     np.testing.assert_allclose(height_above_ground(wide, PARAMS), height, atol=1e-5)
 
 
-TWINS = pytest.mark.parametrize("heights", [height_above_ground, fast.height_above_ground], ids=["book", "fast"])
+@pytest.mark.parametrize("points", [np.array([[1.0, np.nan, 0.0]]), np.array([[np.inf, 0, 0]]), np.zeros((3, 2))])
+def test_compiled_loops_refuse_what_is_no_scan(points):
+    with pytest.raises(ArgumentError, match=r"^points: expected"):
+        fast.height_above_ground(points, PARAMS)
 
 
 @pytest.mark.parametrize(
