@@ -73,7 +73,7 @@ class PlaneSampler(nn.Module):
         return self if type(self) is kind else kind(self.pixels, self.visible, self.image_size)
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "PlaneSampler":
-        """Move the operator as well: PyTorch's `.to`, `.double`, `.cuda` and the like all call this."""
+        """Move the operator as well: PyTorch's `.to`, `.double` and `.cuda` call this."""
         self._hold(self.operator.map(fn))
         return super()._apply(fn, recurse)
 

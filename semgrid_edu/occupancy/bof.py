@@ -231,7 +231,7 @@ class Bof:
     Raises
     ------
     ArgumentError
-        When the lattice has so many velocities that their mass in all cells doesn't fit into memory.
+        When the mass of all velocities in all cells doesn't fit into memory.
 
     Examples
     --------
@@ -266,7 +266,7 @@ class Bof:
 
 
 def _elsewhere(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
-    """Return for each cell the value so many cells away, along x and y, (H, W); 0 outside and for no distance at all.
+    """Return for each cell the value at a distance in cells along x and y, (H, W); 0 outside and for no distance.
 
     At no distance nothing has moved, so there is no other place to look at.
     """

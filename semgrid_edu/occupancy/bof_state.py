@@ -189,7 +189,7 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
     Parameters
     ----------
     state : BofState
-        The belief, of which only the velocities and their remainders count.
+        The belief; only its velocities and their remainders are used.
     spec : GridSpec
         The cells.
     dt : float

@@ -222,7 +222,7 @@ class DriveTracker:
         Parameters
         ----------
         frame : Frame
-            The frame, of which the scan, the pose and the time count.
+            The frame; its scan, pose and time are used.
 
         Returns
         -------

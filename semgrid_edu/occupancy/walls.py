@@ -145,7 +145,7 @@ class Walls:
         cells : (N,) int
             The cell of each, from `cells_of`.
         hidden : (H, W) bool
-            Cells about which the scan says nothing.
+            Cells about which the scan tells nothing.
         spec : GridSpec
             The cells, (H, W).
         """
@@ -171,7 +171,7 @@ def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDAr
     left : (H, W) float
         Dynamic mass that has left each cell; a is at most `CERTAIN`.
     hidden : (H, W) bool
-        Cells about which the scan says nothing. Others stay as they are, because there the scan decides.
+        Cells about which the scan tells nothing. Others stay as they are, because there the scan decides.
     """
     a = np.where(hidden, np.minimum(left, CERTAIN), 0)
     s = posterior[STATIC]

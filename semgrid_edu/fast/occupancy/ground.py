@@ -78,7 +78,7 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray:
 
 
 def heights_of(points: NDArray, params: GroundParams) -> NDArray:
-    """Return what `height_above_ground` does, for points that are known to be finite. Parameters are the same."""
+    """Return heights of points that are known to be finite. Parameters are those of `height_above_ground`."""
     x = points[:, 0].astype(np.float64)
     y = points[:, 1].astype(np.float64)
     sector = beams_of(x, y, params.sectors)
