@@ -26,7 +26,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State
 from semgrid_edu.workshop.doubts import drive_doubts
 
-slow_disk = settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+slow_disk = settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @pytest.fixture

@@ -109,7 +109,7 @@ def test_prediction_is_that_of_cmcdot_when_its_particles_lie_on_the_lattice(seed
         assert np.allclose(state.occupied[k], carried + LATTICE.prior[k] * twin.newborn, atol=2e-6)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=25)
 @given(st.lists(st.floats(0, 0.99), min_size=4, max_size=4))
 def test_mass_moves_one_cell_a_step_and_leaves_free_space(mass):
     """What filterpy's prediction does to a distribution over places: an exact shift."""

@@ -30,7 +30,7 @@ def cmcdot(request) -> type[occupancy.Cmcdot]:
     return request.param
 
 
-def seasoned(cmcdot: type[occupancy.Cmcdot], steps: int = 4) -> occupancy.Cmcdot:
+def seasoned(cmcdot: type[occupancy.Cmcdot], steps: int = 2) -> occupancy.Cmcdot:
     """Return a tracker that has seen a car drive past a wall."""
     tracker = cmcdot(SPEC, PARAMS)
     for k in range(steps):
@@ -106,7 +106,7 @@ def test_returns_from_beyond_the_world_hide_nothing_and_hit_nothing(cmcdot, dist
     points = np.stack([distance * np.cos(azimuth), distance * np.sin(azimuth), np.ones(3600)], axis=1)
     for scan in (points, points.astype(np.float32), points * [1, 1, distance]):
         tracker = seasoned(cmcdot)
-        for _ in range(5):
+        for _ in range(2):
             belief = tracker.step(scan, STILL, 0.1)
             assert_sound(belief)
         assert (np.isin(belief.probability.argmax(axis=0), (State.FREE, State.UNKNOWN, State.STATIC))).all()
@@ -137,7 +137,7 @@ def test_after_ages_all_is_forgotten(cmcdot, dt):
 def test_contradictory_scans_leave_distributions(cmcdot):
     """What is a wall now is free a moment later, and the other way round."""
     tracker = cmcdot(SPEC, PARAMS)
-    for k in range(40):
+    for k in range(12):
         wall = [Box(10 + 8 * (k % 2), 11 + 8 * (k % 2), -9, 9, 2.0)]
         assert_sound(tracker.step(scan_boxes(wall), STILL, [0.0, 0.1, 1e-9, 3.0][k % 4]))
 
