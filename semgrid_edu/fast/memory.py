@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu import memory as book
 from semgrid_edu.errors import check_shape
-from semgrid_edu.fast.occupancy.planar_motion import look_up
+from semgrid_edu.fast.occupancy.cells import look_up
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.memory import Look, MemoryParams, MemoryState, View
 from semgrid_edu.memory.state import FAINT, check_look, something_there
