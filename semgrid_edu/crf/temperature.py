@@ -196,9 +196,11 @@ def _labelled(name: str, columns: ArrayLike, truth: ArrayLike, ignore: int) -> t
     if columns.ndim == 0 or columns.shape[1:] != truth.shape:
         raise ArgumentError(name, f"shape (C, {', '.join(map(str, truth.shape))})", f"shape {columns.shape}")
     kept = truth != ignore
-    classes = truth[kept].astype(np.int64)
-    if not (classes == truth[kept]).all():  # true of NaN as well
-        raise ArgumentError("truth", "whole numbers, the classes", truth[kept][classes != truth[kept]][0])
+    labels = truth[kept]
+    fractional = labels != np.round(labels)  # true of NaN as well
+    if fractional.any():
+        raise ArgumentError("truth", "whole numbers, the classes", labels[fractional][0])
+    classes = labels.astype(np.int64)
     if not len(classes):
         raise ArgumentError("truth", "at least one labelled cell", f"{ignore} everywhere")
     if not (classes.min() >= 0 and classes.max() < len(columns)):
