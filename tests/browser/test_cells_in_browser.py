@@ -5,13 +5,14 @@ import re
 import numpy as np
 import pytest
 from read_page import decode
+from told_story import story_text
 
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import load_net
 from semgrid_edu.pipeline import Stages, run_pipeline
-from semgrid_edu.workshop.demo import cell_story, story_text
+from semgrid_edu.workshop.demo import cell_story
 
 SPEC = GridSpec.compact()
 FRAME = 5

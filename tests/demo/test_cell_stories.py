@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from read_page import Page
+from told_story import memory_of, story_text
 
 import semgrid_edu.workshop.demo.page as page_module
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
@@ -17,7 +18,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import load_net, save_net
 from semgrid_edu.pipeline import Stages, run_pipeline
-from semgrid_edu.workshop.demo import story_text, write_demo
+from semgrid_edu.workshop.demo import write_demo
 from semgrid_edu.workshop.demo.details import FILTER_STEPS, NOT_SEEN, STEPS, VERDICTS, states_bytes
 from semgrid_edu.workshop.demo.record import Record
 from semgrid_edu.workshop.demo.run import STORIES, _stories_every
@@ -189,9 +190,10 @@ class TestScript:
             assert rest == pytest.approx(why.rest, abs=0.151)
             assert parts["times"] == pytest.approx(np.exp(why.score), rel=0.051)
 
-    def test_sentences(self, read, stories):
+    def test_sentences(self, read, stories, story_maps, told):
         for one, story in zip(read, stories, strict=True):
-            lines = story_text(story).splitlines()
+            memory = memory_of(told[-1].remembered, story_maps.sight, story.cell, len(told) - 1)
+            lines = story_text(story, memory).splitlines()
             assert one["sentences"] == [line for line in lines[2:-1] if not line.startswith("LIDAR")]
 
     def test_points_above_a_cell(self, read, stories):

@@ -210,7 +210,7 @@ class TestStory:
         plain = dataclasses.replace(result, belief=dataclasses.replace(result.belief, steps={}), remembered=None)
         story = cell_story(plain, (90, 30), net)
         assert list(story.steps) == ["shown"]
-        assert (story.truth, story.fault, story.memory) == (None, "none", None)
+        assert (story.truth, story.fault) == (None, "none")
 
 
 def test_the_figure_shows_the_numbers(stories, told):

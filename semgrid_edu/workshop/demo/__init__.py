@@ -3,6 +3,5 @@
 from semgrid_edu.workshop.demo.draw_story import draw_cell_story
 from semgrid_edu.workshop.demo.one_cell import cell_story
 from semgrid_edu.workshop.demo.run import write_both_streets, write_demo
-from semgrid_edu.workshop.demo.words import story_text
 
-__all__ = ["cell_story", "draw_cell_story", "story_text", "write_both_streets", "write_demo"]
+__all__ = ["cell_story", "draw_cell_story", "write_both_streets", "write_demo"]

@@ -3,7 +3,6 @@
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,32 +14,11 @@ from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.workshop.demo.all_cells import frame_story
 from semgrid_edu.workshop.demo.contributions import Contributions
-from semgrid_edu.workshop.demo.evidence import VERDICTS, ScanMaps, Sight, place_history
+from semgrid_edu.workshop.demo.evidence import VERDICTS, ScanMaps, place_history
 from semgrid_edu.workshop.demo.what_if import FAULTS
 
 FRAMES = 10
 """How many frames a history goes back, the present one included."""
-
-
-class CellMemory(NamedTuple):
-    """What a cell is called with memory, and when a frame by itself last named its place.
-
-    Parameters
-    ----------
-    label, probability : int, float
-        The class with memory, and its probability.
-    back, seconds, then : int, float, int
-        The cell's numbers in `Sight`: how many frames ago, how long ago, and which class.
-    earlier : int
-        Number of earlier frames that were searched.
-    """
-
-    label: int
-    probability: float
-    back: int
-    seconds: float
-    then: int
-    earlier: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +53,8 @@ class CellStory:
         What it is called before the CRF if an input is true or removed.
     fault : str
         The stage that is to blame, one of `FAULTS`.
-    names, flat : tuple of str
-        The names of all classes, and of those on the ground.
-    memory : CellMemory or None
-        What it is called with memory, if the result has one.
+    names : tuple of str
+        The names of all classes.
     """
 
     cell: tuple[int, int]
@@ -103,8 +79,6 @@ class CellStory:
     otherwise: dict[str, int]
     fault: str
     names: tuple[str, ...]
-    flat: tuple[str, ...]
-    memory: CellMemory | None = None
 
 
 def cell_story(
@@ -121,8 +95,7 @@ def cell_story(
     net : SemanticGridNet
         The network that made the result, in evaluation mode.
     past : sequence of FrameResult
-        The results of earlier frames in the order of time. The history shows the last nine of them; for the memory, all
-        are searched.
+        The results of earlier frames in the order of time; the history shows the last nine of them.
 
     Raises
     ------
@@ -133,13 +106,10 @@ def cell_story(
     --------
     >>> results = list(run_pipeline(drive[:10], Stages.of(net, keep_steps=True)))           # doctest: +SKIP
     >>> story = cell_story(results[-1], (101, 31), net, past=results[:-1])                  # doctest: +SKIP
-    >>> print(story_text(story))                                                            # doctest: +SKIP
-    Cell (101, 31), 20.2 m ahead and 0.2 m to the left.
-    Called road (71 %), but it is car.
-    The mistake comes from the occupancy filter: it takes this cell for FREE. With the true state in ...
+    >>> draw_cell_story(story, results[-1].frame.image)                                     # doctest: +SKIP
     """
     architecture = net.need_architecture()
-    spec, label_set = architecture.grid, LABEL_SETS[architecture.label_set]
+    spec = architecture.grid
     cell = _checked(cell, spec)
     maps = frame_story(result, net, [(one.frame, one.grid.argmax(axis=0)) for one in past])
     times, history = place_history([*past[max(0, len(past) - FRAMES + 1) :], result], spec, cell)
@@ -167,9 +137,7 @@ def cell_story(
         messages=maps.neighbours.messages[:, *cell],
         otherwise={change: int(classes[cell]) for change, classes in maps.otherwise.items()},
         fault=FAULTS[maps.fault[cell]],
-        names=label_set.names,
-        flat=label_set.flat,
-        memory=None if maps.sight is None else _memory(result.remembered[:, *cell], maps.sight, cell, len(past)),
+        names=LABEL_SETS[architecture.label_set].names,
     )
 
 
@@ -180,9 +148,3 @@ def _checked(cell: tuple[int, int], spec: GridSpec) -> tuple[int, int]:
     except (TypeError, ValueError):
         raise ArgumentError("cell", f"row and column in a grid of {spec.shape} cells", cell) from None
     return row, col
-
-
-def _memory(remembered: NDArray, sight: Sight, cell: tuple[int, int], earlier: int) -> CellMemory:
-    label = int(remembered.argmax())
-    back, seconds, then = (values[cell].item() for values in sight)
-    return CellMemory(label, float(remembered[label]), back, seconds, then, earlier)
