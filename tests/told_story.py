@@ -7,15 +7,13 @@ from types import SimpleNamespace
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import State
 from semgrid_edu.workshop.demo.details import SENTENCES
-from semgrid_edu.workshop.demo.one_cell import CellStory
+from semgrid_edu.workshop.demo.stories import CellStory
 from semgrid_edu.workshop.demo.what_if import NO_IMAGE, NO_OCCUPANCY, TRUE_BOTH
 
 
-def story_text(story: CellStory, memory: SimpleNamespace | None = None) -> str:
-    """Tell a cell's story, the numbers last. `memory` is from `memory_of`."""
-    before = (_place(story), _called(story), _fault(story), _image(story))
-    after = (_scan(story), _otherwise(story), _numbers(story))
-    return "\n".join(filter(None, (*before, _memory(story, memory), *after)))
+def told_story(story: CellStory, memory: SimpleNamespace | None = None) -> list[str]:
+    """The sentences that the page's panel shows for a cell; `memory` is from `memory_of`."""
+    return list(filter(None, (_fault(story), _image(story), _memory(story, memory), _otherwise(story))))
 
 
 def memory_of(remembered, sight, cell: tuple[int, int], earlier: int) -> SimpleNamespace:
@@ -31,19 +29,6 @@ def counted(classes: Iterable[int], names: tuple[str, ...]) -> str:
     """How often each class occurs, the most frequent first; a number without a name isn't counted."""
     found = Counter(int(c) for c in classes if 0 <= c < len(names))
     return ", ".join(f"{names[c]} ({number})" for c, number in sorted(found.items(), key=lambda one: (-one[1], one[0])))
-
-
-def _place(story: CellStory) -> str:
-    row, col = story.cell
-    x, y = story.xy
-    side = "right" if y < 0 else "left"
-    return SENTENCES["place"]["cell"].format(row=row, col=col, ahead=f"{x:.1f}", aside=f"{abs(y):.1f}", side=side)
-
-
-def _called(story: CellStory) -> str:
-    case = "unsure" if story.truth is None else "right" if story.refined == story.truth else "wrong"
-    sure = round(100 * float(story.after[story.refined]))
-    return SENTENCES["called"][case].format(sure=sure, **_classes(story))
 
 
 def _classes(story: CellStory) -> dict[str, str | None]:
@@ -118,20 +103,6 @@ def _memory(story: CellStory, memory: SimpleNamespace | None) -> str:
     return f"{said} {words['moves']}" if story.steps["shown"][State.DYNAMIC] > 0.5 else said
 
 
-def _scan(story: CellStory) -> str:
-    words = SENTENCES["scan"]
-    returns = story.scan.obstacles if story.scan.verdict == "hit" else story.scan.ground
-    states = ", ".join(f"{s.name} {100 * story.steps['shown'][s]:.0f} %" for s in State)
-    return f"{words[story.scan.verdict].format(returns=returns)} {words['states'].format(states=states)}"
-
-
 def _otherwise(story: CellStory) -> str:
     no_image, no_occupancy = (story.names[story.otherwise[change]] for change in (NO_IMAGE, NO_OCCUPANCY))
     return SENTENCES["otherwise"]["removed"].format(no_image=no_image, no_occupancy=no_occupancy)
-
-
-def _numbers(story: CellStory) -> str:
-    why = story.why
-    parts = {"planes": why.planes.sum(), "occupancy": why.occupancy.sum(), "rest": why.rest, "score": why.score}
-    words = {name: f"{part:+.1f}" for name, part in parts.items()}
-    return SENTENCES["numbers"]["sum"].format(label=story.names[story.label], rival=story.names[story.rival], **words)

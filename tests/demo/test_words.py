@@ -8,7 +8,7 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from told_story import counted, story_text
+from told_story import counted
 
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.frame import Frame
@@ -104,15 +104,6 @@ def test_classes_are_counted_the_most_frequent_first():
 
 def test_every_fault_has_its_sentence():
     assert set(SENTENCES["fault"]) == set(FAULTS)
-
-
-def test_a_story_says_what_it_holds(story):
-    place, called, *_, numbers = story_text(story).splitlines()
-    assert place.startswith(f"Cell ({story.cell[0]}, {story.cell[1]}), {story.xy[0]:.1f} m ahead")
-    assert called.startswith(f"Called {story.names[story.refined]} (")
-    assert numbers.startswith(f"In logarithms, {story.names[story.label]} against {story.names[story.rival]}: image")
-    image = next(line for line in story_text(story).splitlines() if line.startswith("Image"))
-    assert image.split(" In truth")[0].count("(") == len(set(story.called[story.visible]))
 
 
 def test_the_memory_says_when_a_frame_last_named_the_place():
