@@ -10,11 +10,10 @@ from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.paper.plans import table1_runs
 from semgrid_edu.workshop.paper.published import NETWORKS
 from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.paper.run_counts import RunCounts
-from semgrid_edu.workshop.paper.scales import Scale
+from semgrid_edu.workshop.paper.scales import Scale, table1_runs
 from semgrid_edu.workshop.paper.score_runs import WITH_CRF, WITH_SEARCHED, ScoreRun, by_seed
 from semgrid_edu.workshop.paper.tables import CELLS, beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.truth_costs import learned_from

@@ -11,8 +11,8 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import atomic_path, check_ours, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import versions
 from semgrid_edu.training.devices import choose_device
-from semgrid_edu.workshop.paper.deviations import deviations, frame_counts
-from semgrid_edu.workshop.paper.experiments import EXPERIMENTS, Experiment
+from semgrid_edu.workshop.paper.data_runs import frame_counts
+from semgrid_edu.workshop.paper.experiments import EXPERIMENTS, Experiment, deviations
 from semgrid_edu.workshop.paper.loop import execute_plan
 from semgrid_edu.workshop.paper.run import OUTPUT, Run, estimate, with_needs
 from semgrid_edu.workshop.paper.run_counts import RunCounts
@@ -113,6 +113,7 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
 def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_only: bool) -> str:
     """Plan, run and write, in a folder of runs that no other process writes to."""
     plan = request.plan()
+    echo("Estimating the time, which takes a few trial steps of each network ...")
     estimated = estimate(plan, root)
     minutes = sum(estimated.values()) / (request.workers or usable_cores()) / 60
     left = f"left: {len(estimated)} of {len(plan)} runs, about {minutes:.0f} min"
