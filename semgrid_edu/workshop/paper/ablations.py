@@ -29,7 +29,7 @@ VARIANTS = {name: Variant(**fields) for name, fields in _TABLES["variants"].item
 CALIBRATION_ERRORS = [CalibrationError(**{kind: size}) for kind, sizes in _TABLES["errors"].items() for size in sizes]
 """Errors in the calibration that the trained network is given when it is tested: degrees, metres."""
 
-FEW = 4
+FEWER_FRAMES = 4
 """The small training set has one frame in four."""
 
 NOTES = {"semantic": "", "all": " The truth of a cell without a semantic class is defined by the occupancy grid."}
@@ -58,8 +58,8 @@ def ablated_runs(scale: Scale, seeds: int) -> dict[str, dict[str, tuple[list[Sco
         By key of `SECTIONS` and by what the row is.
     """
     every = table1_runs(scale, seeds)
-    n_frames = max(scale.frames_to_train // FEW, 6)
     usual = every["segnet"]
+    n_frames = max(usual[0].network.arrays.n_labelled // FEWER_FRAMES, 6)
     scored = partial(scale.scored, scale.kitti, crf=False)
     variants = {"usual": usual}
     variants |= {name: scored("segnet", seeds, variant=variant) for name, variant in VARIANTS.items()}

@@ -65,11 +65,6 @@ class Scale:
         """The same with cells of 0.2 m."""
         return replace(self, fine_cells=self.preset != "paper")  # the preset "paper" has them already
 
-    @property
-    def frames_to_train(self) -> int:
-        """Number of labelled frames that Table 1's networks learn from."""
-        return self.arrays(self.kitti, "train", "true").n_labelled
-
     def grid_stage(
         self,
         data: str,
@@ -185,9 +180,9 @@ def table2_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
     return {"segnet": scale.scored(scale.chroma, "segnet", seeds)}
 
 
-def table3_runs(scale: Scale, seeds: int) -> list[ScoreRun]:
-    """Return the runs of Table 3, one per seed: SegNet on data without any error.
+def table3_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
+    """Return the runs of Table 3: SegNet on data without any error.
 
-    Parameters are those of `table1_runs`.
+    Parameters and result are those of `table1_runs`.
     """
-    return scale.scored(scale.synthia, "segnet", seeds, "true", crf=False)
+    return {"segnet": scale.scored(scale.synthia, "segnet", seeds, "true", crf=False)}

@@ -167,45 +167,31 @@ def runs_of_claims(scale: Scale, seeds: int) -> SimpleNamespace:
     all_seeds = max(seeds, scale.table1_seeds if seeds == scale.seeds else seeds)
     networks = table1_runs(replace(scale, networks=tuple(NETWORKS)), all_seeds)
     usual = networks["segnet"][:seeds]
+    scored = partial(scale.scored, scale.kitti, "segnet", crf=False)
+    unreduced = scored(all_seeds, variant=Variant(reduces=False))
+    taught = (scale.grid_stage(scale.kitti, "segnet", seed, "true") for seed in range(seeds))
+    blind = [scale.grid_stage(scale.kitti, "segnet", seed, variant=Variant(occupancy=False)) for seed in range(seeds)]
+    routes = scale.arrays(scale.chroma_routes, "test", "lidar")
+    lying = scale.arrays(scale.overturned, "test", "true")
     return SimpleNamespace(
         networks=networks,
         usual=usual,
         usual_of_all_seeds=networks["segnet"],
         table2=table2_runs(scale, seeds)["segnet"],
-        **vars(_trained_otherwise(scale, seeds, usual, all_seeds)),
-        **vars(_on_other_frames(scale, seeds, usual)),
-        baselines=baselines_of(usual),
-        baselines_off=[BaselineRun(run.network, run.frames, WRONG_CALIBRATION) for run in usual],
-        baselines_dense=[BaselineRun(run.network, run.frames, dense=True) for run in usual],
-        usual_off=[ScoreRun(run.network, run.frames, crf=False, calibration=WRONG_CALIBRATION) for run in usual],
-    )
-
-
-def _trained_otherwise(scale: Scale, seeds: int, usual: list[ScoreRun], all_seeds: int) -> SimpleNamespace:
-    """Return the runs of networks that differ in their training from the usual one, on the same test frames."""
-    scored = partial(scale.scored, scale.kitti, "segnet", crf=False)
-    unreduced = scored(all_seeds, variant=Variant(reduces=False))
-    taught = (scale.grid_stage(scale.kitti, "segnet", seed, "true") for seed in range(seeds))
-    return SimpleNamespace(
         taught_true=[ScoreRun(network, one.frames) for network, one in zip(taught, usual, strict=True)],
         unreduced=unreduced,
         times=[TimeRun(usual[0].network, unreduced[0].network, usual[0].frames)],
         two_stages=scored(seeds, variant=Variant(end_to_end=False)),
         unbalanced=scored(seeds, variant=Variant(balanced=False)),
         one_plane=scored(seeds, variant=Variant(n_planes=1)),
-    )
-
-
-def _on_other_frames(scale: Scale, seeds: int, usual: list[ScoreRun]) -> SimpleNamespace:
-    """Return the runs on other frames than those of Table 1."""
-    routes = scale.arrays(scale.chroma_routes, "test", "lidar")
-    lying = scale.arrays(scale.overturned, "test", "true")
-    blind = [scale.grid_stage(scale.kitti, "segnet", seed, variant=Variant(occupancy=False)) for seed in range(seeds)]
-    return SimpleNamespace(
         new_routes=[ScoreRun(scale.grid_stage(scale.chroma, "segnet", seed), routes) for seed in range(seeds)],
         perfect=scale.fine.scored(scale.synthia_routes, "segnet", seeds, "true", crf=False),
         overturned=[OverturnedRun(run.network, lying) for run in usual],
         overturned_blind=[OverturnedRun(network, lying) for network in blind],
+        baselines=baselines_of(usual),
+        baselines_off=[BaselineRun(run.network, run.frames, WRONG_CALIBRATION) for run in usual],
+        baselines_dense=[BaselineRun(run.network, run.frames, dense=True) for run in usual],
+        usual_off=[ScoreRun(run.network, run.frames, crf=False, calibration=WRONG_CALIBRATION) for run in usual],
     )
 
 

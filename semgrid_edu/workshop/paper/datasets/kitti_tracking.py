@@ -5,10 +5,10 @@ A run of the benchmark follows its development kit, with four of the archives un
     training/image_02/0009/000000.png    training/velodyne/0009/000000.bin
     training/calib/0009.txt              training/oxts/0009.txt (one packet per line)
 
-The labels: Zhang, Candra, Vetter and Zakhor, ICRA 2015. According to their readme (12 August 2015), 252 frames ("acquisitions") from eight runs of KITTI's *tracking* training
-set are labelled, every tenth or twentieth frame: 140 in runs 9, 10, 11 and 19 for training, 112 in runs 0, 4, 5 and 13
-for testing (the paper gives 142 and 110). Image labels are MATLAB files image_02/(trn or test)/(run)/(acquisition),
-each a matrix of the numbers in `ZHANG_CLASSES`.
+The labels are those of Zhang, Candra, Vetter and Zakhor, ICRA 2015. According to their readme (12 August 2015), 252
+frames ("acquisitions") from eight runs of the training set are labelled, every tenth or twentieth frame: 140 in runs 9,
+10, 11 and 19 for training, 112 in runs 0, 4, 5 and 13 for testing (the paper gives 142 and 110). They are MATLAB files
+image_02/(trn or test)/(run)/(acquisition), each a matrix of the numbers in `ZHANG_CLASSES`.
 
 We couldn't inspect the archive, so this reader assumes that files end in .mat, that file and run names are numbers with
 or without leading zeros, and that the matrix is the only two-dimensional variable of its file.
