@@ -403,8 +403,9 @@ class TestChoice:
         assert "Here are 3 frames of the drive" in html
         assert "(one in 2 of frames 0 to 4; it has 6)" in html
 
-    def test_another_network_is_taken_and_one_of_the_image_stage_refused(self, tmp_path):
-        options = ["demo", "--out", str(tmp_path), "--frames", ":1"]
+    def test_another_network_is_taken_and_one_of_the_image_stage_refused(self, drive, tmp_path):
+        root = str(drive.folder.parents[1])
+        options = ["demo", "--kitti", root, "--date", DATE, "--drive", "0001", "--out", str(tmp_path), "--frames", ":1"]
         stage = CliRunner().invoke(app, [*options, "--weights", str(sample_image_stage("fcn"))])
         assert "image stage" in str(stage.exception)
         result = CliRunner().invoke(app, [*options, "--weights", str(sample_weights("fcn"))])

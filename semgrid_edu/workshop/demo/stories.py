@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 from scipy.special import softmax
 
@@ -23,7 +24,7 @@ from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.planes import PlaneSampler, plane_pixels
-from semgrid_edu.workshop.demo.contributions import Contributions, contributions
+from semgrid_edu.workshop.demo.contributions import Contributions, contributions, fusion_inputs
 from semgrid_edu.workshop.demo.evidence import (
     VERDICTS,
     ScanMaps,
@@ -122,12 +123,14 @@ def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[
         raise ArgumentError("net", "a network in evaluation mode, see `net.eval()`", "one in training mode")
     for sampler in (fast.PlaneSampler, PlaneSampler):  # `run_pipeline` takes the first, `Stages.of` the second
         net = _sampling_by(sampler, net)
-        parts = contributions(net, result.scores, o)
-        apart = np.abs(softmax(parts.score, axis=0) - result.grid).max()
+        with torch.no_grad():
+            logits = net.fusion(*fusion_inputs(net, result.scores, o))[0]
+        apart = np.abs(softmax(logits.numpy(), axis=0) - result.grid).max()
         if apart <= TOLERANCE:
             break
     else:
         raise ArgumentError("net", "the network that made the result", f"one whose probabilities are {apart:.3f} apart")
+    parts = contributions(net, result.scores, o)
     labels = result.frame.labels
     truth = np.full(spec.shape, IGNORE) if labels is None else grid_truth(labels, o, spec).astype(np.int64)
     label, second = np.argsort(-result.grid, axis=0, kind="stable")[:2]
