@@ -40,9 +40,7 @@ from semgrid_edu.workshop.demo.what_if import FAULTS, faults, what_if
 FRAMES = 10
 """How many frames a history goes back, the present one included."""
 
-UPDATES = 10
-"""How many updates the CRF makes: the default of `mean_field`."""
-
+UPDATES = 10  # of the CRF: the default of `mean_field`
 TOLERANCE = 1e-3
 """How much the network's probabilities may differ from those of the result that it is to explain."""
 
@@ -54,9 +52,8 @@ class FrameStory:
     Parameters
     ----------
     states : dict of str to (4, H, W) float32
-        The four states after "move", "predict", "update" and "resample", on the filter's map, and "shown", in the grid
-        that the filter returns. "shown" is the prediction updated with the returns of exactly this cell, while the
-        map's cell can be shifted by up to half a cell. Only "shown" if the filter wasn't asked to keep its steps.
+        The four states after "move", "predict", "update" and "resample", on the filter's map, whose cells can be shifted
+        by up to half a cell, and "shown", in the grid that the filter returns. Only "shown" without `keep_steps`.
     scan : ScanMaps
         What the frame's scan says.
     pixels, visible : (D, H, W, 2) float64, (D, H, W) bool
@@ -103,13 +100,11 @@ def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[
     Parameters
     ----------
     result : FrameResult
-        The frame's result from the package's own stages with their default parameters. Made with
-        `Stages.of(net, keep_steps=True)`, it also has the filter's steps.
+        The frame's result from the package's stages with their defaults, such as `Stages.of(net, keep_steps=True)`.
     net : SemanticGridNet
         The network that made the result, in evaluation mode.
     past : sequence of (Frame, (H, W) int)
-        The earlier frames in the order of time, each with the most probable class of each cell by that frame alone.
-        For a result with memory.
+        For a result with memory: the earlier frames in order, each with the class of each cell by that frame alone.
 
     Raises
     ------
@@ -195,9 +190,9 @@ class CellStory:
     heights : (D,) float64
         The heights of the planes above the cell, metres.
     pixels, visible, called, shown : (D, 2) float64, (D,) bool, (D,) int64, (D,) int64
-        The points of the planes in the image, and what is seen there.
+        The planes' points in the image, and what is seen there.
     label, rival, refined, truth : int
-        Its classes; the truth is None where it isn't known.
+        Its classes; the truth is None where unknown.
     before, after : (C,) float32
         Its distribution in the semantic grid, and in the refined grid.
     why : Contributions
@@ -209,7 +204,7 @@ class CellStory:
     fault : str
         The stage that is to blame, one of `FAULTS`.
     names : tuple of str
-        The names of all classes.
+        The class names.
     """
 
     cell: tuple[int, int]
@@ -261,7 +256,6 @@ def cell_story(
     --------
     >>> results = list(run_pipeline(drive[:10], Stages.of(net, keep_steps=True)))           # doctest: +SKIP
     >>> story = cell_story(results[-1], (101, 31), net, past=results[:-1])                  # doctest: +SKIP
-    >>> draw_cell_story(story, results[-1].frame.image)                                     # doctest: +SKIP
     """
     architecture = net.need_architecture()
     spec = architecture.grid
