@@ -52,7 +52,7 @@ class FrameStory:
     Parameters
     ----------
     states : dict of str to (4, H, W) float32
-        The four states after "move", "predict", "update" and "resample", on the filter's map, whose cells can be shifted
+        The four states after "move", "predict", "update" and "resample" on the filter's map, whose cells can be shifted
         by up to half a cell, and "shown", in the grid that the filter returns. Only "shown" without `keep_steps`.
     scan : ScanMaps
         What the frame's scan says.
