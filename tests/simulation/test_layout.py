@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
 from semgrid_edu.workshop.simulation.street.ground import (
     KERB_HEIGHT,
-    Extent,
     ground_height,
     ground_kind,
     ground_kinds,
@@ -106,7 +105,7 @@ def test_a_blurred_line_keeps_its_paint():
 
 
 def test_the_mesh_lies_on_the_ground():
-    mesh = ground_mesh(JUNCTION, Extent(0.0, 60.0))
+    mesh = ground_mesh(JUNCTION, 0.0, 60.0)
     corners = mesh.vertices[mesh.faces]
     flat = np.abs(mesh.normals[:, 2]) > 0.99
     middles = corners[flat].mean(axis=1)

@@ -8,12 +8,12 @@ import pytest
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID
-from semgrid_edu.workshop.simulation import drive
+from semgrid_edu.workshop.simulation import drive, simulate
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.workshop.simulation.named_streets import TEST_STREETS, named_street
+from semgrid_edu.workshop.simulation.named_streets import TEST_STREETS
 from semgrid_edu.workshop.simulation.street.builder import Builder
 from semgrid_edu.workshop.simulation.street.ground import ground_mesh
-from semgrid_edu.workshop.simulation.street.plan import ANY, YARD, Wishes, draw_plan
+from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, YARD, Wishes, draw_plan
 from semgrid_edu.workshop.simulation.street.road_users import overturned_car
 from semgrid_edu.workshop.simulation.street.trajectories import Departure
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
@@ -25,7 +25,7 @@ SEEDS = (0, 1, 2)
 @cache
 def street(name: str, seed: int = 0, frames: int = 2) -> SimulatedDrive:
     """A street that several tests look at; none of them changes it."""
-    return named_street(name, seed, frames)
+    return simulate(seed, frames, name)
 
 
 def convoy_pairs(moving) -> list[tuple[int, int]]:
@@ -52,7 +52,7 @@ def standing(drive, kind: Kind) -> np.ndarray:
 def only_ground(plan, rng) -> Builder:
     """Scenery for tests of what is drawn before it is built."""
     builder = Builder(plan, rng)
-    builder.solid.append((ground_mesh(plan.road, plan.extent), 0))
+    builder.solid.append((ground_mesh(plan.road, plan.start, plan.end), 0))
     return builder
 
 
@@ -60,7 +60,7 @@ def test_the_car_passes_a_border_at_12_to_14_metres_a_second(monkeypatch):
     monkeypatch.setattr(drive, "build_scenery", only_ground)
     offenders = []
     for name, seed in product(FENCED, SEEDS):
-        bare = named_street(name, seed, 2)
+        bare = simulate(seed, 2, name)
         ego, side = bare.ego.trajectory, bare.plan.road.right
         distance = side.edge + side.strip + side.walk + 0.35 + ego.d
         if not (12 <= ego.pace.mean <= 14 and 3 < distance < 8):
@@ -96,7 +96,7 @@ def test_walls_stand_across_behind_gaps():
 def test_cars_of_a_convoy_follow_at_8_to_20_metres():
     offenders = []
     for seed in SEEDS:
-        drive = named_street("convoy", seed)
+        drive = simulate(seed, 36, "convoy")
         road, actors, pairs = (
             drive.plan.road,
             {actor.instance: actor for actor in drive.moving},
@@ -112,12 +112,12 @@ def test_cars_of_a_convoy_follow_at_8_to_20_metres():
 
 
 def test_pedestrians_walk_along_and_across():
-    ways = {(a.trajectory.along, abs(a.trajectory.across)) for a in named_street("pedestrians", 0).moving}
+    ways = {(a.trajectory.along, abs(a.trajectory.across)) for a in simulate(0, 36, "pedestrians").moving}
     assert {(1, 0), (-1, 0), (0, 1)} <= ways
 
 
 def test_slow_starters_stand_for_a_second_and_then_move():
-    drive = named_street("slow starters", 0)
+    drive = simulate(0, 36, "slow starters")
     kinds = {actor.kind for actor in drive.moving}
     assert kinds == {Kind.CAR, Kind.PEDESTRIAN}
     assert all(np.hypot(*velocity) < 1e-9 for velocity in drive.velocities(0.99).values())
@@ -125,12 +125,12 @@ def test_slow_starters_stand_for_a_second_and_then_move():
 
 
 def test_cars_cross_in_both_directions():
-    ways = {seed: {a.trajectory.across for a in named_street("crossing cars", seed).moving} for seed in SEEDS}
+    ways = {seed: {a.trajectory.across for a in simulate(seed, 36, "crossing cars").moving} for seed in SEEDS}
     assert ways == {seed: {-1, 1} for seed in SEEDS}
 
 
 def test_the_seed_and_the_name_decide():
-    drives = street("mesh"), named_street("mesh", 0, 2), street("mesh", 1), street("glass")
+    drives = street("mesh"), simulate(0, 2, "mesh"), street("mesh", 1), street("glass")
     one, again, other, elsewhere = (drive.scan(1).points for drive in drives)
     assert np.array_equal(one, again)
     assert one.shape != other.shape or not np.array_equal(one, other)
@@ -138,7 +138,7 @@ def test_the_seed_and_the_name_decide():
 
 
 def test_poses_come_from_packets_up_to_5_ms_away():
-    drive = named_street("mesh", 0, 8)
+    drive = simulate(0, 8, "mesh")
     errors = [np.linalg.norm(drive.scan(k).T_world_from_lidar[:2, 3] - drive.pose(k * PERIOD)[:2, 3]) for k in range(8)]
     assert 0 < max(errors) <= 0.005 * 14 * 1.15
     assert len(set(errors)) == 8
@@ -146,7 +146,7 @@ def test_poses_come_from_packets_up_to_5_ms_away():
 
 def test_returns_of_a_border_lie_on_what_stands():
     """Beams that pass the mesh and the hedge change ranges, not the truth: what returns, stands there."""
-    drive = named_street("mesh and hedge", 0, 12)
+    drive = simulate(0, 12, "mesh and hedge")
     points = drive.scan(11).points_grid
     kinds = drive.birdseye(1.1)[0]
     right = (points[:, 1] < -3) & (points[:, 0] > 2) & (points[:, 0] < 40) & (points[:, 2] > 0.7) & (points[:, 2] < 1.6)
@@ -163,12 +163,12 @@ def test_a_departure_covers_the_integral_of_its_speed():
 
 
 def test_a_yard_is_never_drawn():
-    assert not any(YARD in draw_plan(np.random.default_rng(seed), 30.0, ANY).styles for seed in range(200))
+    assert not any(YARD in draw_plan(np.random.default_rng(seed), 30.0, RANDOM_STREET).styles for seed in range(200))
 
 
 def test_an_unknown_street_is_refused():
     with pytest.raises(ArgumentError, match=r"mesh and hedge.*found alley"):
-        named_street("alley", 0)
+        simulate(0, 36, "alley")
 
 
 def test_every_street_has_a_name_of_its_own():

@@ -70,7 +70,7 @@ def test_cars_keep_to_the_asphalt_and_houses_off_it(junction_drive):
     for actor in junction_drive.moving + junction_drive.parked:
         if actor.kind == Kind.CAR:
             assert outside_asphalt(road, *actor.trajectory.at(0.0)) < 0
-    end_of_the_world = junction_drive.plan.extent.end - 25
+    end_of_the_world = junction_drive.plan.end - 25
     for f in junction_drive.static_footprints:
         if f[6] in (Kind.BUILDING, Kind.FENCE, Kind.PLANT, Kind.SIGN, Kind.POLE) and f[0] < end_of_the_world:
             points = outline(Footprint(*f)) if f[6] == Kind.BUILDING else f[None, :2]

@@ -20,7 +20,7 @@ from semgrid_edu.workshop.simulation import writer
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
 from semgrid_edu.workshop.simulation.named_streets import SAMPLE_WISHES, wishes_of
 from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD, SAMPLE_RIG, Rig
-from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes
+from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, Wishes
 from semgrid_edu.workshop.workplace import check_workers, workplace
 
 FORMAT = 2
@@ -48,7 +48,7 @@ class Route:
     split: str
     n_frames: int
     all_labelled: bool
-    wishes: Wishes = ANY
+    wishes: Wishes = RANDOM_STREET
     every: int = 1
 
     @property

@@ -13,7 +13,7 @@ from semgrid_edu.workshop.simulation.sensors.raycast import Instant, PorousMesh,
 from semgrid_edu.workshop.simulation.sensors.rig import Geodesy, Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
 from semgrid_edu.workshop.simulation.street.footprints import footprint_table
-from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes, draw_plan
+from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, Wishes, draw_plan
 from semgrid_edu.workshop.simulation.street.road_users import fill_street
 from semgrid_edu.workshop.simulation.street.scenery import build_scenery
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
@@ -78,7 +78,7 @@ class SimulatedDrive:
     """
 
     def __init__(
-        self, seed: int | np.random.SeedSequence, n_frames: int, wishes: Wishes = ANY, rig: Rig | None = None
+        self, seed: int | np.random.SeedSequence, n_frames: int, wishes: Wishes = RANDOM_STREET, rig: Rig | None = None
     ) -> None:
         rng = np.random.default_rng(seed)
         self.n_frames = n_frames

@@ -186,6 +186,8 @@ class Rig:
 
 KITTI_AHEAD = Rig(lidar=HDL64E_AHEAD)
 """The sensors of the simulated data sets."""
+KITTI_RIG = Rig(lidar=HDL64E, packet_interval=0.01)
+"""KITTI's scanner with a pose packet every 10 ms."""
 SAMPLE_RIG = Rig(lidar=replace(HDL64E_AHEAD, azimuth_step=0.45))
 """The sensors of the shipped drive: fewer LIDAR columns, to keep it small."""
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.simulation.street.ground import Extent
 from semgrid_edu.workshop.simulation.street.layout import Road, Side
 from semgrid_edu.workshop.simulation.street.light import Light
 from semgrid_edu.workshop.simulation.things.roadside import FENCES
@@ -64,7 +63,7 @@ class Wishes:
     relief: dict[str, float] | None = None
 
 
-ANY = Wishes()
+RANDOM_STREET = Wishes()
 """No wishes: everything is random."""
 
 
@@ -76,8 +75,8 @@ class Plan:
     ----------
     road : Road
         The street.
-    extent : Extent
-        Extent of the world along the street.
+    start, end : float
+        Smallest and largest s of the world, metres.
     styles : (str, str)
         Left and right side, members of `STYLES`, or `YARD`.
     borders : (str, str)
@@ -94,7 +93,8 @@ class Plan:
     """
 
     road: Road
-    extent: Extent
+    start: float
+    end: float
     styles: tuple[str, str]
     borders: tuple[str, str]
     parking: tuple[bool, bool]
@@ -182,4 +182,4 @@ def draw_plan(rng: np.random.Generator, length: float, wishes: Wishes) -> Plan:
     light = wishes.light or Light.random(rng)
     drawn = float(rng.uniform(0.15, 1.0))
     density = drawn if wishes.density is None else wishes.density
-    return Plan(road, Extent(-45.0, length + 210.0), styles, borders, parking, light, density, foliage)
+    return Plan(road, -45.0, length + 210.0, styles, borders, parking, light, density, foliage)

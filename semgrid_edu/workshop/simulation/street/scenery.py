@@ -24,13 +24,13 @@ def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
         Source of randomness.
     """
     builder = Builder(plan, rng)
-    builder.solid.append((ground_mesh(plan.road, plan.extent), 0))
-    borders.stand_signals(builder)
+    builder.solid.append((ground_mesh(plan.road, plan.start, plan.end), 0))
+    borders.add_junction_signs(builder)
     for sign, style in zip((1, -1), plan.styles, strict=True):
-        borders.stand_lamps(builder, sign)
+        borders.add_lamps(builder, sign)
         _street_trees(builder, sign)
         _LINE_SIDE[style](builder, sign)
-        borders.stand_signs(builder, sign)
+        borders.add_signs(builder, sign)
     _side_street(builder)
     _horizon(builder)
     return builder
@@ -53,7 +53,7 @@ def _tree(builder: Builder, s: float, d: float, species: str | None = None) -> N
     rng = builder.rng
     plan = builder.plan
     species = species or str(rng.choice(roadside.TREES, p=[0.5, 0.15, 0.2, 0.15]))
-    far = abs(d) > 35 or s > plan.extent.end - 120
+    far = abs(d) > 35 or s > plan.end - 120
     shape = roadside.tree(species, int(rng.integers(3)), 350 if far else 1500)
     scale = rng.uniform(0.75, 1.25)
     season = (1, 1, 1) if species == "conifer" else plan.foliage
@@ -103,12 +103,12 @@ def _house_row(builder: Builder, sign: int, town: bool) -> None:
     """Line one side with facades at the sidewalk, or with houses in gardens behind fences and hedges."""
     rng = builder.rng
     side = builder.road.side(sign)
-    extent = builder.plan.extent
+    plan = builder.plan
     border = builder.plan.border(sign)
     line = side.strip + side.walk
     setback = rng.uniform(0.0, 0.4) if town else rng.uniform(3.5, 8.0)
-    s = extent.start + rng.uniform(0, 8)
-    while s < extent.end - 20:
+    s = plan.start + rng.uniform(0, 8)
+    while s < plan.end - 20:
         house = (_town_house if town else _suburb_house)(rng)
         gap = rng.uniform(2.5, 9.0) if not town else 0.02 if rng.random() < 0.75 else rng.uniform(2, 6)
         end = s + house.width + gap
@@ -131,8 +131,8 @@ def _tall_houses(
 ) -> None:
     """Scatter town houses `behind` a line along the road, metres, so that gaps show houses instead of nothing."""
     rng = builder.rng
-    extent = builder.plan.extent
-    for s in np.arange(extent.start, extent.end, step):
+    plan = builder.plan
+    for s in np.arange(plan.start, plan.end, step):
         if rng.random() < share:
             house = _town_house(rng)
             s = s + rng.uniform(0, along)
@@ -173,12 +173,12 @@ def _garden(builder: Builder, s0: float, s1: float, sign: int, offset: float, de
 def _park(builder: Builder, sign: int) -> None:
     """Cover one side with trees and bushes on its bank, sometimes with a fence."""
     rng = builder.rng
-    extent = builder.plan.extent
+    plan = builder.plan
     line = builder.road.side(sign).line
     if rng.random() < 0.65:
         style = str(rng.choice(roadside.FENCES, p=[0.2, 0.25, 0.4, 0.15]))
-        _border(builder, extent.start, extent.start + 150, sign, line + rng.uniform(0.8, 2.5), style)
-    for s in np.arange(extent.start, extent.end, 5.5):
+        _border(builder, plan.start, plan.start + 150, sign, line + rng.uniform(0.8, 2.5), style)
+    for s in np.arange(plan.start, plan.end, 5.5):
         for _ in range(2):
             offset = line + rng.uniform(1.8, 26)
             (_tree if rng.random() < 0.62 else _bush)(builder, s + rng.uniform(0, 5), sign * offset)
@@ -188,11 +188,11 @@ def _park(builder: Builder, sign: int) -> None:
 def _yard(builder: Builder, sign: int) -> None:
     """Build a border along one side, and scatter bushes and trees behind it."""
     rng = builder.rng
-    extent = builder.plan.extent
+    plan = builder.plan
     line = builder.road.side(sign).line + 0.35
-    borders.YARD_BORDERS[builder.plan.border(sign)](builder, extent.start, extent.end - 60, sign * line)
-    borders.stand_pillars(builder, extent.start, extent.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
-    for s in np.arange(extent.start, extent.end, 6.0):
+    borders.YARD_BORDERS[builder.plan.border(sign)](builder, plan.start, plan.end - 60, sign * line)
+    borders.add_pillars(builder, plan.start, plan.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
+    for s in np.arange(plan.start, plan.end, 6.0):
         _bush(builder, s + rng.uniform(0, 6), sign * (line + rng.uniform(3, 15)))
         _tree(builder, s + rng.uniform(0, 6), sign * (line + rng.uniform(6, 30)))
 
@@ -210,12 +210,12 @@ def _street_trees(builder: Builder, sign: int) -> None:
     """Plant a row of trees of one species in the strip beside the kerb."""
     rng = builder.rng
     side = builder.road.side(sign)
-    extent = builder.plan.extent
+    plan = builder.plan
     if side.strip < 1.2:
         return
     species = str(rng.choice(["broad", "tall", "birch"]))
     step = rng.uniform(8, 15)
-    for s in np.arange(extent.start + rng.uniform(0, step), extent.end, step):
+    for s in np.arange(plan.start + rng.uniform(0, step), plan.end, step):
         if rng.random() < 0.9:
             _tree(builder, s, sign * (side.edge + 0.55 * side.strip), species)
 
@@ -244,12 +244,12 @@ def _side_street(builder: Builder) -> None:
 def _horizon(builder: Builder) -> None:
     """Close the horizon with distant trees and houses."""
     rng = builder.rng
-    extent = builder.plan.extent
+    plan = builder.plan
     for _ in range(70):
-        s, d = rng.uniform(extent.start, extent.end + 60), rng.choice([-1, 1]) * rng.uniform(38, 110)
+        s, d = rng.uniform(plan.start, plan.end + 60), rng.choice([-1, 1]) * rng.uniform(38, 110)
         _tree(builder, s, d)
     for d in np.arange(-70, 70, 3.5):
-        _tree(builder, extent.end - 8 + rng.uniform(-12, 10), d + rng.uniform(-1, 1))
+        _tree(builder, plan.end - 8 + rng.uniform(-12, 10), d + rng.uniform(-1, 1))
     for d in np.arange(-60, 60, 17):
-        s = extent.end - 2 + rng.uniform(0, 8)
+        s = plan.end - 2 + rng.uniform(0, 8)
         _house(builder, _town_house(rng), s, d + rng.uniform(-4, 4), -np.pi / 2, across_road=True)
