@@ -23,7 +23,7 @@ from semgrid_edu.workshop.simulation.things.shapes import box, quads, rotation_m
 SIDE = Side(5.0, 0.0, 2.0, 0.0, 3.0)
 ROAD = Road(0.0, 0.0, 0.0, 3.5, 1, 1, SIDE, SIDE, 0.0, 0.0, False, False, 4.0, False, True)
 POSE = rigid_transform(np.eye(3), np.array([0.0, 0.0, KITTI_LIDAR_HEIGHT]))
-EXACT = Lidar(range_sigma=0.0, drop=0.0)
+EXACT = Lidar(range_sigma=0.0, dropout=0.0)
 
 
 def scene(*things) -> Instant:
@@ -87,7 +87,7 @@ def test_a_scanner_that_takes_its_time_measures_each_column_from_where_it_is_the
     def pose(t):
         return rigid_transform(rotation_matrix(0, 0, t), POSE[:3, 3] + [10.0 * t, 0, 0])
 
-    turning = replace(EXACT, turn=0.1)
+    turning = replace(EXACT, revolution=0.1)
     points = labelled_scan(at(scene(wall(12.0))), pose, turning, ROAD, np.random.default_rng(0))[0]
     assert np.abs(sweep_times(points)).max() > 0.02
     still = deskew_scan(points, EgoVelocity(10.0, 0.0, 1.0))
@@ -100,7 +100,7 @@ def test_what_moves_is_where_it_is_when_its_column_is_measured():
     def world(t):
         return scene(box((20.5, -3 + 10 * t, 1), (1, 2, 2), (0.5,) * 3, Material.RETRO, Kind.CAR))
 
-    points, kinds = labelled_scan(world, at(POSE), replace(EXACT, turn=0.1), ROAD, np.random.default_rng(0))
+    points, kinds = labelled_scan(world, at(POSE), replace(EXACT, revolution=0.1), ROAD, np.random.default_rng(0))
     front = points[(kinds == Kind.CAR) & (points[:, 0] < 20.001), 1]
     middle = (front.min() + front.max()) / 2
     assert middle == pytest.approx(-3 + 10 * (0.1 / 360) * np.degrees(np.arctan2(3, 20)), abs=0.1)
@@ -111,7 +111,7 @@ def test_kitti_s_scanner_hits_as_many_cells_as_in_a_real_street():
     real, edges = [0.76, 0.46, 0.21, 0.066], (5, 15, 25, 40, 72)
     spec, rig = replace(LABEL_GRID, cell=0.5), Rig(lidar=HDL64E_AHEAD)
     place = spec.centers()
-    distance, view = np.hypot(*place.T).T, np.arctan(rig.image_size[1] / 2 / rig.camera.K[0, 0])
+    distance, view = np.hypot(*place.T).T, np.arctan(rig.camera.size[1] / 2 / rig.camera.K[0, 0])
     seen, found = np.abs(np.arctan2(place[..., 1], place[..., 0])) < view, []
     for seed in range(8):
         drive = SimulatedDrive(seed, 10, Wishes(density=0.2, parking=(False, False)), rig)
@@ -128,7 +128,7 @@ def test_pixel_rays_project_back_to_their_pixels():
     rig = Rig()
     points = transform_points(rig.T_lidar_from_camera, np.zeros(3)) + 17.0 * rig.pixel_directions().astype(float)
     pixels, visible = project(transform_points(rig.camera.T_camera_from_lidar, points), rig.camera)
-    v, u = np.mgrid[: rig.image_size[0], : rig.image_size[1]]
+    v, u = np.mgrid[: rig.camera.size[0], : rig.camera.size[1]]
     assert pixels == pytest.approx(np.stack([u, v], axis=-1).reshape(-1, 2), abs=2e-3)
     assert visible.mean() > 0.98
 

@@ -1,4 +1,4 @@
-"""Named streets: ten that are hard for occupancy filters, each for a different reason, and the sample drive's street."""
+"""Named streets: ten that are hard for occupancy filters, each for its own reason, and the sample drive's street."""
 
 import numpy as np
 

@@ -18,6 +18,10 @@ _SKY_STEP = 3
 """Sky visibility is sampled at every third pixel of every third row, because it varies slowly."""
 _SUBPIXELS = ((-0.33, 0.33), (0.33, -0.33))
 """Antialiasing: offsets, right and down in pixels, of two extra rays for each pixel on an edge."""
+_NOISE = 0.8
+"""Standard deviation of the pixel noise at mid grey, in steps of 1/255."""
+_BITS = 6
+"""Bits per colour channel: few, to keep PNG files small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,18 +131,18 @@ def _lens(radiance: NDArray[np.float32], centre: float) -> NDArray[np.float32]:
     return radiance
 
 
-def _expose(radiance: NDArray, light: Light, rig: Rig, rng: np.random.Generator) -> NDArray[np.uint8]:
+def _expose(radiance: NDArray, light: Light, rng: np.random.Generator) -> NDArray[np.uint8]:
     """Turn radiance into pixel values: lens blur, exposure, vignette, tone curve, noise, quantisation."""
-    height, width = rig.image_size
+    height, width, _ = radiance.shape
     v, u = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
     gain = light.exposure * (1 - 0.18 * (u**2 + 0.3 * v**2))[..., None] * np.asarray(light.balance)
     exposed = (_lens(radiance, 0.72) * gain.astype(np.float32)).clip(0)
     grey = 255 * (1 - np.exp(-1.25 * exposed)) ** np.float32(1 / 2.0)
-    sigma = rig.camera_noise * (0.6 + 0.6 * np.sqrt(grey / 128))
+    sigma = _NOISE * (0.6 + 0.6 * np.sqrt(grey / 128))
     noisy = grey + sigma * rng.standard_normal(grey.shape, dtype=np.float32)
-    step = 2 ** (8 - rig.bits)
+    step = 2 ** (8 - _BITS)
     levels = np.floor(noisy.clip(0, 255) / step)
-    return (levels * (255 / (2**rig.bits - 1))).clip(0, 255).astype(np.uint8)
+    return (levels * (255 / (2**_BITS - 1))).clip(0, 255).astype(np.uint8)
 
 
 def take_picture(
@@ -153,7 +157,7 @@ def take_picture(
     T_world_from_lidar : (4, 4) float
         Pose of the LIDAR, metres.
     rig : Rig
-        The camera's pose and noise.
+        The camera and its pose.
     road : Road
         The street, for the type of ground.
     light : Light
@@ -161,7 +165,7 @@ def take_picture(
     rng : numpy.random.Generator
         Source of the sensor noise and of the scattered rays for soft shadows.
     """
-    shape = rig.image_size
+    shape = rig.camera.size
     rotation = T_world_from_lidar[:3, :3].astype(np.float32)
     eye = transform_points(T_world_from_lidar @ rig.T_lidar_from_camera, np.zeros(3))
     rays = _rays(rig)
@@ -180,7 +184,7 @@ def take_picture(
 
     ahead = (rays @ rig.camera.T_camera_from_lidar[2, :3]).astype(np.float32) * hits.distance
     return Picture(
-        image=_expose(radiance.reshape(*shape, 3), light, rig, rng),
+        image=_expose(radiance.reshape(*shape, 3), light, rng),
         kind=kind.reshape(shape),
         depth=np.where(hits.triangle < 0, np.float32(np.nan), ahead).reshape(shape),
         instance=np.where(hits.triangle < 0, 0, instant.instance[hits.triangle]).reshape(shape),
