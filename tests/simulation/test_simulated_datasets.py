@@ -23,8 +23,8 @@ from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.writer import DATE
 
 QUIET = Wishes(density=0.2, layout="straight", styles=("park", "park"))
-TINY = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, False, QUIET), Route("test", 1, True, QUIET)))
-DENSE = DatasetRecipe("dense", "SYNTHIA-10", (Route("train", 1, True, QUIET),), dense=True)
+TINY = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, 2, QUIET), Route("test", 1, 1, QUIET)))
+DENSE = DatasetRecipe("dense", "SYNTHIA-10", (Route("train", 1, 1, QUIET),), dense=True)
 
 
 def contents(root: Path) -> dict[str, str]:
@@ -177,9 +177,9 @@ def test_bad_arguments_are_named(tmp_path):
 
 
 def test_one_frame_in_so_many_is_labelled():
-    assert list(Route("train", 10, True, every=3).labelled) == [2, 5, 8]
-    assert list(Route("train", 3, True).labelled) == [0, 1, 2]
-    assert list(Route("train", 3, False).labelled) == [2]
+    assert list(Route("train", 10, every=3).labelled) == [2, 5, 8]
+    assert list(Route("train", 3).labelled) == [0, 1, 2]
+    assert list(Route("train", 3, every=3).labelled) == [2]
 
 
 def test_the_recipes_have_the_papers_numbers_of_frames():

@@ -37,24 +37,21 @@ class Route:
         Its split, such as "train".
     n_frames : int
         Number of frames, ten a second.
-    all_labelled : bool
-        Whether all frames have labels. If not, only the last one has.
+    every : int
+        Label every n-th frame: 1 labels all, and `n_frames` only the last.
     wishes : Wishes
         The fixed properties of the street; the rest is random.
-    every : int
-        With `all_labelled`, label every n-th frame; 1 labels all of them.
     """
 
     split: str
     n_frames: int
-    all_labelled: bool
-    wishes: Wishes = RANDOM_STREET
     every: int = 1
+    wishes: Wishes = RANDOM_STREET
 
     @property
     def labelled(self) -> range:
         """Numbers of the labelled frames."""
-        return range(self.every - 1 if self.all_labelled else self.n_frames - 1, self.n_frames, self.every)
+        return range(self.every - 1, self.n_frames, self.every)
 
 
 @dataclass(frozen=True)
@@ -105,7 +102,7 @@ def read_recipes(name: str) -> dict[str, DatasetRecipe]:
 
 RECIPES = read_recipes("recipes")
 RECIPES["sample"] = DatasetRecipe(
-    "sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),), rig=SAMPLE_RIG, edition=1
+    "sample", "KITTI-14", (Route("drive", 20, 1, SAMPLE_WISHES),), rig=SAMPLE_RIG, edition=1
 )
 """Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes.
 "validation" has drives like minikitti's, half as many as in its training split. It serves to tune parameters after the
@@ -218,8 +215,8 @@ def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, drive: str) -> Non
     """Simulate and write one drive. Its random numbers depend only on data set, seed and drive number."""
     index = int(drive) - 1
     route = recipe.routes[index]
-    own_seed = np.random.SeedSequence([seed, recipe.edition, *recipe.name.encode()], spawn_key=(index,))
-    simulated = SimulatedDrive(own_seed, route.n_frames, route.wishes, recipe.rig)
+    drive_seed = np.random.SeedSequence([seed, recipe.edition, *recipe.name.encode()], spawn_key=(index,))
+    simulated = SimulatedDrive(drive_seed, route.n_frames, route.wishes, recipe.rig)
     writer.write_drive(root, drive, simulated, route.labelled, LABEL_SETS[recipe.label_set], recipe.dense)
 
 
