@@ -92,11 +92,11 @@ def _surface(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
     """Return |cos|, reflectance and kind of some hits. Lane marks are bright; grass is brighter than asphalt."""
     triangle = hits.triangle[near]
-    kinds = instant.looked_up("kind", triangle)
-    material = instant.looked_up("material", triangle)
+    kinds = instant.kind[triangle]
+    material = instant.material[triangle]
     ground = material == Material.GROUND
     kinds[ground] = ground_kinds(road, hits.position[near[ground], :2].astype(np.float64))
-    cosine = np.abs((instant.looked_up("normals", triangle) * hits.directions[near]).sum(axis=1))
+    cosine = np.abs((instant.normals[triangle] * hits.directions[near]).sum(axis=1))
     of_ground = np.full(256, 0.2, np.float32)
     of_ground[[Kind.LANE, Kind.SIDEWALK, Kind.GRASS]] = 0.75, 0.3, 0.45
     return cosine, np.where(ground, of_ground[kinds], REFLECTANCE[material]), kinds

@@ -254,24 +254,6 @@ class Instant:
         position = origins + np.minimum(distance, 1e4)[:, None] * directions
         return Hits(directions, distance, triangle, position)
 
-    def looked_up(self, name: str, triangle: NDArray[np.int32]) -> NDArray:
-        """Return rows of one of the tables, without building the whole table.
-
-        Parameters
-        ----------
-        name : str
-            "normals", "colour", "material" or "kind".
-        triangle : (N,) int32
-            The rows.
-        """
-        parts = [getattr(mesh.shape, name) for mesh in self.meshes]
-        first = np.cumsum([0] + [len(part) for part in parts])
-        out = np.empty((len(triangle), *parts[0].shape[1:]), parts[0].dtype)
-        for part, start in zip(parts, first[:-1], strict=True):
-            mine = (triangle >= start) & (triangle < start + len(part))
-            out[mine] = part[triangle[mine] - start]
-        return out
-
     def blocked(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
         """Return which rays hit anything solid, (N,).
 

@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 
+from semgrid_edu.storage.files import named_rows, table_beside
 from semgrid_edu.workshop.simulation.street import borders
 from semgrid_edu.workshop.simulation.street.builder import Builder
 from semgrid_edu.workshop.simulation.street.ground import ground_mesh
@@ -11,6 +12,8 @@ from semgrid_edu.workshop.simulation.street.plan import YARD, Plan
 from semgrid_edu.workshop.simulation.things import roadside
 from semgrid_edu.workshop.simulation.things.buildings import House, build_house
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+
+_HOUSES = named_rows(table_beside(__file__))
 
 
 def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
@@ -82,21 +85,15 @@ def _house(builder: Builder, house: House, s: float, d: float, yaw: float, acros
         builder.add(build_house(house), s, d, yaw, foot)
 
 
-def _town_house(rng: np.random.Generator) -> House:
-    """Draw a house of 2 to 5 storeys; every second one has a shop."""
+def _draw_house(style: str, rng: np.random.Generator) -> House:
+    """Draw a house for a town or a suburb; in a town every second one has a shop."""
+    its = _HOUSES[style]
     seed = int(rng.integers(2**31))
-    roof = str(rng.choice(["flat", "hip", "gable"], p=[0.45, 0.3, 0.25]))
-    width = rng.uniform(9, 17)
-    depth = rng.uniform(9, 12)
-    storeys = int(rng.integers(2, 6))
-    return House(width, depth, storeys, roof, bool(rng.random() < 0.5), seed)
-
-
-def _suburb_house(rng: np.random.Generator) -> House:
-    """Draw a house of 1 or 2 storeys."""
-    seed = int(rng.integers(2**31))
-    roof = str(rng.choice(["gable", "hip", "flat"], p=[0.65, 0.25, 0.1]))
-    return House(rng.uniform(8, 12), rng.uniform(7.5, 10.5), int(rng.integers(1, 3)), roof, False, seed)
+    roof = str(rng.choice(list(its.roofs), p=list(its.roofs.values())))
+    width = rng.uniform(*its.width)
+    depth = rng.uniform(*its.depth)
+    storeys = int(rng.integers(its.storeys[0], its.storeys[1] + 1))
+    return House(width, depth, storeys, roof, style == "town" and bool(rng.random() < 0.5), seed)
 
 
 def _house_row(builder: Builder, sign: int, town: bool) -> None:
@@ -109,7 +106,7 @@ def _house_row(builder: Builder, sign: int, town: bool) -> None:
     setback = rng.uniform(0.0, 0.4) if town else rng.uniform(3.5, 8.0)
     s = plan.start + rng.uniform(0, 8)
     while s < plan.end - 20:
-        house = (_town_house if town else _suburb_house)(rng)
+        house = _draw_house("town" if town else "suburb", rng)
         gap = rng.uniform(2.5, 9.0) if not town else 0.02 if rng.random() < 0.75 else rng.uniform(2, 6)
         end = s + house.width + gap
         if not _meets_side_road(builder, s, s + house.width, sign, line + 0.8):
@@ -134,7 +131,7 @@ def _tall_houses(
     plan = builder.plan
     for s in np.arange(plan.start, plan.end, step):
         if rng.random() < share:
-            house = _town_house(rng)
+            house = _draw_house("town", rng)
             s = s + rng.uniform(0, along)
             _house(builder, house, s, sign * (line + rng.uniform(*behind)), _facing(sign))
 
@@ -233,7 +230,7 @@ def _side_street(builder: Builder) -> None:
         for flank in (-1, 1):
             d = side.edge + 8
             while d < 70:
-                house = (_town_house if town else _suburb_house)(rng)
+                house = _draw_house("town" if town else "suburb", rng)
                 place = (road.junction + flank * back, sign * (d + house.width / 2), -flank * np.pi / 2)
                 _house(builder, house, *place)
                 if rng.random() < 0.5:
@@ -252,4 +249,4 @@ def _horizon(builder: Builder) -> None:
         _tree(builder, plan.end - 8 + rng.uniform(-12, 10), d + rng.uniform(-1, 1))
     for d in np.arange(-60, 60, 17):
         s = plan.end - 2 + rng.uniform(0, 8)
-        _house(builder, _town_house(rng), s, d + rng.uniform(-4, 4), -np.pi / 2, across_road=True)
+        _house(builder, _draw_house("town", rng), s, d + rng.uniform(-4, 4), -np.pi / 2, across_road=True)

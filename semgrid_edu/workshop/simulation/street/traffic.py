@@ -201,12 +201,11 @@ class Traffic:
         margin : float
             Minimum distance to other road users, metres.
         """
-        actor = Actor(self.builder.next_instance, kind, trajectory, look, float(self.rng.uniform(0, 3)))
+        actor = Actor(self._next_instance(), kind, trajectory, look, float(self.rng.uniform(0, 3)))
         feet = [actor.footprint(self.road, t) for t in self._times]
         pairs = list(zip(feet, self._others, strict=True))
         if any(collides(foot, others, margin) or collides(foot, self._static, 0.05) for foot, others in pairs):
             return False
-        self.builder.next_instance += 1
         self.moving.append(actor)
         for foot, others in pairs:
             others.append(foot)
@@ -224,16 +223,18 @@ class Traffic:
         overturned : bool
             Whether it is upside down.
         """
-        actor = Actor(self.builder.next_instance, kind, trajectory, look, overturned=overturned)
+        actor = Actor(self._next_instance(), kind, trajectory, look, overturned=overturned)
         foot = actor.footprint(self.road, 0.0)
         if collides(foot, self._static, 0.1) or any(collides(foot, others, 0.2) for others in self._others):
             return False
         self.parked.append(actor)
-        self.builder.next_instance += 1
         self.builder.solid.append((actor.shape(self.road, 0.0), actor.instance))
         self.builder.footprints.append(foot)
         self._static = footprint_table(self.builder.footprints)
         return True
+
+    def _next_instance(self) -> int:
+        return 1 + len(self.moving) + len(self.parked)
 
     def paint(self) -> tuple[float, float, float]:
         """Draw the paint of a car, (3,) linear albedo; common colours are more likely."""
