@@ -28,7 +28,7 @@ def simulate(
     n_frames : int
         Number of frames, ten a second.
     street : str or Wishes, optional
-        A street that is hard for occupancy filters, one of `named_streets.TEST_STREETS`; or the properties to fix.
+        A street that is hard for occupancy filters, one of `street.plan.TEST_STREETS`; or the properties to fix.
         By default the whole street is random.
     rig : Rig, optional
         The sensors on the recording car. By default the sensors of the simulated data sets, or `KITTI_RIG` on a named
@@ -47,9 +47,8 @@ def simulate(
         When trimesh or embreex isn't installed.
     """
     from semgrid_edu.workshop.simulation.drive import SimulatedDrive
-    from semgrid_edu.workshop.simulation.named_streets import draw_test_street
     from semgrid_edu.workshop.simulation.sensors.rig import KITTI_RIG
-    from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET
+    from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, draw_test_street
 
     if isinstance(street, str):
         seed, street = draw_test_street(street, seed)

@@ -18,9 +18,8 @@ from semgrid_edu.storage.provenance import versions, write_provenance
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.simulation import writer
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
-from semgrid_edu.workshop.simulation.named_streets import SAMPLE_WISHES, wishes_of
 from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD, SAMPLE_RIG, Rig
-from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, Wishes
+from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, SAMPLE_STREET, Wishes
 from semgrid_edu.workshop.workplace import check_workers, workplace
 
 FORMAT = 2
@@ -94,7 +93,7 @@ def read_recipes(name: str) -> dict[str, DatasetRecipe]:
     for data, row in table_beside(__file__, name).items():
         routes: list[Route] = []
         for times, route, *each in row["routes"]:
-            routes += [Route(**route, wishes=wishes_of(wishes)) for wishes in each] * times
+            routes += [Route(**route, wishes=Wishes(**wishes)) for wishes in each] * times
         rig = {"rig": Rig()} if row.get("coarse") else {}
         recipes[data] = DatasetRecipe(data, row["label_set"], tuple(routes), row.get("dense", False), **rig)
     return recipes
@@ -102,7 +101,7 @@ def read_recipes(name: str) -> dict[str, DatasetRecipe]:
 
 RECIPES = read_recipes("recipes")
 RECIPES["sample"] = DatasetRecipe(
-    "sample", "KITTI-14", (Route("drive", 20, 1, SAMPLE_WISHES),), rig=SAMPLE_RIG, edition=1
+    "sample", "KITTI-14", (Route("drive", 20, 1, SAMPLE_STREET),), rig=SAMPLE_RIG, edition=1
 )
 """Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes.
 "validation" has drives like minikitti's, half as many as in its training split. It serves to tune parameters after the

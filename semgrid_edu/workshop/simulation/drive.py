@@ -12,9 +12,9 @@ from semgrid_edu.workshop.simulation.sensors.lidar import labelled_scan
 from semgrid_edu.workshop.simulation.sensors.raycast import Instant, PorousMesh, RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Geodesy, Rig
 from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_truth
+from semgrid_edu.workshop.simulation.street import road_users
 from semgrid_edu.workshop.simulation.street.footprints import footprint_table
 from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, Wishes, draw_plan
-from semgrid_edu.workshop.simulation.street.road_users import fill_street
 from semgrid_edu.workshop.simulation.street.scenery import build_scenery
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
 from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Ego
@@ -91,7 +91,8 @@ class SimulatedDrive:
         self.geodesy = Geodesy.random(rng)
         builder = build_scenery(self.plan, rng)
         traffic = Traffic(builder, self.ego.trajectory, duration)
-        (wishes.cast or fill_street)(traffic)
+        cast = getattr(road_users, wishes.cast) if isinstance(wishes.cast, str) else wishes.cast
+        cast(traffic)
         self.moving = traffic.moving
         self.parked = traffic.parked
         self.static = RayMesh.of(*zip(*builder.solid, strict=True))

@@ -6,15 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.camera import transform_points
+from semgrid_edu.workshop.simulation.street import footprints
 from semgrid_edu.workshop.simulation.street.builder import OVERHEAD, Builder
-from semgrid_edu.workshop.simulation.street.footprints import (
-    ROUND,
-    ROUNDED,
-    SQUARE,
-    Footprint,
-    collides,
-    footprint_table,
-)
 from semgrid_edu.workshop.simulation.street.ground import on_wheels
 from semgrid_edu.workshop.simulation.street.layout import Road
 from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Trajectory
@@ -98,7 +91,7 @@ class Actor:
         height, roll, pitch = on_wheels(road, s, d, yaw, 0.6 * self.size[0], 0.8 * self.size[1])
         return body.placed((x, y, height), yaw, tilt=(roll if self.kind == Kind.CAR else 0.0, pitch))
 
-    def footprint(self, road: Road, t: float) -> Footprint:
+    def footprint(self, road: Road, t: float) -> footprints.Footprint:
         """Return the ground that it covers at one instant. Parameters are those of `Actor.shape`."""
         return _footprint(self.kind, self.size, self.instance, *self.trajectory.pose(road, t))
 
@@ -138,12 +131,12 @@ class Actor:
         }
 
 
-def _footprint(kind: Kind, size: tuple, instance: int, position: NDArray, yaw: float) -> Footprint:
+def _footprint(kind: Kind, size: tuple, instance: int, position: NDArray, yaw: float) -> footprints.Footprint:
     """Return the ground that a road user covers."""
-    exponent = {Kind.CAR: ROUNDED, Kind.PEDESTRIAN: ROUND}.get(kind, SQUARE)
+    exponent = {Kind.CAR: footprints.ROUNDED, Kind.PEDESTRIAN: footprints.ROUND}.get(kind, footprints.SQUARE)
     length, width, height = size
     x, y, _ = position
-    return Footprint(x, y, length / 2, width / 2, yaw, exponent, int(kind), instance, min(height, OVERHEAD))
+    return footprints.Footprint(x, y, length / 2, width / 2, yaw, exponent, int(kind), instance, min(height, OVERHEAD))
 
 
 def _rounded(values: ArrayLike) -> list[float]:
@@ -185,7 +178,7 @@ class Traffic:
         self.parked: list[Actor] = []
         self._times = np.linspace(0, duration, 6 if duration < 2 else 25)
         self._others = [[_footprint(Kind.CAR, _EGO_SIZE, 0, *ego.pose(self.road, t))] for t in self._times]
-        self._static = footprint_table(builder.footprints)
+        self._static = footprints.footprint_table(builder.footprints)
 
     def add(self, kind: Kind, trajectory: Trajectory, look: Look, margin: float = 0.25) -> bool:
         """Add a road user, unless it would collide with something; return whether it was added.
@@ -204,6 +197,7 @@ class Traffic:
         actor = Actor(self._next_instance(), kind, trajectory, look, float(self.rng.uniform(0, 3)))
         feet = [actor.footprint(self.road, t) for t in self._times]
         pairs = list(zip(feet, self._others, strict=True))
+        collides = footprints.collides
         if any(collides(foot, others, margin) or collides(foot, self._static, 0.05) for foot, others in pairs):
             return False
         self.moving.append(actor)
@@ -225,12 +219,13 @@ class Traffic:
         """
         actor = Actor(self._next_instance(), kind, trajectory, look, overturned=overturned)
         foot = actor.footprint(self.road, 0.0)
+        collides = footprints.collides
         if collides(foot, self._static, 0.1) or any(collides(foot, others, 0.2) for others in self._others):
             return False
         self.parked.append(actor)
         self.builder.solid.append((actor.shape(self.road, 0.0), actor.instance))
         self.builder.footprints.append(foot)
-        self._static = footprint_table(self.builder.footprints)
+        self._static = footprints.footprint_table(self.builder.footprints)
         return True
 
     def _next_instance(self) -> int:
