@@ -1,7 +1,6 @@
 """The camera: renders the world at one instant and records what each pixel shows."""
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numba import njit
@@ -44,9 +43,6 @@ class Picture:
     kind: NDArray[np.uint8]
     depth: NDArray[np.float32]
     instance: NDArray[np.int32]
-
-
-_rays = cache(Rig.pixel_directions)
 
 
 def _discontinuities(triangle: NDArray, distance: NDArray, kind: NDArray, material: NDArray) -> NDArray[np.bool_]:
@@ -166,7 +162,7 @@ def take_picture(
     shape = rig.camera.size
     rotation = T_world_from_lidar[:3, :3].astype(np.float32)
     eye = transform_points(T_world_from_lidar @ rig.T_lidar_from_camera, np.zeros(3))
-    rays = _rays(rig)
+    rays = rig.pixel_directions()
     hits = instant.cast(eye, turned(rays, rotation), rng)
     sunlit, open_sky = _sun_and_sky(hits, instant, light, shape, rng)
     pixel = 1.0 / rig.camera.K[0, 0]
@@ -176,7 +172,7 @@ def take_picture(
     distance = hits.distance.reshape(shape)
     edges = np.flatnonzero(_discontinuities(triangles, distance, instant.kind, instant.material))
     for du, dv in _SUBPIXELS:
-        beside = instant.cast(eye, turned(_rays(rig, du, dv)[edges], rotation), rng)
+        beside = instant.cast(eye, turned(rig.pixel_directions(du, dv)[edges], rotation), rng)
         radiance[edges] += shade(beside, instant, road, light, sunlit[edges], open_sky[edges], pixel)[0]
     radiance[edges] /= 1 + len(_SUBPIXELS)
 

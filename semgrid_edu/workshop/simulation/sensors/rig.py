@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,24 +103,22 @@ class Rig:
     lidar: Lidar = Lidar()
     packet_interval: float = 0.0
 
-    @cached_property
-    def R_rect(self) -> NDArray[np.float64]:
-        """(3, 3): from camera 0 to its rectified frame."""
-        return Rotation.from_euler("xyz", [0.25, -0.42, 0.56], degrees=True).as_matrix()
+    R_rect: ClassVar[NDArray[np.float64]] = Rotation.from_euler("xyz", [0.25, -0.42, 0.56], degrees=True).as_matrix()
+    """(3, 3): from camera 0 to its rectified frame."""
+    T_camera0_from_lidar: ClassVar[NDArray[np.float64]] = rigid_transform(
+        Rotation.from_euler("xyz", [-0.25, 0.35, -0.5], degrees=True).as_matrix() @ _CAMERA_AXES,
+        np.array([-0.004, -0.076, -0.272]),
+    )
+    """(4, 4): camera 0 is 0.27 m ahead of the LIDAR and 0.08 m lower."""
+    T_lidar_from_imu: ClassVar[NDArray[np.float64]] = rigid_transform(
+        Rotation.from_euler("xyz", [0.85, 0.12, 0.045], degrees=True).as_matrix(), np.array([-0.81, 0.32, -0.80])
+    )
+    """(4, 4): the IMU is 0.81 m behind the LIDAR, 0.32 m to its right and 0.8 m lower."""
+    T_grid_from_lidar: ClassVar[NDArray[np.float64]] = invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT))
+    """(4, 4): a translation up by the LIDAR's height."""
 
-    @cached_property
-    def T_camera0_from_lidar(self) -> NDArray[np.float64]:
-        """(4, 4): camera 0 is 0.27 m ahead of the LIDAR and 0.08 m lower."""
-        tilt = Rotation.from_euler("xyz", [-0.25, 0.35, -0.5], degrees=True).as_matrix()
-        return rigid_transform(tilt @ _CAMERA_AXES, np.array([-0.004, -0.076, -0.272]))
-
-    @cached_property
-    def T_lidar_from_imu(self) -> NDArray[np.float64]:
-        """(4, 4): the IMU is 0.81 m behind the LIDAR, 0.32 m to its right and 0.8 m lower."""
-        turn = Rotation.from_euler("xyz", [0.85, 0.12, 0.045], degrees=True).as_matrix()
-        return rigid_transform(turn, np.array([-0.81, 0.32, -0.80]))
-
-    def P_rect(self, index: int) -> NDArray[np.float64]:
+    @staticmethod
+    def P_rect(index: int) -> NDArray[np.float64]:
         """Return the projection matrix of a rectified camera, with the baselines of KITTI's cameras.
 
         Parameters
@@ -149,11 +148,7 @@ class Rig:
         """(4, 4): the inverse of the camera's pose."""
         return invert_rigid(self.camera.T_camera_from_lidar)
 
-    @cached_property
-    def T_grid_from_lidar(self) -> NDArray[np.float64]:
-        """(4, 4): a translation up by the LIDAR's height."""
-        return invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT))
-
+    @cache  # noqa: B019 (there are few rigs)
     def pixel_directions(self, du: float = 0.0, dv: float = 0.0) -> NDArray[np.float32]:
         """Return the viewing direction of every pixel of camera 2.
 
