@@ -146,7 +146,7 @@ class SimulatedDrive:
         actors = self.parked + self.moving
         centres = [transform_points(T, actor.middle(road, t)) for actor in actors]
         inside = LABEL_GRID.cells(np.reshape(centres, (-1, 3)))[2]
-        return [actor.described(road, t, T) for actor, held in zip(actors, inside, strict=True) if held]
+        return [actor.described(road, t, T) for actor, is_inside in zip(actors, inside, strict=True) if is_inside]
 
     def footprints(self, t: float) -> NDArray[np.float64]:
         """Return the footprints of all objects at one instant, static and moving, (K, 9), see `footprint_table`.

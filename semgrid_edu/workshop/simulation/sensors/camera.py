@@ -85,14 +85,14 @@ def _open(
 
     Each chosen hit casts one ray, starting slightly off the surface, along `axis` plus the normal plus random scatter.
     """
-    luck = rng.random((len(chosen), 3), dtype=np.float32)
+    scatter = rng.random((len(chosen), 3), dtype=np.float32)
     normal = instant.normals[hits.triangle[chosen]]
     ray = hits.directions[chosen]
     away = normal[:, 0] * ray[:, 0] + normal[:, 1] * ray[:, 1] + normal[:, 2] * ray[:, 2] > 0
     facing = np.where(away, -1.0, 1.0)[:, None] * normal
     offset = 0.004 + 0.0006 * hits.distance[chosen, None].astype(np.float64)
     starts = (hits.position[chosen] + offset * (facing - ray)).astype(np.float32)
-    rays = (np.float32(axis) + along_normal * facing + spread * (luck - 0.5)).astype(np.float32)
+    rays = (np.float32(axis) + along_normal * facing + spread * (scatter - 0.5)).astype(np.float32)
     length = np.sqrt((rays**2).sum(axis=1, keepdims=True, dtype=np.float64))
     result = np.full(len(hits.distance), -1, np.float32)
     result[chosen] = ~instant.blocked(starts, (rays / length).astype(np.float32))

@@ -54,11 +54,11 @@ def labelled_scan(
     order = np.argsort(number)
     number = number[order]
     distance, cosine, reflectance, kinds = (column[order] for column in measured)
-    luck = rng.random(len(rays), dtype=np.float32)
+    draws = rng.random(len(rays), dtype=np.float32)
     range_noise = rng.standard_normal(len(rays), dtype=np.float32)
     gain_noise = rng.standard_normal(len(rays), dtype=np.float32)
     signal = reflectance * (0.15 + 0.85 * cosine) * (25.0 / np.maximum(distance, 8.0)) ** 2
-    kept = luck[number] > lidar.dropout + np.exp(-signal / lidar.weak_signal)
+    kept = draws[number] > lidar.dropout + np.exp(-signal / lidar.weak_signal)
     measured_range = distance + lidar.range_sigma * range_noise[number]
     intensity = (reflectance * (0.4 + 0.6 * cosine) * (1 + 0.15 * gain_noise[number])).clip(0, 0.99)
     points = np.column_stack([rays[number] * measured_range[:, None], np.round(intensity, 2)])
@@ -77,8 +77,8 @@ def _sectors(
     rays = lidar.directions
     poses = np.stack([pose(t) for t in times]) if lidar.revolution else pose(0.0)[None]
     sector = np.floor(lidar.azimuths / _SECTOR) * bool(lidar.revolution)
-    for one in np.unique(sector):
-        columns = np.flatnonzero(sector == one)
+    for current in np.unique(sector):
+        columns = np.flatnonzero(sector == current)
         chosen = (columns + len(times) * np.arange(len(lidar.elevations))[:, None]).ravel()
         here = poses[chosen % len(times) if lidar.revolution else 0]
         instant = world(float(times[columns].mean()))

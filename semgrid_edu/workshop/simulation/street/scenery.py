@@ -87,12 +87,12 @@ def _house(builder: Builder, house: House, s: float, d: float, yaw: float, acros
 
 def _draw_house(style: str, rng: np.random.Generator) -> House:
     """Draw a house for a town or a suburb; in a town every second one has a shop."""
-    its = _HOUSES[style]
+    spec = _HOUSES[style]
     seed = int(rng.integers(2**31))
-    roof = str(rng.choice(list(its.roofs), p=list(its.roofs.values())))
-    width = rng.uniform(*its.width)
-    depth = rng.uniform(*its.depth)
-    storeys = int(rng.integers(its.storeys[0], its.storeys[1] + 1))
+    roof = str(rng.choice(list(spec.roofs), p=list(spec.roofs.values())))
+    width = rng.uniform(*spec.width)
+    depth = rng.uniform(*spec.depth)
+    storeys = int(rng.integers(spec.storeys[0], spec.storeys[1] + 1))
     return House(width, depth, storeys, roof, style == "town" and bool(rng.random() < 0.5), seed)
 
 
