@@ -71,12 +71,13 @@ def sheet_fence(style: str, length: float) -> tuple[Shape, Shape]:
         The post at the origin with the rails, and the porous sheet.
     """
     spec = SHEETS[style]
-    look = (SHEETS[style].colour, Material.METAL)
-    post = _fence_box((0, 0, spec.post[0]), (0.06, 0.06, spec.post[1]), *look)
-    rails = [_fence_box((length / 2, 0, z), (length, wide, high), *look) for z, wide, high in spec.rails]
-    sheet = _fence_quads(
-        (0, 0, spec.sheet[0]), (length, 0, 0), (0, 0, spec.sheet[1]), spec.colour, Material[spec.material]
-    )
+    metal = (spec.colour, Material.METAL)
+    middle, size = spec.post
+    post = _fence_box((0, 0, middle), (0.06, 0.06, size), *metal)
+    rails = [_fence_box((length / 2, 0, z), (length, wide, high), *metal) for z, wide, high in spec.rails]
+    bottom, height = spec.sheet
+    porous = (spec.colour, Material[spec.material])
+    sheet = _fence_quads((0, 0, bottom), (length, 0, 0), (0, 0, height), *porous)
     return merge([post, *rails]), sheet
 
 
