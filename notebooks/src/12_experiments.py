@@ -951,7 +951,7 @@ def fields(drive, wanted):
 
 
 with tempfile.TemporaryDirectory() as folder:
-    recipe = DatasetRecipe("live", "KITTI-14", (Route("test", 2, False),) * 10, rig=SAMPLE_RIG)
+    recipe = DatasetRecipe("live", "KITTI-14", (Route("test", 2, every=2),) * 10, rig=SAMPLE_RIG)
     index = load_index(make_from_recipe(recipe, Path(folder), 12, workers=1))
     test = [fields(KittiRawDrive(index.root, *name), [1]) for name in index.frames_by_drive("test")]
 learn = fields(sample_drive(), range(len(sample_drive())))

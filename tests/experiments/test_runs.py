@@ -242,7 +242,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(cluster, trained, tm
 
 
 def test_a_cluster_makes_the_same_data(cluster, tmp_path):
-    recipe = DatasetRecipe("two", "KITTI-14", (Route("drive", 1, True),) * 2)
+    recipe = DatasetRecipe("two", "KITTI-14", (Route("drive", 1),) * 2)
     alone = make_from_recipe(recipe, tmp_path / "alone", seed=3, workers=1)
     together = make_from_recipe(recipe, tmp_path / "together", 3, 2, cluster.scheduler_address)
     assert results(together) == results(alone)
