@@ -88,7 +88,7 @@ def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = 
 
     Examples
     --------
-    Four cells at 99 % of which one is wrong: at the right temperature they are at 75 %.
+    Four cells at 99 %, one of them wrong: at the right temperature they are at 75 %.
 
     >>> log_p = np.log([[0.99] * 4, [0.01] * 4])
     >>> T = fit_temperature(log_p, [0, 0, 0, 1])

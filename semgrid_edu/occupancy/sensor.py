@@ -8,9 +8,16 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count, types_named
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence, check_points
+from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.polar import GroundParams, beyond_reach, fill_gaps, height_above_ground, polar_profile, reach
+from semgrid_edu.occupancy.polar import (
+    GroundParams,
+    beyond_reach,
+    fill_gaps,
+    height_above_ground,
+    polar_profile,
+    visible_range,
+)
 
 
 @dataclass(frozen=True)
@@ -97,7 +104,7 @@ class SensorModel:
         """
         prepared = prepare_scan(points, self)
         profile = polar_profile(prepared, self.obstacle_min, self.obstacle_max, self.beams)
-        return Scan(prepared, fill_gaps(reach(*profile), self.gap), self)
+        return Scan(prepared, fill_gaps(visible_range(*profile), self.gap), self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +179,7 @@ def count_in_cells(xy: NDArray, spec: GridSpec) -> NDArray[np.int64]:
 
 
 def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.floating]:
-    """Prepare a scan for evidence: check it, remove the vehicle's own returns, and measure heights from the ground.
+    """Prepare a scan for evidence: remove the vehicle's own returns, and measure heights from the ground.
 
     Parameters
     ----------
@@ -187,7 +194,7 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.floating]:
     (M, 3) float32 or float64
         The other returns, in their order: x, y, and the height above the ground at that place (m).
     """
-    points = without_own_returns(check_points(points), sensor.vehicle, sensor.edge, sensor.obstacle_min)
+    points = without_own_returns(points, sensor.vehicle, sensor.edge, sensor.obstacle_min)
     if sensor.ground is not None:
         points[:, 2] = height_above_ground(points, sensor.ground)
     return points

@@ -169,19 +169,6 @@ def demo_says(tmp_path, monkeypatch, capsys) -> Callable[[], str]:
     return says
 
 
-@pytest.mark.parametrize(("sensor", "what"), [("velodyne_points", "scans"), ("image_02", "images")])
-def test_a_sensor_that_freezes_anywhere_is_named_once_with_its_last_frame(tmp_path, sensor, what):
-    write_tiny_drive(tmp_path, n_frames=12)
-    files = sorted((tmp_path / DATE / f"{DATE}_drive_0001_sync" / sensor / "data").iterdir())
-    for k in (3, 4, 9):
-        shutil.copyfile(files[2 if k < 5 else 8], files[k])
-    found = [line for line in drive_doubts(KittiRawDrive(tmp_path, DATE, "0001")) if f"{what} that differ" in line]
-    assert found == [
-        f"{files[3]}: expected {what} that differ, found {files[2].name} again, up to {files[4].name}",
-        f"{files[9]}: expected {what} that differ, found {files[8].name} again, up to {files[9].name}",
-    ]
-
-
 @pytest.mark.parametrize(("spoilt", "says"), DOUBTFUL.values(), ids=DOUBTFUL, indirect=["spoilt"])
 def test_what_cannot_be_right_is_said_before_the_work(spoilt, says, demo_says):
     assert any(re.search(says, line) for line in drive_doubts(spoilt))

@@ -186,13 +186,6 @@ def test_pixels_take_the_class_of_what_the_camera_sees(scene, size):
         assert found.depth[labels == BUILDING].max() == pytest.approx(WALL, abs=1e-3)
 
 
-def test_frame_labels_are_those_of_its_own_scan(scene):
-    labels = scene[0].labels
-    at_home = (labels.birdseye != IGNORE) & labels.visible
-    assert KITTI_14 is labels.label_set
-    assert set(np.unique(labels.birdseye[at_home])) == {ROAD, CAR, BUILDING}
-
-
 def test_a_scene_without_labels_has_frames(copy):
     shutil.rmtree(copy / SCENE / "annotations")
     scene = PandasetScene(copy, SCENE)
@@ -216,14 +209,6 @@ def test_a_worker_process_can_open_it_again(root):
 def test_a_window_of_fewer_than_no_scans_is_refused(scene, window):
     with pytest.raises(ArgumentError, match=rf"{next(iter(window))}: expected a whole number from 0 up, found -1"):
         scene.truth(1, SPEC, **window)
-
-
-def test_the_index_knows_it(root):
-    frames = [{"scene": SCENE, "camera": "front_camera", "frame": k} for k in (0, 2)]
-    content = {"name": "real", "label_set": "KITTI-14", "reader": "pandaset", "splits": {"train": frames}}
-    (root / "dataset.json").write_text(json.dumps(content))
-    ((scene, numbers),) = load_index(root).drives("train")
-    assert (scene.name, numbers) == (f"{SCENE} front_camera", [0, 2])
 
 
 def test_a_training_set_takes_labels_of_its_own_image_size(root, scene):
@@ -277,8 +262,6 @@ def relabelled(folder):
 
 BAD = {
     "a missing scan": (gone("lidar/02.pkl.gz"), r"lidar/02\.pkl\.gz: expected a file"),
-    "a missing label": (gone("annotations/semseg/02.pkl.gz"), r"semseg/02\.pkl\.gz: expected a file"),
-    "missing cuboids": (gone("annotations/cuboids/02.pkl.gz"), r"cuboids/02\.pkl\.gz: expected a file"),
     "missing poses": (gone("lidar/poses.json"), r"lidar/poses\.json: expected a file"),
     "missing poses of the camera": (
         gone("camera/front_camera/poses.json"),
@@ -286,28 +269,18 @@ BAD = {
     ),
     "too few poses": (written("lidar/poses.json", b"[]"), r"lidar/poses\.json: expected at least 5 poses.*found 0"),
     "a pose of something else": (written("lidar/poses.json", b"[1, 2, 3, 4, 5]"), r"poses\.json: expected poses of"),
-    "too few times": (written("lidar/timestamps.json", b"[1, 2]"), r"timestamps\.json: expected 5 finite times"),
     "times without end": (
         written("lidar/timestamps.json", b"[1, 2, 3, 4, Infinity]"),
         r"timestamps\.json: expected 5 finite times",
     ),
     "no intrinsics": (written("camera/front_camera/intrinsics.json", b'{"fx": 1}'), r"intrinsics\.json: expected the"),
-    "no such lens": (
-        written("camera/front_camera/intrinsics.json", b'{"fx": 1e9, "fy": 1000, "cx": 960, "cy": 540}'),
-        r"intrinsics\.json: expected in K focal lengths",
-    ),
     "an image cut short": (shortened("camera/front_camera/02.jpg"), r"02\.jpg: expected a sound JPEG"),
-    "a scan cut short": (shortened("lidar/02.pkl.gz"), r"lidar/02\.pkl\.gz: expected a gzipped pickle"),
     "labels of another length": (
         lambda folder: write_table(folder / "annotations/semseg/02.pkl.gz", {"class": np.full(7, 7)}),
         r"semseg/02\.pkl\.gz: expected a class for each of the scan's \d+ returns, found 7",
     ),
     "unknown classes": (relabelled, r"semseg/02\.pkl\.gz: expected labels among"),
     "another table": (written("lidar/02.pkl.gz", gzip.compress(pickled_table({"a": [1.0]}))), "expected the columns x"),
-    "text for numbers": (
-        column("annotations/semseg/02.pkl.gz", "class", ["car"]),
-        r"semseg/02\.pkl\.gz: expected finite numbers in the column class",
-    ),
     "a place that is nowhere": (
         column("annotations/cuboids/02.pkl.gz", "position.x", np.array([0.0, np.nan])),
         r"cuboids/02\.pkl\.gz: expected finite numbers in the column position\.x",

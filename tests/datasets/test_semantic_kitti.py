@@ -113,12 +113,6 @@ class TestFrames:
             assert frame.time == pytest.approx(0.103736 * k)
             np.testing.assert_array_equal(frame.points, SemanticKittiSequence(root, "00").scan(k))
 
-    def test_the_camera_stands_where_calibration_says(self, root):
-        expected = CAMERA_FROM_LIDAR.copy()
-        expected[0, 3] += BASELINE
-        camera = SemanticKittiSequence(root, "00").camera
-        np.testing.assert_allclose(camera.T_camera_from_lidar, expected, atol=1e-12)
-
     def test_pykitti_reads_the_same(self, root, folder):
         (root / "poses").mkdir()
         (folder / "poses.txt").rename(root / "poses" / "00.txt")
@@ -207,20 +201,10 @@ class TestTruth:
 
 
 class TestDamage:
-    def test_no_such_sequence(self, root):
-        with pytest.raises(DataError, match=r"01/velodyne: expected scans such as 000000.bin, found no folder"):
-            SemanticKittiSequence(root, "01")
-
     def test_a_label_file_cut_short(self, root, folder):
         path = folder / "labels" / "000000.label"
         path.write_bytes(path.read_bytes()[:-2])
         with pytest.raises(DataError, match=r"expected 4 bytes for each of the scan's 3 returns, found 10 bytes"):
-            SemanticKittiSequence(root, "00").truth(0, SPEC)
-
-    def test_a_scan_cut_short(self, root, folder):
-        path = folder / "velodyne" / "000000.bin"
-        path.write_bytes(path.read_bytes()[:-2])
-        with pytest.raises(DataError, match=r"000000.bin: expected points of 4 x 4 bytes, found 46 bytes, 14 too many"):
             SemanticKittiSequence(root, "00").truth(0, SPEC)
 
     @pytest.mark.parametrize(

@@ -129,5 +129,5 @@ def test_two_thousand_steps_keep_sums_and_limits():
         if k % 200 == 199:
             np.testing.assert_allclose(remembered.sum(axis=0), 1, atol=1e-4)
             assert np.isfinite(class_memory.state.planes).all()
-            assert class_memory.state.weight.max() <= class_memory.params.most + 1e-5
+            assert class_memory.state.weight.max() <= class_memory.params.max_weight + 1e-5
             assert class_memory.state.seen.max() <= 1 + 1e-6

@@ -104,7 +104,7 @@ def needed_returns(points: NDArray) -> NDArray[np.bool_]:
     beyond = np.maximum(np.abs(x - LABEL_GRID.x_max / 2) - LABEL_GRID.x_max / 2, np.abs(y) - LABEL_GRID.y_max)
     kept = beyond < AROUND
     ahead = ~kept & (x > -BEHIND)
-    bins = np.minimum(far / sensor.ground.bin, sensor.ground.bins - 1).astype(np.int64)
+    bins = np.minimum(far / sensor.ground.bin_length, sensor.ground.bins - 1).astype(np.int64)
     bins += beams_of(x, y, sensor.ground.sectors).astype(np.int64) * sensor.ground.bins
     # In float32, as in the filter, because many returns are on the border between two beams.
     beam = beams_of(points[:, 0], points[:, 1], sensor.beams)
