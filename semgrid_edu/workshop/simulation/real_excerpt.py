@@ -164,7 +164,7 @@ def _write(excerpt: _FixedRig, scene: str, n_frames: int, folder: Path) -> Path:
     drive = scene.zfill(4)
     K = excerpt.camera.K
     T = excerpt.camera.T_camera_from_lidar
-    rig = SimpleNamespace(image_size=IMAGE_SIZE, R_rect=np.eye(3), T_camera0_from_lidar=T, T_lidar_from_imu=np.eye(4))
+    rig = SimpleNamespace(camera=excerpt.camera, R_rect=np.eye(3), T_camera0_from_lidar=T, T_lidar_from_imu=np.eye(4))
     rig.P_rect = lambda _: np.column_stack([K, np.zeros(3)])  # KITTI has four cameras, and this one is camera 2
     write_calibration(folder, rig, date)
     label_set = f"{KITTI_14.name}\n{WITH_GAPS}"

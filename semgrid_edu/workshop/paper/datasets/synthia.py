@@ -62,10 +62,11 @@ SYNTHIA_PERIOD = 0.2
 GROUND_RANGE = 20.0
 """Road pixels of the first image closer than this, metres, determine the height of the camera."""
 
-STANDING = 0.05
-MOSTLY = 0.9
-"""STANDING: a camera that moves less than this counts as stationary, metres per frame. MOSTLY: minimum for the forward
-share of a moving camera's steps (median)."""
+STATIONARY_STEP = 0.05
+"""A camera that moves less than this from frame to frame counts as stationary, metres."""
+
+FORWARD_SHARE = 0.9
+"""The smallest plausible forward share of a moving camera's steps (median)."""
 
 _CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """From axes forward, left, up to camera axes."""
@@ -197,10 +198,10 @@ class SynthiaSequence(FrameSequence):
         poses = [self._pose(k) for k in range(len(self))]
         steps = np.array([(invert_rigid(a) @ b)[:3, 3] for a, b in pairwise(poses)]).reshape(-1, 3)
         lengths = np.linalg.norm(steps, axis=1)
-        ahead = steps[lengths > STANDING, 0] / lengths[lengths > STANDING]
-        if ahead.size and np.median(ahead) < MOSTLY:
+        ahead = steps[lengths > STATIONARY_STEP, 0] / lengths[lengths > STATIONARY_STEP]
+        if ahead.size and np.median(ahead) < FORWARD_SHARE:
             found = f"of a step of the camera {np.median(ahead):.2f} ahead (median)"
-            raise DataError(self.folder / "CameraParams", f"steps of which at least {MOSTLY} are ahead", found)
+            raise DataError(self.folder / "CameraParams", f"steps of which at least {FORWARD_SHARE} are ahead", found)
 
     def _frame(self, k: int) -> Frame:
         size = self.camera.size
