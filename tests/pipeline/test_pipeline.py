@@ -45,6 +45,15 @@ def test_every_frame_comes_out_with_every_stage_timed(drive, results):
         assert min(result.seconds.values()) > 0
 
 
+@pytest.mark.parametrize(
+    "spoil", [lambda i: i[:, 1:], lambda i: i[..., 0], lambda i: i / 255], ids=["size", "grey", "float"]
+)
+def test_an_image_that_is_not_its_cameras_is_refused(drive, net, spoil):
+    frame = drive[0]
+    with pytest.raises(ArgumentError, match=r"image: expected \(.*, 3\) uint8, the size of its camera"):
+        next(run_pipeline([replace(frame, image=spoil(frame.image))], net, FEW))
+
+
 def test_occupancy_is_that_of_track_drive(drive, net, results):
     beliefs = track_drive(drive, net.architecture.grid, FEW, seed=0)
     for belief, result in zip(beliefs, results, strict=True):
