@@ -167,7 +167,7 @@ def test_frames_are_read_one_at_a_time(drive, net):
 
 def test_the_network_sees_the_mean_of_the_pixels_it_gathers(drive):
     image = np.arange(4 * 4 * 3, dtype=np.uint8).reshape(4, 4, 3)
-    frame = Frame(image, np.empty((0, 4), np.float32), drive.camera, np.eye(4), time=0.0)
+    frame = Frame(image, np.empty((0, 4), np.float32), drive.camera.resized((4, 4)), np.eye(4), time=0.0)
     expected = image.reshape(2, 2, 2, 2, 3).mean(axis=(1, 3)).transpose(2, 0, 1) / 255
     np.testing.assert_allclose(network_image(frame, (2, 2)), expected, atol=0.5 / 255)
 
