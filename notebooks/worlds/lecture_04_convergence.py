@@ -10,8 +10,8 @@ from semgrid_edu import occupancy
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State
 from semgrid_edu.occupancy.cmcdot import velocity_moments
-from semgrid_edu.occupancy.state import cells_of
 from semgrid_edu.occupancy.sensor import likelihoods
+from semgrid_edu.occupancy.state import cells_of
 from worlds.lecture_02_boxes import Box, cells_in
 from worlds.lecture_04_cmcdot import NO_BIRTHS
 
