@@ -1,5 +1,6 @@
 """The index of a data set: its labelled frames, split into training and test frames (section 4)."""
 
+import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ from semgrid_edu.datasets.pandaset_files import semseg_folder
 from semgrid_edu.datasets.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14, LABEL_SETS, LabelSet
-from semgrid_edu.storage.files import relative_path, write_json
+from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
 
 INDEX_FILE = "dataset.json"
@@ -215,6 +216,25 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
     index |= {"label_set": KITTI_14.name, "splits": {split: frames for split, frames in splits.items() if frames}}
     write_json(path, index)
     return path
+
+
+def relative_path(path: str | Path, folder: str | Path) -> str:
+    """Return the way from a folder to a path; on Windows, from one drive to another, the whole path.
+
+    Parameters
+    ----------
+    path, folder : path-like
+        Where to, and where from.
+
+    Examples
+    --------
+    >>> relative_path("data/kitti", "data/index").replace(os.sep, "/")
+    '../kitti'
+    """
+    try:
+        return os.path.relpath(path, folder)
+    except ValueError:  # only ntpath raises it
+        return os.fspath(path)
 
 
 def _entry(path: Path, content: Any, key: str) -> Any:

@@ -15,12 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_from_grid, transform_points
-from semgrid_edu.datasets.calibration import (
-    BenchmarkCalibration,
-    camera_from,
-    parse_pose,
-    read_benchmark_calibration,
-)
+from semgrid_edu.datasets.benchmark_calibration import BenchmarkCalibration, parse_pose, read_benchmark_calibration
+from semgrid_edu.datasets.calibration import camera_from
 from semgrid_edu.datasets.class_tables import ClassTable
 from semgrid_edu.datasets.frames import FrameSequence, frame_numbers, nothing_known, read_scan
 from semgrid_edu.datasets.project_lidar import birdseye_votes, seen_returns
@@ -187,6 +183,10 @@ class SemanticKittiSequence(FrameSequence):
         labelled = [self._labelled_points(j, k) for j in window]
         points, classes = (np.concatenate(arrays) for arrays in zip(*labelled, strict=True))
         return birdseye_votes(points, classes, spec, KITTI_14)
+
+    def path(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the poses of the LIDAR, (N, 4, 4) T_world_from_lidar in metres, and their times, (N,) seconds."""
+        return np.array(self._poses[: len(self)]), np.array(self._times[: len(self)])
 
     def _labelled_points(self, j: int, k: int) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return scan j in the grid frame of frame k, and its classes, without things that moved in between."""

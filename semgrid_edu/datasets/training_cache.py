@@ -11,11 +11,11 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.datasets import label_policies, training_arrays
 from semgrid_edu.datasets.frames import LabelledDrive
-from semgrid_edu.datasets.index import DatasetIndex
+from semgrid_edu.datasets.index import DatasetIndex, relative_path
 from semgrid_edu.datasets.label_policies import LidarTruth, drive_labels
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
 from semgrid_edu.errors import ArgumentError, DataError, needed
-from semgrid_edu.storage.files import atomic_path, cache_folder, check_writable, relative_path
+from semgrid_edu.storage.files import atomic_path, cache_folder, check_writable
 from semgrid_edu.storage.provenance import code_hash
 from semgrid_edu.storage.tensors import read_arrays
 

@@ -171,25 +171,6 @@ def write_json(path: str | Path, content: object) -> None:
     write_text(path, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
 
 
-def relative_path(path: str | Path, folder: str | Path) -> str:
-    """Return the way from a folder to a path; on Windows, from one drive to another, the whole path.
-
-    Parameters
-    ----------
-    path, folder : path-like
-        Where to, and where from.
-
-    Examples
-    --------
-    >>> relative_path("data/kitti", "data/index").replace(os.sep, "/")
-    '../kitti'
-    """
-    try:
-        return os.path.relpath(path, folder)
-    except ValueError:  # only ntpath raises it
-        return os.fspath(path)
-
-
 def sha256(path: str | Path) -> str:
     """Return the SHA-256 of a file's bytes, in hexadecimal.
 

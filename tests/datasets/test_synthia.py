@@ -71,6 +71,19 @@ def pose(k):
     return " ".join(str(float(x)) for x in T_world_from_camera.T.ravel()) + "\n"
 
 
+def test_a_depth_camera_has_no_bonnet(root):
+    frame = SynthiaSequence(root, NAME)[0]
+    assert frame.vehicle_returns.shape == (len(frame.points),)
+    assert not frame.vehicle_returns.any()
+
+
+def test_depth_in_metres_is_told(root, folder):
+    _, depth = scene(WALL)
+    write_png16(folder / "Depth" / VIEW / "000000.png", [np.round(depth)] * 3)
+    with pytest.raises(DataError, match=r"a camera at least 0\.5 m above .* is the depth in metres"):
+        SynthiaSequence(root, NAME)[0]
+
+
 @pytest.fixture
 def folder(root):
     return root / NAME

@@ -171,6 +171,16 @@ def test_a_beam_that_the_vehicles_edge_splits_is_no_obstacle(evidence_of, y, ref
 
 
 @TWINS
+@pytest.mark.parametrize(("reflectance", "obstacles"), [(0.0, 1), (0.3, 1)], ids=["not measured", "measured"])
+def test_who_stands_before_the_bumper_is_seen_without_reflectance(evidence_of, reflectance, obstacles):
+    """A scanner that writes 0 for all returns: none of them is taken for a split beam."""
+    ground = [[3.75, y, 0.0, reflectance] for y in (-1, 0, 1)]
+    person = [[3.2, 0.2, 1.0 + 0.1 * k, reflectance] for k in range(9)]
+    evidence = evidence_of(np.array([*ground, *person]), GridSpec(0, 4, -2, 2, 0.5), SENSOR)
+    assert (evidence.occupied > evidence.free).sum() == obstacles
+
+
+@TWINS
 @pytest.mark.parametrize(("own", "x", "obstacles"), [(1, 3.2, 0), (0, 1.4, 1)], ids=["far ahead", "where a bonnet is"])
 def test_who_knows_the_vehicles_own_returns_needs_no_outline(evidence_of, own, x, obstacles):
     returns = np.array([[3.75, 0.25, 0.0, 0.3, 0], [x, 0.2, 1.0, 0.0, own]])

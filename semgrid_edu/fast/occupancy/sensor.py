@@ -14,7 +14,7 @@ from semgrid_edu.occupancy import evidence, sensor
 from semgrid_edu.occupancy.evidence import Evidence, Sensor
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.polar import fill_gaps, visible_range
-from semgrid_edu.occupancy.sensor import likelihoods
+from semgrid_edu.occupancy.sensor import edge_of_splits, likelihoods
 from semgrid_edu.occupancy.state import OUTSIDE
 
 
@@ -66,7 +66,8 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: Sensor, pose: PlanarM
 
 def prepare_scan(points: NDArray, sensor: sensor.SensorModel) -> NDArray:
     """Prepare a scan for evidence. Parameters and result are those of `prepare_scan`; the type is that of `points`."""
-    points = without_own_returns(points, sensor.vehicle, sensor.edge, sensor.obstacle_min)
+    edge = edge_of_splits(points, sensor.edge)
+    points = without_own_returns(points, sensor.vehicle, edge, sensor.obstacle_min)
     if sensor.ground is not None:
         points[:, 2] = heights_of(points, sensor.ground)
     return points

@@ -59,6 +59,9 @@ VIEW = "Stereo_Left/Omni_F"
 SYNTHIA_PERIOD = 0.2
 """Seconds between frames: 5 frames per second according to the readme."""
 
+LOWEST_CAMERA = 0.5
+"""No car's camera is lower, metres."""
+
 GROUND_RANGE = 20.0
 """Road pixels of the first image closer than this, metres, determine the height of the camera."""
 
@@ -206,13 +209,15 @@ class SynthiaSequence(FrameSequence):
     def _frame(self, k: int) -> Frame:
         size = self.camera.size
         depth = read_synthia_depth(self._file("Depth", k), size)
+        points = depth_scan(depth, self.camera)
         return Frame(
             image=read_png(self._file("RGB", k), "RGB", size),
-            points=depth_scan(depth, self.camera),
+            points=points,
             camera=self.camera,
             T_world_from_lidar=invert_rigid(self._pose(0)) @ self._pose(k),
             time=k * SYNTHIA_PERIOD,
             labels=self._labels(read_synthia_labels(self._file("GT/LABELS", k), size), depth),
+            vehicle_returns=np.zeros(len(points), np.bool_),  # a depth image doesn't show the vehicle
         )
 
     @cached_property
@@ -236,6 +241,9 @@ class SynthiaSequence(FrameSequence):
         height = float(np.median((rows - K[1, 2]) / K[1, 1] * depth[road]))
         if height <= 0:
             raise DataError(path, "road below the camera", f"road {-height:.2f} m above it")
+        if height < LOWEST_CAMERA:
+            expected = f"a camera at least {LOWEST_CAMERA} m above the road"
+            raise DataError(path, expected, f"{height:.2g} m: is the depth in metres, not in centimetres?")
         return height
 
     def _labels(self, classes: NDArray[np.uint8], depth: NDArray[np.float32]) -> FrameLabels:
