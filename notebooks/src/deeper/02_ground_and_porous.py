@@ -24,8 +24,9 @@ from scipy import ndimage
 
 from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.fast import SensorModel
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import LogOddsGrid, LogOddsParams, PlanarMotion, SensorModel, State, log_odds
+from semgrid_edu.occupancy import LogOddsGrid, LogOddsParams, PlanarMotion, State, log_odds
 from semgrid_edu.occupancy import scan_evidence, update_log_odds
 from semgrid_edu.occupancy.polar import walk_sector
 from semgrid_edu.occupancy.polar import beyond_reach
@@ -309,7 +310,7 @@ for returns in (1, 2):
 lane = GridSpec(x_min=0, x_max=40, y_min=-8, y_max=8, cell=0.5)
 fig, ax = plt.subplots(figsize=(7, 2.8), layout="constrained")
 for width, colour, style in ((0.03, "tab:red", ".:"), (0.1, "tab:orange", ".--"), (0.3, "black", ".-")):
-    grid, p = LogOddsGrid(lane), []
+    grid, p = LogOddsGrid(lane, LogOddsParams(sensor=sensor)), []
     for k in range(25):
         seen = scan_boxes([Box.around(30.3, 3.2, width, width, 2.4)], x=0.5 * k, columns=360)
         belief = grid.step(seen, PlanarMotion(0.5 if k else 0.0, 0.0, 0.0), dt=0.1)
