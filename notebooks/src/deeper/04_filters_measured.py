@@ -199,10 +199,10 @@ def called_moving(run, box_of, since):
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
-print("particles   car, person: called DYNAMIC [%], seeds 1 to 4")
+print("particles   car, person: called DYNAMIC [%], seeds 1 and 2")
 for number in (100, 1000, 30_000):
     tried, found = replace(params, n_particles=number), []
-    for seed in range(1, 5):
+    for seed in (1, 2):
         run = list(watch(crossing, 2.5, params=tried, seed=seed))
         found.append([called_moving(run, lambda t, k=k: crossing(t)[k], since=1.5) for k in (2, 3)])
     print(f"{number:9,}   " + "   ".join(f"{car:3.0f}, {person:3.0f}" for car, person in found))
