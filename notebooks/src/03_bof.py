@@ -768,7 +768,7 @@ def show(speed, spacing):
 speeds = FloatSlider(value=5, min=0, max=8, step=0.5, description="speed [m/s]", continuous_update=False)
 _ = interact(show, speed=speeds, spacing=ToggleButtons(options=[4, 2, 1], description="spacing"))
 
-# %% jupyter={"source_hidden": true} alt="left, P(DYNAMIC) against the true speed: near zero below half a spacing, high from one spacing on; right, the speed that BOF gives, in steps for a spacing of 4 m/s and close to the truth for 2 m/s"
+# %% jupyter={"source_hidden": true} alt="left, P(DYNAMIC) against the true speed: near zero below half a spacing, high from one spacing on; right, the speed that BOF gives, too low at 6 m/s for a spacing of 4 m/s and close to the truth for 2 m/s"
 speeds = np.array([0, 1, 2, 3, 4, 6, 8])
 fig, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained")
 for spacing, style, colour in ((4, "o:", "#c04000"), (2, "s-", "0.2")):
@@ -803,7 +803,7 @@ for way, (x_0, y_0), (vx, vy) in (("drives away", (9.2, 0), (2, 0)), ("crosses t
 # With either spacing, a box that comes at half a spacing or less is called standing, and one that comes at a whole
 # spacing is DYNAMIC with more than 0.7 (left). The same box at 2 m/s is below one half in the second second if it drives
 # away or crosses; lecture 04 asks why for a car that drives away. The speed of the one that comes is right within half a
-# metre a second with 2 m/s, and goes up in stairs with 4 m/s (right). With a spacing of 1 m/s the rule fails: a box that
+# metre a second with 2 m/s, and too low at 6 m/s with 4 m/s (right). With a spacing of 1 m/s the rule fails: a box that
 # comes at 1 m/s gets 0.40, since in two seconds it covers four cells only.
 #
 # Why not take a finer lattice all the same? **What it costs** is a map for every velocity. The number of velocities grows with the
