@@ -44,7 +44,7 @@ from worlds.lecture_04_scenes import hit_cells
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.fast import Cmcdot, track_drive
 from semgrid_edu.occupancy import (
-    Bof, CmcdotParams, Evidence, FilterState, LogOddsGrid, Particles, PlanarMotion, State, VelocityLattice,
+    Bof, BofParams, CmcdotParams, Evidence, FilterState, LogOddsGrid, Particles, PlanarMotion, State, VelocityLattice,
     move, predict, resample, scan_evidence, transition_matrix, update,
 )  # fmt: skip
 from semgrid_edu.occupancy.planar_motion import scroll
@@ -81,7 +81,8 @@ def filtered(tracker):
     return beliefs
 
 
-by_log_odds, by_bof, by_cmcdot = (filtered(tracker) for tracker in (LogOddsGrid(spec), Bof(spec), Cmcdot(spec)))
+lattice = VelocityLattice(max_speed=16, spacing=2)
+by_log_odds, by_bof, by_cmcdot = map(filtered, (LogOddsGrid(spec), Bof(spec, BofParams(lattice)), Cmcdot(spec)))
 
 
 # %% jupyter={"source_hidden": true} alt="animation of three maps of one street, seen from above: a car A overtakes us on the left and is blue in the two maps on the right, a car B comes towards us and is yellow there; in the left map B and the cars behind it leave a long dark trail C on the road, in the others it soon fades; D stands and is dark in all three"
@@ -94,7 +95,7 @@ def three_filters():
     for ax in axes:
         plotting.velocity_wheel(spec, by_bof[0].probability, by_bof[0].velocity, ax=ax, legend=ax is axes[-1])
         ax.set(xlim=(15, -11), ylim=(0, 42), ylabel="x, forward [m]" if ax is axes[0] else "")
-    for k in range(len(frames)):
+    for k in range(0, len(frames), 2):
         pictures = [plotting.occupancy_colours(plotting.binary_states(by_log_odds[k]))]
         pictures += [wheel_colours(spec, b[k].probability, b[k].velocity) for b in (by_bof, by_cmcdot)]
         b, d = 38.3 - 1.72 * k, 36.5 - 0.86 * k
@@ -108,7 +109,7 @@ def three_filters():
         fig.set_layout_engine("none")  # only the first frame is laid out
 
 
-plotting.animate(three_filters(), 0.2, alt="three filters on one street: A overtakes, B comes, C is left, D stands")
+plotting.animate(three_filters(), 0.4, alt="three filters on one street: A overtakes, B comes, C is left, D stands")
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 truth = grid_truth(frames[16].labels, by_cmcdot[16].probability, spec)
@@ -267,7 +268,7 @@ def filter_drive(frames, rng):
         state = resampled
 
 
-all_steps = list(filter_drive(frames, np.random.default_rng(0)))
+all_steps = list(filter_drive(frames[:17], np.random.default_rng(0)))
 
 # %% jupyter={"source_hidden": true}
 old, moved, predicted, evidence, updated, resampled = all_steps[16]

@@ -109,7 +109,7 @@ def moving():
     """Yield the figure for each shift of the true sign and post."""
     fig = plt.figure(figsize=(8.6, 2.6), layout="constrained")
     thing = (truths[NOW] == POST).astype(float)
-    for shift in range(8):
+    for shift in range(5):
         fig.clear()
         image = np.roll(thing, shift, axis=1)[CROP]
         pictures = {"true": image, **{way: apply_mechanism(image, way) for way in MECHANISMS}}
@@ -293,21 +293,22 @@ CHANGES = {
 
 # %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
 @torch.inference_mode()
-def map_of(net, change):
+def map_of(net, change=lambda s: s):
     """Return the classes of the map when the scores are changed before they go to the planes, (H, W)."""
-    scores = net.segmenter(as_input(images[NOW : NOW + 1]))
-    return net.fusion(net.sampler(change(scores)), occupancy)[0].argmax(dim=0)
+    return net.fusion(net.sampler(change(scores_of[net])), occupancy)[0].argmax(dim=0)
 
 
 wholes = [load_net(sample_weights(name), drive.camera) for name in NAMES]
+with torch.inference_mode():
+    scores_of = {net: net.segmenter(as_input(images[NOW : NOW + 1])) for net in wholes}
+unchanged = {net: map_of(net) for net in wholes}
 print("cells of the map that change their class [%]:", *NAMES.values(), sep="  ")
 for name, change in CHANGES.items():
-    shares = [100 * (map_of(net, change) != map_of(net, lambda s: s)).float().mean() for net in wholes]
+    shares = [100 * (map_of(net, change) != unchanged[net]).float().mean() for net in wholes]
     print(f"{name:<40}" + "".join(f"{share:10.0f}" for share in shares))
     low, high = {"1 added": (5, 20), "5 added": (20, 60), "mean shifted to 0": (1, 6)}.get(name, (25, 75))
     assert low < min(shares) <= max(shares) < high
-with torch.inference_mode():
-    means = [net.segmenter(as_input(images[NOW : NOW + 1])).mean(dim=1).abs().mean() for net in wholes]
+means = [scores_of[net].mean(dim=1).abs().mean() for net in wholes]
 print("how far the mean of a pixel's scores lies from 0:", *(f"{mean:.1f}" for mean in means))
 
 # %% [markdown]
@@ -713,22 +714,22 @@ _ = interact(draw_ways, column=IntSlider(9, 4, 16), width=IntSlider(1, 1, 6))
 # ## The same, learnt
 #
 # Do learnt weights repair what the mechanism lost? Here are six networks of seven 3x3 convolutions, 3242 weights each.
-# They start from the same numbers and see the same 1200 pictures: a post one or two pixels wide beside a wall of the
+# They start from the same numbers and see the same 600 pictures: a post one or two pixels wide beside a wall of the
 # same brightness, in noise. They differ in one of the six mechanisms and in nothing else.
 #
 # **Predict before you run.** Order the six by how well they draw posts that they haven't seen (*intersection over
 # union*, IoU: pixels that are post and called post, over pixels that are one or the other). Will the last of them catch
-# up with three times as many steps?
+# up with twice as many steps?
 #
 # <details><summary>Answer</summary>
 #
-# Strided is last, then bilinear and nearest, then indices; skips and atrous are best. With three times the steps
+# Strided is last, then bilinear and nearest, then indices; skips and atrous are best. With twice the steps
 # strided has gained, and its IoU stays below a half.
 #
 # </details>
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true, "outputs_hidden": true}
-unseen, posts_of = draw_poles(200, seed=12345)
+unseen, posts_of = draw_poles(100, seed=12345)
 drawn, reached = {"image": unseen[:, 0], "truth": posts_of}, {}
 print("              IoU [%]   rows missed [%]   width (truth) [pixels]   error in pixels")
 for way in MECHANISMS:
@@ -736,14 +737,14 @@ for way in MECHANISMS:
     got = reached[way] = score_poles(drawn[way], posts_of)
     width = f"{got.width:.1f} ({got.true_width:.1f})"
     print(f"{way:<11} {100 * got.iou:8.0f} {100 * got.missed:15.0f} {width:>23} {got.offset:18.2f}")
-longer = score_poles(train_pole_net("strided", steps=450)(unseen).detach().argmax(dim=1), posts_of)
-print(f"strided, 450 steps in place of 150: IoU {100 * longer.iou:.0f} %")
+longer = score_poles(train_pole_net("strided", steps=300)(unseen).detach().argmax(dim=1), posts_of)
+print(f"strided, 300 steps in place of 150: IoU {100 * longer.iou:.0f} %")
 assert reached["strided"].iou < min(reached["nearest"].iou, reached["bilinear"].iou)
 assert reached["indices"].iou < min(reached["skips"].iou, reached["atrous"].iou)
 assert reached["strided"].iou < longer.iou < 0.5
 assert sum(weights.numel() for weights in train_pole_net("atrous", steps=1).parameters()) == 3242
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three unseen pictures in rows, with truth and what the six networks draw: nearest and bilinear draw some posts too wide, indices one with a gap, and a speck beside another, skips and atrous whole posts, strided misses one and draws two as blobs"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three unseen pictures in rows, with truth and what the six networks draw: nearest and bilinear draw posts too wide, indices ragged or with gaps, skips and atrous whole posts, strided a block, a blob and one too short"
 fig, axes = plt.subplots(3, 8, figsize=(8.8, 3.5), layout="constrained")
 for row, k in zip(axes, (1, 2, 4), strict=True):
     for ax, (name, pictures) in zip(row, drawn.items(), strict=True):
@@ -756,8 +757,8 @@ plt.show()
 # Each row is one unseen picture; in the first column the thin bar is the post, the wide one the wall. (In the
 # table a row is missed if no pixel of it is called post; the error is that of the post's middle.)
 # The three ways that kept the column of the toy post are also the best three after learning (one training run each).
-# Atrous computes more, because its maps keep all their pixels. Three times the steps didn't repair what strides had
-# lost: after 450 of them the strided network is still behind what indices have after 150.
+# Atrous computes more, because its maps keep all their pixels. Twice the steps didn't repair what strides had
+# lost: after 300 of them the strided network is still behind what indices have after 150.
 #
 # ## A post of the drive
 #
@@ -794,38 +795,37 @@ for name, labels in called.items():
 # ## A real street
 #
 # The same three networks on a real image, from PandaSet. They have seen simulated streets only. Half of the image's
-# pixels have a label, from LIDAR returns that people have labelled. Let us train on some of them: 30 steps of gradient
-# descent, each on two of six frames, and on the points of the *left* half of the image alone. Then we judge two later
-# frames, the left half and the right half apart. The vehicle moves by a decimetre only, so the left half of the later
+# pixels have a label, from LIDAR returns that people have labelled. Let us train on some of them: 24 steps of gradient
+# descent, each on the *left* half of one of six frames. Then we judge two later frames, the left half and the right half
+# apart. The vehicle moves by a decimetre only, so the left half of the later
 # frames is nearly the image that was learnt; the right half is another part of the same street.
 #
-# **Predict before you run.** How will the accuracy change on the left half? On the right half? And if the networks learn
+# **Predict before you run.** How will the accuracy change on the left half? On the right half? And if SegNet learns
 # on the right half instead, what happens on the left?
 #
 # <details><summary>Answer</summary>
 #
-# The half that was learnt: all three networks reach more than nine of ten labelled pixels. The other half: learning on
-# the left, SegNet and FCN gain in pixel accuracy and DeepLab loses; all three lose class accuracy, DeepLab the most.
-# Learning on the right, SegNet falls from 81 to 25 % of the left half's pixels, while FCN stays and gains class accuracy.
+# The half that was learnt: all three networks reach about nine of ten labelled pixels. The other half: learning on
+# the left, SegNet gains a little in pixel accuracy, while FCN and DeepLab lose a third; all three lose class accuracy.
+# Learning on the right, SegNet falls from 81 to 30 % of the left half's pixels.
 #
 # </details>
 
 # %% jupyter={"outputs_hidden": true}
 street = real_drive()
 real_images, real_truths = seen_by_networks([street[k] for k in range(10)])
-halves = {"left": np.arange(320) < 160, "right": np.arange(320) >= 160}
-labels_of = {half: np.where(columns, real_truths, IGNORE) for half, columns in halves.items()}
+halves = {"left": np.s_[..., :160], "right": np.s_[..., 160:]}
 way = np.linalg.norm(street[9].T_world_from_lidar[:3, 3] - street[0].T_world_from_lidar[:3, 3])
 print(f"{(real_truths != IGNORE).mean():.0%} of the pixels have a label; the vehicle has moved by {way:.1f} m")
 
 
-def after_learning(name, half, steps=30):
-    """Return an image network after some steps on the labelled points of one half of the first six frames."""
+def after_learning(name, half, steps=24):
+    """Return an image network after some steps on one half of the first six frames."""
     net = load_net(sample_image_stage(name), street.camera).segmenter.train()
-    x, labels = as_input(real_images), torch.from_numpy(labels_of[half]).long()
+    x, labels = as_input(real_images)[halves[half]], torch.from_numpy(real_truths[halves[half]]).long()
     descent, chosen = torch.optim.SGD(net.parameters(), lr=0.02, momentum=0.9), np.random.default_rng(0)
     for _ in range(steps):
-        k = chosen.choice(6, 2, replace=False)
+        k = [chosen.integers(6)]
         descent.zero_grad()
         F.cross_entropy(net(x[k]), labels[k], ignore_index=IGNORE).backward()
         descent.step()
@@ -837,28 +837,27 @@ def after_learning(name, half, steps=30):
 def judged(net):
     """Return the classes of the last two frames, and pixel and class accuracy of each half, in percent."""
     classes = net(as_input(real_images[8:])).argmax(dim=1).numpy()
-    matrices = [confusion_matrix(labels_of[half][8:], classes, len(KITTI_14)) for half in halves]
+    matrices = [confusion_matrix(real_truths[8:][half], classes[half], len(KITTI_14)) for half in halves.values()]
     return classes[1], np.array([[100 * pixel_accuracy(m), 100 * class_accuracy(m)] for m in matrices])
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true, "source_hidden": true}
 views = {name: {"before": judged(nets[name])} for name in NAMES}
 for name in NAMES:
-    views[name] |= {half: judged(after_learning(name, half)) for half in halves}
+    views[name]["left"] = judged(after_learning(name, "left"))
+views["segnet"]["right"] = judged(after_learning("segnet", "right"))
 print(f"{'pixel / class accuracy [%]':<27}{'left half':>12}{'right half':>14}")
 for name, view in views.items():
     for when, (_, shares) in view.items():
         learnt = "before" if when == "before" else f"learnt {when}"
         print(f"{NAMES[name]:<11} {learnt:<15}" + "".join(f"{p:8.0f} /{c:3.0f}" for p, c in shares))
 for view in views.values():
-    before, left, right = (view[key][1] for key in ("before", "left", "right"))  # rows: halves; pixel, class accuracy
-    assert left[0, 0] > max(90, before[0, 0])
-    assert right[1, 0] > max(90, before[1, 0])
+    before, left = (view[key][1] for key in ("before", "left"))  # rows: halves; pixel, class accuracy
+    assert left[0, 0] > max(85, before[0, 0])
 lost = {name: view["before"][1][1] - view["left"][1][1] for name, view in views.items()}  # pixel, class accuracy
-assert [name for name in NAMES if lost[name][0] > 0] == ["deeplab"]
-assert 0 < min(lost["segnet"][1], lost["fcn"][1]) < 10 < lost["deeplab"][1]
+assert [name for name in NAMES if lost[name][0] > 0] == ["fcn", "deeplab"]
+assert min(of_classes for _, of_classes in lost.values()) > 5
 assert views["segnet"]["right"][1][0, 0] < 50 < views["segnet"]["before"][1][0, 0]
-assert views["fcn"]["right"][1][0, 1] > views["fcn"]["before"][1][0, 1]
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="a real street in a grid of pictures: A the image, B its labelled points with a line through the middle, then for SegNet, FCN and DeepLab the classes before (C, E, G) and after (D, F, H) learning from the left half: before, road and cars are roughly there with many wrong patches; after, the left half agrees with the points"
 fig, axes = plt.subplots(4, 2, figsize=(8.6, 5.9), layout="constrained")
@@ -879,9 +878,9 @@ plt.show()
 
 # %% [markdown]
 # The dotted line is the middle. Before, the networks have seen simulated streets only, and call more than half of the
-# labelled pixels right in each half. After 30 steps the left half mostly agrees with its points. On the right half
-# SegNet and FCN have gained pixel accuracy, too; but all three have lost class accuracy, and DeepLab both: it
-# calls the trees *building* (H). To fit the view that is learnt better than the street is
+# labelled pixels right in each half. After 24 steps the left half mostly agrees with its points. On the right half
+# SegNet has gained pixel accuracy, too; but all three have lost class accuracy, and FCN and DeepLab both: they call
+# the trees *building* (F, H). To fit the view that is learnt better than the street is
 # **overfitting**. If you judge a network on
 # the frames that it learnt, you measure its memory. Lecture [13](13_real_drive.ipynb) comes back to it.
 #

@@ -126,6 +126,7 @@ def range_state(world: BeamWorld, z: float | None) -> int:
     return state
 
 
+@cache
 def beam_likelihood(world: BeamWorld, z: float | None) -> Factor:
     """Return P(z | m1 ... mK) of one range as a table over all maps: r is summed out."""
     return (reflection(world) * Factor("r", measurement(world)[:, range_state(world, z)])).sum("r")

@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.fast import scan_evidence
 from semgrid_edu.graphical import Factor, eliminate, in_rows
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import LogOddsParams, SensorModel, log_odds, probability, scan_evidence, update_log_odds
+from semgrid_edu.occupancy import LogOddsParams, SensorModel, log_odds, probability, update_log_odds
 from worlds.lecture_00_stage_graph import CutEdge, Price, StageGraph, binary, directed, with_gaps
 from worlds.lecture_02_beam import (
     BINS_PER_CELL,
@@ -49,7 +50,7 @@ def same_sensor(noise: float, params: LogOddsParams = PARAMS, n_cells: int = 8) 
 def package_row(
     ranges: Sequence[float | None], params: LogOddsParams = PARAMS, n_cells: int = 8, rings: int = 1
 ) -> NDArray[np.float64]:
-    """Return P(occupied) after each scan by the package's `scan_evidence` and `update_log_odds`, (scans, K).
+    """Return P(occupied) after each scan by the package's `scan_evidence`, compiled, and `update_log_odds`, (scans, K).
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ STRIDES = (1, 2, 2, 1, 1, 1, 1)
 """Strides of the seven layers of "strided"."""
 RATES = (1, 1, 2, 4, 4, 4, 4)
 """Rates of the seven layers of "atrous": the atrous algorithm derives them from the strides, see `ResNet`."""
-BATCH_SIZE = 8
+BATCH_SIZE = 4
 LEARNING_RATE = 0.02
 """For Adam: gradient descent with momentum, as in `train`, takes more steps than fit into seconds."""
 POLE_WEIGHT = 4.0
@@ -219,7 +219,7 @@ def train_pole_net(mechanism: str, steps: int = 150, seed: int = 0) -> PoleNet:
     mechanism : str
         One of `MECHANISMS`.
     steps : int
-        Number of steps, each on 8 new images.
+        Number of steps, each on 4 new images.
     seed : int
         Seed for the initial weights and for the images.
     """

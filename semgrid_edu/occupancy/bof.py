@@ -79,13 +79,14 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float, d
     blocked = _blocked(state.velocity, mixed, mixed[UNKNOWN] + vacated, spec, params.world.walls, car_speed)
 
     # What arrives in a cell meets what the cell holds.
+    believed = {k: 1 - blocked(k) for k in np.flatnonzero(moves)}
     possible = np.zeros(spec.shape)
-    for k in np.flatnonzero(moves):
-        possible += occupied[k] * (1 - blocked(k))
+    for k, share in believed.items():
+        possible += occupied[k] * share
     keep, take = strike_out(arrives, possible)
     newborn = keep * newborn
     for k in range(1, len(occupied)):
-        occupied[k] *= take * (1 - blocked(k)) if moves[k] else keep
+        occupied[k] *= take * believed[k] if moves[k] else keep
         occupied[k] += params.lattice.prior[k] * newborn
     occupied[0] = keep * mixed[STATIC]
     free = keep * (mixed[FREE] + vacated)

@@ -192,7 +192,8 @@ def shift(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
         How far, in cells along x and y.
     """
     height, width = plane.shape
-    up, left = np.clip(cells, (-height, -width), (height, width))
+    up = max(-height, min(int(cells[0]), height))
+    left = max(-width, min(int(cells[1]), width))
     shifted = np.zeros_like(plane)
     source = plane[max(up, 0) : height + min(up, 0), max(left, 0) : width + min(left, 0)]
     shifted[max(-up, 0) : height - max(up, 0), max(-left, 0) : width - max(left, 0)] = source
