@@ -973,7 +973,7 @@ plt.show()
 #
 # ### Nineteen scans and a wrong calibration
 #
-# The graph promised that votes can't outvote an error that all returns share. Now we can test it on the drive: ten
+# The graph promised that votes can't outvote an error that all returns share. Now we can test it on the drive: four
 # cameras, each turned and displaced by a small random error, one scan against nineteen, both by majority.
 
 # %% tags=["calibration-19"] jupyter={"source_hidden": true}
