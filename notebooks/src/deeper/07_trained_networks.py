@@ -227,10 +227,11 @@ with torch.inference_mode():
 # </details>
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="two columns, frames 0 and 14, and four rows: true labels with thin yellow posts, then SegNet with ragged borders and specks, FCN and DeepLab with smooth blobs; where a thin post stands there are at most yellow patches"
-called, matrices = {}, {}
+called, matrices, scores_of = {}, {}, {}
 for name in TRAINED:
     with torch.inference_mode():
-        called[name] = nets[name](as_input(images)).argmax(dim=1).numpy()
+        scores_of[name] = nets[name](as_input(images))
+    called[name] = scores_of[name].argmax(dim=1).numpy()
     matrices[name] = confusion_matrix(truths, called[name], len(KITTI_14))
 fig, axes = plt.subplots(4, 2, figsize=(8.6, 6.1), layout="constrained")
 for column, k in enumerate((0, 14)):
@@ -276,7 +277,7 @@ small = [KITTI_14.index(name) for name in ("signage", "pedestrian", "bicycle")]
 print("[%]         pixels, blind to small things   classes, blind to small things")
 for name, m in matrices.items():
     with torch.inference_mode():
-        scores = nets[name](as_input(images))
+        scores = scores_of[name].clone()
         scores[:, small] = -torch.inf
     blind = confusion_matrix(truths, scores.argmax(dim=1).numpy(), len(KITTI_14))
     numbers = [100 * score(matrix) for score in (pixel_accuracy, class_accuracy) for matrix in (m, blind)]
@@ -323,7 +324,7 @@ plt.show()
 # up first.
 #
 # **Another world.** The networks have seen simulated streets by daylight, mirrored by chance and with brightness and
-# contrast varied by up to a fifth (*data augmentation*). Take the same twenty frames, and change them in a way that a
+# contrast varied by up to a fifth (*data augmentation*). Take seven of the same frames, and change them in a way that a
 # human would cope with.
 #
 # **Predict before you run.** Which costs most: half or double the light, noise of 10 %, red and blue swapped, left and
@@ -339,19 +340,20 @@ plt.show()
 # </details>
 
 # %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true, "source_hidden": true}
+some, true = images[::3], truths[::3]
 changes = {
-    "as it is": images,
-    "half the light": images // 2,
-    "double the light": np.minimum(images.astype(int) * 2, 255).astype(np.uint8),
-    "noise of 10 %": np.clip(images + np.random.default_rng(0).normal(0, 25, images.shape), 0, 255).astype(np.uint8),
-    "red and blue swapped": images[..., ::-1].copy(),
-    "left and right swapped": images[:, :, ::-1].copy(),
-    "upside down": images[:, ::-1].copy(),
+    "as it is": some,
+    "half the light": some // 2,
+    "double the light": np.minimum(some.astype(int) * 2, 255).astype(np.uint8),
+    "noise of 10 %": np.clip(some + np.random.default_rng(0).normal(0, 25, some.shape), 0, 255).astype(np.uint8),
+    "red and blue swapped": some[..., ::-1].copy(),
+    "left and right swapped": some[:, :, ::-1].copy(),
+    "upside down": some[:, ::-1].copy(),
 }
-turned, cost = {"left and right swapped": truths[:, :, ::-1], "upside down": truths[:, ::-1]}, {}
+turned, cost = {"left and right swapped": true[:, :, ::-1], "upside down": true[:, ::-1]}, {}
 print(f"pixel accuracy [%]     {'SegNet':>12} {'FCN-8s':>12} {'DeepLab v2':>12}")
 for change, changed in changes.items():
-    expected = turned.get(change, truths)
+    expected = turned.get(change, true)
     for name in TRAINED:
         with torch.inference_mode():
             classes = nets[name](as_input(changed)).argmax(dim=1).numpy()
@@ -360,7 +362,7 @@ for change, changed in changes.items():
             assert all((classes[expected == c] == c).mean() < 0.01 for c in map(KITTI_14.index, ("road", "sky")))
     print(f"{change:<22}", *(f"{100 * cost[change, name]:12.0f}" for name in TRAINED))
 assert all(cost["red and blue swapped", name] < cost["as it is", name] - 0.1 for name in TRAINED)
-assert all(cost["noise of 10 %", name] < 0.52 * cost["as it is", name] for name in ("segnet", "fcn"))
+assert all(cost["noise of 10 %", name] < 0.55 * cost["as it is", name] for name in ("segnet", "fcn"))
 assert cost["noise of 10 %", "deeplab"] > cost["as it is", "deeplab"] - 0.1
 assert all(cost["left and right swapped", name] > cost["as it is", name] - 0.01 for name in TRAINED)
 assert all(cost["upside down", name] == min(cost[change, name] for change in changes) for name in TRAINED)
