@@ -139,7 +139,9 @@ def shares_right():
     """Return labels of pixels and of cells, (1, h, w) and (1, H, W), and the share of each that is right, per cent."""
     with torch.inference_mode():
         pixels, cells = scores_of(learner, batch.frames.image).argmax(dim=1), grid_logits(learner, batch).argmax(dim=1)
-    right = [100 * (a == b)[b != IGNORE].float().mean().item() for a, b in ((pixels, lesson.labels), (cells, lesson.truth))]
+    right = [
+        100 * (a == b)[b != IGNORE].float().mean().item() for a, b in ((pixels, lesson.labels), (cells, lesson.truth))
+    ]
     return pixels.numpy(), cells.numpy(), right
 
 

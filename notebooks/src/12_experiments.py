@@ -226,7 +226,7 @@ def experiment(rng):
 
 
 rng = np.random.default_rng(12)
-found = np.array([experiment(rng) for _ in range(2000)])  # (2000, 3, 2)
+found = np.array([experiment(rng) for _ in range(1000)])  # (1000, 3, 2)
 contains = (found[..., 0] <= 0.75) & (found[..., 1] >= 0.75)
 for way, share in zip(("cells", "frames", "drives"), contains.mean(axis=0), strict=True):
     print(f"interval over {way:<6} contains the true value in {100 * share:4.0f} % of the experiments")
@@ -926,8 +926,8 @@ for line in table1["deviations"]:
 #
 # ## A small case, live
 #
-# We retrain the last part of the network, the fusion, nine times in less than half a minute: the usual network, one
-# without the occupancy grid, and one with the lowest ten planes, with three seeds each. It learns from the 20 frames of
+# We retrain the last part of the network, the fusion, nine times in a few seconds: the usual network, one
+# without the occupancy grid, and one with the lowest ten planes, with three seeds each. It learns from ten frames of
 # the sample drive. The image network is the shipped one, so its scores on the planes are computed once. The grid has
 # cells of 1 m. Ten new drives, made now, with the sample drive's sensors, are the test. The folded cell makes them:
 
@@ -951,10 +951,10 @@ def fields(drive, wanted):
 
 
 with tempfile.TemporaryDirectory() as folder:
-    recipe = DatasetRecipe("live", "KITTI-14", (Route("test", 2, every=2),) * 10, rig=SAMPLE_RIG)
+    recipe = DatasetRecipe("live", "KITTI-14", (Route("test", 1, every=1),) * 10, rig=SAMPLE_RIG)
     index = load_index(make_from_recipe(recipe, Path(folder), 12, workers=1))
-    test = [fields(KittiRawDrive(index.root, *name), [1]) for name in index.frames_by_drive("test")]
-learn = fields(sample_drive(), range(len(sample_drive())))
+    test = [fields(KittiRawDrive(index.root, *name), [0]) for name in index.frames_by_drive("test")]
+learn = fields(sample_drive(), range(0, len(sample_drive()), 2))
 cells = np.concatenate([truth[truth != 255] for _, _, truth in test])
 print(f"learn from {len(learn[0])} frames of one drive; test on {len(test)} drives, one frame each")
 print(f"of the test cells {np.mean(cells >= 10):.0%} are unknown")
@@ -965,7 +965,7 @@ print(f"of the test cells {np.mean(cells >= 10):.0%} are unknown")
 
 
 # %% tags=["live", "nbval-ignore-output"]
-def retrain(variant, seed, steps=40):
+def retrain(variant, seed, steps=20):
     """Train a fusion network, and return its confusion matrices on the test drives, (V, C, C)."""
     net = build_net(variant.applied_to(described), camera, seed).fusion.train()
     optimiser, order = torch.optim.SGD(net.parameters(), lr=0.05, momentum=0.9), np.random.default_rng(seed)
@@ -973,7 +973,7 @@ def retrain(variant, seed, steps=40):
     alpha = torch.tensor(median_frequency_weights(truth.numpy(), 14, limit=4)).float()
     for step in range(steps):
         optimiser.param_groups[0]["lr"] = 0.025 * (1 + np.cos(np.pi * step / steps))
-        k = torch.from_numpy(order.choice(len(truth), 4, replace=False))
+        k = torch.from_numpy(order.choice(len(truth), 2, replace=False))
         scores = net(planes[k, :, : variant.n_planes], o[k])
         loss = F.cross_entropy(scores, truth[k], weight=alpha, ignore_index=255)
         optimiser.zero_grad()
@@ -997,7 +997,7 @@ live = {name: np.array([retrain(variant, seed) for seed in range(3)]) for name, 
 #
 # The occupancy grid tells nearly by itself which kind of unknown a cell is, and about half of the test cells are
 # unknown. In the run stored here, this comparison was clear in all three metrics: *reproduced*. The upper ten planes
-# lie 2 m and more above the ground, higher than road and most cars. The differences were 0.8 to 1.5 points, in favour
+# lie 2 m and more above the ground, higher than road and most cars. The differences were 0.8 to 3.3 points, in favour
 # of ten planes, and all three intervals contained zero: *cannot tell*, with Holm's correction or without. On another
 # machine rounding differs. If one interval ended just below zero there, the uncorrected rule would say *not
 # reproduced*. Would you bet on it, after six comparisons, on one drive to learn from?
