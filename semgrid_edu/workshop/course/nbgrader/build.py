@@ -4,7 +4,6 @@ import hashlib
 import logging
 import os
 import re
-import secrets
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -126,8 +125,7 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
     digests, kept = _write_unless_changed(directory, _course_files(folder, sources, lectures), before.get("files", {}))
     names = [source.stem for source in sources]
     about = {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names}
-    salt = before.get("salt") or secrets.token_hex(16)
-    write_json(marker, about | {"lectures": lectures, "files": digests, "salt": salt})
+    write_json(marker, about | {"lectures": lectures, "files": digests})
     with course_api(directory) as api:
         for name in names:
             _release(api, name, directory / "source" / name)
@@ -145,7 +143,7 @@ def _refuse_other_folders(directory: Path) -> None:
 def _course_files(folder: Path, sources: list[Path], lectures: str) -> dict[str, str]:
     """Return the text of each file of a course, by its path in it."""
     instructor = folder / "instructor"
-    files = {name: instructor / name for name in ("nbgrader_config.py", "README.md", "Containerfile")}
+    files = {name: instructor / name for name in ("nbgrader_config.py", "README.md")}
     files |= {f"instructor/{path.relative_to(instructor).as_posix()}": path for path in instructor.glob("*/*.py")}
     texts = {name: path.read_text(encoding="utf-8") for name, path in files.items()}
     return texts | {f"source/{s.stem}/{s.stem}.ipynb": _source_text(s, lectures) for s in sources}

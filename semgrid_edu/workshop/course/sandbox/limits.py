@@ -9,11 +9,10 @@ from pathlib import Path
 import semgrid_edu
 from semgrid_edu.storage.files import shipped_folder, table_beside
 from semgrid_edu.workshop.course.sandbox import linux
+from semgrid_edu.workshop.course.sandbox.resources import MEGABYTE
 
 PARTS = ("memory", "written files", "processes", "files", "modes and dates of files", "network", "signals")
 """Everything that is limited here; the grader's process limits time."""
-
-MEGABYTE = 1_000_000
 
 SYSTEM: tuple[str, ...] = table_beside(__file__)["system"]
 """The parts of a Linux system that programs need."""
