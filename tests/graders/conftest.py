@@ -16,7 +16,6 @@ from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import samples_dir
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.course.nbgrader import build, preprocessors
-from semgrid_edu.workshop.course.nbgrader.preprocessors import prepared_folder
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -81,14 +80,14 @@ def nursery():
 @pytest.fixture(scope="module")
 def start(nursery, course):
     """A function that forks a process for a student of exercise 01 from one that is ready."""
-    with warm_processes(nursery, SOURCE, prepared_folder(course, NAME)) as start:
+    with warm_processes(nursery, SOURCE, course / "prepared" / NAME) as start:
         yield start
 
 
 @pytest.fixture
 def forked(course, start, monkeypatch):
     """The course while its students' processes are forked: for what doesn't depend on how a process is started."""
-    monkeypatch.setattr(preprocessors, "starter", lambda *_, **__: lambda _: start())
+    monkeypatch.setattr(preprocessors, "StudentProcess", lambda *_, **__: start())
     return course
 
 

@@ -5,7 +5,6 @@ from class_of import NAME, REFERENCE, SOURCE, inside
 from entries import entries_of, pack
 from warm import grade_warm, warm_processes
 
-from semgrid_edu.workshop.course.nbgrader import preprocessors
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.linux import landlock_version
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
@@ -57,10 +56,3 @@ def test_the_reference_cannot_be_read(start):
     reads = f"open({str(SOURCE)!r}).read()"
     assert points(start, inside("predict", reads)) == 12
     assert points(start, inside("predict", "from semgrid_instructor import bayes")) == 12
-
-
-def test_copies_of_the_package_do_not_share_what_is_compiled(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    ours = preprocessors.prepared_folder(tmp_path, NAME)
-    monkeypatch.setattr(preprocessors, "PACKAGE", tmp_path)
-    assert preprocessors.prepared_folder(tmp_path, NAME) != ours
