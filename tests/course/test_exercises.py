@@ -14,6 +14,7 @@ from tiny_course import tiny_notebooks
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
+from semgrid_edu.workshop.course.nbgrader import build
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError, autograde_one, place
 from semgrid_edu.workshop.course.nbgrader.build import (
     build_course,
@@ -83,7 +84,7 @@ def test_notebook_that_nbgrader_cannot_read_is_an_error_not_a_zero(course):
         autograde_one(course, "00_tiny", "breaker", GradeSettings())
 
 
-def test_other_peoples_folder_is_refused(tmp_path, notebooks):
+def test_nothing_is_written_to_other_peoples_folders(tmp_path, notebooks):
     (tmp_path / "thesis.txt").write_text("mine")
     with pytest.raises(DataError, match=r"an empty folder, or a course"):
         build_course(tmp_path, notebooks)
@@ -92,7 +93,7 @@ def test_other_peoples_folder_is_refused(tmp_path, notebooks):
         build_course(tmp_path / "thesis.txt", notebooks)
 
 
-def test_broken_source_is_refused_by_name(tmp_path):
+def test_a_broken_source_is_named(tmp_path):
     notebooks = tiny_notebooks(tmp_path / "notebooks")
     broken = notebooks / "src" / "exercises" / "00_tiny.py"
     broken.write_text(broken.read_text().replace('"points": 2, ', ""))
@@ -103,6 +104,13 @@ def test_broken_source_is_refused_by_name(tmp_path):
 CHANGED = ["nbgrader_config.py", "instructor/semgrid_instructor/tiny.py"]
 
 
+@pytest.fixture
+def unreleased(monkeypatch):
+    """Builds a course without nbgrader's part, which takes most of the time."""
+    monkeypatch.setattr(build, "_release", lambda *arguments: None)
+
+
+@pytest.mark.usefixtures("unreleased")
 def test_what_the_instructor_changed_stays_and_is_named(tmp_path, notebooks):
     build_course(tmp_path / "course", notebooks)
     settings, module = (tmp_path / "course" / name for name in CHANGED)
@@ -124,23 +132,21 @@ def test_what_the_instructor_changed_stays_and_is_named(tmp_path, notebooks):
 RELATIVE = r"\]\((?!https?://)"
 
 
-def released_links(course):
-    return "\n".join(path.read_text() for path in sorted((course / "release").glob("*/*.ipynb")))
-
-
-def test_released_exercises_link_to_where_students_find_the_lectures(tmp_path):
+@pytest.mark.usefixtures("unreleased")
+def test_exercises_link_to_where_students_find_the_lectures(tmp_path):
     notebooks = tiny_notebooks(tmp_path / "notebooks")
     source = notebooks / "src" / "exercises" / "00_tiny.py"
     source.write_text(source.read_text().replace("# # A tiny exercise", "# See [the tour](../00_tour.ipynb)."))
     course = tmp_path / "course"
+    exercise = course / "source" / "00_tiny" / "00_tiny.ipynb"
     build_course(course, notebooks)
-    assert "See the tour." in released_links(course)
+    assert "See the tour." in exercise.read_text()
     build_course(course, notebooks, "https://course.example/lectures/")
-    assert "See [the tour](https://course.example/lectures/00_tour.ipynb)." in released_links(course)
+    assert "See [the tour](https://course.example/lectures/00_tour.ipynb)." in exercise.read_text()
     build_course(course, notebooks)
-    assert "https://course.example/lectures/00_tour.ipynb" in released_links(course), "it is remembered"
+    assert "https://course.example/lectures/00_tour.ipynb" in exercise.read_text(), "it is remembered"
     assert build_course(course, notebooks, "../lectures").kept == []
-    assert "See [the tour](../lectures/00_tour.ipynb)." in released_links(course)
+    assert "See [the tour](../lectures/00_tour.ipynb)." in exercise.read_text()
     with pytest.raises(ArgumentError, match="blanks"):
         build_course(course, notebooks, "my lectures")
 

@@ -105,10 +105,10 @@ def instructor_problems(folder: Path) -> list[str]:
         QUOTES: "a sentence of a hidden test quotes no values",
     }
     return [
-        f"instructor/{path.name}: `{line.strip()}`: {says}"
+        f"instructor/{path.name}: `{line.strip()}`: {remedy}"
         for path in sorted(folder.glob("[!_]*.py"))
         for line in path.read_text("utf-8").splitlines()
-        for rule, says in rules.items()
+        for rule, remedy in rules.items()
         if rule.search(line)
     ]
 
@@ -149,9 +149,9 @@ def text_problems(notebook: NotebookNode, folder: Path) -> Iterator[str]:
     for cell in notebook.cells:
         name = cell.metadata.get("nbgrader", {}).get("grade_id") or cell.source.strip().split("\n")[0][:60]
         lines = len(cell.source.splitlines())
-        most = MAX_TEST_LINES if is_grade(cell) else MAX_LINES
-        if cell.cell_type == "code" and lines > most:
-            yield f"cell '{name}' has {lines} lines, more than {most}"
+        limit = MAX_TEST_LINES if is_grade(cell) else MAX_LINES
+        if cell.cell_type == "code" and lines > limit:
+            yield f"cell '{name}' has {lines} lines, more than {limit}"
         for found in MACHINE.findall(cell.source + _printed(cell)):
             yield f"cell '{name}' names a path of one machine: {found}"
         for target in LINK.findall(_shown(cell)):

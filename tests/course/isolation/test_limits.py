@@ -84,7 +84,7 @@ def test_no_network(limited):
 
 
 def test_calls_that_were_given_up_fail(session):
-    calls = linux.PROCESSORS.get(platform.machine(), {"refused": {}})["refused"]
+    calls = linux.PROCESSORS.get(platform.machine(), {"denied": {}})["denied"]
     session.run(
         "import ctypes\nlibc = ctypes.CDLL(None, use_errno=True)\ndef try_call(number):\n"
         "    ctypes.set_errno(0)\n    return libc.syscall(number, 0, 0, 0, 0, 0), ctypes.get_errno()\n"
@@ -197,8 +197,8 @@ HIDES_PROCESSES = {
 
 
 def test_no_process_can_hide_from_those_who_count(limited):
-    refused_if = linux.PROCESSORS.get(platform.machine(), {}).get("refused_if")
-    clone = refused_if["namespaces"]["call"] if refused_if else 0
+    denied_if = linux.PROCESSORS.get(platform.machine(), {}).get("denied_if")
+    clone = denied_if["namespaces"]["call"] if denied_if else 0
     for kind, call in HIDES_PROCESSES.items():
         line = f"(ctypes := __import__('ctypes'), libc := ctypes.CDLL(None), {call.format(clone=clone)})[-1]"
         assert limited(line, "network") == ("value", -1), kind

@@ -53,7 +53,7 @@ def test_only_the_students_own_time_counts(session, hostile_answer):
     assert f() == 1
     session.left_in_all = 0.3
     assert session.run("while True: pass")["error"]["kind"] == "AnswerTimeoutError" or session.left_in_all <= 0
-    assert "used up their time" in session.run("x = 1")["error"]["says"], "all cells together have a limit"
+    assert "used up their time" in session.run("x = 1")["error"]["message"], "all cells together have a limit"
 
 
 def test_a_call_returns_values_and_changes_arguments(answer):
@@ -190,7 +190,7 @@ def test_a_pool_of_processes_fails_with_a_sentence(session):
     if "files" in session.run("1") or "files" in session.process.unlimited:
         pytest.skip("this system can't limit files")
     error = session.run("import multiprocessing\nmultiprocessing.Pool(2)")["error"]
-    assert "not allowed where answers are graded: pools of processes" in error["says"]
+    assert "not allowed where answers are graded: pools of processes" in error["message"]
 
 
 def test_files_that_were_handed_in_beside_the_notebook_are_there(prepared, tmp_path):

@@ -115,7 +115,7 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
         When the folder contains something else, there are no exercises, or nbgrader can't release one.
     """
     directory = Path(directory).resolve()
-    _refuse_other_folders(directory)
+    _check_folder(directory)
     sources = exercise_sources(folder)
     if not sources:
         raise DataError(folder / "src" / "exercises", "the sources of the exercises", "none")
@@ -132,7 +132,7 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
     return BuiltCourse(names, kept)
 
 
-def _refuse_other_folders(directory: Path) -> None:
+def _check_folder(directory: Path) -> None:
     """Raise an error if a folder contains anything but a course that `build_course` wrote."""
     if directory.is_file():
         raise DataError(directory, "a folder", "a file")
@@ -265,8 +265,8 @@ def failure_reason(result: dict, errors: list[BaseException]) -> str:
     errors : list of BaseException
         What `caught_errors` collected. The last one counts; without any, the last line of nbgrader's message.
     """
-    said = result.get("error") or result.get("log") or "no reason"
-    return one_line(errors[-1]) if errors else said.strip().splitlines()[-1]
+    log = result.get("error") or result.get("log") or "no reason"
+    return one_line(errors[-1]) if errors else log.strip().splitlines()[-1]
 
 
 def one_line(error: BaseException) -> str:
@@ -278,6 +278,6 @@ def one_line(error: BaseException) -> str:
         The error.
     """
     # It may quote what a student wrote, and some characters control terminals.
-    says = "".join(one if one.isprintable() else "?" for one in [*str(error).splitlines(), ""][0][:300])
+    message = "".join(one if one.isprintable() else "?" for one in [*str(error).splitlines(), ""][0][:300])
     ours = type(error).__module__.startswith("semgrid_edu.")
-    return says if ours else f"{type(error).__name__}: {says}".removesuffix(": ")
+    return message if ours else f"{type(error).__name__}: {message}".removesuffix(": ")

@@ -72,7 +72,7 @@ def grade_course(
     wanted = submissions(course, assignments) if again else book.ungraded(course, assignments)
     yield from _in_pools(course, wanted, settings, workers, failed)
     if failed:
-        raise UngradedError("\n".join(f"{which}: {says}" for which, says in failed.items()))
+        raise UngradedError("\n".join(f"{which}: {message}" for which, message in failed.items()))
 
 
 def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int, failed: dict) -> Iterator[Graded]:

@@ -27,10 +27,10 @@ INSTRUCTOR = "semgrid_instructor"
 """The instructor's module, with the hidden tests."""
 
 CRASHED = "Crashed: "
-"""The beginning of a comment that says what ended Python."""
+"""The beginning of a comment on what ended Python."""
 
 CRASHES = "crashes"
-"""The name under which `ExecuteApart` tells `NoteCrashes` what ended a student's process."""
+"""The name under which `ExecuteApart` leaves for `NoteCrashes` what ended a student's process."""
 
 REFERENCE_TIMEOUT = 600.0
 """Time limit of a reference cell, seconds: it compiles functions that submissions then reuse."""
@@ -67,7 +67,7 @@ class MakeWhole(NbGraderPreprocessor):
         if not any(cell_name(cell) in blanks for cell in nb.cells):
             _recognise(nb.cells, [blank for blank in blanks.values() if is_solution(blank)])
         _mark(nb.cells, blanks)
-        nb.cells = _with_own_versions(nb.cells, blanks)
+        nb.cells = _with_students_versions(nb.cells, blanks)
         _insert_missing(nb.cells, blanks)
         return nb, resources
 
@@ -121,7 +121,7 @@ def _mark(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> None:
             cell.metadata["nbgrader"] = blank.metadata.nbgrader.copy()
 
 
-def _with_own_versions(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> list[NotebookNode]:
+def _with_students_versions(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> list[NotebookNode]:
     """Return the cells, with the student's version after each locked cell that she changed, unless it is a test."""
     found = []
     for cell in cells:

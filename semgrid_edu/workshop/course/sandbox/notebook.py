@@ -64,7 +64,7 @@ def run_submission(
     Raises
     ------
     ChildProcessError
-        When no process could be started for her code, which says nothing about her answers.
+        When no process could be started for her code, which proves nothing about her answers.
     """
     seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
     tests = TestCells(seen, unseen)
@@ -164,7 +164,7 @@ class TestCells:
         error = _run(lambda: complaints.extend(check() for check in self.postponed.pop(name, [])))
         if error is not None:
             return [_as_output(error, "")]
-        return [_error("AssertionError", says) for says in complaints[:] if says][:1]
+        return [_error("AssertionError", message) for message in complaints[:] if message][:1]
 
     def _run_among(self, code: CodeType, answers: dict[str, Any]) -> Exception | None:
         """Run a test in the namespace of the instructor's functions, which call answers too; then restore it."""
@@ -254,7 +254,7 @@ def _as_outputs(reply: dict) -> list[NotebookNode]:
     error = reply.get("error")
     if error is None:
         return streams + shown
-    return [*streams, *shown, _error(error.get("kind", ""), error.get("says", ""), error.get("traceback", []))]
+    return [*streams, *shown, _error(error.get("kind", ""), error.get("message", ""), error.get("traceback", []))]
 
 
 def _harmless(shown: dict[str, str]) -> dict[str, str]:
@@ -267,10 +267,10 @@ def _shortened(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNod
     size = len(json.dumps(outputs))
     if size <= room:
         return outputs, room - size
-    says = "all outputs together are too long to be shown"
-    return [_error(one.ename[:99], says) for one in outputs if one.output_type == "error"], room
+    message = "all outputs together are too long to be shown"
+    return [_error(one.ename[:99], message) for one in outputs if one.output_type == "error"], room
 
 
-def _error(kind: str, says: str, lines: Sequence[str] = ()) -> NotebookNode:
+def _error(kind: str, message: str, lines: Sequence[str] = ()) -> NotebookNode:
     """Return an error as an output of a notebook."""
-    return new_output("error", ename=kind, evalue=says, traceback=[*lines] or [f"{kind}: {says}"])
+    return new_output("error", ename=kind, evalue=message, traceback=[*lines] or [f"{kind}: {message}"])

@@ -110,7 +110,7 @@ class StudentProcess:
         threading.Thread(target=self._watch, args=(limits,), daemon=True).start()
 
     def _started(self, command: Sequence[str]) -> subprocess.Popen:
-        """Start the worker in a session of its own, with a pipe in each direction."""
+        """Start the worker in a new session, with a pipe in each direction."""
         return subprocess.Popen(
             command,
             stdin=subprocess.PIPE,

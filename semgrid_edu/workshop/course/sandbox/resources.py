@@ -64,7 +64,7 @@ def processes_in(namespace: str) -> list[Path]:
 
 
 def has_ended(process: Path) -> bool:
-    """Return whether a process has ended with all its threads, so that at most a zombie is left.
+    """Return whether a process has ended with all its threads; a zombie has.
 
     Parameters
     ----------
@@ -148,15 +148,15 @@ def deleted_bytes(processes: list[Path], each: int) -> int:
     return sum(sizes.values())
 
 
-def exceeds_disk_limits(folder: Path, most: int) -> bool:
-    """Return whether the files in a folder take more bytes, are too many, or can't be listed.
+def exceeds_disk_limits(folder: Path, max_bytes: int) -> bool:
+    """Return whether the files in a folder are too large together, too many, or can't be listed.
 
     Parameters
     ----------
     folder : Path
         The folder.
-    most : int
-        Bytes of all files together.
+    max_bytes : int
+        Limit for all files together.
     """
     size, count, waiting = 0, 0, [str(folder)]
     while waiting:
@@ -169,7 +169,7 @@ def exceeds_disk_limits(folder: Path, most: int) -> bool:
                         size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
                         if stat.S_ISDIR(found.st_mode):
                             waiting.append(entry.path)
-                    if size > most or count > MAX_FILES:
+                    if size > max_bytes or count > MAX_FILES:
                         return True
         except (FileNotFoundError, NotADirectoryError):
             continue

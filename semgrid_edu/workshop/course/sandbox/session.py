@@ -91,8 +91,8 @@ class Session:
         try:
             reply = self._ask({"do": "run", "code": code})
         except (AnswerTimeoutError, AnswerEndedError) as error:
-            said = {"kind": type(error).__name__, "says": str(error), "line": "", "traceback": []}
-            return {"streams": {}, "shown": [], "error": said}
+            report = {"kind": type(error).__name__, "message": str(error), "line": "", "traceback": []}
+            return {"streams": {}, "shown": [], "error": report}
         self.cells.append(code)
         return reply
 
@@ -163,9 +163,9 @@ class Session:
         """Return the error that an answer raised; with secret inputs, only its line."""
         if self.secret:
             lines = min(MAX_LINE, max((cell.count("\n") + 1 for cell in self.cells), default=0))
-            says = f"an error in line {error['number']}" if error["number"] in range(1, lines + 1) else "an error"
-            found = _standard_error(error | {"kind": "", "says": says, "line": ""})
-            found.secret = says
+            message = f"an error in line {error['number']}" if error["number"] in range(1, lines + 1) else "an error"
+            found = _standard_error(error | {"kind": "", "message": message, "line": ""})
+            found.secret = message
             return found
         # A line number outside all cells was forged to smuggle out a value.
         known = any(error["line"] in cell for cell in self.cells)
@@ -287,11 +287,11 @@ def _standard_error(reported: dict[str, Any]) -> Exception:
     kind = getattr(builtins, reported["standard"], Exception)
     # A StopIteration would silently end a loop of the test.
     if not issubclass(kind, Exception) or kind is Exception or issubclass(kind, StopIteration | StopAsyncIteration):
-        kind, reported = AnswerError, reported | {"says": f"{reported['kind']}: {reported['says']}".removeprefix(": ")}
+        kind = None
     try:
-        error = kind(reported["says"])
-    except TypeError:
-        error = AnswerError(f"{reported['kind']}: {reported['says']}".removeprefix(": "))
+        error = kind(reported["message"])
+    except TypeError:  # no standard error, or one that isn't made of a message
+        error = AnswerError(f"{reported['kind']}: {reported['message']}".removeprefix(": "))
     if reported["line"]:
         error.add_note(f"in your line: {reported['line']}")
     return error

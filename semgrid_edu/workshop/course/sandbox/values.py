@@ -51,7 +51,7 @@ class NotPlainError(TypeError):
     """A value that can't be sent."""
 
 
-def encode(value: Any, callbacks: list[Callable] | None = None, most: int = MAX_BYTES) -> bytes:
+def encode(value: Any, callbacks: list[Callable] | None = None, max_bytes: int = MAX_BYTES) -> bytes:
     """Turn a value into bytes.
 
     Parameters
@@ -61,8 +61,8 @@ def encode(value: Any, callbacks: list[Callable] | None = None, most: int = MAX_
         into an array (a tensor, a table, a fraction); one of `RECORDS`.
     callbacks : list of callable, optional
         Collects the functions within `value`; the other side gets their numbers. Without it no function can pass.
-    most : int
-        Bytes that all arrays together may have.
+    max_bytes : int
+        Limit for all arrays together.
 
     Raises
     ------
@@ -72,13 +72,13 @@ def encode(value: Any, callbacks: list[Callable] | None = None, most: int = MAX_
     arrays: list[NDArray] = []
     tree = _tree(value, arrays, callbacks)
     head = json.dumps({"value": tree, "arrays": [[array.dtype.str, array.shape] for array in arrays]})
-    if len(head) > MAX_JSON or sum(array.nbytes for array in arrays) > most:
+    if len(head) > MAX_JSON or sum(array.nbytes for array in arrays) > max_bytes:
         raise NotPlainError("more than can be sent: is it as long as it should be, and an array rather than a list?")
     return b"".join([head.encode(), b"\n", *(array.tobytes() for array in arrays)])
 
 
 def decode(data: bytes, callback: Callable[[int], Callable] | None = None) -> Any:
-    """Turn bytes back into the value that `encode` was given; an array is a plain one, with memory of its own.
+    """Turn bytes back into the value that `encode` was given; an array is a plain one with new memory.
 
     Parameters
     ----------

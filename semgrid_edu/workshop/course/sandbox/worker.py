@@ -220,9 +220,9 @@ def _report(error: BaseException) -> dict[str, Any]:
     kinds = [kind.__name__ for kind in type(error).__mro__ if kind.__module__ == "builtins"]
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename.startswith("<ipython")]
     line = linecache.getline(frames[-1].filename, frames[-1].lineno).strip() if frames else ""
-    says = f"{error}: {FORBIDDEN}" if isinstance(error, PermissionError) else str(error)
-    said = {"kind": type(error).__name__, "standard": kinds[0], "says": _text(says), "line": _text(line)[:200]}
-    return said | {"number": frames[-1].lineno if frames else 0}
+    message = f"{error}: {FORBIDDEN}" if isinstance(error, PermissionError) else str(error)
+    report = {"kind": type(error).__name__, "standard": kinds[0], "message": _text(message), "line": _text(line)[:200]}
+    return report | {"number": frames[-1].lineno if frames else 0}
 
 
 def _main() -> None:
