@@ -6,7 +6,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from glob import has_magic
-from multiprocessing import get_context
+from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 
 import nbformat
@@ -23,7 +23,7 @@ from semgrid_edu.workshop.course.nbgrader.autograde import (
 )
 from semgrid_edu.workshop.course.nbgrader.build import one_line
 from semgrid_edu.workshop.course.nbgrader.gradebook import Graded, submissions
-from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED, prepare
+from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
 from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_grader
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
@@ -78,9 +78,7 @@ def grade_course(
 def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int, failed: dict) -> Iterator[Graded]:
     """Yield results; if a process died, grade its submissions again one by one, to find the culprit."""
     with _pool(workers) as pool:
-        failed |= _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
-        ready = [one for one in wanted if one[0] not in failed]
-        waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
+        waiting = {pool.submit(grade_one, course, *one, settings): one for one in wanted}
         left = yield from _as_they_end(course, waiting, failed)
     begun = [one for one in left if book.has_begun(course, *one)]
     if begun and len(wanted) == 1:
@@ -95,11 +93,16 @@ def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int,
 
 @contextmanager
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Start processes that grade, with temporary files in a folder that is always deleted at the end."""
+    """Start processes that grade, with temporary files in a folder that is always deleted at the end.
+
+    They are forked from a process that has loaded what they need, where the system can fork.
+    """
+    context = get_context("forkserver" if "forkserver" in get_all_start_methods() else "spawn")
+    context.set_forkserver_preload([__name__])
     with ExitStack() as stack:
         folder = tempfile.mkdtemp(prefix="semgrid-grading-")
         stack.callback(delete_folder, Path(folder))
-        pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (folder,))
+        pool = ProcessPoolExecutor(workers, context, _begin, (folder,))
         stack.callback(pool.shutdown, cancel_futures=True)
         yield pool
 
@@ -127,15 +130,6 @@ def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: d
 def _which(submission: tuple[str, str]) -> str:
     """Return the name of a submission."""
     return ", ".join(reversed(submission))
-
-
-def _failing_references(
-    pool: ProcessPoolExecutor, course: Path, settings: GradeSettings, assignments: Sequence[str]
-) -> dict[str, str]:
-    """Grade the reference answers of exercises; return the errors of those that fail."""
-    trials = {name: pool.submit(prepare, course, name, settings.memory) for name in dict.fromkeys(assignments)}
-    errors = {name: trial.exception() for name, trial in trials.items()}
-    return {name: one_line(error) for name, error in errors.items() if error is not None}
 
 
 def missing_limits() -> list[str]:
