@@ -129,6 +129,7 @@ def warm_processes(nursery, source, prepared):
     `nursery` is what `open_nursery` gives; the folder `prepared` takes what is compiled there.
     """
     use_instructor(NOTEBOOKS / "instructor")
+    prepared.mkdir(parents=True, exist_ok=True)
     if not hasattr(os, "pidfd_open"):
         yield lambda: StudentProcess(Limits(), prepared)
         return
