@@ -167,8 +167,10 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
         return Graded(student, assignment, 0, 0, 0, note)
     try:
         with book.unfinished(course, assignment, student):
+            path = place(course, "submitted", student, assignment)
+            book.check_time(path)
             try:
-                book.check_file(place(course, "submitted", student, assignment))
+                book.check_file(path)
                 autograde_one(course, assignment, student, settings)
             except UnfitError as error:
                 note = f"{CRASHED}the file can't be graded: {error}"

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import nbformat
 from nbgrader.api import Gradebook, MissingEntry
+from nbgrader.utils import parse_utc
 
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.storage.files import write_text
@@ -127,6 +128,27 @@ def check_file(path: Path) -> None:
         raise UnfitError(f"it is no notebook ({type(error).__name__})") from error
     if len(notebook.cells) > MAX_PARTS:
         raise UnfitError(f"it has more than {MAX_PARTS} cells")
+
+
+def check_time(path: Path) -> None:
+    """Check that the instructor's note on the time of a submission can be read; nbgrader's own error hides the reason.
+
+    Parameters
+    ----------
+    path : Path
+        The notebook; there may be a `timestamp.txt` beside it.
+
+    Raises
+    ------
+    DataError
+        When that file contains no time.
+    """
+    note = path.with_name("timestamp.txt")
+    text = note.read_text(encoding="utf-8", errors="replace").strip() if note.exists() else ""
+    try:
+        parse_utc(text or None)
+    except (ValueError, OverflowError):
+        raise DataError(note, "a time such as 2027-03-01 17:12:00 UTC", text[:100]) from None
 
 
 @contextmanager
