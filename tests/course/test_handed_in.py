@@ -15,8 +15,12 @@ from nbgrader.utils import is_grade
 from submissions import submission
 from tiny_course import TINY
 
-from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UnfitError, place
-from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.files import write_json
+from semgrid_edu.storage.reading import read_json
+from semgrid_edu.workshop.course.nbgrader import preprocessors as steps
+from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UnfitError, place, student_variant
+from semgrid_edu.workshop.course.nbgrader.build import MARKER, build_course, exercise_sources
 from semgrid_edu.workshop.course.nbgrader.cleaning import without_scripts
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
 from semgrid_edu.workshop.course.nbgrader.gradebook import check_file
@@ -174,3 +178,31 @@ def test_every_written_question_has_a_rubric():
     for source in exercise_sources():
         written = [c for c in read_percent(source).cells if c.cell_type == "markdown" and is_grade(c)]
         assert len(written) == len(rubrics(read_percent(source))) == 1, source
+
+
+def test_hidden_inputs_are_a_students_alone_and_the_same_each_time(course, right, monkeypatch):
+    drawn = []
+
+    def draw(*_):
+        drawn.append(sys.modules[steps.INSTRUCTOR].generator(7).random())
+        return {}
+
+    graded(course, "ada", right)  # with it the reference, which draws the usual inputs
+    monkeypatch.setattr(steps, "run_submission", draw)
+    for student, by_student in (("ada", False), ("ada", True), ("bob", True), ("ada", True), ("bob", False)):
+        write_notebook(right, place(course, "submitted", student, TINY))
+        grade_one(course, TINY, student, GradeSettings(seed_by_student=by_student))
+    usual, ada, bob, ada_again, usual_again = drawn
+    assert (ada_again, usual_again) == (ada, usual)
+    assert len({usual, ada, bob}) == 3
+
+
+def test_nobody_knows_a_students_hidden_inputs_without_the_courses_salt(course, notebooks, tmp_path):
+    build_course(tmp_path, notebooks)
+    there, here = student_variant(tmp_path, "ada"), student_variant(course, "ada")
+    assert there != here
+    build_course(tmp_path, notebooks)
+    assert student_variant(tmp_path, "ada") == there, "a second build keeps the salt"
+    write_json(tmp_path / MARKER, read_json(tmp_path / MARKER) | {"salt": ""})
+    with pytest.raises(DataError, match="course build"):
+        student_variant(tmp_path, "ada")

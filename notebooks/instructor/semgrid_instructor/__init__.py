@@ -15,13 +15,17 @@ from numpy.typing import ArrayLike
 
 from semgrid_edu.workshop.course.sandbox.session import AnswerEndedError, AnswerTimeoutError
 
-VARIANT: list[int] = []
-"""Write any number between these brackets, and hidden tests draw other inputs than the published ones."""
+_variant: list[int] = []
+
+
+def choose_variant(*number: int) -> None:
+    """Let hidden tests draw the inputs of this number from now on, or without a number the usual ones."""
+    _variant[:] = number
 
 
 def generator(seed: int) -> np.random.Generator:
-    """Return the generator from which a hidden test draws its inputs."""
-    return np.random.default_rng([seed, *VARIANT])
+    """Return the generator from which a hidden test draws its inputs, by the variant that was chosen last."""
+    return np.random.default_rng([seed, *_variant])
 
 
 def close(got: ArrayLike, wanted: ArrayLike, rtol: float = 1e-5, atol: float = 1e-6, equal_nan: bool = False) -> bool:

@@ -75,13 +75,14 @@ def grade(
     workers: Annotated[int, typer.Option(min=1, max=64, help="Submissions at the same time.")] = os.cpu_count() or 1,
     timeout: Annotated[int, typer.Option(min=1, help="Seconds for a cell, or for all calls of a test.")] = 30,
     memory: Annotated[int, typer.Option(min=100, help="Megabytes of memory for a student's code.")] = 4000,
+    seed_by_student: Annotated[bool, typer.Option("--seed-by-student", help="Draw hidden inputs per student.")] = False,
 ) -> None:
     """Grade a class with nbgrader: students' code runs in separate processes, apart from tests and gradebook."""
     from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError
     from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, missing_limits
     from semgrid_edu.workshop.course.nbgrader.gradebook import misplaced, write_graded
 
-    settings = GradeSettings(timeout, memory)
+    settings = GradeSettings(timeout, memory, seed_by_student)
     for path in misplaced(folder):
         typer.echo(f"not graded: expected submitted/STUDENT/EXERCISE/EXERCISE.ipynb, found {path}", err=True)
     if missing := missing_limits():

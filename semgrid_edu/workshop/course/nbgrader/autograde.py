@@ -1,5 +1,6 @@
 """One submission, graded by nbgrader, which writes score and messages to the course's gradebook and folders."""
 
+import hashlib
 import warnings
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -7,6 +8,8 @@ from pathlib import Path
 from nbgrader.api import InvalidEntry
 from sqlalchemy.exc import SAWarning
 
+from semgrid_edu.errors import DataError
+from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.course.nbgrader import build
 
 TRIES = 10
@@ -31,10 +34,13 @@ class GradeSettings:
         Seconds for a cell.
     memory : int
         Megabytes of memory for a student's code.
+    seed_by_student : bool
+        Whether the hidden tests draw other inputs for each student.
     """
 
     timeout: int = 30
     memory: int = 4000
+    seed_by_student: bool = False
 
 
 def autograde_one(
@@ -94,3 +100,25 @@ def place(course: Path, step: str, student: str, assignment: str) -> Path:
         Whose notebook.
     """
     return course / step / student / assignment / f"{assignment}.ipynb"
+
+
+def student_variant(course: Path, student: str) -> int:
+    """Return the number that chooses the inputs of a student's hidden tests: always the same, and secret like the salt.
+
+    Parameters
+    ----------
+    course : Path
+        A course that `build_course` wrote, with its salt.
+    student : str
+        The student.
+
+    Raises
+    ------
+    DataError
+        When the course has no salt.
+    """
+    marker = course / build.MARKER
+    salt = read_json(marker).get("salt")
+    if not salt:
+        raise DataError(marker, "a salt, which `semgrid-edu course build` adds", "none")
+    return int.from_bytes(hashlib.sha256(f"{salt} {student}".encode()).digest()[:8], "big")

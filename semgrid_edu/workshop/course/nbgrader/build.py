@@ -4,6 +4,7 @@ import hashlib
 import logging
 import os
 import re
+import secrets
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -125,7 +126,8 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
     digests, kept = _write_unless_changed(directory, _course_files(folder, sources, lectures), before.get("files", {}))
     names = [source.stem for source in sources]
     about = {"written by": f"semgrid_edu {version('semgrid_edu')}", "assignments": names}
-    write_json(marker, about | {"lectures": lectures, "files": digests})
+    salt = before.get("salt") or secrets.token_hex(16)
+    write_json(marker, about | {"lectures": lectures, "files": digests, "salt": salt})
     with course_api(directory) as api:
         for name in names:
             _release(api, name, directory / "source" / name)

@@ -15,10 +15,10 @@ from nbformat.v4 import new_code_cell, new_markdown_cell
 from nbgrader.api import Gradebook, SourceCell
 from nbgrader.preprocessors import NbGraderPreprocessor
 from nbgrader.utils import is_grade, is_solution
-from traitlets import Integer, Unicode
+from traitlets import Bool, Integer, Unicode
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.workshop.course.nbgrader.autograde import UnfitError
+from semgrid_edu.workshop.course.nbgrader.autograde import UnfitError, student_variant
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
@@ -150,11 +150,14 @@ class ExecuteApart(NbGraderPreprocessor):
     course = Unicode(help="The folder of the course.").tag(config=True)
     timeout = Integer(30, help="Seconds for a cell, or for all calls of a test.").tag(config=True)
     memory = Integer(4000, help="Megabytes of memory for a student's code.").tag(config=True)
+    seed_by_student = Bool(help="Whether the hidden tests draw other inputs for each student.").tag(config=True)
 
     def preprocess(self, nb: NotebookNode, resources: ResourcesDict) -> tuple[NotebookNode, ResourcesDict]:
         """Run one notebook. Parameters are those of `MakeWhole.preprocess`."""
-        where = resources["nbgrader"]
-        prepared = prepare(Path(self.course), where["assignment"], self.memory)
+        where, course = resources["nbgrader"], Path(self.course)
+        prepared = prepare(course, where["assignment"], self.memory)
+        if self.seed_by_student:
+            use_instructor(course / "instructor", student_variant(course, where["student"]))
         with Gradebook(where["db_url"]) as gradebook:
             exercise = gradebook.find_notebook(where["notebook"], where["assignment"])
             trusted = {cell.name: cell.source for cell in exercise.source_cells}
@@ -164,22 +167,24 @@ class ExecuteApart(NbGraderPreprocessor):
         return nb, resources
 
 
-def use_instructor(folder: Path) -> None:
+def use_instructor(folder: Path, *variant: int) -> None:
     """Make test cells import the hidden tests of this course, and of no other.
 
     Parameters
     ----------
     folder : Path
         The folder `instructor` of a course.
+    *variant : int
+        A number that chooses the inputs of hidden tests; without one they draw the usual ones.
     """
     place = folder / INSTRUCTOR / "__init__.py"
-    if getattr(sys.modules.get(INSTRUCTOR), "__file__", None) == str(place):
-        return
-    for name in [name for name in sys.modules if name.partition(".")[0] == INSTRUCTOR]:
-        del sys.modules[name]
-    spec = spec_from_file_location(INSTRUCTOR, place)
-    sys.modules[INSTRUCTOR] = module_from_spec(spec)
-    spec.loader.exec_module(sys.modules[INSTRUCTOR])
+    if getattr(sys.modules.get(INSTRUCTOR), "__file__", None) != str(place):
+        for name in [name for name in sys.modules if name.partition(".")[0] == INSTRUCTOR]:
+            del sys.modules[name]
+        spec = spec_from_file_location(INSTRUCTOR, place)
+        sys.modules[INSTRUCTOR] = module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[INSTRUCTOR])
+    sys.modules[INSTRUCTOR].choose_variant(*variant)
 
 
 def prepare(course: Path, assignment: str, memory: int) -> Path:
