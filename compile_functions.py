@@ -26,7 +26,7 @@ def filters_and_simulator() -> None:
     even = np.full((len(KITTI_14), *spec.shape), 1 / len(KITTI_14), np.float32)
     ClassMemory(spec).advance(even, belief, PlanarMotion(), 0.1)
     with tempfile.TemporaryDirectory() as folder:
-        recipe = DatasetRecipe("small", "KITTI-14", (Route("test", 2, False),))
+        recipe = DatasetRecipe("small", "KITTI-14", (Route("test", 2, every=2),))
         make_from_recipe(recipe, Path(folder), seed=0, workers=1)
 
 

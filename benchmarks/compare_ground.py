@@ -74,7 +74,7 @@ def simulated(rig: Rig, seeds: Iterable[int]) -> list[Scan]:
     scans = []
     for seed in seeds:
         drive = SimulatedDrive(seed, 20, Wishes(styles=SIDES[seed % len(SIDES)]), rig=rig)
-        ground = RayMesh.of([ground_mesh(drive.plan.road, drive.plan.extent)], [0])
+        ground = RayMesh.of([ground_mesh(drive.plan.road, drive.plan.start, drive.plan.end)], [0])
         for k in (3, 15):
             frame = drive.scan(k)
             world = transform_points(frame.T_world_from_lidar, frame.points[:, :3].astype(np.float64))

@@ -14,7 +14,7 @@ from pathlib import Path
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions
-from semgrid_edu.workshop.simulation.named_streets import TEST_STREETS
+from semgrid_edu.workshop.simulation.street.plan import TEST_STREETS
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "notebooks"))
 

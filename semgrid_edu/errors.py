@@ -78,6 +78,28 @@ def check_whole(least: int = 0, **numbers: int) -> None:
             raise ArgumentError(name, f"a whole number from {least} up", value)
 
 
+def check_text(**names: tuple[str, str]) -> None:
+    """Check that names of folders are text, and not empty.
+
+    Parameters
+    ----------
+    **names : (str, str)
+        The name and an example, by the name of its argument.
+
+    Raises
+    ------
+    ArgumentError
+        For the first that isn't.
+
+    Examples
+    --------
+    >>> check_text(drive=("0013", "0013"))
+    """
+    for argument, (name, example) in names.items():
+        if not (isinstance(name, str) and name):
+            raise ArgumentError(argument, f"text such as {example!r}", repr(name))
+
+
 def check_shape(name: str, values: ArrayLike, shape: tuple[int, ...]) -> None:
     """Check the shape of an array.
 

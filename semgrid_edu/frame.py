@@ -112,9 +112,13 @@ class Frame:
     vehicle_returns: NDArray[np.bool_] | None = None
 
     def need_image(self) -> NDArray[np.uint8]:
-        """Return the image, (h, w, 3) RGB, or raise an error when the frame has none."""
+        """Return the image, (h, w, 3) uint8, RGB; raise an error when there is none, or it isn't its camera's."""
         if self.image is None:
             raise ArgumentError("frame", "a frame with a camera image", "a frame without one")
+        expected = (*self.camera.size, 3)
+        if np.shape(self.image) != expected or self.image.dtype != np.uint8:
+            found = f"{np.shape(self.image)} {getattr(self.image, 'dtype', type(self.image).__name__)}"
+            raise ArgumentError("image", f"{expected} uint8, the size of its camera", found)
         return self.image
 
     @property

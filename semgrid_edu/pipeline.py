@@ -90,7 +90,7 @@ def run_frame(frame: Frame, stages: Stages) -> FrameResult:
     ArgumentError
         When the frame has no image.
     """
-    image = network_image(frame, stages.architecture.image_size).numpy()
+    image = network_image(frame, stages.image_size).numpy()
     clock = Stopwatch()
 
     # l -> o: a Bayes filter turns the LIDAR scans so far into an occupancy grid (section 3.2).
@@ -171,7 +171,7 @@ def run_pipeline(
         if not isinstance(frame, Frame):
             raise ArgumentError("frames", "the frames of a drive", repr(frame)[:100])
         if running is None:
-            complete = Stages.completed(stages, frame.camera, occupancy, crf, seed, memory)
+            complete = Stages.completed(stages, frame.camera, memory, occupancy=occupancy, crf=crf, seed=seed)
             running = complete.started()
         yield run_frame(frame, running)
 

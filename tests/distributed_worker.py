@@ -1,6 +1,7 @@
 """What each of two processes does in test_distributed.py, by torchrun: `distributed_worker.py FOLDER TASK...`."""
 
 import sys
+import time
 import warnings
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from torch import nn
 from semgrid_edu.networks import build_net
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training import loop as training
+from semgrid_edu.training.checkpoint import check_folder
 from semgrid_edu.training.devices import open_fabric
 from semgrid_edu.training.loop import learn
 
@@ -70,10 +72,13 @@ def share(folder, fabric):
 
 
 def learn_streets(folder, fabric):
-    """Train; then once more, interrupted and resumed."""
+    """Train, the second process half a second late; then once more, interrupted and resumed."""
     training.CHECKPOINT_EVERY = 2
     streets = tiny_streets(FRAMES)
+    if fabric.global_rank == 1:
+        training.check_folder = late(training.check_folder)
     train(build_net(SMALL, CAMERA), streets, folder / "whole", QUICK, fabric=fabric)
+    training.check_folder = check_folder
     train(
         build_net(SMALL, CAMERA),
         streets,
@@ -85,6 +90,16 @@ def learn_streets(folder, fabric):
         train(build_net(SMALL, CAMERA), Broken(streets, 3 * FRAMES + 5 * 4), folder / "resumed", QUICK, fabric=fabric)
     except InterruptedError:
         train(build_net(SMALL, CAMERA, seed=5), streets, folder / "resumed", QUICK, resume=True, fabric=fabric)
+
+
+def late(function):
+    """The same function, half a second later."""
+
+    def delayed(*arguments):
+        time.sleep(0.5)
+        return function(*arguments)
+
+    return delayed
 
 
 def refuse(folder, fabric):

@@ -15,13 +15,13 @@ import semgrid_edu.datasets.index
 import semgrid_edu.workshop.paper.reproduce
 import semgrid_edu.workshop.training_run
 from semgrid_edu.workshop import demo
-from semgrid_edu.workshop.commands.arguments import TOLD, tell
+from semgrid_edu.workshop.commands.arguments import SHOWN_DOUBTS, tell
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.simulation import datasets
 
 
 def test_one_doubt_too_many_is_told_as_such(capsys):
-    tell(["a doubt"] * (TOLD + 1))
+    tell(["a doubt"] * (SHOWN_DOUBTS + 1))
     assert capsys.readouterr().err.splitlines()[-1] == "semgrid-edu: doubtful: and 1 more"
 
 

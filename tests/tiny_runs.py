@@ -12,7 +12,7 @@ from semgrid_edu.workshop.paper.training_runs import GridStageRun, ImageStageRun
 from semgrid_edu.workshop.paper.variants import Variant
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route
 
-TRAIN, TEST = (Route(split, 2, False) for split in ("train", "test"))
+TRAIN, TEST = (Route(split, 2, every=2) for split in ("train", "test"))
 data_runs.RECIPE_OF["tiny"] = DatasetRecipe("tiny", "KITTI-14", (TRAIN,) * 6)
 data_runs.RECIPE_OF["tinytested"] = DatasetRecipe("tinytested", "KITTI-14", (TRAIN,) * 6 + (TEST,) * 2)
 

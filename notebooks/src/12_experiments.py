@@ -47,7 +47,7 @@ from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.fast import build_net, load_net, track_drive
 from semgrid_edu.workshop.scoring.score_with_interval import compared, shown, shown_seeds
 from semgrid_edu.workshop.paper.published import NETWORKS
-from semgrid_edu.workshop.paper.pictures import accuracy_picture
+from semgrid_edu.workshop.paper.pictures import accuracy_picture, draw_score, forest_plot
 from semgrid_edu.workshop.paper.variants import Variant
 from semgrid_edu.workshop.paper.claims import stated
 from semgrid_edu.workshop.paper.verdicts import holm, verdict
@@ -56,7 +56,6 @@ from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eli
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import METRICS, class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.pipeline import network_image
-from semgrid_edu.workshop.paper.forest import draw_score, forest_plot
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
@@ -952,7 +951,7 @@ def fields(drive, wanted):
 
 
 with tempfile.TemporaryDirectory() as folder:
-    recipe = DatasetRecipe("live", "KITTI-14", (Route("test", 2, False),) * 10, rig=SAMPLE_RIG)
+    recipe = DatasetRecipe("live", "KITTI-14", (Route("test", 2, every=2),) * 10, rig=SAMPLE_RIG)
     index = load_index(make_from_recipe(recipe, Path(folder), 12, workers=1))
     test = [fields(KittiRawDrive(index.root, *name), [1]) for name in index.frames_by_drive("test")]
 learn = fields(sample_drive(), range(len(sample_drive())))

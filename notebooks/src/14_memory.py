@@ -332,7 +332,7 @@ Markdown(f"Loss in nats in cells in view, {measured['drives']} streets:\n\n" + "
 # while cars, people and bicycles were remembered in view too. Now that the frame alone speaks of them there, 0.2 to
 # 0.35 are best, by at most 0.02 nats, and nearby no larger one than far away.
 #
-# What happens if evidence may pile up without a limit? `MemoryParams.most` is the limit, in frames: what all frames
+# What happens if evidence may pile up without a limit? `MemoryParams.max_weight` is the limit, in frames: what all frames
 # together may be worth. Once it is reached, each new frame pushes older ones out. We count only what the classes say of
 # each other (the unknown ones left aside), so that this comparison can't be won by answering more frequently.
 
@@ -357,7 +357,7 @@ groups, table = ("in view", "seen before"), {}
 print("simulated drive                   in view: nats   sure  right   seen before: nats")
 for most in (None, 1.0, 2.0, 4.0, 20.0):
     name = "one frame" if most is None else f"memory, worth {most:g} frames at most"
-    piled = one_frame if most is None else list(remember_drive(views, spec, MemoryParams(most=most)))
+    piled = one_frame if most is None else list(remember_drive(views, spec, MemoryParams(max_weight=most)))
     view, before = (semantic_scores(piled, simulated, group) for group in groups)
     table[most] = [view[0], before[0]]
     print(f"{name:<34}{view[0]:13.2f}{100 * view[1]:5.0f} %{100 * view[2]:5.0f} %{before[0]:20.2f}")
@@ -392,7 +392,7 @@ def learn_by_hand(mean, weight, p, w, most):
 
 
 here, o = GridSpec(0, 1, 0, 1, 1), np.eye(4, dtype=np.float32)[State.FREE].reshape(4, 1, 1)
-params = MemoryParams(worth=0.5, reach=1e9, most=1.0, movable=())
+params = MemoryParams(near_exponent=0.5, decay_distance=1e9, max_weight=1.0, movable=())
 memory, mean, weight = MemoryState.empty(2, here), np.zeros(2), 0.0
 for p in ([0.8, 0.2], [0.5, 0.5], [0.3, 0.7]):
     mean, weight = learn_by_hand(mean, weight, p, w=0.5, most=1.0)

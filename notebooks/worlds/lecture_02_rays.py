@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Evidence, SensorModel
-from semgrid_edu.occupancy.polar import fill_gaps, polar_profile, reach
+from semgrid_edu.occupancy.polar import fill_gaps, polar_profile, visible_range
 from semgrid_edu.occupancy.sensor import likelihoods, prepare_scan
 
 
@@ -59,7 +59,7 @@ def evidence_by_rays(points: NDArray, spec: GridSpec, sensor: SensorModel) -> Ev
     """
     points = prepare_scan(points, sensor)
     first_obstacle, last_ground = polar_profile(points, sensor.obstacle_min, sensor.obstacle_max, sensor.beams)
-    free_to = fill_gaps(reach(first_obstacle, last_ground), sensor.gap)
+    free_to = fill_gaps(visible_range(first_obstacle, last_ground), sensor.gap)
     obstacles = np.zeros(spec.shape, np.int64)
     free = np.zeros(spec.shape, bool)
     for (x, y, z), row, col, inside in zip(points, *spec.cells(points[:, :2]), strict=True):

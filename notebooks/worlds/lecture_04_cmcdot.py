@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.occupancy import CmcdotParams, FilterState, Particles, State, WorldModel, predict, resample, update
-from semgrid_edu.occupancy.particles import cells_of, weight_in_cells
+from semgrid_edu.occupancy.state import cells_of, weight_in_cells
 from worlds.lecture_03_bof import bof_beliefs
 from worlds.lecture_03_row import CELL, DT, SPEED, Cell, CellsInARow, exact_beliefs
 

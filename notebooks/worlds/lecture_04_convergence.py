@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from semgrid_edu import occupancy
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import State
-from semgrid_edu.occupancy.local_belief import velocity_moments
-from semgrid_edu.occupancy.particles import cells_of
+from semgrid_edu.occupancy.cmcdot import velocity_moments
 from semgrid_edu.occupancy.sensor import likelihoods
+from semgrid_edu.occupancy.state import cells_of
 from worlds.lecture_02_boxes import Box, cells_in
 from worlds.lecture_04_cmcdot import NO_BIRTHS
 

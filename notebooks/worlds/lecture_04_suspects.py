@@ -11,16 +11,18 @@ from semgrid_edu.fast import Cmcdot
 from semgrid_edu.fast.occupancy import cellwise
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams
+from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.workshop.simulation.named_streets import KITTI_RIG, named_street
 from semgrid_edu.workshop.simulation.sensors.raycast import RayMesh
-from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.sensors.rig import KITTI_RIG, Rig
 from semgrid_edu.workshop.simulation.things.materials import Kind
 from worlds.lecture_04_scenes import KnownScene, SceneHistory, true_cells
 from worlds.lecture_04_street_scores import StreetScores
 
 BEFORE = CmcdotParams(walls=None, first_sight=(0.93, 0.067, 0.003))
 """The filter before the two rules against phantoms, with its `first_sight` of that time."""
+FRAMES = 36
+"""Frames of a drive, 3.5 s."""
 BARRED = "no arrivals in UNKNOWN cells"
 MENDED = "the two rules"
 GROUPS = {"border": ("fences", "walls")} | {
@@ -94,7 +96,7 @@ SUSPECTS = {
 
 def scenes_of(street: str, number: int, spec: GridSpec, suspect: Suspect) -> tuple[SimulatedDrive, list[KnownScene]]:
     """Return a drive through a street of `TEST_STREETS`, `number` being its seed, and its scenes on the grid."""
-    drive = named_street(street, number, rig=suspect.rig)
+    drive = simulate(number, FRAMES, street, suspect.rig)
     if suspect.change:
         suspect.change(drive)
     past = SceneHistory(spec)

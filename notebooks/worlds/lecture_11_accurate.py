@@ -10,10 +10,9 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.crf import CrfParams, SeparableGaussian
-from semgrid_edu.crf.kernel import gaussian
-from semgrid_edu.crf.naive import settled, updates
+from semgrid_edu.crf.mean_field import settled, updates
 from semgrid_edu.crf.params import check_inputs, check_stop
-from semgrid_edu.fast.crf.arithmetic import HALF, exponential
+from semgrid_edu.fast.crf import HALF, exponential
 
 RADIUS = 4.0
 """Reach of the window, in widths `sigma_alpha`: cells further up, down, left or right are left out."""
@@ -126,7 +125,7 @@ class WindowedGaussian:
         _, height, width = values.shape
         reach = int(min(np.ceil(radius * params.sigma_alpha), max(height, width) - 1))
         with np.errstate(over="ignore"):  # exp(-inf) is 0, the right limit of a width near 0
-            taps = gaussian((np.arange(reach + 1) / params.sigma_alpha) ** 2)
+            taps = np.exp(-((np.arange(reach + 1) / params.sigma_alpha) ** 2) / 2)
         sharpness = min(np.float32(1 / max(params.sigma_beta, 1e-30)), _SHARPEST)
         state = np.ascontiguousarray(values.transpose(1, 0, 2), np.float32) * sharpness
         kernel = cls(state, taps.astype(np.float32), np.ones((height, width), np.float32))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import log_softmax, logsumexp
 
 from semgrid_edu.crf import CrfParams, pair_weights
-from semgrid_edu.crf.kernel import kernels
+from semgrid_edu.crf.naive import kernels
 from semgrid_edu.crf.params import check_inputs
 from semgrid_edu.errors import ArgumentError
 from worlds.lecture_11_accurate import filtered

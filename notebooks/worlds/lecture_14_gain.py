@@ -232,7 +232,7 @@ def worth_by_distance(
     distance = spec.distances()
     loss, cells = np.zeros((len(worths), len(edges) - 1)), np.zeros(len(edges) - 1, np.int64)
     for k, worth in enumerate(worths):
-        params = MemoryParams(worth=worth, reach=1e9)
+        params = MemoryParams(near_exponent=worth, decay_distance=1e9)
         for views in drives:
             for view, remembered in zip(views, remember_drive(views, spec, params), strict=True):
                 truth = view.frame.labels.birdseye_on(spec)

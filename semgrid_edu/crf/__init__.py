@@ -1,10 +1,15 @@
 """The fully connected CRF that refines the semantic grid: energy, exact inference, and mean field in two versions."""
 
 from semgrid_edu.crf.exact import crf_model, energy, exact_marginals, free_energy, log_partition, most_likely
-from semgrid_edu.crf.kernel import gram_matrix, pair_weights
-from semgrid_edu.crf.lattice import PermutohedralLattice, enclosing_simplices
-from semgrid_edu.crf.mean_field import SeparableGaussian, bilateral_kernel, mean_field
-from semgrid_edu.crf.naive import damping, mean_field_naive, mean_field_sequential, mean_field_updates
+from semgrid_edu.crf.lattice import PermutohedralLattice, bilateral_kernel, enclosing_simplices
+from semgrid_edu.crf.mean_field import SeparableGaussian, damping, mean_field
+from semgrid_edu.crf.naive import (
+    gram_matrix,
+    mean_field_naive,
+    mean_field_sequential,
+    mean_field_updates,
+    pair_weights,
+)
 from semgrid_edu.crf.params import CrfParams, unary_from_log_probability, unary_from_probability
 from semgrid_edu.crf.temperature import (
     Reliability,

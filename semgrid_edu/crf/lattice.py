@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array, diags_array, eye_array
 
+from semgrid_edu.crf.params import NARROWEST, CrfParams
 from semgrid_edu.errors import ArgumentError
 
 FARTHEST = 2**30
@@ -221,3 +222,56 @@ def _blur(numbers: NDArray[np.int64], step: int) -> csr_array:
     _, ahead, here = np.intersect1d(numbers, numbers + step, assume_unique=True, return_indices=True)
     forward = csr_array((np.ones(len(here)), (here, ahead)), shape=(size, size))
     return csr_array(eye_array(size) / 2 + (forward + forward.T) / 4)
+
+
+_ZERO_SUM_STATES = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
+"""An orthonormal basis of the space orthogonal to (1, 1, 1, 1). The four probabilities sum to one, so three numbers in
+this basis preserve the distance between two cells' states."""
+
+
+def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
+    """Build the first kernel of eq. (4), on place and occupancy, including its weight and normalisation.
+
+    Parameters
+    ----------
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell: they sum to one.
+    params : CrfParams
+        Weight, widths and normalisation.
+
+    Returns
+    -------
+    PermutohedralLattice
+        A lattice around H W points in five dimensions: two for the place, three for the state.
+
+    Raises
+    ------
+    ArgumentError
+        If the states differ, or the grid extends, by more kernel widths than the lattice can count.
+    """
+    lattice = PermutohedralLattice.build(bilateral_features(values, params))
+    degree = np.ones(values[0].size)
+    if params.normalization == "symmetric":
+        degree = lattice(np.ones((values[0].size, 1)))[:, 0]
+    return lattice.scaled(np.sqrt(params.w_bilateral / degree))
+
+
+def bilateral_features(values: NDArray, params: CrfParams) -> NDArray[np.float64]:
+    """Return place and occupancy of each cell in units of the bilateral kernel's widths.
+
+    Parameters
+    ----------
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell: they sum to one.
+    params : CrfParams
+        The widths. If the kernel has weight zero, the features don't matter, and all are zero.
+
+    Returns
+    -------
+    (H W, 5) float64
+        Row, column, and three numbers for the state, with the same distances as the four probabilities.
+    """
+    place = np.indices(values.shape[1:]) / max(params.sigma_alpha, NARROWEST)
+    state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta
+    features = np.concatenate([place, state]) * (params.w_bilateral > 0)
+    return features.reshape(5, -1).T

@@ -1,19 +1,123 @@
 """Mean field on the whole grid: eq. (3), (4) with filters in place of the sum over all pairs.
 
-The spatial kernel is a separable Gaussian, one pass along rows and one along columns; the bilateral kernel is a
-lattice.
+First the update rule, which `mean_field_naive` shares. Then the spatial kernel, a separable Gaussian: one pass along
+rows and one along columns. The bilateral kernel is a lattice.
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import log_softmax
 
-from semgrid_edu.crf.kernel import gaussian, normalise
-from semgrid_edu.crf.lattice import PermutohedralLattice
-from semgrid_edu.crf.naive import settled, updates
+from semgrid_edu.crf.lattice import bilateral_kernel
 from semgrid_edu.crf.params import NARROWEST, CrfParams, check_inputs, check_stop
 from semgrid_edu.errors import check_whole
+
+NEVER = 1e30
+"""A cost in place of infinity: it avoids inf - inf, which is NaN, and exp(-1e30) is 0."""
+
+
+def updates(
+    unary: NDArray, disagreement: Callable[[NDArray], NDArray], self_coupling: NDArray
+) -> Iterator[NDArray[np.floating]]:
+    """Yield the initial Q and the Q after each simultaneous update, without end: the update rule of mean field.
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u; inf where a class is impossible.
+    disagreement : callable
+        Q (C, H W) -> sum_{j != i} k_ij (1 - Q_j(l)), (C, H W), up to a constant that is the same for all classes.
+    self_coupling : (H W,) float
+        k_ii, see `damping`.
+
+    Yields
+    ------
+    (C, H, W) float
+        Q, the distribution over classes in each cell.
+    """
+    phi = above_best(unary).astype(np.float64)
+    part = damping(self_coupling)
+    log_Q = log_softmax(-phi, axis=0)
+    while True:
+        Q = np.exp(log_Q)
+        yield Q.reshape(unary.shape)
+        target = -phi - disagreement(Q)
+        log_Q = log_softmax((1 - part) * log_Q + part * target, axis=0)
+
+
+def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return the cost of each class relative to the cell's best one: the unary term up to a constant.
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u; inf where a class is impossible.
+
+    Returns
+    -------
+    (C, H W) float
+        Finite, at most `NEVER`.
+    """
+    return np.minimum(unary - unary.min(axis=0), NEVER).reshape(len(unary), -1)
+
+
+def settled(states: Iterator[NDArray], iterations: int, tolerance: float) -> NDArray:
+    """Update until the number of updates is reached, or an update changes no probability by more than the tolerance.
+
+    Parameters
+    ----------
+    states : iterator of (C, H, W) float
+        Q at first and after each update, such as `mean_field_updates`.
+    iterations : int
+        The largest number of updates.
+    tolerance : float
+        Stop as soon as an update changes no probability by more than this.
+
+    Returns
+    -------
+    (C, H, W) float
+        The last Q.
+    """
+    Q = next(states)
+    for _ in range(iterations):
+        before = Q
+        Q = next(states)
+        if np.abs(Q - before).max() <= tolerance:
+            break
+    return Q
+
+
+def damping(self_coupling: NDArray) -> NDArray:
+    """Return how far all cells may move at once without raising the free energy.
+
+    With k_ii the weight of a cell with itself (the diagonal of `gram_matrix`), the free energy is::
+
+        F(Q) = sum_i Q_i . phi_i - 1/2 sum_ij k_ij Q_i . Q_j + 1/2 sum_i k_ii |Q_i|^2 - H(Q) + constant
+
+    The first sum over pairs has a positive semidefinite matrix, so with its minus sign it is concave, and nowhere above
+    its tangent at the present Q. The next sum exceeds its tangent by ``k_ii / 2 |Q'_i - Q_i|^2``, which is at most
+    ``k_ii / 2 KL(Q'_i || Q_i)`` by Pinsker's inequality. Tangents plus bound are nowhere below F and equal it at Q. So
+    F at their minimum Q' is no larger than at Q. Setting the derivative to zero gives::
+
+        log Q'_i = (1 - p_i) log Q_i + p_i (-phi_i - sum_{j != i} k_ij (1 - Q_j)) + constant,   p_i = 1 / (1 + k_ii / 2)
+
+    (compare Kraehenbuehl and Koltun 2013, section 3; Baque et al. 2016).
+
+    Parameters
+    ----------
+    self_coupling : (N,) float
+        k_ii, for each cell the sum over the kernels.
+
+    Returns
+    -------
+    (N,) float
+        p_i, 0 < p_i <= 1. With the default parameters and many neighbours it is near 1, so damping costs nothing; with
+        `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
+    """
+    return 1 / (1 + self_coupling / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +173,20 @@ class SeparableGaussian:
 def _between(size: int, sigma: float) -> NDArray[np.float64]:
     """Return the Gaussian between all cells of one axis, (size, size)."""
     place = np.arange(size) / sigma
-    return gaussian((place[:, None] - place) ** 2)
+    return np.exp(-((place[:, None] - place) ** 2) / 2)
 
 
-_ZERO_SUM_STATES = np.array([[1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2
-"""An orthonormal basis of the space orthogonal to (1, 1, 1, 1). The four probabilities sum to one, so three numbers in
-this basis preserve the distance between two cells' states."""
+def normalise(kernel: NDArray[np.float64]) -> None:
+    """Replace K by D^-1/2 K D^-1/2, in place, where D holds its row sums.
+
+    Parameters
+    ----------
+    kernel : (N, N) float64
+        K; overwritten.
+    """
+    root = np.sqrt(kernel.sum(axis=1))
+    kernel /= root[:, None]
+    kernel /= root
 
 
 def mean_field(
@@ -84,20 +196,35 @@ def mean_field(
 
     The sum over all pairs becomes two filters. The spatial one is exact (`SeparableGaussian`). The bilateral one is
     the permutohedral lattice, whose kernel is only nearly Gaussian. Filters include the cell itself, which forms no
-    pair, so its own contribution is subtracted. The other Parameters are those of `mean_field_naive`, and so are
-    errors, but the grid may be of any size.
+    pair, so its own contribution is subtracted.
 
     Parameters
     ----------
+    unary : (C, H, W) float
+        phi_u, see `unary_from_probability`; inf where a class is impossible.
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell: they sum to one.
+    params : CrfParams
+        Weights, widths and normalisation.
+    iterations : int
+        The largest number of updates of all cells.
+    tolerance : float
+        Stop as soon as an update changes no probability by more than this.
     pad : int
         Number of cells by which the border is padded (with its own values) before the CRF; cut off afterwards. At the
         edge of the grid a cell has neighbours on one side only; a pad of 8 recovers sidewalks at the edge of real
-        streets. => If states differ
+        streets.
 
     Returns
     -------
     (C, H, W) float32
         Q, the distribution over classes in each cell.
+
+    Raises
+    ------
+    ArgumentError
+        When shapes don't fit, numbers aren't what they should be, or the states of the cells differ, or the grid
+        extends, by more kernel widths than the lattice can count.
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations, tolerance)
@@ -113,54 +240,6 @@ def mean_field(
 
     Q = settled(updates(unary, disagreement, self_coupling), iterations, tolerance)
     return without_border(Q, pad).astype(np.float32)
-
-
-def bilateral_kernel(values: NDArray, params: CrfParams) -> PermutohedralLattice:
-    """Build the first kernel of eq. (4), on place and occupancy, including its weight and normalisation.
-
-    Parameters
-    ----------
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell: they sum to one.
-    params : CrfParams
-        Weight, widths and normalisation.
-
-    Returns
-    -------
-    PermutohedralLattice
-        A lattice around H W points in five dimensions: two for the place, three for the state.
-
-    Raises
-    ------
-    ArgumentError
-        If the states differ, or the grid extends, by more kernel widths than the lattice can count.
-    """
-    lattice = PermutohedralLattice.build(bilateral_features(values, params))
-    degree = np.ones(values[0].size)
-    if params.normalization == "symmetric":
-        degree = lattice(np.ones((values[0].size, 1)))[:, 0]
-    return lattice.scaled(np.sqrt(params.w_bilateral / degree))
-
-
-def bilateral_features(values: NDArray, params: CrfParams) -> NDArray[np.float64]:
-    """Return place and occupancy of each cell in units of the bilateral kernel's widths.
-
-    Parameters
-    ----------
-    values : (4, H, W) float
-        o_i, the occupancy probabilities of each cell: they sum to one.
-    params : CrfParams
-        The widths. If the kernel has weight zero, the features don't matter, and all are zero.
-
-    Returns
-    -------
-    (H W, 5) float64
-        Row, column, and three numbers for the state, with the same distances as the four probabilities.
-    """
-    place = np.indices(values.shape[1:]) / max(params.sigma_alpha, NARROWEST)
-    state = np.einsum("ks,shw->khw", _ZERO_SUM_STATES, values) / params.sigma_beta
-    features = np.concatenate([place, state]) * (params.w_bilateral > 0)
-    return features.reshape(5, -1).T
 
 
 def with_border(maps: NDArray, pad: int) -> NDArray:

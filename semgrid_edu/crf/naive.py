@@ -1,16 +1,105 @@
-"""Mean field with every pair of cells written out, all cells at once or one by one (eq. (3), (4)); for small grids."""
+"""Every pair of cells written out: the kernels of eq. (4), and mean field at once or cell by cell; for small grids."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.distance import cdist
 from scipy.special import log_softmax
 
-from semgrid_edu.crf.kernel import gram_matrix, pair_weights
+from semgrid_edu.crf.mean_field import above_best, normalise, settled, updates
 from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
+from semgrid_edu.errors import ArgumentError
 
-NEVER = 1e30
-"""A cost in place of infinity: it avoids inf - inf, which is NaN, and exp(-1e30) is 0."""
+MAX_CELLS = 10_000
+"""The largest grid whose pairs are written out: two matrices of 10,000 x 10,000 numbers are 1.6 GB."""
+
+
+def kernels(
+    values: ArrayLike, params: CrfParams, cells: slice | NDArray = slice(None)
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Compute both kernels of eq. (4), without their weights, between some cells i and all cells j.
+
+    With c the row and column of a cell and o its occupancy, they are
+
+        k1_ij = exp(-|c_i - c_j|^2 / (2 sigma_alpha^2) - |o_i - o_j|^2 / (2 sigma_beta^2))
+        k2_ij = exp(-|c_i - c_j|^2 / (2 sigma_gamma^2))
+
+    Parameters
+    ----------
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        The widths.
+    cells : slice or (n,) int
+        The cells i, counted row by row; all of them when left out.
+
+    Returns
+    -------
+    bilateral, spatial : (n, H W) float64
+        k1 and k2.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    place = np.indices(values.shape[1:]).reshape(2, -1).T.astype(np.float64)
+    occupancy = values.reshape(len(values), -1).T
+    both = np.hstack([place / params.sigma_alpha, occupancy / params.sigma_beta])
+    alone = place / params.sigma_gamma
+    bilateral, spatial = (np.exp(-cdist(features[cells], features, "sqeuclidean") / 2) for features in (both, alone))
+    return bilateral, spatial
+
+
+def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
+    """Compute the bracket of eq. (4) for all pairs of cells, including each cell with itself.
+
+    Gaussians of distances are inner products in some space, so this matrix has no negative eigenvalue, whatever the
+    weights, widths and normalisation. `damping` relies on this to keep mean field from oscillating.
+
+    Parameters
+    ----------
+    values : (4, H, W) float
+        o_i, the occupancy probabilities of each cell.
+    params : CrfParams
+        Weights, widths and normalisation.
+
+    Returns
+    -------
+    (H W, H W) float64
+        Symmetric and positive semidefinite; equal to `pair_weights` except on the diagonal.
+
+    Raises
+    ------
+    ArgumentError
+        When `values` has another shape or isn't finite, or the grid has more than `MAX_CELLS` cells.
+    """
+    values = np.asarray(values, dtype=np.float64)
+    if values.ndim != 3:
+        raise ArgumentError("values", "shape (4, H, W)", f"shape {values.shape}")
+    if not np.isfinite(values).all():
+        raise ArgumentError("values", "probabilities", "NaN or infinity")
+    if values[0].size > MAX_CELLS:
+        raise ArgumentError("values", f"at most {MAX_CELLS} cells; mean_field takes more", values[0].size)
+    bilateral, spatial = kernels(values, params)
+    if params.normalization == "symmetric":
+        normalise(bilateral)
+        normalise(spatial)
+    bilateral *= params.w_bilateral  # in place, because these matrices may be large
+    spatial *= params.w_spatial
+    bilateral += spatial
+    return bilateral
+
+
+def pair_weights(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:
+    """Compute the bracket of eq. (4) for every pair of cells. Parameters are those of `gram_matrix`, and so are errors.
+
+    Returns
+    -------
+    (H W, H W) float64
+        The cost of different labels in two cells, counted row by row. Zero on the diagonal, because a cell forms no
+        pair with itself.
+    """
+    weights = gram_matrix(values, params)
+    np.fill_diagonal(weights, 0)
+    return weights
 
 
 def mean_field_naive(
@@ -81,107 +170,6 @@ def mean_field_updates(unary: ArrayLike, values: ArrayLike, params: CrfParams) -
     self_coupling = np.diag(weights).copy()
     np.fill_diagonal(weights, 0)  # a cell forms no pair with itself
     return updates(unary, lambda Q: (1 - Q) @ weights, self_coupling)
-
-
-def updates(
-    unary: NDArray, disagreement: Callable[[NDArray], NDArray], self_coupling: NDArray
-) -> Iterator[NDArray[np.floating]]:
-    """Yield the initial Q and the Q after each simultaneous update, without end: the update rule of mean field.
-
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u; inf where a class is impossible.
-    disagreement : callable
-        Q (C, H W) -> sum_{j != i} k_ij (1 - Q_j(l)), (C, H W), up to a constant that is the same for all classes.
-    self_coupling : (H W,) float
-        k_ii, see `damping`.
-
-    Yields
-    ------
-    (C, H, W) float
-        Q, the distribution over classes in each cell.
-    """
-    phi = above_best(unary).astype(np.float64)
-    part = damping(self_coupling)
-    log_Q = log_softmax(-phi, axis=0)
-    while True:
-        Q = np.exp(log_Q)
-        yield Q.reshape(unary.shape)
-        target = -phi - disagreement(Q)
-        log_Q = log_softmax((1 - part) * log_Q + part * target, axis=0)
-
-
-def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return the cost of each class relative to the cell's best one: the unary term up to a constant.
-
-    Parameters
-    ----------
-    unary : (C, H, W) float
-        phi_u; inf where a class is impossible.
-
-    Returns
-    -------
-    (C, H W) float
-        Finite, at most `NEVER`.
-    """
-    return np.minimum(unary - unary.min(axis=0), NEVER).reshape(len(unary), -1)
-
-
-def settled(states: Iterator[NDArray], iterations: int, tolerance: float) -> NDArray:
-    """Update until the number of updates is reached, or an update changes no probability by more than the tolerance.
-
-    Parameters
-    ----------
-    states : iterator of (C, H, W) float
-        Q at first and after each update, such as `mean_field_updates`.
-    iterations : int
-        The largest number of updates.
-    tolerance : float
-        Stop as soon as an update changes no probability by more than this.
-
-    Returns
-    -------
-    (C, H, W) float
-        The last Q.
-    """
-    Q = next(states)
-    for _ in range(iterations):
-        before = Q
-        Q = next(states)
-        if np.abs(Q - before).max() <= tolerance:
-            break
-    return Q
-
-
-def damping(self_coupling: NDArray) -> NDArray:
-    """Return how far all cells may move at once without raising the free energy.
-
-    With k_ii the weight of a cell with itself (the diagonal of `gram_matrix`), the free energy is::
-
-        F(Q) = sum_i Q_i . phi_i - 1/2 sum_ij k_ij Q_i . Q_j + 1/2 sum_i k_ii |Q_i|^2 - H(Q) + constant
-
-    The first sum over pairs has a positive semidefinite matrix, so with its minus sign it is concave, and nowhere above
-    its tangent at the present Q. The next sum exceeds its tangent by ``k_ii / 2 |Q'_i - Q_i|^2``, which is at most
-    ``k_ii / 2 KL(Q'_i || Q_i)`` by Pinsker's inequality. Tangents plus bound are nowhere below F and equal it at Q. So
-    F at their minimum Q' is no larger than at Q. Setting the derivative to zero gives::
-
-        log Q'_i = (1 - p_i) log Q_i + p_i (-phi_i - sum_{j != i} k_ij (1 - Q_j)) + constant,   p_i = 1 / (1 + k_ii / 2)
-
-    (compare Kraehenbuehl and Koltun 2013, section 3; Baque et al. 2016).
-
-    Parameters
-    ----------
-    self_coupling : (N,) float
-        k_ii, for each cell the sum over the kernels.
-
-    Returns
-    -------
-    (N,) float
-        p_i, 0 < p_i <= 1. With the default parameters and many neighbours it is near 1, so damping costs nothing; with
-        `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
-    """
-    return 1 / (1 + self_coupling / 2)
 
 
 def mean_field_sequential(

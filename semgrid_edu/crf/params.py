@@ -73,6 +73,8 @@ class CrfParams:
         >>> CrfParams.for_cells(0.5).sigma_alpha
         3.2
         """
+        if not 0 < cell < np.inf:
+            raise ArgumentError("cell", "a positive number of metres", cell)
         scale = PAPER_CELL / cell
         return cls(sigma_alpha=cls.sigma_alpha * scale, sigma_gamma=cls.sigma_gamma * scale)
 

@@ -1,5 +1,6 @@
 """Calibration: a network's accuracy by its confidence, and the temperature that corrects it (eq. (3))."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,9 @@ from semgrid_edu.labels import IGNORE
 
 COLDEST, HOTTEST = 0.01, 100.0
 """The temperatures between which `fit_temperature` searches."""
+
+SUM_TOLERANCE = 1e-3
+"""How far the probabilities of a cell may be from a sum of 1: float32 networks round."""
 
 
 class Reliability(NamedTuple):
@@ -40,7 +44,7 @@ def at_temperature(log_probability: ArrayLike, temperature: float) -> NDArray:
     Parameters
     ----------
     log_probability : (C, ...) float
-        log p, natural logarithms.
+        log p, natural logarithms; -inf for a class of probability 0.
     temperature : float
         T, positive.
 
@@ -49,6 +53,11 @@ def at_temperature(log_probability: ArrayLike, temperature: float) -> NDArray:
     (C, ...) float
         Logarithms of the new distribution, in the type of the argument.
 
+    Raises
+    ------
+    ArgumentError
+        When T isn't a positive number, or exp(log p) isn't a distribution in each cell.
+
     Examples
     --------
     >>> np.exp(at_temperature(np.log([0.8, 0.2]), 2.0)).round(3)
@@ -56,7 +65,9 @@ def at_temperature(log_probability: ArrayLike, temperature: float) -> NDArray:
     """
     if not (np.isfinite(temperature) and temperature > 0):
         raise ArgumentError("temperature", "a positive number", temperature)
-    return log_softmax(np.asarray(log_probability) / float(temperature), axis=0)
+    log_p = np.asarray(log_probability)
+    _check_distribution("log_probability", log_p, np.exp)
+    return log_softmax(log_p / float(temperature), axis=0)
 
 
 def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = IGNORE) -> float:
@@ -83,12 +94,13 @@ def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = 
     Raises
     ------
     ArgumentError
-        When the shapes don't fit, a label is no class, no cell is labelled, a probability is 0, or the best temperature
-        is outside this range: when every cell is right, or log p has nothing to do with the truth.
+        When the shapes don't fit, a label is no class, no cell is labelled, exp(log p) isn't a distribution in each
+        labelled cell, a probability is 0, or the best temperature is outside this range: when every cell is right, or
+        log p has nothing to do with the truth.
 
     Examples
     --------
-    Four cells at 99 % of which one is wrong: at the right temperature they are at 75 %.
+    Four cells at 99 %, one of them wrong: at the right temperature they are at 75 %.
 
     >>> log_p = np.log([[0.99] * 4, [0.01] * 4])
     >>> T = fit_temperature(log_p, [0, 0, 0, 1])
@@ -98,6 +110,7 @@ def fit_temperature(log_probability: ArrayLike, truth: ArrayLike, ignore: int = 
     columns, classes = _labelled("log_probability", log_probability, truth, ignore)
     if not np.isfinite(columns).all():
         raise ArgumentError("log_probability", "finite logarithms", "infinity or NaN: a class of probability 0?")
+    _check_distribution("log_probability", columns, np.exp)
     columns = columns.astype(np.float64)
     of_truth = columns[classes, np.arange(len(classes))].mean()
 
@@ -133,11 +146,13 @@ def reliability(probability: ArrayLike, truth: ArrayLike, n_bins: int = 15, igno
     Raises
     ------
     ArgumentError
-        When the shapes don't fit, a label is no class, no cell is labelled, or there is no bin.
+        When the shapes don't fit, a label is no class, no cell is labelled, a labelled cell has no distribution, or
+        there is no bin.
     """
     columns, classes = _labelled("probability", probability, truth, ignore)
     if n_bins < 1:
         raise ArgumentError("n_bins", "at least one bin", n_bins)
+    _check_distribution("probability", columns, np.positive)
     confident = columns.max(axis=0).astype(np.float64)
     bins = np.clip(np.ceil(confident * n_bins).astype(int) - 1, 0, n_bins - 1)
     right = columns.argmax(axis=0) == classes
@@ -162,13 +177,30 @@ def expected_calibration_error(diagram: Reliability) -> float:
     return float(diagram.cells @ np.abs(diagram.confidence - diagram.accuracy) / diagram.cells.sum())
 
 
+def _check_distribution(name: str, values: NDArray, to_probability: Callable[[NDArray], NDArray]) -> None:
+    """Check that the values of each cell, (C, ...), are probabilities that sum to 1, or their logarithms."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        probability = to_probability(values.astype(np.float64))
+        total = probability.sum(axis=0)
+    wrong = ~(np.abs(total - 1) <= SUM_TOLERANCE) | (probability < 0).any(axis=0)
+    if wrong.any():
+        what = "logarithms of probabilities" if to_probability is np.exp else "probabilities"
+        raise ArgumentError(
+            name, f"{what} that sum to 1 in each cell", f"a cell with {values[:, wrong][:, 0].tolist()}"
+        )
+
+
 def _labelled(name: str, columns: ArrayLike, truth: ArrayLike, ignore: int) -> tuple[NDArray, NDArray[np.int64]]:
     """Return the columns (C, N) and the classes (N,) of the labelled cells, after checking that they fit."""
     columns, truth = np.asarray(columns), np.asarray(truth)
     if columns.ndim == 0 or columns.shape[1:] != truth.shape:
         raise ArgumentError(name, f"shape (C, {', '.join(map(str, truth.shape))})", f"shape {columns.shape}")
     kept = truth != ignore
-    classes = truth[kept].astype(np.int64)
+    labels = truth[kept]
+    fractional = labels != np.round(labels)  # true of NaN as well
+    if fractional.any():
+        raise ArgumentError("truth", "whole numbers, the classes", labels[fractional][0])
+    classes = labels.astype(np.int64)
     if not len(classes):
         raise ArgumentError("truth", "at least one labelled cell", f"{ignore} everywhere")
     if not (classes.min() >= 0 and classes.max() < len(columns)):

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from semgrid_edu.camera import invert_rigid, transform_points
 
@@ -52,8 +53,13 @@ class Cuboids:
             Number of the LIDAR of each point.
         """
         holder = np.full(len(points), -1)
+        if not (len(points) and len(self.names)):
+            return holder
+        # Only points in the sphere around a box are tested; a search tree finds them without looking at the others.
+        radii = np.linalg.norm(self.sizes / 2 + MARGIN, axis=1) + 1e-6  # a corner is in despite rounding
+        around = KDTree(points).query_ball_point(self.T_world_from_box[:, :3, 3], radii, return_sorted=True)
         for b, (T, size, lidar) in enumerate(zip(self.T_world_from_box, self.sizes, self.lidars, strict=True)):
-            near = np.flatnonzero(np.abs(points - T[:3, 3]).max(axis=1) < np.linalg.norm(size) / 2 + MARGIN)
+            near = np.array(around[b], np.int64)
             inside = (np.abs(transform_points(invert_rigid(T), points[near])) <= size / 2 + MARGIN).all(axis=1)
             holder[near[inside & ((lidar == ANY_LIDAR) | (lidars[near] == lidar))]] = b
         return holder
@@ -63,7 +69,8 @@ class Cuboids:
         return {self.names[b]: self.T_world_from_box[b] for b in np.argsort(-self.lidars, kind="stable")}
 
 
-class LabelledScan(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class LabelledScan:
     """The returns of one instant with their classes, and the objects among them.
 
     Parameters
@@ -85,6 +92,11 @@ class LabelledScan(NamedTuple):
     movable: NDArray[np.bool_]
     lidars: NDArray[np.int64]
     cuboids: Cuboids
+
+    @cached_property
+    def holder(self) -> NDArray[np.int64]:
+        """The number of the cuboid of each movable return, in their order; -1 if none holds it."""
+        return self.cuboids.holding(self.points[self.movable], self.lidars[self.movable])
 
 
 def put_together(now: LabelledScan, others: Sequence[LabelledScan]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
@@ -122,10 +134,9 @@ def _carried(
     kept = np.ones(len(scan.points), bool)
     boxes = scan.cuboids
     movable = np.flatnonzero(scan.movable)
-    holder = boxes.holding(points[movable], scan.lidars[movable])
-    kept[movable[holder < 0]] = own
+    kept[movable[scan.holder < 0]] = own
     for b in np.flatnonzero(boxes.moving):
-        held = movable[holder == b]
+        held = movable[scan.holder == b]
         if boxes.names[b] in places:
             T_now_from_then = places[boxes.names[b]] @ invert_rigid(boxes.T_world_from_box[b])
             points[held] = transform_points(T_now_from_then, points[held])

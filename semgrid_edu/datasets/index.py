@@ -211,11 +211,30 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
         raise DataError(semseg_folder(Path(root) / scene), "the classes of the returns", "no folder")
     if not splits["train"]:
         raise ArgumentError("test_cameras", "at least one camera less", ", ".join(test_cameras))
-    place = os.path.relpath(Path(root).resolve(), Path(folder).resolve())
+    place = relative_path(Path(root).resolve(), Path(folder).resolve())
     index = {"name": f"pandaset-{scene}", "reader": "pandaset", "root": place}
     index |= {"label_set": KITTI_14.name, "splits": {split: frames for split, frames in splits.items() if frames}}
     write_json(path, index)
     return path
+
+
+def relative_path(path: str | Path, folder: str | Path) -> str:
+    """Return the way from a folder to a path; on Windows, from one drive to another, the whole path.
+
+    Parameters
+    ----------
+    path, folder : path-like
+        Where to, and where from.
+
+    Examples
+    --------
+    >>> relative_path("data/kitti", "data/index").replace(os.sep, "/")
+    '../kitti'
+    """
+    try:
+        return os.path.relpath(path, folder)
+    except ValueError:  # only ntpath raises it
+        return os.fspath(path)
 
 
 def _entry(path: Path, content: Any, key: str) -> Any:

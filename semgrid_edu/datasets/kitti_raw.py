@@ -23,7 +23,7 @@ from semgrid_edu.datasets.kitti_labels import (
 from semgrid_edu.datasets.layouts import what_is
 from semgrid_edu.datasets.oxts import imu_pose, read_packet, read_timestamps
 from semgrid_edu.datasets.project_lidar import cells_in_view
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, check_text
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.storage.reading import read_png
@@ -95,9 +95,7 @@ class KittiRawDrive(FrameSequence):
     """
 
     def __init__(self, root: str | Path, date: str, drive: str, *, images: bool = True, view: str = VIEWS[0]) -> None:
-        for name, value in (("date", date), ("drive", drive)):
-            if not value:
-                raise ArgumentError(name, "such as 2011_09_26 and 0013", repr(value))
+        check_text(date=(date, "2011_09_26"), drive=(drive, "0013"))
         if view not in VIEWS:
             raise ArgumentError("view", " or ".join(VIEWS), repr(view))
         self.date_folder, self.folder = _existing(Path(root), date, drive)

@@ -17,9 +17,9 @@ from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_tran
 from semgrid_edu.datasets import pandaset_files as files
 from semgrid_edu.datasets.calibration import camera_from
 from semgrid_edu.datasets.cuboids import LabelledScan, put_together
-from semgrid_edu.datasets.frames import FrameSequence, frame_numbers, nothing_known
-from semgrid_edu.datasets.project_lidar import birdseye_votes, cells_in_view, closest_returns, unhidden
-from semgrid_edu.errors import ArgumentError, DataError, check_whole
+from semgrid_edu.datasets.frames import FrameSequence, frame_numbers
+from semgrid_edu.datasets.project_lidar import birdseye_votes, cells_in_view, paint_image, unhidden
+from semgrid_edu.errors import ArgumentError, DataError, check_text, check_whole
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -69,7 +69,7 @@ class PandasetScene(FrameSequence):
     Raises
     ------
     ArgumentError
-        When there is no such camera.
+        When `scene` isn't text, or there is no such camera.
     DataError
         When there is no such scene, or no image. `scene[k]` raises it when a file that the frame needs is missing or
         damaged.
@@ -84,6 +84,7 @@ class PandasetScene(FrameSequence):
     credit = files.CREDIT
 
     def __init__(self, root: str | Path, scene: str, camera: str = CAMERAS[0]) -> None:
+        check_text(scene=(scene, "002"))
         if camera not in CAMERAS:
             raise ArgumentError("camera", f"one of {', '.join(CAMERAS)}", repr(camera))
         self.folder = Path(root) / scene
@@ -121,7 +122,9 @@ class PandasetScene(FrameSequence):
         number = self.numbers[0]
         if self._scan(number).labelled is None:
             return LIDAR_HEIGHT
-        points, classes, *_ = self._labelled_scan(number)
+        labelled = self._labelled_scan(number)
+        points = labelled.points
+        classes = labelled.classes
         eye = self._T_world_from_lidar(0)[:3, 3]
         near = (classes == KITTI_14.index("road")) & (np.hypot(*(points[:, :2] - eye[:2]).T) < 12)
         return float(eye[2] - np.median(points[near, 2])) if near.any() else LIDAR_HEIGHT
@@ -179,7 +182,8 @@ class PandasetScene(FrameSequence):
         (h, w) uint8
             Classes of KITTI-14; 255 where there is no such return, or the closest one is unlabelled.
         """
-        return _painted(*self._cloud(k, before, after), self._camera(k).resized(size))[0]
+        points, classes = self._cloud(k, before, after)
+        return paint_image(points, classes, _standing(classes), self._camera(k).resized(size))[0]
 
     def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
         """Return the cells in view of the camera, (H, W); only some of them have a labelled return.
@@ -187,6 +191,12 @@ class PandasetScene(FrameSequence):
         Parameters are those of `LabelledDrive.truth`.
         """
         return cells_in_view(self._camera(k), spec)
+
+    def path(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the poses of the vehicle, (N, 4, 4) T_world_from_vehicle with x forward, and their times, (N,)."""
+        forward = np.eye(4)
+        forward[:2, :2] = [[0, -1], [1, 0]]  # the y axis of PandaSet's poses points ahead
+        return self._poses @ forward, self._times
 
     def _frame(self, k: int) -> Frame:
         frame = self.without_labels(k)
@@ -209,7 +219,7 @@ class PandasetScene(FrameSequence):
         if self._scan(self.numbers[k]).labelled is None:
             return None
         points, classes = self._cloud(k)
-        image, depth = _painted(points, classes, camera)
+        image, depth = paint_image(points, classes, _standing(classes), camera)
         birdseye = birdseye_votes(self._in_grid(points), classes, LABEL_GRID, KITTI_14)
         visible = self._visible(points, classes, camera, LABEL_GRID)
         return FrameLabels(KITTI_14, image, depth, birdseye, visible, cells_in_view(camera, LABEL_GRID))
@@ -282,18 +292,3 @@ class PandasetScene(FrameSequence):
 def _standing(classes: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Return which returns may hide something from a camera: all except the ground's."""
     return ~np.isin(classes, [KITTI_14.index(name) for name in ("road", "sidewalk")])
-
-
-def _painted(
-    points: NDArray, classes: NDArray[np.uint8], camera: Camera
-) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-    """Return class and depth of the closest return on each pixel that the camera sees."""
-    seen = unhidden(points, _standing(classes), camera)
-    points = points[seen]
-    classes = classes[seen]
-    blank = nothing_known(KITTI_14, camera.size)
-    returns, uv = closest_returns(Frame(None, points, camera, np.eye(4), 0.0))
-    u, v = uv.T
-    blank.image[v, u] = classes[returns]
-    blank.depth[v, u] = transform_points(camera.T_camera_from_lidar, points[returns])[:, 2]
-    return blank.image, blank.depth

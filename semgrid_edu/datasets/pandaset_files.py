@@ -17,7 +17,7 @@ from semgrid_edu.datasets.class_tables import ClassTable
 from semgrid_edu.datasets.cuboids import Cuboids, LabelledScan
 from semgrid_edu.errors import DataError
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.storage.pickled_tables import read_pickled_table
+from semgrid_edu.storage.pickled_tables import PickledTable, read_pickled_table
 from semgrid_edu.storage.reading import read_json
 
 CREDIT = "PandaSet by Hesai and Scale AI, CC BY 4.0 (creativecommons.org/licenses/by/4.0), cut and reduced."
@@ -64,6 +64,10 @@ PANDASET_CLASSES = ClassTable(
 """KITTI-14's class of each number in annotations/semseg; the numbers come from PandaSet's classes.json.
 
 Ambiguous classes stay unlabelled: an "other static object" may be a pole, a wall or a hydrant."""
+
+
+FARTHEST = 1000.0
+"""No return is this far from most others, metres; the LIDARs reach 200 and 300 m."""
 
 
 class PandasetScan(NamedTuple):
@@ -129,18 +133,24 @@ def read_pandaset_scan(scene: Path, number: int) -> PandasetScan:
         Number of the scan.
     """
     path = scene / "lidar" / f"{number:02d}.pkl.gz"
-    table = _table(path, ("x", "y", "z", "i", "d"))
+    table, rows = _table(path, ("x", "y", "z", "i", "d"))
     points = np.column_stack([table[axis] for axis in "xyz"])
     reflectance = (table["i"] / 255).astype(np.float32)
     lidars = table["d"]
     if not ((reflectance >= 0) & (reflectance <= 1)).all():
         raise DataError(path, "i from 0 to 255", f"{table['i'].min():g} to {table['i'].max():g}")
+    if len(points):
+        distance = np.abs(points - np.median(points, axis=0)).max(axis=1)
+        if distance.max() > FARTHEST:
+            expected = f"returns within {FARTHEST:g} m of the scan's middle"
+            raise DataError(path, expected, f"{points[distance.argmax()].tolist()} in row {distance.argmax()}")
     if not semseg_folder(scene).is_dir():
         return PandasetScan(points, reflectance, lidars, None)
     path = semseg_folder(scene) / f"{number:02d}.pkl.gz"
-    numbers = _table(path, ("class",))["class"]
-    if len(numbers) != len(points):
-        raise DataError(path, f"a class for each of the scan's {len(points)} returns", f"{len(numbers)}")
+    table, class_rows = _table(path, ("class",))
+    if len(class_rows) != len(points):
+        raise DataError(path, f"a class for each of the scan's {len(points)} returns", f"{len(class_rows)}")
+    numbers = table["class"][_same_rows(path, class_rows, rows)]
     arrays = points, PANDASET_CLASSES.classes(path, numbers), np.isin(numbers, MOVABLE), lidars
     cuboids = _read_cuboids(scene / "annotations" / "cuboids" / path.name)
     labelled = LabelledScan(*(array[numbers >= FIRST_THING] for array in arrays), cuboids)
@@ -206,23 +216,35 @@ def read_intrinsics(path: Path) -> NDArray[np.float64]:
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
 
 
-def _table(path: Path, numbers: Sequence[str], others: Sequence[str] = ()) -> dict[str, NDArray]:
+def _same_rows(path: Path, rows: NDArray, wanted: NDArray) -> NDArray[np.int64]:
+    """Return where in a table the wanted rows are: pandas' index names them, whatever order they were written in."""
+    if np.array_equal(rows, wanted):
+        return np.arange(len(rows))
+    if rows.dtype.kind in "iu" and wanted.dtype.kind in "iu":
+        by_name = np.argsort(rows)
+        found = by_name[np.searchsorted(rows, wanted, sorter=by_name).clip(max=len(rows) - 1)]
+        if np.array_equal(rows[found], wanted) and len(np.unique(wanted)) == len(wanted):
+            return found
+    raise DataError(path, "the index (the names of the rows) of the scan's table, each once", "another")
+
+
+def _table(path: Path, numbers: Sequence[str], others: Sequence[str] = ()) -> PickledTable:
     """Read a table, and check that it has some columns of finite numbers and some of other things."""
-    table = read_pickled_table(path)
+    table, rows = read_pickled_table(path)
     columns = [*numbers, *others]
     if not set(columns) <= set(table):
         raise DataError(path, f"the columns {', '.join(columns)}", ", ".join(table)[:200])
     for name in numbers:
         if len(table[name]) and (table[name].dtype == object or not np.isfinite(table[name]).all()):
             raise DataError(path, f"finite numbers in the column {name}", "others")
-    return table
+    return PickledTable(table, rows)
 
 
 def _read_cuboids(path: Path) -> Cuboids:
     """Read the cuboids of a scan. A thing that moves has two, one for each LIDAR, which name each other."""
     columns = [f"{what}.{axis}" for what in ("position", "dimensions") for axis in "xyz"]
     which = ("uuid", "stationary", "cuboids.sibling_id")
-    table = _table(path, (*columns, "yaw", "cuboids.sensor_id"), which)
+    table, _ = _table(path, (*columns, "yaw", "cuboids.sensor_id"), which)
     places, sizes = np.split(np.column_stack([table[column] for column in columns]).astype(np.float64), 2, axis=1)
     turns = Rotation.from_rotvec(np.outer(table["yaw"], [0, 0, 1])).as_matrix()
     T = np.array([rigid_transform(*pose) for pose in zip(turns, places, strict=True)]).reshape(-1, 4, 4)

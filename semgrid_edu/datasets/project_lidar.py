@@ -131,6 +131,40 @@ CLEARANCE = 2.5
 and also the height up to which `SensorModel` counts returns as obstacles."""
 
 
+def paint_image(
+    points: NDArray, classes: NDArray[np.uint8], hiding: NDArray[np.bool_], camera: Camera
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """Return class and depth of the closest return on each pixel that the camera sees.
+
+    Parameters
+    ----------
+    points : (N, 3) float
+        LIDAR frame, metres.
+    classes : (N,) uint8
+        Class of each.
+    hiding : (N,) bool
+        Whether it can hide others, see `unhidden`.
+    camera : Camera
+        The camera.
+
+    Returns
+    -------
+    classes : (h, w) uint8
+        255 where there is no return.
+    depth : (h, w) float32
+        Metres along the optical axis; NaN where there is no return.
+    """
+    seen = unhidden(points, hiding, camera)
+    points = points[seen]
+    returns, uv = closest_returns(Frame(None, points, camera, np.eye(4), 0.0))
+    u, v = uv.T
+    image = np.full(camera.size, IGNORE, np.uint8)
+    image[v, u] = classes[seen][returns]
+    depth = np.full(camera.size, np.nan, np.float32)
+    depth[v, u] = transform_points(camera.T_camera_from_lidar, points[returns])[:, 2]
+    return image, depth
+
+
 def birdseye_votes(
     points_grid: NDArray, classes: NDArray[np.uint8], spec: GridSpec, label_set: LabelSet
 ) -> NDArray[np.uint8]:

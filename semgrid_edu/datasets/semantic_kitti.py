@@ -15,16 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_from_grid, transform_points
-from semgrid_edu.datasets.calibration import (
-    BenchmarkCalibration,
-    camera_from,
-    parse_pose,
-    read_benchmark_calibration,
-)
+from semgrid_edu.datasets.benchmark_calibration import BenchmarkCalibration, parse_pose, read_benchmark_calibration
+from semgrid_edu.datasets.calibration import camera_from
 from semgrid_edu.datasets.class_tables import ClassTable
 from semgrid_edu.datasets.frames import FrameSequence, frame_numbers, nothing_known, read_scan
 from semgrid_edu.datasets.project_lidar import birdseye_votes, seen_returns
-from semgrid_edu.errors import DataError
+from semgrid_edu.errors import DataError, check_text
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
@@ -102,6 +98,8 @@ class SemanticKittiSequence(FrameSequence):
 
     Raises
     ------
+    ArgumentError
+        When `sequence` isn't text.
     DataError
         When there are no scans of the sequence. `drive[k]` raises it when a file that the frame needs is missing or
         damaged.
@@ -115,6 +113,7 @@ class SemanticKittiSequence(FrameSequence):
     label_set = KITTI_14
 
     def __init__(self, root: str | Path, sequence: str) -> None:
+        check_text(sequence=(sequence, "00"))
         self.folder = Path(root) / "sequences" / sequence
         self.name = sequence
         self._length = 1 + max(frame_numbers(self.folder / "velodyne", "scans", ".bin"))
@@ -136,7 +135,7 @@ class SemanticKittiSequence(FrameSequence):
         (N, 4) float32
             LIDAR frame, metres, and reflectance.
         """
-        return read_scan(self.folder / "velodyne" / f"{k:06d}.bin")
+        return read_scan(self._scan_file(k))
 
     def classes(self, k: int) -> NDArray[np.uint8]:
         """Read the class of each return of one scan. Parameters are those of `SemanticKittiSequence.scan`.
@@ -180,10 +179,14 @@ class SemanticKittiSequence(FrameSequence):
         (H, W) uint8
             Classes of KITTI-14; 255 in a cell in which there is no labelled return.
         """
-        window = range(max(0, k - before), min(len(self), k + after + 1))
+        window = [j for j in range(max(0, k - before), min(len(self), k + after + 1)) if j == k or self._has_scan(j)]
         labelled = [self._labelled_points(j, k) for j in window]
         points, classes = (np.concatenate(arrays) for arrays in zip(*labelled, strict=True))
         return birdseye_votes(points, classes, spec, KITTI_14)
+
+    def path(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the poses of the LIDAR, (N, 4, 4) T_world_from_lidar in metres, and their times, (N,) seconds."""
+        return np.array(self._poses[: len(self)]), np.array(self._times[: len(self)])
 
     def _labelled_points(self, j: int, k: int) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return scan j in the grid frame of frame k, and its classes, without things that moved in between."""
@@ -212,6 +215,12 @@ class SemanticKittiSequence(FrameSequence):
         visible = np.zeros(LABEL_GRID.shape, dtype=np.bool_)
         visible.flat[cells] = True
         return replace(nothing_known(KITTI_14, self.camera.size), birdseye=self.truth(k, LABEL_GRID), visible=visible)
+
+    def _scan_file(self, k: int) -> Path:
+        return self.folder / "velodyne" / f"{k:06d}.bin"
+
+    def _has_scan(self, k: int) -> bool:
+        return self._scan_file(k).exists()
 
     def _label_file(self, k: int) -> Path:
         return self.folder / "labels" / f"{k:06d}.label"
@@ -252,10 +261,17 @@ class SemanticKittiSequence(FrameSequence):
 
     @cached_property
     def _times(self) -> list[float]:
-        """Seconds since the first scan."""
+        """Seconds since the first scan: one number in each line, each above the one before."""
         path = self.folder / "times.txt"
-        times = parse_numbers(path, " ".join(self._lines(path)), "times")
-        return [float(time - times[0]) for time in times]
+        times: list[float] = []
+        for number, line in enumerate(self._lines(path), 1):
+            found = parse_numbers(path, line, f"the time in line {number}")
+            if len(found) != 1:
+                raise DataError(path, f"one time in line {number}", repr(line))
+            if times and found[0] <= times[-1]:
+                raise DataError(path, "increasing times", f"{line!r} in line {number}, not after the one before")
+            times.append(float(found[0]))
+        return [time - times[0] for time in times]
 
     def _lines(self, path: Path) -> list[str]:
         """Return the lines of a file with one line per frame; the last frames may be missing on this disk."""

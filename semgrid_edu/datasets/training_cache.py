@@ -2,7 +2,6 @@
 
 import hashlib
 import inspect
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.datasets import label_policies, training_arrays
 from semgrid_edu.datasets.frames import LabelledDrive
-from semgrid_edu.datasets.index import DatasetIndex
+from semgrid_edu.datasets.index import DatasetIndex, relative_path
 from semgrid_edu.datasets.label_policies import LidarTruth, drive_labels
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
 from semgrid_edu.errors import ArgumentError, DataError, needed
@@ -138,7 +137,7 @@ def _code_and_files(
     modules = [Path(training_arrays.__file__), *map(_file_of, parts_of_others)]
     parts = [code_hash(modules)]
     for drive, labelled in drives:
-        found = {os.path.relpath(path, index.root): path.stat() for path in drive.files()}
+        found = {relative_path(path, index.root): path.stat() for path in drive.files()}
         parts += [drive.name, repr(labelled)]
         parts += sorted(f"{path} {stat.st_size} {stat.st_mtime_ns}" for path, stat in found.items())
     return parts

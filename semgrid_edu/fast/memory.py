@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from semgrid_edu import memory as book
 from semgrid_edu.errors import check_shape
-from semgrid_edu.fast.occupancy.planar_motion import look_up
+from semgrid_edu.fast.occupancy.cells import look_up
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.memory import Look, MemoryParams, MemoryState, View
-from semgrid_edu.memory.state import FAINT, MOVES, check_look, something_there
+from semgrid_edu.memory.state import FAINT, check_look, something_there
 from semgrid_edu.occupancy import N_STATES, State
 
 
@@ -35,8 +35,9 @@ def _exponents(spec: GridSpec, params: MemoryParams) -> NDArray[np.float32]:
 def _seen_classes(grid, n):
     """Divide the semantic classes by their sum; numpy would need five passes over the grid."""
     height, width = grid.shape[1:]
-    classes, sees = np.zeros((n, height, width), np.float32), np.zeros((height, width), np.float32)
+    classes = np.zeros((n, height, width), np.float32)
     log_class = np.zeros((n, height, width), np.float32)
+    sees = np.zeros((height, width), np.float32)
     for r in range(height):
         for k in range(n):
             for c in range(width):
@@ -51,53 +52,6 @@ def _seen_classes(grid, n):
     return classes, log_class, sees
 
 
-def carry_classes(
-    memory: MemoryState, moving: NDArray, velocity: NDArray, cell: float, dt: float, params: MemoryParams
-) -> MemoryState:
-    """Predict: a moving thing takes its class along. Parameters and result are those of `carry_classes`."""
-    check_shape("moving", moving, memory.weight.shape[1:])
-    check_shape("velocity", velocity, (2, *moving.shape))
-    carried = memory.copy()
-    numbers = map(np.float32, (cell, dt, params.least_moving))
-    _carry(_moving_planes(memory), moving, velocity, *numbers, _moving_planes(carried))
-    kept = params.kept(dt).astype(np.float32)[:, None, None]
-    carried.weight[:] *= kept
-    carried.seen[:] *= kept
-    return carried
-
-
-def _moving_planes(memory: MemoryState) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    return memory.evidence[MOVES], memory.weight[MOVES], memory.seen[MOVES], memory.offset
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _carry(before, moving, velocity, cell, dt, least, after):
-    """Look up the origin of each moving cell: there are few, so one by one."""
-    evidence, weight, seen, offset = before
-    to_evidence, to_weight, to_seen, to_offset = after
-    to_evidence[:], to_weight[:], to_seen[:], to_offset[:] = 0, 0, 0, 0
-    height, width = moving.shape
-    for r in range(height):
-        for c in range(width):
-            if moving[r, c] >= least:
-                x, y = np.nan_to_num(velocity[0, r, c]) * dt, np.nan_to_num(velocity[1, r, c]) * dt
-                r0, c0 = _behind(r, c, x, y, cell, height, width)
-                r0, c0 = _behind(r, c, x + offset[0, r0, c0], y + offset[1, r0, c0], cell, height, width)
-                for k in range(len(evidence)):
-                    to_evidence[k, r, c] = evidence[k, r0, c0]
-                to_weight[r, c], to_seen[r, c] = weight[r0, c0], seen[r0, c0]
-                x, y = x + offset[0, r0, c0] - (r0 - r) * cell, y + offset[1, r0, c0] - (c0 - c) * cell
-                to_offset[0, r, c] = min(max(x, -cell / 2), cell / 2)
-                to_offset[1, r, c] = min(max(y, -cell / 2), cell / 2)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _behind(r, c, x, y, cell, height, width):
-    """Return the cell that a moving thing came from: x points to row 0, y to column 0."""
-    r0, c0 = r + int(np.rint(x / cell)), c + int(np.rint(y / cell))
-    return min(max(r0, 0), height - 1), min(max(c0, 0), width - 1)
-
-
 def recall_classes(
     memory: MemoryState, places: NDArray, occupancy: NDArray, look: Look, params: MemoryParams
 ) -> NDArray[np.float32]:
@@ -109,7 +63,7 @@ def recall_classes(
     flat = memory.evidence.reshape(2, n, -1), memory.weight.reshape(2, -1), memory.seen.reshape(2, -1)
     movable = np.isin(np.arange(n), params.movable)
     beam = np.log(something_there(occupancy)).astype(np.float32)
-    _recall(*flat, places, occupancy, *look[:-1], np.float32(params.most), movable, beam, recalled)
+    _recall(*flat, places, occupancy, *look[:-1], np.float32(params.max_weight), movable, beam, recalled)
     return recalled
 
 
@@ -122,9 +76,11 @@ def _recall(evidence, weight, seen, places, o, classes, log_class, sees, exponen
     for r in range(height):
         alone[:] = 0
         for layer in range(2):
-            first, last = width, 0
+            first = width
+            last = 0
             for c in range(width):
-                p, moving = places[r, c], o[2, r, c]
+                p = places[r, c]
+                moving = o[2, r, c]
                 unknown = (1 - seen[layer, p]) * (1 - sees[r, c])
                 mass[c] = (moving if layer == 1 else 1 - moving) * (1 - unknown)
                 old[c], new[c] = _parts(weight[layer, p], sees[r, c], exponent[r, c], most)
@@ -132,9 +88,11 @@ def _recall(evidence, weight, seen, places, o, classes, log_class, sees, exponen
                     if (state == 2) == (layer == 1):
                         recalled[n + state, r, c] = o[state, r, c] * unknown
                 if old[c] == 0:  # the frame alone
-                    alone[c], mass[c] = alone[c] + mass[c], 0
+                    alone[c] += mass[c]
+                    mass[c] = 0
                 else:
-                    first, last = min(first, c), c + 1
+                    first = min(first, c)
+                    last = c + 1
             here = r, first, last
             scores = _scores(evidence[layer], places, log_class, old[first:last], new[first:last], movable, laser, here)
             _add_beliefs(scores, mass[first:last], classes, sees, movable, recalled, here)
@@ -146,43 +104,60 @@ def _recall(evidence, weight, seen, places, o, classes, log_class, sees, exponen
 def _scores(evidence, places, log_class, old, new, movable, laser, here):
     """Return the log of memory times frame for a row of cells, up to a constant in each cell."""
     r, first, last = here
-    scores, place, beam = np.empty((len(evidence), len(old)), np.float32), places[r][first:last], laser[r][first:last]
+    scores = np.empty((len(evidence), len(old)), np.float32)
+    place = places[r][first:last]
+    beam = laser[r][first:last]
     for c in range(len(old)):
         total = max(old[c] + new[c], np.float32(1e-12))
-        old[c], new[c] = old[c] * max(1 / total, np.float32(1)), new[c] * max(1 / total, np.float32(1))
+        old[c] *= max(1 / total, np.float32(1))
+        new[c] *= max(1 / total, np.float32(1))
     for k in range(len(scores)):
-        was, says, score, comes = evidence[k], log_class[k, r][first:last], scores[k], np.float32(movable[k])
+        remembered = evidence[k]
+        shown = log_class[k, r][first:last]
+        score = scores[k]
+        comes = np.float32(movable[k])
         for c in range(len(old)):
-            score[c] = old[c] * (was[place[c]] + comes * beam[c]) + new[c] * says[c]
+            score[c] = old[c] * (remembered[place[c]] + comes * beam[c]) + new[c] * shown[c]
     return scores
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_beliefs(scores, mass, classes, sees, movable, recalled, here):
     """Distribute the mass of each cell in a row; where the frame sees, it decides about `movable` classes."""
-    (n, width), (r, first, last) = scores.shape, here
-    top, sums = np.full((2, width), np.float32(-1e30)), np.zeros((2, width), np.float32)  # others, movable
-    look, seen, parts = sees[r][first:last], np.zeros(width, np.float32), np.empty((2, width), np.float32)
+    n, width = scores.shape
+    r, first, last = here
+    top = np.full((2, width), np.float32(-1e30))  # of the others, and of the movable classes
+    sums = np.zeros((2, width), np.float32)
+    parts = np.empty((2, width), np.float32)
+    look = sees[r][first:last]
+    seen = np.zeros(width, np.float32)
     for k in range(n):
-        of_group, score = top[int(movable[k])], scores[k]
+        of_group = top[int(movable[k])]
+        score = scores[k]
         for c in range(width):
             of_group[c] = max(of_group[c], score[c])
     for k in range(n):
-        of_group, total, score, comes = top[int(movable[k])], sums[int(movable[k])], scores[k], np.float32(movable[k])
-        says = classes[k, r][first:last]
+        of_group = top[int(movable[k])]
+        total = sums[int(movable[k])]
+        score = scores[k]
+        comes = np.float32(movable[k])
+        shown = classes[k, r][first:last]
         for c in range(width):
             score[c] = np.exp(score[c] - of_group[c])
             total[c] += score[c]
-            seen[c] += comes * look[c] * says[c]
+            seen[c] += comes * look[c] * shown[c]
     for c in range(width):
         most = max(top[0, c], top[1, c])
-        others, movers = sums[0, c] * np.exp(top[0, c] - most), np.exp(top[1, c] - most)
+        others = sums[0, c] * np.exp(top[0, c] - most)
+        movers = np.exp(top[1, c] - most)
         each = (1 - look[c]) * movers / (others + sums[1, c] * movers)  # scale of the movable classes
         there = seen[c] + each * sums[1, c]
-        parts[0, c], parts[1, c] = mass[c] * (1 - there) / max(sums[0, c], np.float32(1e-12)), mass[c] * each
+        parts[0, c] = mass[c] * (1 - there) / max(sums[0, c], np.float32(1e-12))
+        parts[1, c] = mass[c] * each
     for k in range(n):
-        row, comes, says = recalled[k, r][first:last], np.float32(movable[k]), classes[k, r][first:last]
-        row += parts[int(movable[k])] * scores[k] + comes * mass * look * says
+        row = recalled[k, r][first:last]
+        comes = np.float32(movable[k])
+        row += parts[int(movable[k])] * scores[k] + comes * mass * look * classes[k, r][first:last]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -198,7 +173,7 @@ def learn_classes(memory: MemoryState, places: NDArray, look: Look, params: Memo
     learnt = memory.copy()
     n = len(look.log_class)
     flat = look.log_class.reshape(n, -1), *(part.ravel() for part in look[2:])
-    _learn(learnt.evidence, learnt.weight, learnt.seen, places, *flat, np.float32(params.most))
+    _learn(learnt.evidence, learnt.weight, learnt.seen, places, *flat, np.float32(params.max_weight))
     return learnt
 
 
@@ -206,13 +181,15 @@ def learn_classes(memory: MemoryState, places: NDArray, look: Look, params: Memo
 def _learn(evidence, weight, seen, places, log_class, sees, exponent, moving, most):
     """Change the arrays in place where the camera sees something; the inner loops run over a row for one class."""
     height, width = places.shape
-    old, new = np.zeros(width, np.float32), np.zeros(width, np.float32)
+    old = np.zeros(width, np.float32)
+    new = np.zeros(width, np.float32)
     for r in range(height):
         for layer in range(2):
             for c in range(width):
                 p = places[r, c]
                 part = (moving[p] if layer == 1 else 1 - moving[p]) * sees[p] if p >= 0 else np.float32(0)
-                old[c], new[c] = np.float32(0), np.float32(0)
+                old[c] = np.float32(0)
+                new[c] = np.float32(0)
                 if part >= np.float32(FAINT):
                     old[c], new[c] = _parts(weight[layer, r, c], part, exponent[p], most)
                     seen[layer, r, c] = 1 - (1 - seen[layer, r, c]) * (1 - part)
@@ -232,7 +209,6 @@ class ClassMemory(book.ClassMemory):
 
     look_at = staticmethod(look_at)
     look_up = staticmethod(look_up)
-    carry = staticmethod(carry_classes)
     recall = staticmethod(recall_classes)
     learn = staticmethod(learn_classes)
     dtype = np.float32

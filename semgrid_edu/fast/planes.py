@@ -73,7 +73,7 @@ class PlaneSampler(nn.Module):
         return self if type(self) is kind else kind(self.pixels, self.visible, self.image_size)
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "PlaneSampler":
-        """Move the operator as well: PyTorch's `.to`, `.double`, `.cuda` and the like all call this."""
+        """Move the operator as well: PyTorch's `.to`, `.double` and `.cuda` call this."""
         self._hold(self.operator.map(fn))
         return super()._apply(fn, recurse)
 
@@ -178,10 +178,13 @@ def _corners(points: NDArray, image_size: tuple[int, int]) -> tuple[NDArray[np.i
     """Return the four pixels around each point as columns of the matrix, (N, 4), and their weights, (N, 4)."""
     height, width = image_size
     u, v = points.T
-    left, top = np.floor(u), np.floor(v)
-    right_weight, lower_weight = u - left, v - top
+    left = np.floor(u)
+    top = np.floor(v)
+    right_weight = u - left
+    lower_weight = v - top
     # On the last column or row the far neighbour has weight zero, but it must exist.
-    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+    right = np.minimum(left + 1, width - 1)
+    bottom = np.minimum(top + 1, height - 1)
     rows = (top, 1 - lower_weight), (bottom, lower_weight)
     columns = (left, 1 - right_weight), (right, right_weight)
     indices = np.stack([row * width + column for row, _ in rows for column, _ in columns], axis=-1)

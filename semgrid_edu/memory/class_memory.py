@@ -1,39 +1,174 @@
-"""Class beliefs over a drive, in a map that scrolls under the vehicle by whole cells (section 3.2, step 1)."""
-
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
-from typing import NamedTuple
+"""Class beliefs in a map that scrolls under the vehicle: carry what moves, recall, learn from a frame (section 3.2)."""
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import softmax
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.memory.state import MemoryParams, MemoryState, look_at
-from semgrid_edu.memory.steps import carry_classes, learn_classes, recall_classes
+from semgrid_edu.memory.state import (
+    FAINT,
+    MOVES,
+    STAYS,
+    Look,
+    MemoryParams,
+    MemoryState,
+    View,
+    look_at,
+    something_there,
+)
 from semgrid_edu.occupancy import N_STATES, Belief, PlanarMotion, State
 from semgrid_edu.occupancy.cmcdot import motion_since
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, look_up, map_around, scroll
 
 
-class View(NamedTuple):
-    """What the earlier stages made of one frame.
+def carry_classes(
+    memory: MemoryState, moving: NDArray, velocity: NDArray, cell: float, dt: float, params: MemoryParams
+) -> MemoryState:
+    """Predict: what moves takes its class along with the velocity field, and both layers forget.
+
+    Each cell that holds something moving copies the class of the cell where this came from. Nothing is interpolated;
+    the rest of the displacement stays in `MemoryState.offset`. Where nothing moves any more, the moving layer forgets
+    at once.
 
     Parameters
     ----------
-    frame : Frame
-        The frame, with its pose and its time.
-    belief : Belief
-        o, the occupancy grid, with velocities.
-    grid : (C, H, W) float
-        g, the semantic grid of this frame alone: probabilities of S semantic classes, then of the four unknown ones in
-        the order of `State`. They sum to 1 in each cell.
+    memory : MemoryState
+        The memory at the previous frame, over the map's cells, (H, W).
+    moving : (H, W) float
+        P(DYNAMIC) of these cells now.
+    velocity : (2, H, W) float
+        Velocity along the axes of the map, m/s; NaN, where it is unknown, counts as 0.
+    cell : float
+        Side of a cell, metres.
+    dt : float
+        Seconds since the previous frame.
+    params : MemoryParams
+        How fast classes are forgotten, and what counts as moving.
     """
+    check_shape("moving", moving, memory.weight.shape[1:])
+    check_shape("velocity", velocity, (2, *moving.shape))
+    carried = memory.copy()
+    for part in (carried.evidence[MOVES], carried.weight[MOVES], carried.seen[MOVES], carried.offset):
+        part[:] = 0
 
-    frame: Frame
-    belief: Belief
-    grid: NDArray
+    dtype = memory.planes.dtype
+    cell = float(dtype.type(cell))  # rounded as the planes are: in `fast` to single precision
+    now = np.stack(np.nonzero(moving >= params.least_moving))  # rows and columns, (2, N)
+    displacement = np.nan_to_num(velocity[:, *now]) * dt
+    # Where in its cell a thing was is known only when that cell is found, so the search is done twice.
+    guess = _cells_behind(now, displacement, cell, moving.shape)
+    before = _cells_behind(now, displacement + memory.offset[:, *guess], cell, moving.shape)
+    carried.evidence[MOVES][:, *now] = memory.evidence[MOVES][:, *before]
+    carried.weight[MOVES][*now] = memory.weight[MOVES][*before]
+    carried.seen[MOVES][*now] = memory.seen[MOVES][*before]
+    rest = displacement + memory.offset[:, *before] - (before - now) * cell
+    carried.offset[:, *now] = np.clip(rest, -cell / 2, cell / 2)
+
+    kept = params.kept(dt).astype(dtype)[:, None, None]
+    carried.weight[:] *= kept
+    carried.seen[:] *= kept
+    return carried
+
+
+def _cells_behind(cells: NDArray, displacement: NDArray, cell: float, shape: tuple[int, int]) -> NDArray[np.int64]:
+    """Return the cells, (2, N), from which something moved to these. x points to row 0 and y to column 0."""
+    behind = cells + np.rint(displacement / cell).astype(int)
+    return np.clip(behind, 0, np.array(shape)[:, None] - 1)
+
+
+def recall_classes(
+    memory: MemoryState, places: NDArray, occupancy: NDArray, look: Look, params: MemoryParams
+) -> NDArray[np.float64]:
+    """Combine memory and frame into a semantic grid.
+
+    The classes of what stays count with P(not DYNAMIC), those of what moves with P(DYNAMIC). Where a layer was never
+    seen, its mass goes to the unknown classes of the occupancy states.
+
+    Parameters
+    ----------
+    memory : MemoryState
+        The memory before the frame, over the map's cells.
+    places : (H, W) int
+        For each of the vehicle's cells the number of the map's cell that it is in, row by row from 0.
+    occupancy : (4, H, W) float
+        o, the occupancy grid of the frame.
+    look : Look
+        What the frame shows of the vehicle's cells.
+    params : MemoryParams
+        How much all frames together may count, and which classes are movable.
+
+    Returns
+    -------
+    (C, H, W) float
+        Probabilities of the semantic and of the unknown classes, which sum to 1 in each cell.
+    """
+    check_shape("occupancy", occupancy, (N_STATES, *look.sees.shape))
+    check_shape("places", places, look.sees.shape)
+    here = memory.at(places)
+    movable = np.isin(np.arange(len(look.classes)), params.movable)
+    # A remembered car is believed only as far as the LIDAR, a second witness, finds something.
+    here.evidence[:, movable] += np.log(something_there(occupancy))
+    evidence, weight, seen = _joined(here, look, np.ones((2, 1, 1)), params)
+    scores = np.maximum(weight, 1)[:, None] * evidence
+    belief = np.where((here.weight > 0)[:, None], _come_and_gone(scores, look, movable), look.classes)
+
+    moving = occupancy[State.DYNAMIC]
+    classes = (1 - moving) * seen[STAYS] * belief[STAYS] + moving * seen[MOVES] * belief[MOVES]
+    layers = [MOVES if state == State.DYNAMIC else STAYS for state in range(N_STATES)]
+    unknown = occupancy * (1 - seen[layers])
+    return np.concatenate([classes, unknown])
+
+
+def _come_and_gone(scores: NDArray, look: Look, movable: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Let the frame alone decide, as far as it sees, on what comes and goes; the other classes share the rest."""
+    movable = movable[:, None, None]
+    decided = look.sees * look.classes + (1 - look.sees) * softmax(scores, axis=1)
+    any_movable = np.where(movable, decided, 0).sum(axis=1, keepdims=True)
+    others = softmax(np.where(movable, -np.inf, scores), axis=1)
+    return np.where(movable, decided, (1 - any_movable) * others)
+
+
+def learn_classes(memory: MemoryState, places: NDArray, look: Look, params: MemoryParams) -> MemoryState:
+    """Add a frame to the memory, to each layer as far as the camera sees this layer.
+
+    Parameters
+    ----------
+    memory : MemoryState
+        The memory before the frame, over the map's cells, (H, W).
+    places : (H, W) int
+        For each of the map's cells the number of the vehicle's cell that it is in, row by row from 0; negative outside
+        the vehicle's grid.
+    look : Look
+        What the frame shows of the vehicle's cells.
+    params : MemoryParams
+        How much all frames together may count.
+    """
+    check_shape("places", places, memory.weight.shape[1:])
+    inside = places >= 0
+    on_map = Look(*(part.reshape(*part.shape[:-2], -1)[..., places] * inside for part in look))
+    share = np.stack([1 - on_map.moving, on_map.moving])  # of each layer in what the camera sees
+    share = np.where(share * on_map.sees < FAINT, 0, share)
+    learnt = memory.copy()
+    learnt.evidence[:], learnt.weight[:], learnt.seen[:] = _joined(memory, on_map, share, params)
+    return learnt
+
+
+def _joined(memory: MemoryState, look: Look, share: NDArray, params: MemoryParams) -> tuple[NDArray, NDArray, NDArray]:
+    """Return evidence, weight and seen with a frame added.
+
+    The first view of a cell counts fully. Each further one adds its exponent, because frames make the same mistakes.
+    All of them together count at most `params.max_weight`: beyond this the old ones lose weight.
+    """
+    sees = share * look.sees
+    new = np.maximum(look.exponent * sees, sees - memory.weight)
+    old = np.minimum(memory.weight, params.max_weight - new)
+    total = np.maximum(old + new, 1e-12)[:, None]
+    mean = (old[:, None] * memory.evidence + new[:, None] * look.log_class) / total
+    evidence = np.where(new[:, None] > 0, mean, memory.evidence)
+    weight = np.where(new > 0, old + new, memory.weight)
+    return evidence, weight, 1 - (1 - memory.seen) * (1 - sees)
 
 
 class ClassMemory:
@@ -108,35 +243,37 @@ class ClassMemory:
             Time since the last step, seconds.
         """
         look = self.look_at(grid, belief.probability, self.spec, self.params)
-        n_semantic = len(look.classes)
-        if self.state is None:
-            self.state = MemoryState.empty(n_semantic, self.map_spec, self.dtype)
-        if n_semantic != (known := self.state.evidence.shape[1]):
-            raise ArgumentError("grid", f"{known} semantic classes and {N_STATES} unknown ones", f"{len(grid)} classes")
-
+        before = self._state_for(len(look.classes))
         shift, self.pose = scroll(self.pose.then(motion), self.map_spec.cell, MAX_YAW)
-        x, y = self.pose.to_now(np.zeros(2))
-        map_pose = PlanarMotion(float(x), float(y), -self.pose.dyaw)  # of the map in the vehicle's frame
+        moving, velocity = self._movers(belief)
+        self.predicted = self.carry(self._shifted(before, shift), moving, velocity, self.spec.cell, dt, self.params)
         self.here = self._places(self.map_spec, self.spec, self.pose)
-        on_grid = self._places(self.spec, self.map_spec, map_pose)
-
-        moving, velocity = self._movers(belief, map_pose)
-        self.predicted = self.carry(self._shifted(shift), moving, velocity, self.spec.cell, dt, self.params)
         recalled = self.recall(self.predicted, self.here, belief.probability, look, self.params)
+        on_grid = self._places(self.spec, self.map_spec, self.pose.inverse)
         self.state = self.learn(self.predicted, on_grid, look, self.params)
         return recalled
 
-    def _shifted(self, shift: PlanarMotion) -> MemoryState:
+    def _state_for(self, n_semantic: int) -> MemoryState:
+        """Return the memory after the last frame, after checking its classes; before the first frame it is empty."""
+        if self.state is None:
+            return MemoryState.empty(n_semantic, self.map_spec, self.dtype)
+        known = self.state.evidence.shape[1]
+        if n_semantic != known:
+            expected = f"{known} semantic classes and {N_STATES} unknown ones"
+            raise ArgumentError("grid", expected, f"{n_semantic + N_STATES} classes")
+        return self.state
+
+    def _shifted(self, state: MemoryState, shift: PlanarMotion) -> MemoryState:
         """Return the memory in the map's new frame; nothing is known of the cells that come in."""
         if shift == PlanarMotion():
-            return self.state
-        planes = self.state.planes
+            return state
+        planes = state.planes
         return MemoryState(self.look_up(planes, np.zeros(len(planes), self.dtype), self.map_spec, self.map_spec, shift))
 
-    def _movers(self, belief: Belief, map_pose: PlanarMotion) -> tuple[NDArray, NDArray]:
+    def _movers(self, belief: Belief) -> tuple[NDArray, NDArray]:
         """Return P(DYNAMIC) of the map's cells, and the velocities there along the map's axes."""
         planes = np.concatenate([belief.probability[State.DYNAMIC][None], belief.velocity])
-        found = self.look_up(planes, np.zeros(3, planes.dtype), self.spec, self.map_spec, map_pose)
+        found = self.look_up(planes, np.zeros(3, planes.dtype), self.spec, self.map_spec, self.pose.inverse)
         rotation = self.pose.rotation.astype(found.dtype)
         return found[0], np.einsum("ij,jhw->ihw", rotation, found[1:])
 
@@ -144,74 +281,3 @@ class ClassMemory:
         """Return the number of the cell of `source` that each cell of `target` is in, row by row; -1 outside."""
         numbers = np.arange(np.prod(source.shape), dtype=np.float32).reshape(1, *source.shape)  # exact up to 2^24
         return self.look_up(numbers, np.array([-1], np.float32), source, target, pose)[0].astype(np.int32)
-
-
-def remember_drive(views: Iterable[View], spec: GridSpec, params: MemoryParams | None = None) -> Iterator[NDArray]:
-    """Remember the classes of a drive, frame after frame: g -> g.
-
-    Parameters
-    ----------
-    views : iterable of View
-        What the earlier stages made of each frame, in the order of time.
-    spec, params
-        Those of `ClassMemory`.
-
-    Yields
-    ------
-    (C, H, W) float
-        The semantic grid with memory, after each frame.
-    """
-    memory = ClassMemory(spec, params)
-    for view in views:
-        yield memory.step(view)
-
-
-def smooth_drive(views: Sequence[View], spec: GridSpec, params: MemoryParams | None = None) -> Iterator[NDArray]:
-    """Return what each cell is, given the frames before and after: forward-backward.
-
-    A second memory runs through the drive from its end, where everything moves the other way, and each frame is
-    combined with both memories. For the chain of a single cell `smoothed_classes` is the exact algorithm.
-
-    Parameters
-    ----------
-    views : sequence of View
-        What the earlier stages made of each frame, in the order of time.
-    spec, params
-        Those of `ClassMemory`.
-
-    Yields
-    ------
-    (C, H, W) float
-        The semantic grid of each frame: probabilities that sum to 1 in each cell.
-    """
-    params = params or MemoryParams()
-    same_cells = np.arange(np.prod(spec.shape)).reshape(spec.shape)
-    backward = ClassMemory(spec, params)
-    after = []
-    for view in reversed(views):
-        backward.step(_reversed_in_time(view))
-        after.append(backward.predicted.at(backward.here))
-
-    forward = ClassMemory(spec, params)
-    for view in views:
-        forward.step(view)
-        both = _weighted_mean(forward.predicted.at(forward.here), after.pop(), params)
-        occupancy = view.belief.probability
-        yield recall_classes(both, same_cells, occupancy, look_at(view.grid, occupancy, spec, params), params)
-
-
-def _reversed_in_time(view: View) -> View:
-    """Return a view as it would be if time ran backwards."""
-    frame = replace(view.frame, time=-view.frame.time)
-    return view._replace(frame=frame, belief=replace(view.belief, velocity=-view.belief.velocity))
-
-
-def _weighted_mean(past: MemoryState, future: MemoryState, params: MemoryParams) -> MemoryState:
-    """Return the mean of two memories of the same cells by their weights."""
-    mean = past.copy()
-    weight = past.weight + future.weight
-    share = (future.weight / np.maximum(weight, 1e-12))[:, None]
-    mean.evidence[:] += share * (future.evidence - past.evidence)
-    mean.weight[:] = np.minimum(weight, params.most)
-    mean.seen[:] = 1 - (1 - past.seen) * (1 - future.seen)
-    return mean

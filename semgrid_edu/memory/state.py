@@ -1,4 +1,4 @@
-"""What the memory holds of each cell, what a single frame shows of it, and what the memory assumes."""
+"""What the memory assumes, what it holds of each cell, and what a single frame shows of it (section 3)."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from semgrid_edu.errors import ArgumentError, check_fields, check_shape, not_negative, types_named
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.occupancy import N_STATES, State, WorldModel
+from semgrid_edu.occupancy import N_STATES, Belief, State, WorldModel
 
 STAYS, MOVES = 0, 1
 """The two layers of the memory: what stays in a cell, such as road or house, and what moves through it."""
@@ -29,16 +30,16 @@ class MemoryParams:
 
     Parameters
     ----------
-    worth : float
+    near_exponent : float
         Exponent of the evidence of one more frame, for a cell next to the vehicle: 1 if frames were independent.
-        Measured on simulated drives other than the shipped one (`worth_by_distance`), when `movable` classes were still
-        remembered in view. Now that they aren't, a smaller exponent is better in view, by 0.02 nats at most.
-    reach : float
+        Measured on simulated drives other than the shipped one (`worth_by_distance`). In view a smaller exponent would
+        be better, by 0.02 nats at most.
+    decay_distance : float
         Distance from the vehicle, metres, over which the exponent falls by a factor e, because far views are less
         reliable. Measured on the same drives.
-    most : float
-        The most that all frames together count, in frames, at least 1. Once this is reached, each new frame lowers the
-        weight of the old ones. Measured on the same drives.
+    max_weight : float
+        Limit of the weight of all frames together, in frames, at least 1. Once this is reached, each new frame lowers
+        the weight of the old ones. Measured on the same drives.
     change_rate : (float, float)
         Rates at which what stays and what moves becomes something else, 1/s: by default those at which a STATIC and a
         DYNAMIC cell change into another known state in the occupancy filter's `WorldModel`.
@@ -51,9 +52,9 @@ class MemoryParams:
         filter gives anything at first sight, and far below the 0.5 from which the cell is called DYNAMIC.
     """
 
-    worth: float = 0.7
-    reach: float = 100.0
-    most: float = 1.0
+    near_exponent: float = 0.7
+    decay_distance: float = 100.0
+    max_weight: float = 1.0
     change_rate: tuple[float, float] = (_leaving_rate(State.STATIC), _leaving_rate(State.DYNAMIC))
     movable: tuple[int, ...] = tuple(map(KITTI_14.index, ("car", "pedestrian", "bicycle")))
     least_moving: float = 0.02
@@ -61,9 +62,9 @@ class MemoryParams:
     @types_named
     def __post_init__(self) -> None:
         """Check that the numbers describe a memory."""
-        check_fields(self, "an exponent from 0 to 1", lambda w: 0 <= w <= 1, "worth")
-        check_fields(self, "a positive distance in metres", lambda r: r > 0, "reach")
-        check_fields(self, "a number of frames, at least 1", lambda n: np.isfinite(n) and n >= 1, "most")
+        check_fields(self, "an exponent from 0 to 1", lambda w: 0 <= w <= 1, "near_exponent")
+        check_fields(self, "a positive distance in metres", lambda d: d > 0, "decay_distance")
+        check_fields(self, "a number of frames, at least 1", lambda n: np.isfinite(n) and n >= 1, "max_weight")
         check_fields(self, "a probability above 0", lambda p: 0 < p <= 1, "least_moving")
         if len(self.change_rate) != 2 or not all(map(not_negative, self.change_rate)):
             raise ArgumentError("change_rate", "two rates in 1/s, not negative", self.change_rate)
@@ -76,7 +77,7 @@ class MemoryParams:
         distance : (...) float
             Metres.
         """
-        return self.worth * np.exp(-np.asarray(distance) / self.reach)
+        return self.near_exponent * np.exp(-np.asarray(distance) / self.decay_distance)
 
     def kept(self, dt: float) -> NDArray[np.float64]:
         """Return the part of each layer's evidence that still holds after a time, (2,).
@@ -140,7 +141,7 @@ class MemoryState:
 
     @property
     def weight(self) -> NDArray:
-        """(2, H, W): the sum of the frames' exponents, from 0 to `MemoryParams.most`.
+        """(2, H, W): the sum of the frames' exponents, from 0 to `MemoryParams.max_weight`.
 
         `evidence` times `weight` is the log of the belief, up to a constant in each cell. A weight below 1 counts as 1,
         because `seen` already accounts for how little was seen.
@@ -160,6 +161,25 @@ class MemoryState:
         cell.
         """
         return self.planes[-2:]
+
+
+class View(NamedTuple):
+    """What the earlier stages made of one frame.
+
+    Parameters
+    ----------
+    frame : Frame
+        The frame, with its pose and its time.
+    belief : Belief
+        o, the occupancy grid, with velocities.
+    grid : (C, H, W) float
+        g, the semantic grid of this frame alone: probabilities of S semantic classes, then of the four unknown ones in
+        the order of `State`. They sum to 1 in each cell.
+    """
+
+    frame: Frame
+    belief: Belief
+    grid: NDArray
 
 
 class Look(NamedTuple):

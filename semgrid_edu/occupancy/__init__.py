@@ -5,8 +5,8 @@ filter, each a pure function on a `FilterState`. `Cmcdot` runs the steps, and `t
 `LogOddsGrid` and `Bof` are the filters that came before it: the binary grid, and the exact filter on a lattice of
 velocities. `semgrid_edu.fast` has compiled twins of what takes long.
 
-In reading order: `state`, `planar_motion`; `evidence`, `polar`, `sensor`; `log_odds`; `particles`, `walls`, `world`,
-`resampling`, `steps`; `local_belief`, `cmcdot`; `bof_state`, `bof`.
+In reading order: `planar_motion`, `state`; `evidence`, `polar`, `sensor`; `log_odds`; `walls`, `world`, `resampling`,
+`steps`, `cmcdot`; `bof_state`, `bof`.
 """
 
 from semgrid_edu.occupancy.bof import Bof, bof_move, bof_predict, bof_update, bof_velocity

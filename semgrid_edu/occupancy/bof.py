@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState, origins, whole_cells
-from semgrid_edu.occupancy.evidence import Evidence
-from semgrid_edu.occupancy.local_belief import local_belief, observe
-from semgrid_edu.occupancy.particles import slow_down
+from semgrid_edu.occupancy.cmcdot import local_belief
+from semgrid_edu.occupancy.evidence import Evidence, observe
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll, shift
-from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State, ratio
+from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State, ratio, slow_down
 from semgrid_edu.occupancy.steps import mix, strike_out, update
 from semgrid_edu.occupancy.walls import Walls, free_beside_static, strike_out_wakes
 from semgrid_edu.occupancy.world import transition_matrix
@@ -36,7 +35,8 @@ def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion) -> BofState:
     planes = np.concatenate([[state.unknown, state.free], state.occupied])
     entering = np.eye(1, len(planes), dtype=np.float32)[0]
     moved = look_up(planes, entering, spec, spec, motion)
-    velocity, remainder = state.velocity @ motion.rotation, state.remainder @ motion.rotation
+    velocity = state.velocity @ motion.rotation
+    remainder = state.remainder @ motion.rotation
     return BofState(moved[1], moved[0], moved[2:], velocity, remainder)
 
 
@@ -68,25 +68,17 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float, d
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     M = transition_matrix(params.world, dt)
-    kept = M[DYNAMIC, DYNAMIC] * _going_on(state, params, dt)
     cells, remainder = whole_cells(state, spec, dt)
     moves = cells.any(axis=1)
-    occupied = np.zeros_like(state.occupied)
-    going = np.zeros(spec.shape)
-    stays = np.zeros(spec.shape)
-    arrives = np.zeros(spec.shape)
-    for k in range(1, len(occupied)):
-        mass = float(kept[k]) * _accelerated(state, k, params, dt)
-        occupied[k] = shift(mass, cells[k])
-        going += mass
-        total = arrives if moves[k] else stays
-        total += occupied[k]
-
-    # What arrives in a cell meets what the cell holds.
-    mixed, newborn = mix(state.probability, np.zeros(spec.shape), going, M)
+    occupied, going = _shifted(state, cells, M[DYNAMIC, DYNAMIC], params, dt)
+    arrives = occupied.sum(axis=0, dtype=np.float64, where=moves[:, None, None])
+    stays = occupied.sum(axis=0, dtype=np.float64, where=~moves[:, None, None])
     vacated = going - stays
+    mixed, newborn = mix(state.probability, np.zeros(spec.shape), going, M)
     car_speed = driven / dt if dt > 0 else 0.0
     blocked = _blocked(state.velocity, mixed, mixed[UNKNOWN] + vacated, spec, params.world.walls, car_speed)
+
+    # What arrives in a cell meets what the cell holds.
     possible = np.zeros(spec.shape)
     for k in np.flatnonzero(moves):
         possible += occupied[k] * (1 - blocked(k))
@@ -102,10 +94,20 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float, d
     return BofState(free.astype(dtype), unknown.astype(dtype), occupied, state.velocity, remainder)
 
 
-def _going_on(state: BofState, params: BofParams, dt: float) -> NDArray[np.float64]:
-    """Return the share of each velocity's mass that doesn't stop, (V,), by `slow_down` of one particle per velocity."""
+def _shifted(
+    state: BofState, cells: NDArray[np.int64], stays_dynamic: float, params: BofParams, dt: float
+) -> tuple[NDArray, NDArray[np.float64]]:
+    """Return the mass of each velocity in its new cells, (V, H, W), and all that moves in its old cells, (H, W)."""
     particles = Particles(np.zeros_like(state.velocity), state.velocity, np.ones(len(state.velocity)))
-    return slow_down(particles, params.world.stop_rate, params.world.stop_speed, dt).weight
+    world = params.world
+    kept = stays_dynamic * slow_down(particles, world.stop_rate, world.stop_speed, dt).weight
+    occupied = np.zeros_like(state.occupied)
+    going = np.zeros(state.free.shape)
+    for k in range(1, len(occupied)):
+        mass = float(kept[k]) * _accelerated(state, k, params, dt)
+        occupied[k] = shift(mass, cells[k])
+        going += mass
+    return occupied, going
 
 
 def _accelerated(state: BofState, k: int, params: BofParams, dt: float) -> NDArray[np.floating]:
@@ -182,7 +184,8 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
         probability = strike_out_wakes(probability, left, evidence.occupied == evidence.free)
     occupied[0] = probability[STATIC]
     dtype = occupied.dtype
-    free, unknown = probability[FREE].astype(dtype), probability[UNKNOWN].astype(dtype)
+    free = probability[FREE].astype(dtype)
+    unknown = probability[UNKNOWN].astype(dtype)
     return BofState(free, unknown, occupied, state.velocity, state.remainder)
 
 
@@ -228,7 +231,7 @@ class Bof:
     Raises
     ------
     ArgumentError
-        When the lattice has so many velocities that their mass in all cells doesn't fit into memory.
+        When the mass of all velocities in all cells doesn't fit into memory.
 
     Examples
     --------
@@ -252,17 +255,18 @@ class Bof:
         Parameters, result and errors are those of `Cmcdot.step`.
         """
         world = self.params.world
-        shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
+        step, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
         seen = observe(world.sensor, points_grid, pose, self.map_spec, self.spec)
-        moved = bof_move(self._state, self.map_spec, shift)
+        moved = bof_move(self._state, self.map_spec, step)
         predicted = bof_predict(moved, self.map_spec, self.params, dt, motion.dx)
-        self._state, self._pose = bof_update(predicted, self.map_spec, seen.on_map, self.params), seen.pose
+        self._state = bof_update(predicted, self.map_spec, seen.on_map, self.params)
+        self._pose = pose
         velocity = bof_velocity(self._state)
         return local_belief(predicted.probability, velocity, seen, self.map_spec, self.spec, world)
 
 
 def _elsewhere(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
-    """Return for each cell the value so many cells away, along x and y, (H, W); 0 outside and for no distance at all.
+    """Return for each cell the value at a distance in cells along x and y, (H, W); 0 outside and for no distance.
 
     At no distance nothing has moved, so there is no other place to look at.
     """

@@ -173,7 +173,8 @@ class BofState:
         if (size := 4 * float(np.prod(shape, dtype=float))) > MOST_BYTES:
             expected = f"velocities x cells that take at most {MOST_BYTES / 1e9:g} GB"
             raise ArgumentError("lattice", expected, "{} x {} x {}, ".format(*shape) + f"{size / 1e9:.1f} GB")
-        free, unknown = np.zeros(spec.shape, np.float32), np.ones(spec.shape, np.float32)
+        free = np.zeros(spec.shape, np.float32)
+        unknown = np.ones(spec.shape, np.float32)
         return cls(free, unknown, np.zeros(shape, np.float32), lattice.velocities, np.zeros((len(lattice), 2)))
 
     @property
@@ -188,7 +189,7 @@ def whole_cells(state: BofState, spec: GridSpec, dt: float) -> tuple[NDArray[np.
     Parameters
     ----------
     state : BofState
-        The belief, of which only the velocities and their remainders count.
+        The belief; only its velocities and their remainders are used.
     spec : GridSpec
         The cells.
     dt : float

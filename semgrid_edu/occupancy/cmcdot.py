@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError, not_negative
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.local_belief import local_belief, observe, velocity_moments
-from semgrid_edu.occupancy.particles import cells_of, transform
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
-from semgrid_edu.occupancy.state import Belief, FilterState, Particles
+from semgrid_edu.occupancy.evidence import Observation, observe
+from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll, turn_moments
+from semgrid_edu.occupancy.state import OUTSIDE, Belief, FilterState, Particles, State, cells_of, transform
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
-from semgrid_edu.occupancy.world import CmcdotParams
+from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
 
 
 class Cmcdot:
@@ -115,6 +114,81 @@ class Cmcdot:
         return look_up(probability, NOTHING_KNOWN, self.map_spec, self.spec, self._pose)
 
 
+def local_belief(
+    predicted: NDArray,
+    velocity: tuple[NDArray, NDArray],
+    seen: Observation,
+    map_spec: GridSpec,
+    spec: GridSpec,
+    world: WorldModel,
+) -> Belief:
+    """Look the map up in the vehicle's cells, and update those with the scan; nothing of this goes back to the map.
+
+    The vehicle's cells don't coincide with the map's. Because they are updated with evidence on their own grid, each
+    return counts for the very cell that it hit, however the vehicle is turned in the map.
+
+    Parameters
+    ----------
+    predicted : (4, H, W) float
+        The belief on the map before the scan.
+    velocity : (2, H, W) and (2, 2, H, W) float
+        Mean and covariance of the velocity on the map, given the scan, along the axes of the map, m/s and m^2/s^2;
+        NaN where nothing moves.
+    seen : Observation
+        The scan in the vehicle's cells, and the pose of the vehicle in the map.
+    map_spec, spec : GridSpec
+        The cells of the map, (H, W), and those of the vehicle, (H', W').
+    world : WorldModel
+        What `update` assumes.
+    """
+    here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, seen.pose)
+    prior = FilterState(here, Particles.none(), np.zeros(spec.shape))
+    probability = update(prior, spec, seen.in_grid, world).probability.astype(np.float32)
+    mean, covariance = velocity
+    moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)]).astype(np.float32)
+    moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, seen.pose)
+    moments[:, probability[State.DYNAMIC] == 0] = np.nan
+    return Belief(probability, *turn_moments(moments[:2], moments[2:].reshape(2, 2, *spec.shape), seen.pose))
+
+
+def velocity_moments(
+    particles: Particles, cells: NDArray, shape: tuple[int, int]
+) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    """Return mean and covariance of the velocities in each cell, weighted by the weights of the particles.
+
+    Parameters
+    ----------
+    particles : Particles
+        N particles on the map.
+    cells : (N,) int
+        The cell of each particle, from `cells_of`.
+    shape : (int, int)
+        H, W of the map.
+
+    Returns
+    -------
+    mean : (2, H, W) float64
+        sum(w v) / sum(w), along the axes of the map, m/s; NaN in cells without particles.
+    covariance : (2, 2, H, W) float64
+        sum(w (v - mean) (v - mean)^T) / sum(w), m^2/s^2; zero for a single particle, NaN in cells without particles.
+    """
+    n_cells = shape[0] * shape[1]
+    inside = cells != OUTSIDE
+    cell = cells[inside]
+    weight = particles.weight[inside].astype(np.float64)
+    velocity = particles.velocity[inside].astype(np.float64)
+
+    def average(values: NDArray) -> NDArray[np.float64]:
+        return np.bincount(cell, weight * values, n_cells) / total
+
+    with np.errstate(invalid="ignore"):  # 0 / 0 is NaN, as it should be in cells without particles
+        total = np.bincount(cell, weight, n_cells)
+        mean = np.stack([average(velocity[:, 0]), average(velocity[:, 1])])
+        dx, dy = velocity.T - mean[:, cell]
+        covariance = np.stack([average(dx * dx), average(dx * dy), average(dx * dy), average(dy * dy)])
+    return mean.reshape(2, *shape), covariance.reshape(2, 2, *shape)
+
+
 class DriveTracker:
     """A filter that takes frames: it finds the motion and the time since the previous frame by itself.
 
@@ -148,7 +222,7 @@ class DriveTracker:
         Parameters
         ----------
         frame : Frame
-            The frame, of which the scan, the pose and the time count.
+            The frame; its scan, pose and time are used.
 
         Returns
         -------

@@ -5,7 +5,7 @@ cells of any grid (`Measurement.evidence`). Any two classes with these methods w
 """
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,6 +178,45 @@ def evidence_of(measurement: Measurement, spec: GridSpec, pose: PlanarMotion) ->
     return evidence
 
 
+class Observation(NamedTuple):
+    """What a scan tells a filter in one step.
+
+    Parameters
+    ----------
+    pose : PlanarMotion
+        Pose of the vehicle in the frame of the map, metres and radians.
+    on_map : Evidence
+        What the scan tells about the cells of the map, (H, W).
+    in_grid : Evidence
+        What the scan tells about the cells of the grid around the vehicle, (H', W').
+    """
+
+    pose: PlanarMotion
+    on_map: Evidence
+    in_grid: Evidence
+
+
+def observe(
+    sensor: Sensor, points_grid: NDArray, pose: PlanarMotion, map_spec: GridSpec, spec: GridSpec
+) -> Observation:
+    """Ask the sensor what a scan tells about the cells of the map, and about those around the vehicle.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Turns the scan into evidence.
+    points_grid : (N, 3+) float
+        The scan: x forward, y left, z above the ground (m), in the grid frame of the vehicle now.
+    pose : PlanarMotion
+        Pose of the vehicle in the frame of the map, metres and radians.
+    map_spec, spec : GridSpec
+        The cells of the map, (H, W), and those of the grid around the vehicle, (H', W').
+    """
+    measurement = take_scan(sensor, points_grid)
+    in_grid = evidence_of(measurement, spec, PlanarMotion())
+    return Observation(pose, evidence_of(measurement, map_spec, pose), in_grid)
+
+
 def check_sensor(sensor: Sensor) -> None:
     """Check that an object is a sensor.
 
@@ -203,8 +242,8 @@ def check_points(points: NDArray) -> NDArray:
     if points.dtype.kind not in "biuf":
         raise ArgumentError("points", "real numbers", f"type {points.dtype}")
     points = points.astype(np.float32 if np.can_cast(points.dtype, np.float32) else np.float64, copy=False)
-    finite = np.isfinite(points[:, :3]).all(axis=1)
+    finite = np.isfinite(points[:, :3])
     if not finite.all():
-        bad = np.count_nonzero(~finite)
+        bad = np.count_nonzero(~finite.all(axis=1))
         raise ArgumentError("points", "finite coordinates", f"{bad} of {len(points)} points with NaN or infinity")
     return points

@@ -7,8 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import ArgumentError, not_negative, types_named
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor
-from semgrid_edu.occupancy.local_belief import observe
+from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor, observe
 from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
 from semgrid_edu.occupancy.sensor import SensorModel
 
@@ -146,8 +145,9 @@ class LogOddsGrid:
         shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
         seen = observe(self.params.sensor, points_grid, pose, self.map_spec, self.spec)
         moved = look_up(self._log_odds[None], self._prior, self.map_spec, self.map_spec, shift)[0]
-        before = look_up(moved[None], self._prior, self.map_spec, self.spec, seen.pose)[0]
-        self._log_odds, self._pose = update_log_odds(moved, seen.on_map, self.params), seen.pose
+        before = look_up(moved[None], self._prior, self.map_spec, self.spec, pose)[0]
+        self._log_odds = update_log_odds(moved, seen.on_map, self.params)
+        self._pose = pose
         return probability(update_log_odds(before, seen.in_grid, self.params))
 
 

@@ -64,6 +64,12 @@ class PlanarMotion:
         cos, sin = np.cos(self.dyaw), np.sin(self.dyaw)
         return np.array([[cos, -sin], [sin, cos]])
 
+    @property
+    def inverse(self) -> "PlanarMotion":
+        """The pose of the previous instant, in the grid frame of now."""
+        dx, dy = self.to_now(np.zeros(2))
+        return PlanarMotion(float(dx), float(dy), -self.dyaw)
+
     def to_previous(self, xy: NDArray) -> NDArray:
         """Return the coordinates in the previous frame of points given in the frame of now.
 
@@ -191,3 +197,28 @@ def shift(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
     source = plane[max(up, 0) : height + min(up, 0), max(left, 0) : width + min(left, 0)]
     shifted[max(-up, 0) : height - max(up, 0), max(-left, 0) : width - max(left, 0)] = source
     return shifted
+
+
+def turn_moments(mean: NDArray, covariance: NDArray, motion: PlanarMotion) -> tuple[NDArray, NDArray]:
+    """Express moments of velocity in the axes of another frame: R^T mean, R^T C R.
+
+    Parameters
+    ----------
+    mean : (2, H, W) float32
+        Mean velocity along the axes of one frame, m/s.
+    covariance : (2, 2, H, W) float32
+        Covariance of the velocity along the same axes, m^2/s^2.
+    motion : PlanarMotion
+        Pose of the other frame in that one; R is its rotation.
+
+    Returns
+    -------
+    mean : (2, H, W) float32
+        Mean velocity along the axes of the other frame, m/s.
+    covariance : (2, 2, H, W) float32
+        Covariance along the same axes, m^2/s^2, symmetric to the last bit.
+    """
+    R = motion.rotation.astype(mean.dtype)
+    turned = np.einsum("jkhw,kl->jlhw", np.einsum("ij,ikhw->jkhw", R, covariance), R)
+    turned[1, 0] = turned[0, 1]  # rounded differently
+    return np.einsum("ij,ihw->jhw", R, mean), turned

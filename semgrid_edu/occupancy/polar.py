@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import check_points
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 
 
@@ -63,7 +62,7 @@ def polar_profile(
     return first_obstacle, last_ground
 
 
-def reach(first_obstacle: NDArray, last_ground: NDArray) -> NDArray[np.floating]:
+def visible_range(first_obstacle: NDArray, last_ground: NDArray) -> NDArray[np.floating]:
     """Return how far each beam sees, (B,) metres: to its first obstacle, else to its last ground return, else 0.
 
     Parameters
@@ -139,7 +138,7 @@ class GroundParams:
     sectors : int
         Number of sectors of azimuth in a turn, each of which is walked separately. The default sectors of 1 degree hold
         at least one column of returns of any scanner of this project.
-    bin : float
+    bin_length : float
         Length of a bin along a sector, metres. It has to be shorter than a car's bonnet, so that the front of a car
         still shows as something upright.
     farthest : float
@@ -164,7 +163,7 @@ class GroundParams:
     """
 
     sectors: int = 360
-    bin: float = 0.25
+    bin_length: float = 0.25
     farthest: float = 80.0
     step: float = 0.1
     slope: float = 1 / 3
@@ -180,13 +179,13 @@ class GroundParams:
             expected = f"a whole number, less than half of the {self.sectors} sectors"
             raise ArgumentError("neighbours", expected, self.neighbours)
         check_fields(self, "a finite number, not negative", not_negative, "step", "slope", "rise", "grade", "gap")
-        if not (np.isfinite(self.farthest) and 0 < self.bin <= self.farthest):
-            raise ArgumentError("bin", f"metres, above 0 and up to farthest, {self.farthest}", self.bin)
+        if not (np.isfinite(self.farthest) and 0 < self.bin_length <= self.farthest):
+            raise ArgumentError("bin_length", f"metres, above 0 and up to farthest, {self.farthest}", self.bin_length)
 
     @property
     def bins(self) -> int:
         """Number of bins along a sector."""
-        return int(np.ceil(self.farthest / self.bin))
+        return int(np.ceil(self.farthest / self.bin_length))
 
 
 def height_above_ground(points: NDArray, params: GroundParams) -> NDArray[np.float64]:
@@ -209,7 +208,7 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray[np.flo
     (N,) float64
         Heights in metres; z itself where no ground is found.
     """
-    x, y, z = check_points(points)[:, :3].T.astype(np.float64)
+    x, y, z = points[:, :3].T.astype(np.float64)
     distance = np.hypot(x, y)
     sector = beams_of(x, y, params.sectors)
     profile = np.full((params.sectors, params.bins), np.nan)
@@ -246,7 +245,7 @@ def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[
 
     >>> distance = np.array([4.0, 6.0, 9.0, 12.0, 12.0, 12.0])
     >>> z = np.array([0.12, 0.18, 0.27, 0.5, 1.0, 1.5])
-    >>> walk_sector(distance, z, GroundParams(bin=4, farthest=16)).round(2)
+    >>> walk_sector(distance, z, GroundParams(bin_length=4, farthest=16)).round(2)
     array([0.06, 0.18, 0.27, 0.27])
     """
     bins = _bins_of(distance, params)
@@ -263,13 +262,13 @@ def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[
         if rise <= params.rise and abs(height - ground[-1]) <= allowed:
             ground_at.append(at)
             ground.append(height)
-    middles = (np.arange(params.bins) + 0.5) * params.bin
+    middles = (np.arange(params.bins) + 0.5) * params.bin_length
     return np.interp(middles, ground_at, ground)
 
 
 def _bins_of(distance: NDArray, params: GroundParams) -> NDArray[np.int64]:
     """Return the bin of each return, (N,); returns beyond the last bin count to it."""
-    return np.minimum(distance / params.bin, params.bins - 1).astype(np.int64)
+    return np.minimum(distance / params.bin_length, params.bins - 1).astype(np.int64)
 
 
 def _median_of_neighbours(profile: NDArray, neighbours: int) -> NDArray[np.float64]:

@@ -89,7 +89,8 @@ def systematic_resample(weight: NDArray, count: int, offset: float) -> NDArray[n
     ends = np.cumsum(weight, dtype=np.float64)
     points = (np.arange(count) + offset) / count * ends[-1]
     chosen = np.searchsorted(ends, points, side="right")
-    return np.minimum(chosen, len(weight) - 1)  # rounding can put the last point on the very end
+    last = np.flatnonzero(weight)[-1]
+    return np.minimum(chosen, last)  # rounding can put the last point on the very end, behind which all weights are 0
 
 
 def draw_again(particles: Particles, count: int, resampling: Resampling, rng: np.random.Generator) -> Particles:

@@ -8,9 +8,16 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count, types_named
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence, check_points
+from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.polar import GroundParams, beyond_reach, fill_gaps, height_above_ground, polar_profile, reach
+from semgrid_edu.occupancy.polar import (
+    GroundParams,
+    beyond_reach,
+    fill_gaps,
+    height_above_ground,
+    polar_profile,
+    visible_range,
+)
 
 
 @dataclass(frozen=True)
@@ -46,8 +53,8 @@ class SensorModel:
     edge : float
         Up to how far outside the outline an obstacle whose reflectance is 0 counts as the vehicle's own, metres. A
         beam that grazes the vehicle's edge is split, and its two echoes merge into one range in between while they are
-        closer than half the length of a pulse: 0.75 m for the default, a pulse of 5 ns. Take 0 for a scanner that
-        measures no reflectance and writes 0 for all returns.
+        closer than half the length of a pulse: 0.75 m for the default, a pulse of 5 ns. The rule is off in a scan of
+        which most returns have reflectance 0: that scanner doesn't measure it.
     ground : GroundParams or None
         How the ground is found from which heights count; None for flat ground at z = 0.
     """
@@ -97,7 +104,7 @@ class SensorModel:
         """
         prepared = prepare_scan(points, self)
         profile = polar_profile(prepared, self.obstacle_min, self.obstacle_max, self.beams)
-        return Scan(prepared, fill_gaps(reach(*profile), self.gap), self)
+        return Scan(prepared, fill_gaps(visible_range(*profile), self.gap), self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +179,7 @@ def count_in_cells(xy: NDArray, spec: GridSpec) -> NDArray[np.int64]:
 
 
 def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.floating]:
-    """Prepare a scan for evidence: check it, remove the vehicle's own returns, and measure heights from the ground.
+    """Prepare a scan for evidence: remove the vehicle's own returns, and measure heights from the ground.
 
     Parameters
     ----------
@@ -187,10 +194,26 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.floating]:
     (M, 3) float32 or float64
         The other returns, in their order: x, y, and the height above the ground at that place (m).
     """
-    points = without_own_returns(check_points(points), sensor.vehicle, sensor.edge, sensor.obstacle_min)
+    edge = edge_of_splits(points, sensor.edge)
+    points = without_own_returns(points, sensor.vehicle, edge, sensor.obstacle_min)
     if sensor.ground is not None:
         points[:, 2] = height_above_ground(points, sensor.ground)
     return points
+
+
+def edge_of_splits(points: NDArray, edge: float) -> float:
+    """Return how far outside the vehicle's outline dark returns come from split beams, metres.
+
+    Parameters
+    ----------
+    points : (N, 3+) float
+        Returns; a fourth column is reflectance.
+    edge : float
+        `SensorModel.edge`. It becomes 0 if most returns have reflectance 0, because a scanner that doesn't measure
+        reflectance writes 0 everywhere; KITTI's has 15 % of them.
+    """
+    measured = points.shape[1] < 4 or np.count_nonzero(points[:, 3]) >= len(points) / 2
+    return edge if measured else 0.0
 
 
 def without_own_returns(

@@ -8,10 +8,21 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.evidence import Evidence
-from semgrid_edu.occupancy.particles import at_cells, cells_of, fly, slow_down, transform, weight_in_cells
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up
 from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
-from semgrid_edu.occupancy.state import CERTAIN, FilterState, Particles, State, ratio
+from semgrid_edu.occupancy.state import (
+    CERTAIN,
+    FilterState,
+    Particles,
+    State,
+    at_cells,
+    cells_of,
+    fly,
+    ratio,
+    slow_down,
+    transform,
+    weight_in_cells,
+)
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -95,24 +106,12 @@ def predict(
     if world.walls is not None:
         car_speed = driven / dt if dt > 0 else 0.0
         blocked += world.walls.doubt(particles, end, mixed, mixed[UNKNOWN] + vacated, spec, car_speed)
-    return _collide(mixed, newborn, vacated, particles, end, moved, blocked)
 
-
-def _collide(
-    mixed: NDArray,
-    newborn: NDArray,
-    vacated: NDArray,
-    particles: Particles,
-    end: NDArray[np.int64],
-    moved: NDArray[np.bool_],
-    blocked: NDArray,
-) -> FilterState:
-    """Let the particles that have `moved` meet what their cells hold; each is `blocked` with some probability, (N,)."""
-    stays = weight_in_cells(particles.weight * ~moved, end, newborn.shape)
-    arrives = weight_in_cells(particles.weight * moved, end, newborn.shape)
-    possible = weight_in_cells(particles.weight * moved * (1 - blocked), end, newborn.shape)
+    # The particles that have moved meet what their new cells hold; each is blocked with some probability.
+    stays = weight_in_cells(particles.weight * ~moved, end, spec.shape)
+    arrives = weight_in_cells(particles.weight * moved, end, spec.shape)
+    possible = weight_in_cells(particles.weight * moved * (1 - blocked), end, spec.shape)
     keep, take = strike_out(arrives, possible)
-
     probability = keep * mixed
     probability[FREE] += keep * vacated  # what flew away leaves free space behind
     probability[DYNAMIC] = keep * (newborn + stays) + take * possible

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.errors import check_fields, not_negative, types_named
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.particles import at_cells, cells_of, weight_in_cells
-from semgrid_edu.occupancy.state import CERTAIN, OUTSIDE, Particles, State, ratio
+from semgrid_edu.occupancy.state import CERTAIN, OUTSIDE, Particles, State, at_cells, cells_of, ratio, weight_in_cells
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -146,7 +145,7 @@ class Walls:
         cells : (N,) int
             The cell of each, from `cells_of`.
         hidden : (H, W) bool
-            Cells about which the scan says nothing.
+            Cells about which the scan tells nothing.
         spec : GridSpec
             The cells, (H, W).
         """
@@ -172,7 +171,7 @@ def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDAr
     left : (H, W) float
         Dynamic mass that has left each cell; a is at most `CERTAIN`.
     hidden : (H, W) bool
-        Cells about which the scan says nothing. Others stay as they are, because there the scan decides.
+        Cells about which the scan tells nothing. Others stay as they are, because there the scan decides.
     """
     a = np.where(hidden, np.minimum(left, CERTAIN), 0)
     s = posterior[STATIC]

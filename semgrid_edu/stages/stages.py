@@ -103,6 +103,11 @@ class Stages:
         """The names of the stages that weren't left out, in their order."""
         return tuple(name for name in STAGES | REMEMBER if getattr(self, name) is not None)
 
+    @property
+    def image_size(self) -> tuple[int, int]:
+        """Height and width of the image that `segment` takes, pixels."""
+        return (self.architecture or Architecture()).image_size
+
     @classmethod
     def of(
         cls,
@@ -112,6 +117,7 @@ class Stages:
         seed: int = 0,
         keep_steps: bool = False,
         memory: bool | MemoryParams = False,
+        parts: Any = None,
     ) -> "Stages":
         """Return the package's own stages, in the book's readable version.
 
@@ -129,6 +135,8 @@ class Stages:
             Whether each belief also holds what the filter had after each of its steps (`Belief.steps`).
         memory : bool or MemoryParams
             Whether class beliefs are carried over frames, or the parameters with which they are.
+        parts : module, optional
+            Where `DriveTracker`, `PlaneSampler`, `mean_field` and `ClassMemory` come from; the book if left out.
 
         Raises
         ------
@@ -140,23 +148,33 @@ class Stages:
         >>> own = Stages.of(load_net(sample_weights(), drive.camera))                   # doctest: +SKIP
         >>> dataclasses.replace(own, refine=my_refine)                                  # doctest: +SKIP
         """
-        return _assembled(_BOOK, net, occupancy, crf, seed, keep_steps, memory)
+        parts = parts or _BOOK
+        architecture = net.need_architecture()
+        crf = crf or CrfParams.for_cells(architecture.grid.cell)
+
+        def refine(log_g: NDArray, o: NDArray) -> NDArray:
+            return parts.mean_field(unary_from_log_probability(log_g), o, crf)
+
+        return cls(
+            track=parts.DriveTracker(architecture.grid, occupancy, seed, keep_steps),
+            **_network_stages(net, net.sampler.as_kind(parts.PlaneSampler)),
+            refine=refine,
+            architecture=architecture,
+            remember=_memory(parts, memory, architecture),
+        )
 
     @classmethod
-    def fast(
-        cls,
-        net: SemanticGridNet,
-        occupancy: CmcdotParams | None = None,
-        crf: CrfParams | None = None,
-        seed: int = 0,
-        keep_steps: bool = False,
-        memory: bool | MemoryParams = False,
-    ) -> "Stages":
+    def fast(cls, net: SemanticGridNet, occupancy: CmcdotParams | None = None, **options: Any) -> "Stages":
         """Return the same stages by the compiled twins of `semgrid_edu.fast`; the book's where numba is missing.
 
-        Parameters and errors are those of `Stages.of`.
+        Parameters
+        ----------
+        net : SemanticGridNet
+            A network for the camera of the drive and in evaluation mode.
+        occupancy, **options
+            Those of `Stages.of`.
         """
-        return _assembled(_fast_parts(), net, occupancy, crf, seed, keep_steps, memory)
+        return cls.of(net, occupancy, **options, parts=_fast_parts())
 
     def over(self, other: "Stages") -> "Stages":
         """Return these stages, and those of `other` where one was left out.
@@ -180,10 +198,8 @@ class Stages:
         cls,
         stages: "Stages | SemanticGridNet",
         camera: Camera,
-        occupancy: CmcdotParams | None = None,
-        crf: CrfParams | None = None,
-        seed: int = 0,
         memory: bool | MemoryParams = False,
+        **options: Any,
     ) -> "Stages":
         """Return a complete set for a drive: the package's fast stages fill the gaps.
 
@@ -194,15 +210,14 @@ class Stages:
             these three.
         camera : Camera
             The camera as it took the images of the drive.
-        occupancy, crf, seed, memory
-            Those of `of`.
+        memory, **options
+            Those of `Stages.of`.
         """
-        options = {"occupancy": occupancy, "crf": crf, "seed": seed, "memory": memory}
         if isinstance(stages, SemanticGridNet):
-            return cls.fast(stages, **options)
+            return cls.fast(stages, memory=memory, **options)
         if set(STAGES) <= set(stages.given) and memory is False:
             return stages
-        return stages.over(cls.fast(load_net(sample_weights(), camera), **options))
+        return stages.over(cls.fast(load_net(sample_weights(), camera), memory=memory, **options))
 
     def started(self) -> "Stages":
         """Return the stages for one drive: with fresh copies of tracker and memory, and with their results checked."""
@@ -234,19 +249,8 @@ def _fast_parts() -> Any:
     return fast
 
 
-def _assembled(
-    parts: Any,
-    net: SemanticGridNet,
-    occupancy: CmcdotParams | None,
-    crf: CrfParams | None,
-    seed: int,
-    keep_steps: bool,
-    memory: bool | MemoryParams,
-) -> Stages:
-    """Put the package's own stages together from the book's parts or from the fast ones."""
-    architecture = net.need_architecture()
-    sampler = net.sampler.as_kind(parts.PlaneSampler)
-    crf = crf or CrfParams.for_cells(architecture.grid.cell)
+def _network_stages(net: SemanticGridNet, sampler: PlaneSampler) -> dict[str, Callable]:
+    """Return the stages that the network computes as functions on numpy arrays, without gradients."""
 
     @torch.inference_mode()
     def segment(image: NDArray) -> NDArray:
@@ -263,18 +267,7 @@ def _assembled(
         planes = planes.as_strided((1, *planes.shape), (planes.numel(), *planes.stride()))
         return net.fusion(planes, _tensor(o)[None])[0].log_softmax(dim=0).numpy()
 
-    def refine(log_g: NDArray, o: NDArray) -> NDArray:
-        return parts.mean_field(unary_from_log_probability(log_g), o, crf)
-
-    return Stages(
-        track=parts.DriveTracker(architecture.grid, occupancy, seed, keep_steps),
-        segment=segment,
-        sample=sample,
-        fuse=fuse,
-        refine=refine,
-        architecture=architecture,
-        remember=_memory(parts, memory, architecture),
-    )
+    return {"segment": segment, "sample": sample, "fuse": fuse}
 
 
 def _memory(parts: Any, memory: bool | MemoryParams, architecture: Architecture) -> Tracker | None:

@@ -10,6 +10,7 @@ import pickle
 import pickletools
 import zlib
 from pathlib import Path
+from typing import NamedTuple
 
 from numpy.typing import NDArray
 
@@ -60,8 +61,23 @@ class _TableUnpickler(pickle.Unpickler):
         return super().find_class(*_MOVED.get((module, name), (module, name)))
 
 
-def read_pickled_table(path: Path) -> dict[str, NDArray]:
-    """Read the columns of a table that pandas (0.25 to 3) wrote with `to_pickle("....pkl.gz")`.
+class PickledTable(NamedTuple):
+    """The contents of a table.
+
+    Parameters
+    ----------
+    columns : dict of str to (N,) array
+        The columns by name, all of the same length: numbers, booleans, or objects such as text.
+    rows : (N,) array
+        The name of each row, pandas' index: two tables belong together row by row if these agree.
+    """
+
+    columns: dict[str, NDArray]
+    rows: NDArray
+
+
+def read_pickled_table(path: Path) -> PickledTable:
+    """Read a table that pandas (0.25 to 3) wrote with `to_pickle("....pkl.gz")`.
 
     Parameters
     ----------
@@ -70,8 +86,8 @@ def read_pickled_table(path: Path) -> dict[str, NDArray]:
 
     Returns
     -------
-    dict of str to (N,) array
-        The columns by name, all of the same length: numbers, booleans, or objects such as text.
+    PickledTable
+        Its columns, and the names of its rows.
 
     Raises
     ------
@@ -90,7 +106,8 @@ def read_pickled_table(path: Path) -> dict[str, NDArray]:
         table = _TableUnpickler(io.BytesIO(content)).load()
         if not isinstance(table, DataFrame):
             raise pickle.UnpicklingError(f"{type(table).__name__} in place of DataFrame")
-        return {str(name): _column(table[name].to_numpy()) for name in table.columns}
+        columns = {str(name): _column(table[name].to_numpy()) for name in table.columns}
+        return PickledTable(columns, table.index.to_numpy())
     except Exception as error:  # a damaged pickle can raise any
         found = str(error) if isinstance(error, pickle.UnpicklingError) else f"{type(error).__name__}: {error}"
         raise DataError(path, _EXPECTED, found[:300]) from error

@@ -91,6 +91,7 @@ def train(
     check_folder(folder, resume)
     with sole_writer(folder) if fabric.is_global_zero else nullcontext(), _freezing(net) as learnable:
         check_folder(folder, resume)  # check again: until now another process could write to it
+        fabric.barrier()  # process 0 writes its log only when all have checked, or a slow one would reject that log
         net.to(fabric.device)
         if fabric.world_size > 1 and fabric.device.type == "cuda":
             nn.SyncBatchNorm.convert_sync_batchnorm(net)

@@ -1,7 +1,7 @@
 """Data that can be read but can't be right: frozen sensors, wrong units or axes, jumping poses, scans cut short."""
 
 import filecmp
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets.frames import LIDAR_RANGE, FrameSequence
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive
-from semgrid_edu.datasets.oxts import mercator_pose, mercator_scale, read_packet, read_timestamps
+from semgrid_edu.datasets.oxts import read_packet, read_timestamps
 from semgrid_edu.datasets.pandaset import PandasetScene
+from semgrid_edu.datasets.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
+from semgrid_edu.workshop.pose_doubts import packet_doubts, path_doubts
 
 SHORT_SCAN = 0.6
 """A scan smaller than this fraction of the drive's median scan was probably cut short: sound ones differ less."""
@@ -26,25 +28,36 @@ FEWEST_RETURNS = 100
 RETURN_BYTES = 16
 """Size of a return on disk: four floats."""
 
-FASTEST = 100.0
-"""Metres per second. No car drives faster."""
-
 LEVEL = (0.5, 0.05)
 """How far the ground may be above or below its level under the vehicle: metres, and metres per metre of distance."""
 
 FEWEST_ON_GROUND = 0.05
 """The smallest plausible fraction of returns near the level of the ground: 0.7 to 0.9 in KITTI and in the sample."""
 
-MISTAKES: dict[str, Callable[[NDArray], NDArray]] = {
-    "are they in kilometres?": lambda points: 1000 * points,
-    "are they in millimetres?": lambda points: points / 1000,
-    "are they in camera axes (x right, y down, z ahead)?": lambda points: points[:, [2, 0, 1]] * (1, -1, -1),
-    "were three columns read as four?": lambda points: points.ravel()[: points.size // 3 * 3].reshape(-1, 3),
+MISTAKES: dict[str, Callable[[NDArray, float], NDArray]] = {
+    "are they in kilometres?": lambda points, _: 1000 * points,
+    "are they in millimetres?": lambda points, _: points / 1000,
+    "are they in camera axes (x right, y down, z ahead)?": lambda points, _: points[:, [2, 0, 1]] * (1, -1, -1),
+    "does y point up, as in computer graphics?": lambda points, _: points[:, [2, 0, 1]] * (-1, -1, 1),
+    "does z point down?": lambda points, _: points[:, :3] * (1, -1, -1),
+    "does x point up?": lambda points, _: points[:, [1, 2, 0]],
+    "does x point down?": lambda points, _: points[:, [1, 2, 0]] * (1, -1, -1),
+    "is z the height above the ground?": lambda points, height: points[:, :3] - (0, 0, height),
+    "were three columns read as four?": lambda points, _: _in_columns(points, 3),
+    "were five columns read as four?": lambda points, _: _in_columns(points, 5),
+    "were six columns read as four?": lambda points, _: _in_columns(points, 6),
 }
-"""How to undo common mistakes on the returns (N, 4). If undoing one puts them on the ground, its question is asked."""
+"""How to undo common mistakes on the returns (N, 4), given the LIDAR's height above the ground, metres.
+
+If undoing one puts the returns on the ground, its question is asked."""
 
 LIKELY = 0.4
-"""A mistake is named if undoing it puts at least this fraction of returns on the ground, and 1.5 times as many."""
+"""A mistake is named if fewer than this fraction of returns are on the ground, and undoing it puts more there.
+
+It has to put at least 1.5 times as many there."""
+
+ALIKE = 0.8
+"""A mistake fits about as well as another one if undoing it puts at least this part as many returns on the ground."""
 
 FEWEST_SEEN = 1e-3
 """The smallest plausible fraction of returns ahead, or in the image: 0.14 to 0.26 in KITTI and in the sample."""
@@ -65,14 +78,16 @@ def drive_doubts(drive: FrameSequence) -> list[str]:
     -------
     list of str
         One line for each doubt, which names the file or folder. For KITTI raw drives: missing and short scans, files
-        that repeat the one before, and poses that no car can have reached. For PandaSet: missing and repeated files.
-        For every drive: the doubts of `frame_doubts`.
+        that repeat the one before. For PandaSet: missing and repeated files. For these two and SemanticKITTI: poses
+        that no car can have (`pose_doubts`). For every drive: the doubts of `frame_doubts`.
     """
     in_files = []
     if isinstance(drive, KittiRawDrive):
         in_files = _kitti_doubts(drive)
     elif isinstance(drive, PandasetScene):
-        in_files = _pandaset_doubts(drive)
+        in_files = [*_pandaset_doubts(drive), *_path_doubts(drive, "lidar/poses.json")]
+    elif isinstance(drive, SemanticKittiSequence):
+        in_files = _path_doubts(drive, "poses.txt")
     return [*in_files, *frame_doubts(drive, drive.folder, drive.without_labels)]
 
 
@@ -80,10 +95,10 @@ def _kitti_doubts(drive: KittiRawDrive) -> list[str]:
     scans = [drive.file("velodyne_points", k, ".bin") for k in range(len(drive))]
     images = [drive.file(drive.view, k, ".png") for k in range(len(drive))]
     gaps = [str(DataError(scans[k], "a scan", "none: the filter predicts over the gap")) for k in drive.gaps]
-    return [*gaps, *repeats(scans, "scans"), *repeats(images, "images"), *short_scans(scans), *_kitti_jumps(drive)]
+    return [*gaps, *repeats(scans, "scans"), *repeats(images, "images"), *short_scans(scans), *_packet_doubts(drive)]
 
 
-def _kitti_jumps(drive: KittiRawDrive) -> list[str]:
+def _packet_doubts(drive: KittiRawDrive) -> list[str]:
     """Check the poses whose packets and times can be read; what can't be read is an error, not a doubt."""
     packets = {}
     readable = []
@@ -97,7 +112,16 @@ def _kitti_jumps(drive: KittiRawDrive) -> list[str]:
     except DataError:
         return []
     seconds = (times - times[0]) / np.timedelta64(1, "s")  # an unknown time (NaT) becomes NaN
-    return jumps(packets, seconds[readable])
+    return packet_doubts(packets, seconds[readable])
+
+
+def _path_doubts(drive: PandasetScene | SemanticKittiSequence, file: str) -> list[str]:
+    """Check the poses of a drive; what can't be read is an error, not a doubt."""
+    try:
+        poses, seconds = drive.path()
+    except DataError:
+        return []
+    return path_doubts(poses, seconds, [f"{drive.folder / file}, pose {k}" for k in range(len(poses))])
 
 
 def _pandaset_doubts(scene: PandasetScene) -> list[str]:
@@ -132,35 +156,6 @@ def short_scans(paths: Iterable[Path]) -> list[str]:
                 found.append(str(DataError(path, expected, size // RETURN_BYTES)))
         elif size < SHORT_SCAN * median:
             found.append(str(DataError(path, f"a scan about as large as the drive's others, {median:g} bytes", size)))
-    return found
-
-
-def jumps(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str]:
-    """Name the packets whose position no car can have reached since the packet before.
-
-    Parameters
-    ----------
-    packets : mapping of Path to (30,) float
-        The packets of a drive, in order, from `read_packet`.
-    seconds : (N,) float
-        Time of each packet; steps that aren't positive or not known are skipped.
-
-    Returns
-    -------
-    list of str
-        One line for each such packet.
-    """
-    if len(packets) < 2:
-        return []
-    scale = mercator_scale(next(iter(packets.values())))
-    positions = np.array([mercator_pose(packet, scale)[:3, 3] for packet in packets.values()])
-    metres = np.linalg.norm(np.diff(positions, axis=0), axis=1)
-    steps = np.diff(seconds)
-    found = []
-    for path, distance, step in zip(list(packets)[1:], metres, steps, strict=True):
-        if step > 0 and distance > FASTEST * step:
-            expected = f"a place within {FASTEST * step:.0f} m of the packet before"
-            found.append(str(DataError(path, expected, f"{distance:.0f} m")))
     return found
 
 
@@ -258,12 +253,18 @@ def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
         yield "returns from places around the LIDAR", "only zeros"
         return
     on_ground = _on_ground(points, height)
-    undone, question = max((_on_ground(undo(points), height), question) for question, undo in MISTAKES.items())
+    shares = {question: _on_ground(undo(points, height), height) for question, undo in MISTAKES.items()}
+    # Of several that fit about as well, the first: z moved by a metre puts any scan in kilometres on the ground.
+    question = next(question for question, share in shares.items() if share >= ALIKE * max(shares.values()))
+    undone = shares[question]
     hint = ""
-    if undone > max(LIKELY, 1.5 * on_ground):
+    if undone > LIKELY > on_ground and undone > 1.5 * on_ground:
         hint = question
     elif on_ground < FEWEST_ON_GROUND:
         hint = f"half of them lie below z = {np.median(points[:, 2]):.3g} m"
+    if not points[:, 3].any():
+        found = "0 everywhere: beams that the vehicle's own edge splits can't be told from obstacles"
+        yield "returns of different reflectance", found
     in_image = project(transform_points(frame.camera.T_camera_from_lidar, points[:, :3]), frame.camera)[1]
     if hint:
         yield f"ground about {height:.3g} m below the LIDAR", f"{on_ground:.0%} of the returns near there: {hint}"
@@ -271,6 +272,11 @@ def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
         yield "returns ahead of the LIDAR (x > 0)", f"{np.sum(points[:, 0] > 0)} of {n}: do all lie behind?"
     elif in_image.mean() < FEWEST_SEEN:
         yield "returns in the image", f"{in_image.sum()} of {n}: is the calibration that of this camera?"
+
+
+def _in_columns(points: NDArray, n_columns: int) -> NDArray:
+    """Return the numbers of a scan in rows of another length."""
+    return points.ravel()[: points.size // n_columns * n_columns].reshape(-1, n_columns)
 
 
 def _on_ground(points: NDArray, height: float) -> float:

@@ -170,3 +170,9 @@ def test_the_reach_in_metres_is_the_same_in_every_grid(cell):
     params = CrfParams.for_cells(cell)
     assert params.sigma_alpha * cell == pytest.approx(CrfParams().sigma_alpha * 0.2)
     assert params.sigma_gamma * cell == pytest.approx(CrfParams().sigma_gamma * 0.2)
+
+
+@pytest.mark.parametrize("cell", [0, -0.5, np.nan, np.inf])
+def test_cells_without_a_size_are_refused(cell):
+    with pytest.raises(ArgumentError, match="cell: expected a positive number of metres"):
+        CrfParams.for_cells(cell)

@@ -49,7 +49,8 @@ def test_float32_stays_float32(drawn):
 @pytest.mark.parametrize("temperature", [0.3, 1.0, 4.0])
 def test_labels_drawn_from_the_distribution_give_back_the_temperature_by_which_it_was_spoilt(drawn, temperature):
     log_p, truth = drawn
-    assert fit_temperature(log_p / temperature, truth) == pytest.approx(1 / temperature, rel=0.05)
+    spoilt = at_temperature(log_p, temperature)
+    assert fit_temperature(spoilt, truth) == pytest.approx(1 / temperature, rel=0.05)
 
 
 def test_no_other_temperature_is_more_likely_by_torchs_loss(drawn):
@@ -96,12 +97,27 @@ def test_a_fitted_temperature_lowers_the_calibration_error_of_too_sure_a_network
         (np.array([[0.0, -1.0], [-np.inf, -0.5]]), [0, 1], "finite logarithms"),
         (np.log([[0.9, 0.2], [0.1, 0.8]]), [0, 2], "classes 0..1"),
         (np.log([[0.9, 0.2], [0.1, 0.8]]), [255, 255], "labelled cell"),
+        (np.log([[0.9, 0.2], [0.1, 0.8]]), [0, 0.5], "truth: expected whole numbers"),
+        (np.log([[0.9, 0.2], [0.1, 0.8]]), [0, np.nan], "truth: expected whole numbers"),
+        (np.array([[0.9, 0.2], [0.1, 0.8]]), [0, 0], "expected logarithms of probabilities that sum to 1"),
         (np.log([[0.9, 0.2], [0.1, 0.8]]), [0, 1, 1], r"shape \(C, 3\)"),
     ],
 )
 def test_what_has_no_temperature_is_refused(log_p, truth, message):
     with pytest.raises(ArgumentError, match=message):
         fit_temperature(log_p, truth)
+
+
+@pytest.mark.parametrize("probability", [[0.9, 0.2], [1.5, -0.5], [np.nan, 1.0], np.log([0.9, 0.1])])
+def test_a_reliability_of_what_is_no_distribution_is_refused(probability):
+    with pytest.raises(ArgumentError, match="probability: expected probabilities that sum to 1"):
+        reliability(np.transpose([probability, [0.9, 0.1]]), [0, 1])
+
+
+def test_a_class_without_probability_stays_without_and_scores_are_refused():
+    assert at_temperature(np.array([0.0, -np.inf]), 2).tolist() == [0, -np.inf]
+    with pytest.raises(ArgumentError, match="log_probability: expected logarithms of probabilities that sum to 1"):
+        at_temperature(np.array([2.0, 1.0]), 2)
 
 
 @pytest.mark.parametrize("temperature", [0.0, -1.0, np.nan, np.inf])

@@ -60,12 +60,6 @@ def contents(root):
 
 
 class TestDownload:
-    def test_a_drive_is_there_as_it_was_packed(self, tmp_path, original, archives):
-        with serve(archives) as (source, _):
-            drive = fetch_kitti(tmp_path, DRIVE, source)
-        assert contents(tmp_path) == contents(original)
-        assert drive.problems() == []
-
     def test_goes_on_where_a_connection_breaks_off(self, tmp_path, original, archives):
         with serve(archives, break_after=[10**9, 5000, 3000]) as (source, requests):
             fetch_kitti(tmp_path, DRIVE, source)
@@ -154,12 +148,6 @@ class TestWithoutNetwork:
             DataError, match=f"{CALIB}: expected an answer of the server, found ConnectionError; .*{place}"
         ):
             fetch_kitti(tmp_path, DRIVE, source)
-
-    def test_names_only_what_is_missing(self, tmp_path, archives):
-        (tmp_path / "archives").mkdir()
-        (tmp_path / "archives" / CALIB[1:]).write_bytes(archives[CALIB])
-        with pytest.raises(DataError, match=f"without network, put http://127.0.0.1:1{SYNC} into"):
-            fetch_kitti(tmp_path, DRIVE, "http://127.0.0.1:1")
 
     def test_archives_put_there_by_hand_are_unpacked(self, tmp_path, original, archives):
         for path, content in archives.items():

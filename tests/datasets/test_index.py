@@ -1,11 +1,13 @@
 """dataset.json: what it lists comes out, and whatever is wrong with it is said."""
 
 import json
+import ntpath
+from types import SimpleNamespace
 
 import pytest
 from tiny_drive import DATE
 
-from semgrid_edu.datasets import LabelledFrame, load_index
+from semgrid_edu.datasets import LabelledFrame, index, load_index
 from semgrid_edu.errors import ArgumentError, DataError
 
 FRAME = {"date": DATE, "drive": "0001", "frame": 9}
@@ -63,3 +65,9 @@ def test_a_number_is_no_folder():
 def test_missing_index_is_named(tmp_path):
     with pytest.raises(DataError, match=r"dataset\.json"):
         load_index(tmp_path)
+
+
+def test_a_path_on_another_drive_of_windows_is_written_whole(monkeypatch):
+    monkeypatch.setattr(index, "os", SimpleNamespace(path=ntpath, fspath=str))
+    assert index.relative_path(r"D:\data\kitti", r"D:\index") == r"..\data\kitti"
+    assert index.relative_path(r"D:\data\kitti", r"C:\index") == r"D:\data\kitti"

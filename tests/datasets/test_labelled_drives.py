@@ -5,15 +5,12 @@ import pytest
 from npz_drive import NpzDrive, write_npz_drives
 
 from semgrid_edu.datasets import training_cache
-from semgrid_edu.datasets.ground_truth import lidar_truth
-from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.fast import TrainingSet, track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import WEIGHTS, Architecture, build_net
 from semgrid_edu.training import TrainingParams, train
-from semgrid_edu.workshop.flaws import NO_FLAWS
 
 SPEC, SIZE = GridSpec(0, 71, -15.5, 15.5, 1.0), (24, 80)
 WALL, ROAD, UNSEEN = (KITTI_14.index(name) for name in ("building", "road", "unknown-unobserved"))
@@ -43,14 +40,6 @@ def test_cells_take_the_readers_truth_and_else_their_occupancy(index):
     np.testing.assert_array_equal(arrays["truth"][1][labelled], truth[labelled])
     assert (arrays["truth"][1][~labelled] >= KITTI_14.n_semantic).all()
     assert arrays["truth"][1][0, 0] == UNSEEN
-
-
-def test_truth_can_be_made_from_its_image_labels(index):
-    exact = training(index, truth=LidarTruth(flaws=NO_FLAWS))
-    for k, (name, number) in enumerate([("a", 1), ("b", 2)]):
-        expected = lidar_truth(NpzDrive(index.root, name)[number], exact.arrays["occupancy"][k], SPEC)
-        np.testing.assert_array_equal(exact.arrays["truth"][k], expected)
-    assert exact.drives == ("a", "b")
 
 
 def test_a_network_learns_from_it(index, tmp_path):

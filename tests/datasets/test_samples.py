@@ -6,6 +6,7 @@ import pytest
 import torch
 from tiny_drive import write_tiny_dataset
 
+from semgrid_edu.datasets import training_cache
 from semgrid_edu.datasets.samples import (
     sample_drive,
     sample_frames,
@@ -26,7 +27,9 @@ from semgrid_edu.workshop.commands.excerpt import write_excerpt
 def excerpt(tmp_path_factory):
     """A data set and the excerpt of both frames of its training split."""
     root, samples = write_tiny_dataset(tmp_path_factory.mktemp("tiny")), tmp_path_factory.mktemp("samples")
-    write_excerpt(root, 2, samples / "frames")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(training_cache, "WORKERS", 1)  # processes take seconds to start
+        write_excerpt(root, 2, samples / "frames")
     return root, samples / "frames"
 
 
@@ -73,11 +76,6 @@ def test_a_missing_or_damaged_excerpt_is_named(tmp_path, content):
         write_bytes(tmp_path / FRAMES, content)
     with pytest.raises(DataError, match=FRAMES):
         read_excerpt(tmp_path)
-
-
-def test_no_samples_at_all_is_an_error(tmp_path):
-    with pytest.raises(DataError, match="found none"):
-        samples_problems(tmp_path)
 
 
 @pytest.mark.parametrize("segmenter", trained_segmenters())

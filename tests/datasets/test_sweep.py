@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from semgrid_edu.datasets.ground_truth.window import EgoVelocity, deskew_scan, ego_velocity, skew_scan, sweep_times
+from semgrid_edu.datasets.ground_truth.window import EgoVelocity, deskew_scan, ego_velocity, skew_scan
 from semgrid_edu.errors import ArgumentError
 
 VELOCITY = EgoVelocity(forward=12.0, left=0.5, turn=0.4)
@@ -51,12 +51,6 @@ def test_skewing_is_undone_by_deskewing():
     assert skewed.dtype == np.float32
     assert np.abs(skewed - points).max() > 0.05
     np.testing.assert_allclose(deskew_scan(skewed, VELOCITY), points, atol=0.01)
-
-
-def test_times_run_clockwise_through_a_tenth_of_a_second():
-    angles = np.linspace(np.pi - 1e-9, -np.pi + 1e-9, 9)
-    times = sweep_times(np.c_[np.cos(angles), np.sin(angles)])
-    np.testing.assert_allclose(times, np.linspace(-0.05, 0.05, 9), atol=1e-8)
 
 
 def test_the_velocity_is_that_of_the_poses():

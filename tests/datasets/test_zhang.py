@@ -79,10 +79,6 @@ class TestLabels:
         with pytest.raises(ArgumentError, match="split: expected one of train, test, found 'validation'"):
             labels.frames("validation")
 
-    def test_no_labels(self, tmp_path):
-        with pytest.raises(DataError, match=r"expected labels such as .*000000.mat, found no folder"):
-            ZhangLabels(tmp_path / "nowhere")
-
     @pytest.mark.parametrize(
         ("variables", "message"),
         [

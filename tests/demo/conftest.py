@@ -8,8 +8,9 @@ from torch import nn
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.pipeline import Stages, run_pipeline
-from semgrid_edu.workshop.demo import cell_story, one_cell, record
-from semgrid_edu.workshop.demo.all_cells import frame_story
+from semgrid_edu.workshop.demo import cell_story, record
+from semgrid_edu.workshop.demo import stories as stories_module
+from semgrid_edu.workshop.demo.stories import frame_story
 
 CELLS = [(81, 31), (82, 25), (120, 33), (30, 5), (0, 0), (141, 61)]
 """On the wall of the tiny drive, before it, on the road, far away, and two corners."""
@@ -69,7 +70,7 @@ def story_maps(told, net):
 def stories(told, net, story_maps):
     """The stories of `CELLS`, from the maps that have been computed already."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(one_cell, "frame_story", lambda *_: story_maps)
+        patch.setattr(stories_module, "frame_story", lambda *_: story_maps)
         return [cell_story(told[-1], cell, net, past=told[:-1]) for cell in CELLS]
 
 

@@ -23,9 +23,8 @@ from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import StageError, Stages
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.demo import example_stages, write_demo
-from semgrid_edu.workshop.demo.comparison import Comparison
 from semgrid_edu.workshop.demo.run import run_side_by_side
-from semgrid_edu.workshop.demo.stages_file import load_stages
+from semgrid_edu.workshop.demo.stages_file import Comparison, load_stages
 
 EXAMPLE = Path(example_stages.__file__)
 

@@ -333,7 +333,7 @@ class TestPanels:
         record.views.append(view)
         record._occurs[0] = True
         record._seconds[""] = [[0.1] * 5]
-        html = page_html(record, "<i>&", self.CAMERA, (96, 320))
+        html = page_html(record, "<i>&", self.CAMERA, (96, 320), {})
         page = Page(html)
         assert "<i>&" not in html
         assert "<u>" not in html
@@ -403,8 +403,9 @@ class TestChoice:
         assert "Here are 3 frames of the drive" in html
         assert "(one in 2 of frames 0 to 4; it has 6)" in html
 
-    def test_another_network_is_taken_and_one_of_the_image_stage_refused(self, tmp_path):
-        options = ["demo", "--out", str(tmp_path), "--frames", ":1"]
+    def test_another_network_is_taken_and_one_of_the_image_stage_refused(self, drive, tmp_path):
+        root = str(drive.folder.parents[1])
+        options = ["demo", "--kitti", root, "--date", DATE, "--drive", "0001", "--out", str(tmp_path), "--frames", ":1"]
         stage = CliRunner().invoke(app, [*options, "--weights", str(sample_image_stage("fcn"))])
         assert "image stage" in str(stage.exception)
         result = CliRunner().invoke(app, [*options, "--weights", str(sample_weights("fcn"))])

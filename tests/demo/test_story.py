@@ -20,10 +20,10 @@ from semgrid_edu.occupancy import CmcdotParams, SensorModel, scan_evidence, upda
 from semgrid_edu.occupancy.state import FilterState, Particles
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.workshop.demo import cell_story, draw_cell_story
-from semgrid_edu.workshop.demo.all_cells import frame_story
 from semgrid_edu.workshop.demo.contributions import contributions
 from semgrid_edu.workshop.demo.evidence import VERDICTS, place_history, scan_maps
 from semgrid_edu.workshop.demo.neighbours import neighbour_pull
+from semgrid_edu.workshop.demo.stories import frame_story
 
 PARAMS = CmcdotParams(n_particles=5000)
 SPEC = GridSpec.compact()
@@ -210,7 +210,7 @@ class TestStory:
         plain = dataclasses.replace(result, belief=dataclasses.replace(result.belief, steps={}), remembered=None)
         story = cell_story(plain, (90, 30), net)
         assert list(story.steps) == ["shown"]
-        assert (story.truth, story.fault, story.memory) == (None, "none", None)
+        assert (story.truth, story.fault) == (None, "none")
 
 
 def test_the_figure_shows_the_numbers(stories, told):

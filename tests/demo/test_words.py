@@ -8,16 +8,16 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from told_story import counted
 
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.occupancy import State
-from semgrid_edu.workshop.demo import story_text
+from semgrid_edu.workshop.demo.details import SENTENCES
 from semgrid_edu.workshop.demo.evidence import last_sight
 from semgrid_edu.workshop.demo.what_if import FAULTS, faults, right_occupancy, right_scores, what_if
-from semgrid_edu.workshop.demo.words import SENTENCES
 
 ROAD, SIDEWALK, CAR, FENCE = map(KITTI_14.index, ("road", "sidewalk", "car", "fence"))
 SPEC = GridSpec.compact()
@@ -98,17 +98,12 @@ def test_without_labels_no_stage_is_charged():
     assert FAULTS[faults(ROAD, CAR, IGNORE, {"no image": ROAD})] == "none"
 
 
+def test_classes_are_counted_the_most_frequent_first():
+    assert counted([0, 3, 3, 255], ("road", "sidewalk", "vegetation", "car")) == "car (2), road (1)"
+
+
 def test_every_fault_has_its_sentence():
     assert set(SENTENCES["fault"]) == set(FAULTS)
-
-
-def test_a_story_says_what_it_holds(story):
-    place, called, *_, numbers = story_text(story).splitlines()
-    assert place.startswith(f"Cell ({story.cell[0]}, {story.cell[1]}), {story.xy[0]:.1f} m ahead")
-    assert called.startswith(f"Called {story.names[story.refined]} (")
-    assert numbers.startswith(f"In logarithms, {story.names[story.label]} against {story.names[story.rival]}: image")
-    image = next(line for line in story_text(story).splitlines() if line.startswith("Image"))
-    assert image.split(" In truth")[0].count("(") == len(set(story.called[story.visible]))
 
 
 def test_the_memory_says_when_a_frame_last_named_the_place():

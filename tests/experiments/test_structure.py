@@ -11,10 +11,16 @@ from worlds.lecture_12_structure import DATA, structure, structure_runs
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.storage.tensors import write_arrays
-from semgrid_edu.workshop.paper.deviations import frame_counts
-from semgrid_edu.workshop.paper.other_runs import GRIDS, KEPT
-from semgrid_edu.workshop.paper.pictures import PARTS, figures_markdown, figures_picture
-from semgrid_edu.workshop.paper.plans import figure_runs, shown_frames
+from semgrid_edu.workshop.paper.data_runs import frame_counts
+from semgrid_edu.workshop.paper.figures import (
+    GRIDS,
+    KEPT,
+    PARTS,
+    figure_runs,
+    figures_markdown,
+    figures_picture,
+    shown_frames,
+)
 from semgrid_edu.workshop.paper.recompute import differences
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.scales import SCALES

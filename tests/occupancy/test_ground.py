@@ -14,7 +14,7 @@ from semgrid_edu.occupancy.polar import GroundParams, height_above_ground, walk_
 from semgrid_edu.occupancy.sensor import prepare_scan
 
 PARAMS = GroundParams()
-MIDDLES = (np.arange(PARAMS.bins) + 0.5) * PARAMS.bin
+MIDDLES = (np.arange(PARAMS.bins) + 0.5) * PARAMS.bin_length
 SCENE = [Box.around(12, 2, 4, 1.8, 1.5), Box.around(20, -4, 1, 8, 2.4), Box.around(7, -3, 0.5, 0.5, 1.8)]
 
 
@@ -135,26 +135,16 @@ def test_neither_order_nor_type_nor_further_columns_matter():
     np.testing.assert_allclose(height_above_ground(wide, PARAMS), height, atol=1e-5)
 
 
-TWINS = pytest.mark.parametrize("heights", [height_above_ground, fast.height_above_ground], ids=["book", "fast"])
-
-
-@TWINS
-def test_whole_numbers_and_lists_are_points_too(heights):
-    points = [[10, 0, 0], [10, 0, 1], [12, 3, 0]]
-    np.testing.assert_array_equal(heights(points, PARAMS), [0, 1, 0])
-    np.testing.assert_array_equal(heights(np.array(points), PARAMS), [0, 1, 0])
-
-
-@TWINS
 @pytest.mark.parametrize("points", [np.array([[1.0, np.nan, 0.0]]), np.array([[np.inf, 0, 0]]), np.zeros((3, 2))])
-def test_what_is_no_scan_is_refused_by_name(heights, points):
+def test_compiled_loops_refuse_what_is_no_scan(points):
     with pytest.raises(ArgumentError, match=r"^points: expected"):
-        heights(points, PARAMS)
+        fast.height_above_ground(points, PARAMS)
 
 
 @pytest.mark.parametrize(
     "bad",
-    [{"sectors": 0}, {"sectors": 4.5}, {"neighbours": -1}, {"neighbours": 180}, {"bin": 0.0}, {"bin": 100.0}]
+    [{"sectors": 0}, {"sectors": 4.5}, {"neighbours": -1}, {"neighbours": 180}]
+    + [{"bin_length": 0.0}, {"bin_length": 100.0}]
     + [{name: value} for name in ("step", "slope", "rise", "grade", "gap") for value in (-0.1, np.nan)],
 )
 def test_impossible_ground_is_refused_by_name(bad):

@@ -47,18 +47,6 @@ def test_a_cell_follows_bayes_rule_on_two_states(prior, scans):
     assert np.isclose(probability(L[0, 0]), expected[0])
 
 
-@given(SCANS, st.randoms(use_true_random=False))
-def test_the_order_of_scans_does_not_matter_within_the_bounds(scans, random):
-    orders = [scans, random.sample(scans, len(scans))]
-    ends = []
-    for order in orders:
-        L = np.zeros((1, 1))
-        for scan in order:
-            L = update_log_odds(L, evidence(*scan), FREELY)
-        ends.append(L)
-    assert np.allclose(*ends)
-
-
 @pytest.mark.parametrize(("scan", "expected"), [((0, 1), 0.12), ((1, 0), 0.97), ((0, 0), 0.5), ((1e-40, 1e-40), 0.5)])
 def test_contradictory_evidence_ends_at_the_bounds(scan, expected):
     assert np.isclose(probability(update_log_odds(np.zeros((1, 1)), evidence(*scan), LogOddsParams()))[0, 0], expected)
@@ -103,12 +91,6 @@ def test_a_filter_that_knows_motion_smears_less():
     assert smears(lambda points: tracker.step(points, PlanarMotion(), 0.1).probability[states].sum(axis=0)) < 2
 
 
-def test_area_is_counted_in_square_metres():
-    p, left = np.full(SPEC.shape, 0.5), np.zeros(SPEC.shape, bool)
-    p[2:4, 3], left[3:, :] = 0.9, True
-    assert smear_area(p, left, SPEC) == 0.25
-
-
 def test_the_grid_follows_the_vehicle_through_a_turn():
     grid, pose = LogOddsGrid(SPEC), PlanarMotion()
     for _ in range(20):
@@ -120,22 +102,6 @@ def test_the_grid_follows_the_vehicle_through_a_turn():
     assert p.dtype == np.float32
     assert p[row, col][0] > 0.9
     assert p[row, col][1] < 0.2
-
-
-def test_a_jump_of_a_hundred_metres_forgets_everything():
-    grid = LogOddsGrid(SPEC)
-    grid.step(scan_boxes([car(0)]), PlanarMotion(), 0.1)
-    p = grid.step(np.empty((0, 3)), PlanarMotion(100, 0, 0.5), 0.1)
-    assert np.allclose(p, 0.5)
-
-
-def test_what_is_no_scan_or_time_is_refused_and_changes_nothing():
-    grid, twin = LogOddsGrid(SPEC), LogOddsGrid(SPEC)
-    for points, dt, name in ((np.array([[np.nan, 0, 0]]), 0.1, "points"), (np.zeros((1, 3)), -1.0, "dt")):
-        with pytest.raises(ArgumentError, match=name):
-            grid.step(points, PlanarMotion(1, 0, 0), dt)
-    points = scan_boxes([car(0)])
-    assert np.array_equal(*[g.step(points, PlanarMotion(), 0.1) for g in (grid, twin)])
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from semgrid_edu import fast
-from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.fast import Cmcdot, track_drive
+from semgrid_edu.fast import Cmcdot
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
     CmcdotParams,
@@ -67,16 +66,6 @@ def test_it_is_asked_for_particles_and_for_newborn_cells():
     for _ in range(2):
         tracker.step(WALL, PlanarMotion(), 0.1)
     assert resampling.asked == [(cells, 1500), (1500, 3500), (cells, 1500)]
-
-
-def test_a_drive_is_tracked_with_it():
-    frames, spec = [sample_drive()[k] for k in range(2)], GridSpec.compact()
-    own, usual = (
-        [belief.probability for belief in track_drive(frames, spec, params_with(resampling), seed=1)]
-        for resampling in (Stratified(), SystematicResampling())
-    )
-    assert not np.array_equal(own[1], usual[1])
-    assert np.abs(np.subtract(own, usual)).mean() < 0.02
 
 
 def test_both_twins_draw_by_it():

@@ -14,14 +14,12 @@ from semgrid_edu.occupancy import (
     Evidence,
     LogOddsGrid,
     LogOddsParams,
-    Measurement,
     PlanarMotion,
     Sensor,
     SensorModel,
     State,
     VelocityLattice,
     WorldModel,
-    scan_evidence,
 )
 
 
@@ -157,17 +155,3 @@ def test_a_refused_answer_changes_nothing(kind):
 def test_what_takes_no_scans_is_refused_when_it_is_handed_over(params, sensor, found):
     with pytest.raises(ArgumentError, match=rf"^sensor: expected .*scan\(points\).*found {found}"):
         params(sensor=sensor)
-
-
-def test_points_are_checked_before_a_sensor_gets_them():
-    with pytest.raises(ArgumentError, match="points: expected finite coordinates"):
-        scan_evidence(np.array([[1.0, np.nan, 0.0]]), SPEC, HitsOnly())
-
-
-def test_the_packages_own_sensor_and_scan_are_what_the_protocols_say():
-    model = SensorModel()
-    assert isinstance(model, Sensor)
-    assert isinstance(model.scan(WALL), Measurement)
-    here, there = model.scan(WALL).evidence(SPEC, PlanarMotion()), scan_evidence(WALL, SPEC, model)
-    assert np.array_equal(here.occupied, there.occupied)
-    assert np.array_equal(here.free, there.free)

@@ -5,9 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from semgrid_edu.occupancy import Particles, PlanarMotion
-from semgrid_edu.occupancy.local_belief import turn_moments, velocity_moments
-from semgrid_edu.occupancy.particles import transform
-from semgrid_edu.occupancy.state import OUTSIDE
+from semgrid_edu.occupancy.cmcdot import velocity_moments
+from semgrid_edu.occupancy.planar_motion import turn_moments
+from semgrid_edu.occupancy.state import OUTSIDE, transform
 
 SHAPE = (2, 3)
 
@@ -33,17 +33,6 @@ def test_moments_of_velocity_are_numpys(cells, seed):
         else:
             assert np.isnan(mean[:, *at]).all()
             assert np.isnan(covariance[:, :, *at]).all()
-
-
-def test_moments_by_hand():
-    """Speeds 0 and 4 m/s along x with weights 3 : 1 have mean 1 and variance (3 * 1 + 1 * 9) / 4 = 3."""
-    velocity, weight = np.float32([[0, 2], [4, 2], [7, -3]]), np.float32([0.3, 0.1, 0.2])
-    particles, cells = Particles(np.zeros((3, 2), np.float32), velocity, weight), np.int32([0, 0, 4])
-    mean, covariance = velocity_moments(particles, cells, SHAPE)
-    np.testing.assert_allclose(mean[:, 0, 0], [1, 2], rtol=1e-6)
-    np.testing.assert_allclose(covariance[:, :, 0, 0], [[3, 0], [0, 0]], rtol=1e-6)
-    assert mean[:, 1, 1].tolist() == [7, -3]
-    assert (covariance[:, :, 1, 1] == 0).all()
 
 
 @settings(deadline=None)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import rigid_transform
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.fast.occupancy.planar_motion import _look_up, look_up
+from semgrid_edu.fast.occupancy.cells import _look_up, look_up
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion
 

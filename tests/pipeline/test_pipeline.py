@@ -45,6 +45,15 @@ def test_every_frame_comes_out_with_every_stage_timed(drive, results):
         assert min(result.seconds.values()) > 0
 
 
+@pytest.mark.parametrize(
+    "spoil", [lambda i: i[:, 1:], lambda i: i[..., 0], lambda i: i / 255], ids=["size", "grey", "float"]
+)
+def test_an_image_that_is_not_its_cameras_is_refused(drive, net, spoil):
+    frame = drive[0]
+    with pytest.raises(ArgumentError, match=r"image: expected \(.*, 3\) uint8, the size of its camera"):
+        next(run_pipeline([replace(frame, image=spoil(frame.image))], net, FEW))
+
+
 def test_occupancy_is_that_of_track_drive(drive, net, results):
     beliefs = track_drive(drive, net.architecture.grid, FEW, seed=0)
     for belief, result in zip(beliefs, results, strict=True):
@@ -158,7 +167,7 @@ def test_frames_are_read_one_at_a_time(drive, net):
 
 def test_the_network_sees_the_mean_of_the_pixels_it_gathers(drive):
     image = np.arange(4 * 4 * 3, dtype=np.uint8).reshape(4, 4, 3)
-    frame = Frame(image, np.empty((0, 4), np.float32), drive.camera, np.eye(4), time=0.0)
+    frame = Frame(image, np.empty((0, 4), np.float32), drive.camera.resized((4, 4)), np.eye(4), time=0.0)
     expected = image.reshape(2, 2, 2, 2, 3).mean(axis=(1, 3)).transpose(2, 0, 1) / 255
     np.testing.assert_allclose(network_image(frame, (2, 2)), expected, atol=0.5 / 255)
 

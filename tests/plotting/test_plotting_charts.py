@@ -5,7 +5,7 @@ import pytest
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.plotting import training_curves
 from semgrid_edu.training.log import TrainingLog
-from semgrid_edu.workshop.paper.forest import forest_plot
+from semgrid_edu.workshop.paper.pictures import forest_plot
 
 
 def _log(image=200, grid=100):

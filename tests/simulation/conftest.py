@@ -1,4 +1,4 @@
-"""Shared by the simulator's tests: one small drive, simulated once."""
+"""Fixtures of the simulator's tests: drives that are simulated once."""
 
 import pytest
 
@@ -10,23 +10,23 @@ BUSY = Wishes(layout="junction", styles=("suburb", "town"), density=0.9, speed=8
 
 @pytest.fixture(scope="session")
 def junction_drive() -> SimulatedDrive:
-    """A drive of ten frames towards a busy junction, houses and gardens beside it."""
+    """A drive of ten frames towards a busy junction with houses and gardens."""
     return SimulatedDrive(5, 10, BUSY)
 
 
 @pytest.fixture
 def junction_drive_again() -> SimulatedDrive:
-    """The same drive, made anew from the same seed."""
+    """A second drive with the arguments of `junction_drive`."""
     return SimulatedDrive(5, 10, BUSY)
 
 
 @pytest.fixture(scope="session")
 def crowded_drives() -> list[SimulatedDrive]:
-    """Three drives through towns full of people."""
+    """Three drives through crowded towns."""
     return [SimulatedDrive(seed, 10, Wishes(density=1.0, styles=("town", "town"))) for seed in range(3)]
 
 
 @pytest.fixture(scope="session")
 def last_frame(junction_drive):
-    """Its last frame, with bird's-eye truth."""
+    """The last frame of `junction_drive`, with bird's-eye truth."""
     return junction_drive.frame(9, labelled=True)

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
 from semgrid_edu.workshop.simulation.street.ground import (
     KERB_HEIGHT,
-    Extent,
     ground_height,
     ground_kind,
     ground_kinds,
@@ -62,12 +61,12 @@ def test_a_crest_joins_two_grades_without_a_step_or_a_kink():
     assert height[s == 60] == pytest.approx(0.06 * 60 - 0.1 * 20)
 
 
-def test_rain_runs_off_the_crown_to_the_kerbs():
+def test_the_road_falls_from_the_crown_to_the_kerbs():
     heights = [ground_height(HILL, 0.0, d) for d in (0.0, 2.0, -2.0, 4.0, -4.0, 4.5)]
     assert heights == pytest.approx([0, -0.04, -0.04, -0.08, -0.08, KERB_HEIGHT - 0.08])
 
 
-def test_a_vehicle_stands_on_its_wheels():
+def test_a_vehicle_rests_on_its_wheels():
     even = on_wheels(STRAIGHT, 5.0, -1.5, 0.0, 2.7, 1.5)
     assert even == (0.0, 0.0, 0.0)
     height, roll, pitch = on_wheels(HILL, 5.0, -1.5, 0.0, 2.7, 1.5)
@@ -76,7 +75,7 @@ def test_a_vehicle_stands_on_its_wheels():
     assert (roll, pitch) == pytest.approx((np.arctan(0.02), np.arctan(0.06)))
 
 
-def test_the_recording_car_climbs_as_the_road_does():
+def test_the_recording_car_tilts_with_the_road():
     ego = Ego(HILL, Trajectory(0.0, 0.0, 1.0, 0.0, ActorPace(10.0)), sway=0.0, roll=0.0, pitch=0.0, phase=0.0)
     T = ego.T_world_from_lidar(1.0)
     assert T[:3, 0] @ [0, 0, 1] == pytest.approx(np.sin(np.arctan(0.06)))
@@ -99,14 +98,14 @@ def test_a_solid_centre_line_is_fourteen_centimetres_wide():
     assert ground_kinds(STRAIGHT, np.array([[5.0, 0.0], [5.0, 1.0]])).tolist() == [Kind.LANE, Kind.ROAD]
 
 
-def test_a_blurred_line_keeps_its_paint():
+def test_blurring_a_line_conserves_its_paint():
     d = np.linspace(-0.5, 0.5, 2001)
     total = [sum(lane_mark(STRAIGHT, 5.0, x, blur) for x in d) * 0.0005 for blur in (0.01, 0.1)]
     assert total[0] == pytest.approx(total[1], rel=0.02)
 
 
-def test_the_mesh_lies_on_the_ground():
-    mesh = ground_mesh(JUNCTION, Extent(0.0, 60.0))
+def test_the_mesh_follows_the_ground():
+    mesh = ground_mesh(JUNCTION, 0.0, 60.0)
     corners = mesh.vertices[mesh.faces]
     flat = np.abs(mesh.normals[:, 2]) > 0.99
     middles = corners[flat].mean(axis=1)

@@ -1,4 +1,4 @@
-"""The named test streets: each has what its name says, where real streets have it."""
+"""Each named street has the things that its name promises, where real streets have them."""
 
 from functools import cache
 from itertools import pairwise, product
@@ -8,12 +8,11 @@ import pytest
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID
-from semgrid_edu.workshop.simulation import drive
+from semgrid_edu.workshop.simulation import drive, simulate
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.workshop.simulation.named_streets import TEST_STREETS, named_street
 from semgrid_edu.workshop.simulation.street.builder import Builder
 from semgrid_edu.workshop.simulation.street.ground import ground_mesh
-from semgrid_edu.workshop.simulation.street.plan import ANY, YARD, Wishes, draw_plan
+from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, YARD, Wishes, draw_plan
 from semgrid_edu.workshop.simulation.street.road_users import overturned_car
 from semgrid_edu.workshop.simulation.street.trajectories import Departure
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
@@ -24,12 +23,12 @@ SEEDS = (0, 1, 2)
 
 @cache
 def street(name: str, seed: int = 0, frames: int = 2) -> SimulatedDrive:
-    """A street that several tests look at; none of them changes it."""
-    return named_street(name, seed, frames)
+    """A street that several tests share and none of them changes."""
+    return simulate(seed, frames, name)
 
 
 def convoy_pairs(moving) -> list[tuple[int, int]]:
-    """The numbers of each car and of the next one behind it: cars on one line at one pace."""
+    """Numbers of each car and its follower: cars on the same line at the same pace."""
     lines: dict[object, list[tuple[float, int]]] = {}
     for path, number in ((actor.trajectory, actor.instance) for actor in moving if actor.kind == Kind.CAR):
         line = (path.along, path.across, path.d if path.along else path.s, path.pace)
@@ -42,17 +41,17 @@ def materials(drive) -> set:
     return set(drive.instant(0.0).material)
 
 
-def standing(drive, kind: Kind) -> np.ndarray:
-    """The places along and to the right of the lane of all that stands right of it and is of a kind."""
+def places_right_of_lane(drive, kind: Kind) -> np.ndarray:
+    """Positions of all objects of a kind to the right of our lane: along the road, and distance from the lane."""
     row = drive.static_footprints
     x, y = row[:, 0], row[:, 1]
     return np.column_stack([x, drive.ego.trajectory.d - y])[(row[:, 6] == kind) & (y < drive.ego.trajectory.d)]
 
 
 def only_ground(plan, rng) -> Builder:
-    """Scenery for tests of what is drawn before it is built."""
+    """Scenery that is quick to build, for tests of the plan alone."""
     builder = Builder(plan, rng)
-    builder.solid.append((ground_mesh(plan.road, plan.extent), 0))
+    builder.solid.append((ground_mesh(plan.road, plan.start, plan.end), 0))
     return builder
 
 
@@ -60,7 +59,7 @@ def test_the_car_passes_a_border_at_12_to_14_metres_a_second(monkeypatch):
     monkeypatch.setattr(drive, "build_scenery", only_ground)
     offenders = []
     for name, seed in product(FENCED, SEEDS):
-        bare = named_street(name, seed, 2)
+        bare = simulate(seed, 2, name)
         ego, side = bare.ego.trajectory, bare.plan.road.right
         distance = side.edge + side.strip + side.walk + 0.35 + ego.d
         if not (12 <= ego.pace.mean <= 14 and 3 < distance < 8):
@@ -68,7 +67,7 @@ def test_the_car_passes_a_border_at_12_to_14_metres_a_second(monkeypatch):
     assert offenders == []
 
 
-def test_what_can_be_seen_through_is_where_the_name_says_so():
+def test_the_porous_materials_of_a_street():
     porous = {Material.WIRE, Material.TWIGS, Material.PANE}
     expected = {name: set() for name in (*FENCED, "convoy")}
     expected |= {"mesh": {Material.WIRE}, "mesh and hedge": {Material.WIRE, Material.TWIGS}}
@@ -76,8 +75,8 @@ def test_what_can_be_seen_through_is_where_the_name_says_so():
     assert {name: materials(street(name)) & porous for name in expected} == expected
 
 
-def test_posts_stand_in_a_regular_row():
-    places = standing(street("posts"), Kind.POLE)
+def test_posts_form_a_regular_row():
+    places = places_right_of_lane(street("posts"), Kind.POLE)
     offsets, counts = np.unique(places[:, 1].round(2), return_counts=True)
     row = np.sort(places[np.isclose(places[:, 1], offsets[counts.argmax()], atol=0.01), 0])
     steps = np.diff(row)
@@ -86,17 +85,17 @@ def test_posts_stand_in_a_regular_row():
     assert 1.4 <= np.median(steps) <= 2.6
 
 
-def test_walls_stand_across_behind_gaps():
+def test_there_are_cross_walls_behind_gaps():
     drive = street("walls")
     walls = drive.static_footprints[drive.static_footprints[:, 6] == Kind.BUILDING]
     across = walls[(np.abs(np.cos(walls[:, 4])) < np.sin(0.6)) & (walls[:, 3] < 0.2)]
     assert len(across) > 5
 
 
-def test_cars_of_a_convoy_follow_at_8_to_20_metres():
+def test_the_gaps_of_a_convoy_are_8_to_20_metres():
     offenders = []
     for seed in SEEDS:
-        drive = named_street("convoy", seed)
+        drive = simulate(seed, 36, "convoy")
         road, actors, pairs = (
             drive.plan.road,
             {actor.instance: actor for actor in drive.moving},
@@ -112,12 +111,12 @@ def test_cars_of_a_convoy_follow_at_8_to_20_metres():
 
 
 def test_pedestrians_walk_along_and_across():
-    ways = {(a.trajectory.along, abs(a.trajectory.across)) for a in named_street("pedestrians", 0).moving}
+    ways = {(a.trajectory.along, abs(a.trajectory.across)) for a in simulate(0, 36, "pedestrians").moving}
     assert {(1, 0), (-1, 0), (0, 1)} <= ways
 
 
-def test_slow_starters_stand_for_a_second_and_then_move():
-    drive = named_street("slow starters", 0)
+def test_slow_starters_wait_for_a_second_and_then_move():
+    drive = simulate(0, 36, "slow starters")
     kinds = {actor.kind for actor in drive.moving}
     assert kinds == {Kind.CAR, Kind.PEDESTRIAN}
     assert all(np.hypot(*velocity) < 1e-9 for velocity in drive.velocities(0.99).values())
@@ -125,12 +124,12 @@ def test_slow_starters_stand_for_a_second_and_then_move():
 
 
 def test_cars_cross_in_both_directions():
-    ways = {seed: {a.trajectory.across for a in named_street("crossing cars", seed).moving} for seed in SEEDS}
+    ways = {seed: {a.trajectory.across for a in simulate(seed, 36, "crossing cars").moving} for seed in SEEDS}
     assert ways == {seed: {-1, 1} for seed in SEEDS}
 
 
-def test_the_seed_and_the_name_decide():
-    drives = street("mesh"), named_street("mesh", 0, 2), street("mesh", 1), street("glass")
+def test_seed_and_name_decide_the_street():
+    drives = street("mesh"), simulate(0, 2, "mesh"), street("mesh", 1), street("glass")
     one, again, other, elsewhere = (drive.scan(1).points for drive in drives)
     assert np.array_equal(one, again)
     assert one.shape != other.shape or not np.array_equal(one, other)
@@ -138,15 +137,15 @@ def test_the_seed_and_the_name_decide():
 
 
 def test_poses_come_from_packets_up_to_5_ms_away():
-    drive = named_street("mesh", 0, 8)
+    drive = simulate(0, 8, "mesh")
     errors = [np.linalg.norm(drive.scan(k).T_world_from_lidar[:2, 3] - drive.pose(k * PERIOD)[:2, 3]) for k in range(8)]
     assert 0 < max(errors) <= 0.005 * 14 * 1.15
     assert len(set(errors)) == 8
 
 
-def test_returns_of_a_border_lie_on_what_stands():
-    """Beams that pass the mesh and the hedge change ranges, not the truth: what returns, stands there."""
-    drive = named_street("mesh and hedge", 0, 12)
+def test_returns_of_a_border_are_where_the_truth_has_an_object():
+    """Beams that pass through mesh and hedge get longer ranges, but still end on something in the truth."""
+    drive = simulate(0, 12, "mesh and hedge")
     points = drive.scan(11).points_grid
     kinds = drive.birdseye(1.1)[0]
     right = (points[:, 1] < -3) & (points[:, 0] > 2) & (points[:, 0] < 40) & (points[:, 2] > 0.7) & (points[:, 2] < 1.6)
@@ -162,20 +161,16 @@ def test_a_departure_covers_the_integral_of_its_speed():
     assert [pace.distance(t) for t in times] == pytest.approx(covered, abs=1e-6)
 
 
-def test_a_yard_is_never_drawn():
-    assert not any(YARD in draw_plan(np.random.default_rng(seed), 30.0, ANY).styles for seed in range(200))
+def test_a_yard_never_comes_up_at_random():
+    assert not any(YARD in draw_plan(np.random.default_rng(seed), 30.0, RANDOM_STREET).styles for seed in range(200))
 
 
-def test_an_unknown_street_is_refused():
+def test_an_unknown_street_raises_an_error():
     with pytest.raises(ArgumentError, match=r"mesh and hedge.*found alley"):
-        named_street("alley", 0)
+        simulate(0, 36, "alley")
 
 
-def test_every_street_has_a_name_of_its_own():
-    assert len(set(TEST_STREETS)) == len(TEST_STREETS) == 10
-
-
-def test_a_car_lies_on_its_top_a_few_metres_ahead():
+def test_the_overturned_car_is_a_few_metres_ahead():
     for seed in SEEDS:
         objects = SimulatedDrive(seed, 3, Wishes(cast=overturned_car)).objects(2 * PERIOD)
         (lying,) = (one for one in objects if one.get("overturned"))

@@ -1,4 +1,4 @@
-"""Rays through wire mesh, twigs and glass, against the law of Beer and Lambert."""
+"""Rays through wire mesh, twigs and glass against the Beer-Lambert law."""
 
 import numpy as np
 import pytest
@@ -10,12 +10,12 @@ from semgrid_edu.workshop.simulation.things.shapes import Shape, box, quads
 
 N = 20_000
 FOUR_SIGMA = 4 / np.sqrt(4 * N)
-"""A share of N chances is farther than this from its expectation once in 16,000 times at most."""
+"""The share of successes in N trials is off by more than this in at most 1 of 16,000 runs."""
 EYE = np.array([0.0, 0.0, 1.0])
 
 
 def instant(*porous: tuple[Shape, float], wall: float = 20.0) -> Instant:
-    """A wall across the x axis, and porous things before it."""
+    """A wall across the x axis with porous objects in front."""
     solid = RayMesh.of(
         [quads([wall, -90, -90], [0, 180, 0], [0, 0, 180], (0.5,) * 3, Material.PLASTER, Kind.BUILDING)], [0]
     )
@@ -32,21 +32,21 @@ def twigs(x: float, length: float) -> Shape:
 
 
 def ranges(world: Instant, angle: float = 0.0, seed: int = 0) -> np.ndarray:
-    """How far N equal rays get, at an angle from the x axis."""
+    """Lengths of N equal rays at an angle from the x axis."""
     ray = np.float32([np.cos(angle), np.sin(angle), 0])
     return world.cast(EYE, np.tile(ray, (N, 1)), np.random.default_rng(seed)).distance
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.8, 1.2])
 @pytest.mark.parametrize("x", [4.0, 8.0])
-def test_more_wires_stop_a_beam_far_away_and_at_a_grazing_angle(x, angle):
+def test_wire_stops_more_beams_at_a_distance_and_at_grazing_incidence(x, angle):
     distance, cosine = x / np.cos(angle), np.cos(angle)
     through = ranges(instant((sheet(x, Material.WIRE), 0.03)), angle) > distance + 0.1
     assert through.mean() == pytest.approx(np.exp(-0.03 * distance / cosine), abs=FOUR_SIGMA)
 
 
 @pytest.mark.parametrize("x", [4.0, 8.0])
-def test_a_pane_passes_the_same_share_at_any_distance(x):
+def test_a_pane_transmits_the_same_share_at_any_distance(x):
     through = ranges(instant((sheet(x, Material.PANE), 0.2)), 0.8) > x / np.cos(0.8) + 0.1
     assert through.mean() == pytest.approx(np.exp(-0.2 / np.cos(0.8)), abs=FOUR_SIGMA)
 
@@ -56,8 +56,8 @@ def test_shares_of_two_sheets_multiply():
     assert through.mean() == pytest.approx(np.exp(-0.7), abs=FOUR_SIGMA)
 
 
-def test_a_hedge_returns_from_its_depth():
-    """In a volume without end the way inside is distributed exponentially, with mean 1 / opacity."""
+def test_a_hedge_returns_beams_from_inside():
+    """In an endless volume, the path inside has an exponential distribution with mean 1 / opacity."""
     depth = ranges(instant((twigs(3.0, 16.0), 4.0))) - 3.0
     assert depth.min() >= -1e-5
     assert depth.mean() == pytest.approx(0.25, rel=4 / np.sqrt(N))
@@ -72,21 +72,21 @@ def test_a_thin_hedge_lets_beams_through_to_the_wall_however_it_is_cut(pieces):
     assert np.all((distance == 20) | ((distance > 2.99) & (distance < 3.61)))
 
 
-def test_an_eye_inside_a_hedge_sees_its_twigs():
+def test_rays_that_start_inside_a_hedge_hit_its_twigs():
     assert ranges(instant((twigs(-8.0, 18.0), 4.0))).mean() == pytest.approx(0.25, rel=4 / np.sqrt(N))
 
 
-def test_a_wall_inside_a_hedge_is_hit_by_what_reaches_it():
+def test_a_wall_inside_a_hedge_is_hit_by_the_rays_that_reach_it():
     distance = ranges(instant((twigs(19.5, 2.0), 2.0)))
     assert np.mean(distance == 20) == pytest.approx(np.exp(-1.0), abs=FOUR_SIGMA)
     assert distance.max() == 20
 
 
-def test_what_lies_behind_something_solid_stops_nothing():
+def test_porous_objects_behind_a_wall_stop_nothing():
     assert np.all(ranges(instant((sheet(25, Material.WIRE), 100.0))) == 20)
 
 
-def test_the_tables_say_what_stopped_a_ray():
+def test_the_tables_give_the_material_that_stopped_a_ray():
     world = instant((sheet(4, Material.PANE), 0.5), (twigs(6, 4.0), 1.0))
     hits = world.cast(EYE, np.tile(np.float32([1, 0, 0]), (N, 1)), np.random.default_rng(0))
     material = world.material[hits.triangle]
@@ -97,17 +97,17 @@ def test_the_tables_say_what_stopped_a_ray():
     assert np.allclose(hits.position[:, 0], hits.distance, atol=1e-5)
 
 
-def test_a_ray_that_meets_nothing_goes_on():
+def test_a_ray_that_hits_nothing_is_a_miss():
     assert np.all(ranges(instant((sheet(4, Material.PANE), 0.2)), np.pi) == MISS)
 
 
-def test_where_nothing_is_porous_nothing_is_drawn():
+def test_without_porous_objects_no_random_numbers_are_used():
     rng, untouched = np.random.default_rng(0), np.random.default_rng(0)
     instant().cast(EYE, np.tile(np.float32([1, 0, 0]), (N, 1)), rng)
     assert rng.random() == untouched.random()
 
 
-def test_a_piece_of_mesh_stands_between_its_posts():
+def test_wire_mesh_fills_its_frame():
     frame, wire = roadside.sheet_fence("wire", 2.5)
     assert set(wire.material) == {Material.WIRE}
     assert wire.vertices[:, 0].min() == 0

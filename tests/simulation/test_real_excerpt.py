@@ -1,4 +1,4 @@
-"""An excerpt of a real scene reads back as the scene, and the filter doesn't notice which returns are left out."""
+"""An excerpt of a real scene reads back like the scene, and the filter doesn't notice the missing returns."""
 
 import shutil
 from dataclasses import replace
@@ -40,7 +40,7 @@ def drive(folder):
     return KittiRawDrive(folder, "1970_01_01", "0002")
 
 
-def test_it_reads_back_as_a_whole_drive(drive, folder):
+def test_the_reader_finds_a_complete_drive(drive, folder):
     assert drive.problems() == []
     assert len(drive) == len(NUMBERS)
     assert provenance_problems(folder) == []
@@ -73,8 +73,8 @@ def test_the_same_command_gives_the_same_bytes(root, folder, tmp_path):
     assert files == again
 
 
-def test_the_filter_believes_the_same_without_the_other_returns():
-    """With scans all around, in a bend, where the filter's map turns against the grid."""
+def test_the_filter_gives_the_same_belief_without_the_other_returns():
+    """With full-circle scans in a bend, where the filter's map rotates relative to the grid."""
     simulated = SimulatedDrive(11, 4, Wishes(layout="bend", speed=12.0), Rig(lidar=replace(HDL64E, azimuth_step=0.9)))
     frames = [simulated.scan(k) for k in range(4)]
     kept = [needed_returns(frame.points_grid) for frame in frames]
@@ -84,7 +84,7 @@ def test_the_filter_believes_the_same_without_the_other_returns():
         np.testing.assert_array_equal(all_returns.probability, needed.probability)
 
 
-def test_a_scene_with_fewer_frames_and_a_folder_with_files_are_refused(root, tmp_path):
+def test_too_few_frames_and_a_folder_with_files_are_errors(root, tmp_path):
     with pytest.raises(ArgumentError, match="n_frames: expected 2 to 3 frames, found 4"):
         write_real_excerpt(root, SCENE, 4, tmp_path / "new")
     assert not (tmp_path / "new").exists()
@@ -93,7 +93,7 @@ def test_a_scene_with_fewer_frames_and_a_folder_with_files_are_refused(root, tmp
         write_real_excerpt(root, SCENE, 2, tmp_path)
 
 
-def test_a_scene_without_labels_is_refused_before_anything_is_written(tmp_path):
+def test_a_scene_without_labels_is_an_error_before_anything_is_written(tmp_path):
     bare = write_tiny_pandaset(tmp_path / "bare")
     shutil.rmtree(bare / SCENE / "annotations")
     with pytest.raises(DataError, match="expected the classes of the returns, found no folder"):

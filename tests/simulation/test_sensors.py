@@ -1,4 +1,4 @@
-"""What camera and LIDAR read, against geometry done by hand."""
+"""Camera and LIDAR against geometry by hand."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -23,7 +23,7 @@ from semgrid_edu.workshop.simulation.things.shapes import box, quads, rotation_m
 SIDE = Side(5.0, 0.0, 2.0, 0.0, 3.0)
 ROAD = Road(0.0, 0.0, 0.0, 3.5, 1, 1, SIDE, SIDE, 0.0, 0.0, False, False, 4.0, False, True)
 POSE = rigid_transform(np.eye(3), np.array([0.0, 0.0, KITTI_LIDAR_HEIGHT]))
-EXACT = Lidar(range_sigma=0.0, drop=0.0)
+EXACT = Lidar(range_sigma=0.0, dropout=0.0)
 
 
 def scene(*things) -> Instant:
@@ -32,7 +32,7 @@ def scene(*things) -> Instant:
 
 
 def at(thing):
-    """A function of the time that always returns the same."""
+    """A function of time that always returns the same thing."""
     return lambda _: thing
 
 
@@ -77,17 +77,17 @@ def test_dark_and_distant_surfaces_lose_more_returns():
     assert share(Material.RUBBER, 15.0) > 2 * share(Material.RUBBER, 60.0)
 
 
-def test_a_turned_vehicle_sees_the_wall_turned():
+def test_a_rotated_vehicle_measures_a_rotated_wall():
     turn = rigid_transform(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), POSE[:3, 3])
     points = labelled_scan(at(scene(wall(12.0))), at(turn), EXACT, ROAD, np.random.default_rng(0))[0]
     assert points[points[:, 2] > -1.7, 1] == pytest.approx(-12.0, abs=1e-3)
 
 
-def test_a_scanner_that_takes_its_time_measures_each_column_from_where_it_is_then():
+def test_a_rolling_scan_measures_each_column_from_the_pose_at_its_time():
     def pose(t):
         return rigid_transform(rotation_matrix(0, 0, t), POSE[:3, 3] + [10.0 * t, 0, 0])
 
-    turning = replace(EXACT, turn=0.1)
+    turning = replace(EXACT, revolution=0.1)
     points = labelled_scan(at(scene(wall(12.0))), pose, turning, ROAD, np.random.default_rng(0))[0]
     assert np.abs(sweep_times(points)).max() > 0.02
     still = deskew_scan(points, EgoVelocity(10.0, 0.0, 1.0))
@@ -96,22 +96,22 @@ def test_a_scanner_that_takes_its_time_measures_each_column_from_where_it_is_the
     assert np.abs(points[ahead, 0] - 12.0).max() > 0.2
 
 
-def test_what_moves_is_where_it_is_when_its_column_is_measured():
+def test_a_rolling_scan_measures_a_moving_object_at_the_time_of_its_column():
     def world(t):
         return scene(box((20.5, -3 + 10 * t, 1), (1, 2, 2), (0.5,) * 3, Material.RETRO, Kind.CAR))
 
-    points, kinds = labelled_scan(world, at(POSE), replace(EXACT, turn=0.1), ROAD, np.random.default_rng(0))
+    points, kinds = labelled_scan(world, at(POSE), replace(EXACT, revolution=0.1), ROAD, np.random.default_rng(0))
     front = points[(kinds == Kind.CAR) & (points[:, 0] < 20.001), 1]
     middle = (front.min() + front.max()) / 2
     assert middle == pytest.approx(-3 + 10 * (0.1 / 360) * np.degrees(np.arctan2(3, 20)), abs=0.1)
 
 
-def test_kitti_s_scanner_hits_as_many_cells_as_in_a_real_street():
-    # Share of the 0.5 m cells in view of the camera that are hit in drive 0013, by distance: few cars stand there.
+def test_kittis_scanner_hits_as_many_cells_as_on_a_real_street():
+    # Share of the 0.5 m cells in view of the camera that are hit in drive 0013, by distance: there are few cars.
     real, edges = [0.76, 0.46, 0.21, 0.066], (5, 15, 25, 40, 72)
     spec, rig = replace(LABEL_GRID, cell=0.5), Rig(lidar=HDL64E_AHEAD)
     place = spec.centers()
-    distance, view = np.hypot(*place.T).T, np.arctan(rig.image_size[1] / 2 / rig.camera.K[0, 0])
+    distance, view = np.hypot(*place.T).T, np.arctan(rig.camera.size[1] / 2 / rig.camera.K[0, 0])
     seen, found = np.abs(np.arctan2(place[..., 1], place[..., 0])) < view, []
     for seed in range(8):
         drive = SimulatedDrive(seed, 10, Wishes(density=0.2, parking=(False, False)), rig)
@@ -128,12 +128,12 @@ def test_pixel_rays_project_back_to_their_pixels():
     rig = Rig()
     points = transform_points(rig.T_lidar_from_camera, np.zeros(3)) + 17.0 * rig.pixel_directions().astype(float)
     pixels, visible = project(transform_points(rig.camera.T_camera_from_lidar, points), rig.camera)
-    v, u = np.mgrid[: rig.image_size[0], : rig.image_size[1]]
+    v, u = np.mgrid[: rig.camera.size[0], : rig.camera.size[1]]
     assert pixels == pytest.approx(np.stack([u, v], axis=-1).reshape(-1, 2), abs=2e-3)
     assert visible.mean() > 0.98
 
 
-def test_the_camera_stands_1_65_m_above_the_ground():
+def test_the_camera_is_1_65_m_above_the_ground():
     rig = Rig()
     eye = transform_points(np.linalg.inv(rig.camera.T_camera_from_grid), np.zeros(3))
     assert eye == pytest.approx([0.27, 0.06, 1.65], abs=0.02)

@@ -1,4 +1,4 @@
-"""Shapes stand where their makers say."""
+"""Shapes have the sizes, positions and kinds that their functions promise."""
 
 import numpy as np
 import pytest
@@ -22,12 +22,12 @@ def test_a_quad_faces_right_cross_up():
     assert quads([0, 0, 0], [1, 0, 0], [0, 0, 1], **STYLE).normals == pytest.approx(np.array([[0, -1, 0]] * 2))
 
 
-def test_placing_turns_then_moves():
+def test_placing_rotates_then_translates():
     turned = box((1, 0, 0), (0.2, 0.2, 0.2), **STYLE).placed((10, 20, 1), np.pi / 2)
     assert turned.vertices.mean(axis=0) == pytest.approx([10, 21, 1], abs=1e-5)
 
 
-def test_an_overturned_car_stands_on_its_roof():
+def test_an_overturned_car_rests_on_its_roof():
     height = car_size("sedan")[2]
     upright, lying = car("sedan"), car("sedan").overturned(height)
     ends = upright.vertices.min(axis=0), upright.vertices.max(axis=0)
@@ -47,7 +47,7 @@ def test_merging_keeps_every_triangle():
     assert np.array_equal(both.vertices[both.faces[-len(two.faces) :]], two.vertices[two.faces])
 
 
-def test_a_car_fills_its_box_and_stands_on_the_ground():
+def test_a_car_fills_its_box_and_touches_the_ground():
     offenders = []
     for body in BODIES:
         low, high = car(body).vertices.min(axis=0), car(body).vertices.max(axis=0)
@@ -57,7 +57,7 @@ def test_a_car_fills_its_box_and_stands_on_the_ground():
     assert offenders == []
 
 
-def test_people_stand_on_the_ground_at_their_height():
+def test_people_have_their_height_and_touch_the_ground():
     person = Person.random(np.random.default_rng(0))
     for distance in (0.0, 0.4, 1.0):
         shape = walker(person, distance)
@@ -67,7 +67,7 @@ def test_people_stand_on_the_ground_at_their_height():
         assert set(rider(person, distance).kind) == {Kind.BICYCLE}
 
 
-def test_a_stride_repeats():
+def test_the_gait_repeats():
     person = Person.random(np.random.default_rng(0))
     assert np.array_equal(walker(person, 0.3).vertices, walker(person, 0.3 + 1.45).vertices)
 
@@ -80,7 +80,7 @@ def test_a_house_covers_its_plan_up_to_its_eaves():
     assert set(shape.kind) == {Kind.BUILDING}
 
 
-def test_everything_else_is_what_it_says():
+def test_all_triangles_have_the_kind_of_their_object():
     kinds = {Kind.PLANT: [tree(s, 0) for s in TREES] + [bush(0), hedge(0)], Kind.FENCE: [fence(s, 2.5) for s in FENCES]}
     for kind, shapes in kinds.items():
         assert all(set(shape.kind) == {kind} for shape in shapes)

@@ -1,4 +1,4 @@
-"""A simulated street is closed, and its labels agree with each other."""
+"""Road users don't collide, and the labels of a street agree with each other and with its geometry."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ from semgrid_edu.workshop.simulation.things.materials import Kind, class_of_kind
 from semgrid_edu.workshop.simulation.things.shapes import merge
 
 
-def test_stamp_equals_the_literal_test_of_every_cell():
+def test_stamping_equals_testing_every_cell():
     rng = np.random.default_rng(0)
     feet = [
         Footprint(*rng.uniform(0, 6, 2), *rng.uniform(0.3, 1.5, 2), rng.uniform(-3, 3), p, k, 0, 2.0)
@@ -54,7 +54,7 @@ def test_collision_of_rectangles():
     assert collides(car, footprint_table([into]))
 
 
-def test_nobody_runs_into_anybody(crowded_drives):
+def test_road_users_never_collide(crowded_drives):
     offenders = []
     for drive in [*crowded_drives, *(SimulatedDrive(seed, 10) for seed in range(3, 6))]:
         for t in (0.0, 0.45, 0.9):
@@ -65,14 +65,14 @@ def test_nobody_runs_into_anybody(crowded_drives):
     assert offenders == []
 
 
-def test_cars_keep_to_the_asphalt_and_houses_off_it(junction_drive):
+def test_cars_are_on_the_asphalt_and_scenery_is_off_it(junction_drive):
     road = junction_drive.plan.road
     for actor in junction_drive.moving + junction_drive.parked:
         if actor.kind == Kind.CAR:
             assert outside_asphalt(road, *actor.trajectory.at(0.0)) < 0
-    end_of_the_world = junction_drive.plan.extent.end - 25
+    end_of_world = junction_drive.plan.end - 25
     for f in junction_drive.static_footprints:
-        if f[6] in (Kind.BUILDING, Kind.FENCE, Kind.PLANT, Kind.SIGN, Kind.POLE) and f[0] < end_of_the_world:
+        if f[6] in (Kind.BUILDING, Kind.FENCE, Kind.PLANT, Kind.SIGN, Kind.POLE) and f[0] < end_of_world:
             points = outline(Footprint(*f)) if f[6] == Kind.BUILDING else f[None, :2]
             assert min(outside_asphalt(road, *to_road(road, x, y)) for x, y in points) > 0
 
@@ -88,7 +88,7 @@ def test_people_walk_at_1_4_metres_a_second(crowded_drives):
     assert np.mean(speeds) == pytest.approx(1.4, abs=0.15)
 
 
-def test_velocity_of_objects_is_the_change_of_their_place(junction_drive):
+def test_the_velocity_of_objects_is_the_change_of_their_position(junction_drive):
     road = junction_drive.plan.road
     before, after = ({o["id"]: o for o in junction_drive.objects(t)} for t in (0.4, 0.5))
     pose = junction_drive.rig.T_grid_from_lidar @ np.linalg.inv(junction_drive.pose(0.45))
@@ -110,7 +110,7 @@ def test_velocities_are_those_of_the_objects(junction_drive):
         assert velocities[thing["id"]] == pytest.approx(thing["velocity"], abs=1e-3)
 
 
-def test_birdseye_names_what_stands_where_and_who_it_is(junction_drive, last_frame):
+def test_birdseye_gives_kind_and_number_of_every_object(junction_drive, last_frame):
     kinds, instances = junction_drive.birdseye(0.9)
     assert np.array_equal(kinds, last_frame.truth.kinds)
     assert set(kinds[instances > 0]) <= {Kind.CAR, Kind.BICYCLE, Kind.PEDESTRIAN}
@@ -119,7 +119,7 @@ def test_birdseye_names_what_stands_where_and_who_it_is(junction_drive, last_fra
         assert instances[row[0], col[0]] == thing["id"]
 
 
-def test_a_scan_is_a_frame_without_picture_with_noise_of_its_own(junction_drive, last_frame):
+def test_a_scan_is_a_frame_without_image_and_with_different_noise(junction_drive, last_frame):
     scan, again = junction_drive.scan(9), junction_drive.scan(9)
     assert scan.image is None
     assert np.array_equal(scan.points, again.points)
@@ -131,7 +131,7 @@ def test_a_scan_is_a_frame_without_picture_with_noise_of_its_own(junction_drive,
     assert not np.array_equal(scan.points, last_frame.points)
 
 
-def test_stamps_agree_with_rays_from_below(junction_drive, last_frame):
+def test_the_truth_agrees_with_rays_from_below(junction_drive, last_frame):
     instant = junction_drive.instant(0.9)
     solid = np.isin(instant.kind, (Kind.CAR, Kind.BUILDING))
     rows, cols = np.mgrid[0:710:7, 0:310:7]
@@ -151,7 +151,7 @@ def test_stamps_agree_with_rays_from_below(junction_drive, last_frame):
     assert (met == truth).mean() > 0.985
 
 
-def test_labelled_pixels_fall_beside_cells_of_their_class(junction_drive, last_frame):
+def test_labelled_pixels_project_near_cells_of_their_class(junction_drive, last_frame):
     rig, picture = junction_drive.rig, last_frame.picture
     v, u = np.nonzero(np.nan_to_num(picture.depth, nan=1e9) < 40)
     rays = np.stack([u, v, np.ones(len(u))], axis=-1) @ np.linalg.inv(rig.camera.K).T

@@ -1,4 +1,4 @@
-"""What is written is KITTI's raw layout, to pykitti and to our own reader."""
+"""Written drives have KITTI's raw layout, as pykitti and our reader understand it."""
 
 import json
 
@@ -65,7 +65,7 @@ def test_pykitti_reads_points_image_and_times(theirs, simulated):
     assert steps == pytest.approx(0.1, abs=1e-6)
 
 
-def test_our_reader_finds_nothing_wrong(root, simulated):
+def test_our_reader_finds_no_problems(root, simulated):
     drive = KittiRawDrive(root, DATE, "0007")
     assert drive.problems() == []
     assert [frame.labels is None for frame in drive] == [True, True, True, False]

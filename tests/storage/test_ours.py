@@ -1,7 +1,9 @@
 """The one rule by which every command knows what it may replace."""
 
+import gc
 import json
 
+import numba
 import pytest
 
 from semgrid_edu.errors import ArgumentError, DataError
@@ -9,7 +11,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, SensorModel
 from semgrid_edu.storage.files import check_ours, write_json
 from semgrid_edu.training import TrainingParams
-from semgrid_edu.workshop.demo.compile_bar import CompileBar
+from semgrid_edu.workshop.demo.run import compile_bar
 
 MARK = '"command": "semgrid-edu evaluate '
 
@@ -64,9 +66,7 @@ def test_a_parameter_of_a_wrong_type_is_named(make, field, wrong):
 
 
 def test_compiling_shows_a_bar_of_its_own(capsys):
-    bar = CompileBar()
-    for _ in range(3):
-        bar.on_start(None)
-        bar.on_end(None)
-    bar.bar.close()
-    assert "compiling, only the first time: 3 functions" in capsys.readouterr().err
+    with compile_bar():
+        numba.njit(lambda x: x + 1)(1)
+    gc.collect()  # the bar closes with its listener
+    assert "compiling, only the first time: 1 functions" in capsys.readouterr().err

@@ -48,7 +48,8 @@ def written(folder, content):
 
 @pytest.mark.parametrize("version", WRITTEN_BY_PANDAS)
 def test_reads_what_pandas_wrote(tmp_path, version):
-    table = read_pickled_table(written(tmp_path, base64.b85decode(WRITTEN_BY_PANDAS[version])))
+    table, rows = read_pickled_table(written(tmp_path, base64.b85decode(WRITTEN_BY_PANDAS[version])))
+    assert rows.tolist() == [0, 1, 2, 3]
     assert list(table) == ["x", "d", "z", "name", "m", "y"]
     assert table["x"].tolist() == table["y"].tolist() == [0, 1, 2, 3]
     assert (table["d"].tolist(), table["z"].tolist()) == ([0, 1, 0, 1], [0, 2, 4, 6])
@@ -59,7 +60,7 @@ def test_reads_what_pandas_wrote(tmp_path, version):
 @pytest.mark.parametrize("protocol", [3, 4, 5])
 def test_reads_the_form_of_pandas_1(tmp_path, protocol):
     columns = {"x": np.array([1.5, -2.0]), "name": ["a", "b"], "n": np.array([3, 4]), "y": np.array([0.5, np.inf])}
-    table = read_pickled_table(written(tmp_path, gzip.compress(pickled_table(columns, protocol))))
+    table, _ = read_pickled_table(written(tmp_path, gzip.compress(pickled_table(columns, protocol))))
     assert list(table) == list(columns)
     for name, values in columns.items():
         assert table[name].tolist() == list(values)

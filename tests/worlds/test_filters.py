@@ -15,8 +15,7 @@ from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
-from semgrid_edu.workshop.simulation.street.trajectories import STAND, ActorPace, Trajectory
-from semgrid_edu.workshop.simulation.things.cars_and_people import car_size
+from semgrid_edu.workshop.simulation.street.trajectories import STANDSTILL, ActorPace, Trajectory
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 COMMITTED = Path(semgrid_edu.__file__).parents[1] / "docs" / "results" / "occupancy.json"
@@ -28,8 +27,8 @@ def people_and_parked_cars(traffic: Traffic) -> None:
     road = traffic.road
     for side, sign in ((road.left, 1), (road.right, -1)):
         for s in (8.0, 14.0, 20.0, 26.0):
-            way = Trajectory(s, sign * (side.edge - 1.06), 1, 0, STAND)
-            traffic.park(Kind.CAR, car_size("estate"), way, ("estate", (0.3, 0.3, 0.3)))
+            way = Trajectory(s, sign * (side.edge - 1.06), 1, 0, STANDSTILL)
+            traffic.park(Kind.CAR, way, ("estate", (0.3, 0.3, 0.3)))
         for s, along in ((10.0, 1), (16.0, -1), (21.0, 1), (24.0, -1)):
             traffic.walk(s, sign * (side.edge + side.strip + side.walk / 2), along, 0, ActorPace(1.4))
         traffic.walk(12.0 + 3 * sign, 3.0 * sign, 0, -sign, ActorPace(1.4))

@@ -10,12 +10,12 @@ from worlds.lecture_04_suspects import BEFORE, GROUPS, SUSPECTS, arrivals_barred
 from semgrid_edu.fast import predict
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import FilterState, Particles, State
-from semgrid_edu.workshop.simulation.named_streets import named_street
+from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 
 def points_of(change, street="mesh"):
-    drive = named_street(street, 0, frames=1)
+    drive = simulate(0, 1, street)
     if change:
         change(drive)
     return drive, drive.scan(0).points
@@ -29,7 +29,7 @@ def test_an_opaque_fence_stops_beams_that_the_mesh_lets_through():
 
 
 def test_without_pillars_no_ray_can_meet_a_pole_and_all_else_is_left():
-    drive = named_street("walls", 0, frames=1)
+    drive = simulate(0, 1, "walls")
     kinds = drive.static.shape.kind
     without_pillars(drive)
     assert (kinds == Kind.POLE).any()

@@ -107,7 +107,7 @@ def allowed(d, params):
 def walk_out(distance, h, params):
     """Note where the ground lies along one column of returns, from the vehicle outward."""
     ground_at, ground = [0.0], [0.0]
-    bins = np.floor(distance / params.bin)
+    bins = np.floor(distance / params.bin_length)
     for b in np.unique(bins):
         r, heights = distance[bins == b], h[bins == b]
         if np.ptp(heights) > params.rise:
@@ -124,7 +124,7 @@ def walk_out(distance, h, params):
 distance = np.array([4.0, 6, 7, 8, 9, 10, 11, 11, 11, 12])
 h = np.array([0.0, 0, 0.25, 0.5, 0.75, 1, 1.3, 1.9, 2.4, 1])
 ground_at, ground = walk_out(distance, h, sensor.ground)
-middles = (np.arange(sensor.ground.bins) + 0.5) * sensor.ground.bin
+middles = (np.arange(sensor.ground.bins) + 0.5) * sensor.ground.bin_length
 np.testing.assert_allclose(np.interp(middles, ground_at, ground), walk_sector(distance, h, sensor.ground))
 assert ground_at == [0, 4, 6, 7, 8, 9, 10, 12]
 print("obstacles on flat ground at", *distance[h >= 0.3], "m; on the walked ground at 11 m alone")

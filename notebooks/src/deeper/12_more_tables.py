@@ -30,14 +30,12 @@ from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.workshop.paper.plans import table1_runs
 from semgrid_edu.workshop.paper.run_counts import RunCounts
-from semgrid_edu.workshop.paper.scales import SCALES
+from semgrid_edu.workshop.paper.scales import SCALES, table1_runs
 from semgrid_edu.workshop.paper.score_runs import by_seed
 from semgrid_edu.workshop.scoring.grids import NETWORK
 from semgrid_edu.workshop.paper.ablations import ablated_runs
-from semgrid_edu.workshop.paper.forest import draw_score, legend_entries
-from semgrid_edu.workshop.paper.pictures import confusion_picture
+from semgrid_edu.workshop.paper.pictures import confusion_picture, draw_score, legend_entries
 from semgrid_edu.workshop.paper.published import NETWORKS
 from semgrid_edu.workshop.scoring.score_with_interval import compared, on_cells, shown
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.crf.lattice import FARTHEST, elevated, peak
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.fast.crf.arithmetic import FAST, HALF
+from semgrid_edu.fast.crf import FAST, HALF
 from semgrid_edu.fast.crf.simplices import origins_and_ranks, responses, self_responses
 from semgrid_edu.fast.crf.vertices import number_vertices, sort_by_vertex
 
@@ -78,7 +78,8 @@ class PermutohedralLattice:
         vertices = number_vertices(origins, ranks)
         corners = vertices.simplices.take(vertices.members, axis=0)
         starts, members = sort_by_vertex(corners.ravel(), vertices.neighbours.shape[2])
-        factor, shares = np.float32(peak(dimensions)), weights.astype(np.float32)
+        factor = np.float32(peak(dimensions))
+        shares = weights.astype(np.float32)
         return cls(
             corners=corners,
             slices=factor * shares,
@@ -141,7 +142,8 @@ class PermutohedralLattice:
 @njit(cache=True, parallel=True)
 def _scaled(slices, splats, points, scale):
     """Return both weights of each point times its scale."""
-    scaled_slices, scaled_splats = np.empty_like(slices), np.empty_like(splats)
+    scaled_slices = np.empty_like(slices)
+    scaled_splats = np.empty_like(splats)
     for i in prange(len(slices)):
         for corner in range(slices.shape[1]):  # not row by row: numba would allocate an array for each product
             scaled_slices[i, corner] = scale[i] * slices[i, corner]

@@ -4,10 +4,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.crf.mean_field import bilateral_features, with_border, without_border
-from semgrid_edu.crf.naive import NEVER, damping
+from semgrid_edu.crf.lattice import bilateral_features
+from semgrid_edu.crf.mean_field import NEVER, damping, with_border, without_border
 from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
-from semgrid_edu.fast.crf.arithmetic import FAST, exponential
+from semgrid_edu.fast.crf import FAST, exponential
 from semgrid_edu.fast.crf.lattice import PermutohedralLattice
 from semgrid_edu.fast.crf.spatial import SeparableGaussian
 
@@ -68,13 +68,17 @@ def iterate(
     """
     n_classes, height, width = phi.shape
     cells = np.zeros((height * width, -(-n_classes // LANES) * LANES), np.float32)
-    rewards, own = np.zeros_like(cells), (bilateral.diagonal + spatial.diagonal).reshape(height, width)
-    part, logits, Q = damping(own).astype(np.float32), -phi, np.zeros_like(phi)
-    _update(rewards, phi, own, np.ones_like(part), logits, Q, cells)  # without rewards: the soft-max of the unary term
+    rewards = np.zeros_like(cells)
+    self_coupling = (bilateral.diagonal + spatial.diagonal).reshape(height, width)
+    part = damping(self_coupling).astype(np.float32)
+    logits = -phi
+    Q = np.zeros_like(phi)
+    # Without rewards, an update is the soft-max of the unary term.
+    _update(rewards, phi, self_coupling, np.ones_like(part), logits, Q, cells)
     for _ in range(iterations):
         spatial.filter(cells, rewards)
         bilateral.add(cells, rewards)
-        change = _update(rewards, phi, own, part, logits, Q, cells)
+        change = _update(rewards, phi, self_coupling, part, logits, Q, cells)
         if change <= tolerance:
             break
     return Q
@@ -109,25 +113,27 @@ def _above_best(unary):
     return phi
 
 
-# Outside the filters, arrays have the axes (class, row, column): all loops then run along a row of the grid, and the #
+# Outside the filters, arrays have the axes (class, row, column): all loops then run along a row of the grid, and the
 # compiler vectorises over its cells.
 @njit(cache=True, parallel=True, fastmath=FAST)
-def _update(rewards, phi, own, part, logits, Q, cells):
+def _update(rewards, phi, self_coupling, part, logits, Q, cells):
     """Update all cells, and return the largest change of a probability; `cells` gets a copy of Q in the filters' order.
 
-    A cell's reward contains the cell's own contribution, which is subtracted. Its log Q moves, up to a constant, part
-    of the way to the reward minus the unary term, see `updates`.
+    A cell's reward contains the contribution of the cell itself, which is subtracted. Its log Q moves, up to a
+    constant, part of the way to the reward minus the unary term, see `updates`.
     """
     n_classes, height, width = phi.shape
     change = np.zeros(height, np.float32)
-    rewards, cells = rewards.reshape(height, width, -1), cells.reshape(height, width, -1)
+    rewards = rewards.reshape(height, width, -1)
+    cells = cells.reshape(height, width, -1)
     for r in prange(height):
-        fresh, moved = np.empty((n_classes, width), np.float32), np.zeros(width, np.float32)
+        fresh = np.empty((n_classes, width), np.float32)
+        moved = np.zeros(width, np.float32)
         for c in range(width):  # transpose from the filters' order, and back below: cell by cell is faster
             for k in range(n_classes):
                 fresh[k, c] = rewards[r, c, k]
         for k in range(n_classes):
-            _approach(logits[k, r], fresh[k], own[r], Q[k, r], phi[k, r], part[r])
+            _approach(logits[k, r], fresh[k], self_coupling[r], Q[k, r], phi[k, r], part[r])
         _softmax(logits, r, fresh)
         for k in range(n_classes):
             _replace(Q[k, r], fresh[k], moved)
@@ -139,15 +145,16 @@ def _update(rewards, phi, own, part, logits, Q, cells):
 
 
 @njit(cache=True, fastmath=FAST, inline="always")
-def _approach(logits, reward, own, Q, phi, part):
+def _approach(logits, reward, self_coupling, Q, phi, part):
     for c in range(len(logits)):
-        logits[c] += part[c] * (reward[c] - own[c] * Q[c] - phi[c] - logits[c])
+        logits[c] += part[c] * (reward[c] - self_coupling[c] * Q[c] - phi[c] - logits[c])
 
 
 @njit(cache=True, fastmath=FAST, inline="always")
 def _softmax(logits, r, out):
     """Write the soft-max of row r of the logits to `out`, (C, W), and make the largest logit of each cell 0."""
-    best, total = logits[0, r].copy(), np.zeros(out.shape[1], np.float32)
+    best = logits[0, r].copy()
+    total = np.zeros(out.shape[1], np.float32)
     for k in range(1, len(out)):
         row = logits[k, r]
         for c in range(len(best)):

@@ -8,9 +8,10 @@ from which it subtracts d.
 import numpy as np
 from numba import njit, prange
 
-from semgrid_edu.fast.crf.arithmetic import HALF
+from semgrid_edu.fast.crf import HALF
 
-FORWARD, BACKWARD = 0, 1
+FORWARD = 0
+BACKWARD = 1
 """Indices on the second axis of `neighbours`: the vertex one step forward, and the vertex one step back."""
 
 
@@ -34,10 +35,13 @@ def origins_and_ranks(elevated):
         The barycentric weights of the corners with remainders 0 .. d; they sum to 1.
     """
     n_points, size = elevated.shape
-    origins, ranks = np.empty((n_points, size), np.int32), np.empty((n_points, size), np.int32)
+    origins = np.empty((n_points, size), np.int32)
+    ranks = np.empty((n_points, size), np.int32)
     weights = np.empty((n_points, size), np.float64)
     for i in prange(n_points):
-        distances, rank, weight = np.empty(size), np.zeros(size, np.int32), np.zeros(size + 1)
+        distances = np.empty(size)
+        rank = np.zeros(size, np.int32)
+        weight = np.zeros(size + 1)
         excess = 0
         for j in range(size):
             steps = np.rint(elevated[i, j] * (1 / size))
@@ -88,19 +92,25 @@ def responses(simplices, ranks, neighbours):
         From the row's corner to the column's corner.
     """
     n_simplices, size = simplices.shape
-    alive = survivors(neighbours, FORWARD), survivors(neighbours, BACKWARD)
+    alive_forward = survivors(neighbours, FORWARD)
+    alive_backward = survivors(neighbours, BACKWARD)
     response = np.zeros((n_simplices, size, size), np.float32)
     for s in prange(n_simplices):
         direction = np.empty(2 * size, np.int32)  # twice, since corner 0 follows corner d
         for j in range(size):
             direction[ranks[s, j]] = direction[ranks[s, j] + size] = j
         for a in range(size):
-            forward, backward = alive[FORWARD][simplices[s, a]], alive[BACKWARD][simplices[s, a]]
+            forward = alive_forward[simplices[s, a]]
+            backward = alive_backward[simplices[s, a]]
             weight = np.float32(0.5) ** size
             response[s, a, a] += weight  # no step at all
-            above, below, steps_forward, steps_backward = a, a, 0, 0
+            above = a
+            below = a
+            steps_forward = 0
+            steps_backward = 0
             for steps in range(1, size + 1):
-                above, below = (above + 1 if above < size - 1 else 0), (below - 1 if below > 0 else size - 1)
+                above = above + 1 if above < size - 1 else 0
+                below = below - 1 if below > 0 else size - 1
                 steps_forward |= 1 << direction[2 * size - a - steps]
                 steps_backward |= 1 << direction[size - a + steps - 1]
                 weight *= HALF
@@ -157,7 +167,8 @@ def self_responses(members, weights, response):
     """
     diagonal = np.empty(len(members), np.float32)
     for i in prange(len(members)):
-        weight, returned = weights[i], 0.0
+        weight = weights[i]
+        returned = 0.0
         for a in range(len(weight)):
             reached = 0.0
             for b in range(len(weight)):

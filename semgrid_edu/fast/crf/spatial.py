@@ -6,9 +6,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from semgrid_edu.crf.kernel import gaussian
 from semgrid_edu.crf.params import NARROWEST
-from semgrid_edu.fast.crf.arithmetic import FAST
+from semgrid_edu.fast.crf import FAST
 
 
 @dataclass(frozen=True)
@@ -46,8 +45,9 @@ class SeparableGaussian:
         """
         sigma = max(sigma, NARROWEST)
         reach = int(min(np.ceil(5 * sigma), max(shape) - 1))
-        taps = gaussian((np.arange(reach + 1) / sigma) ** 2)
-        row_scale, column_scale = np.ones(shape[0]), np.ones(shape[1])
+        taps = np.exp(-((np.arange(reach + 1) / sigma) ** 2) / 2)
+        row_scale = np.ones(shape[0])
+        column_scale = np.ones(shape[1])
         if normalization == "symmetric":
             row_scale, column_scale = (1 / np.sqrt(_row_sums(size, sigma)) for size in shape)
         row_scale = row_scale * np.sqrt(weight)
@@ -84,7 +84,7 @@ class SeparableGaussian:
 
 def _row_sums(size: int, sigma: float) -> NDArray[np.float64]:
     """Return the row sums of the Gaussian between all cells of one axis, (size,)."""
-    to_one_side = np.cumsum(gaussian((np.arange(size) / sigma) ** 2))
+    to_one_side = np.cumsum(np.exp(-((np.arange(size) / sigma) ** 2) / 2))
     return to_one_side + to_one_side[::-1] - 1
 
 
@@ -95,7 +95,8 @@ def _convolve(values, lanes, taps, row_scale, column_scale, out):
 
     The number of taps is even, and the first one is half of what it should be, since it is added forward and backward.
     """
-    length, margin = values.shape[1], (len(taps) - 1) * lanes
+    length = values.shape[1]
+    margin = (len(taps) - 1) * lanes
     for r in prange(len(values)):
         padded = np.zeros(length + 2 * margin, np.float32)  # zeros beyond the ends of the row
         row = padded[margin : margin + length]
@@ -110,12 +111,17 @@ def _convolve(values, lanes, taps, row_scale, column_scale, out):
 @njit(cache=True, fastmath=FAST, inline="always")
 def _add_rows(values, r, taps, row_scale, total):
     """Add up rows around row r; rows beyond the grid have scale 0."""
-    last, middle = len(values) - 1, len(taps) + r
+    last = len(values) - 1
+    middle = len(taps) + r
     for t in range(0, len(taps), 2):
-        a, b = values[max(r - t, 0)], values[min(r + t, last)]
-        c, d = values[max(r - t - 1, 0)], values[min(r + t + 1, last)]
-        w_a, w_b = taps[t] * row_scale[middle - t], taps[t] * row_scale[middle + t]
-        w_c, w_d = taps[t + 1] * row_scale[middle - t - 1], taps[t + 1] * row_scale[middle + t + 1]
+        a = values[max(r - t, 0)]
+        b = values[min(r + t, last)]
+        c = values[max(r - t - 1, 0)]
+        d = values[min(r + t + 1, last)]
+        w_a = taps[t] * row_scale[middle - t]
+        w_b = taps[t] * row_scale[middle + t]
+        w_c = taps[t + 1] * row_scale[middle - t - 1]
+        w_d = taps[t + 1] * row_scale[middle + t + 1]
         for n in range(len(total)):
             total[n] = total[n] + w_a * a[n] + w_b * b[n] + w_c * c[n] + w_d * d[n]
 
@@ -124,8 +130,11 @@ def _add_rows(values, r, taps, row_scale, total):
 def _add_neighbours(padded, lanes, taps, total):
     """Add up the neighbours on the left and right in a padded row."""
     for t in range(0, len(taps), 2):
-        left, right = padded[(len(taps) - 1 - t) * lanes :], padded[(len(taps) - 1 + t) * lanes :]
-        left_2, right_2 = padded[(len(taps) - 2 - t) * lanes :], padded[(len(taps) + t) * lanes :]
-        w, w_2 = taps[t], taps[t + 1]
+        left = padded[(len(taps) - 1 - t) * lanes :]
+        right = padded[(len(taps) - 1 + t) * lanes :]
+        left_2 = padded[(len(taps) - 2 - t) * lanes :]
+        right_2 = padded[(len(taps) + t) * lanes :]
+        w = taps[t]
+        w_2 = taps[t + 1]
         for n in range(len(total)):
             total[n] = total[n] + w * (left[n] + right[n]) + w_2 * (left_2[n] + right_2[n])

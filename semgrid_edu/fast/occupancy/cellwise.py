@@ -29,7 +29,8 @@ def renormalise(probability, claimed):
     factor : (H, W) float32
         Factor of the weights of the cell's particles.
     """
-    shared, factor = np.empty_like(probability), np.empty_like(claimed)
+    shared = np.empty_like(probability)
+    factor = np.empty_like(claimed)
     for r in range(claimed.shape[0]):
         for c in range(claimed.shape[1]):
             dynamic = min(claimed[r, c], np.float32(1))
@@ -65,9 +66,10 @@ def mix(probability, newborn, going, M):
     newborn : (H, W) float32
         The part of P(DYNAMIC) that no particle carries, including what the other states turned into DYNAMIC.
     """
-    mixed, born = np.empty_like(probability), np.empty_like(newborn)
+    mixed = np.empty_like(probability)
+    born = np.empty_like(newborn)
     for j in range(4):  # outermost, so that the compiler vectorises over cells: four times as fast
-        from_free, from_static, from_dynamic, from_unknown = M[FREE, j], M[STATIC, j], M[DYNAMIC, j], M[UNKNOWN, j]
+        from_free, from_static, from_dynamic, from_unknown = M[:, j]
         for r in range(newborn.shape[0]):
             for c in range(newborn.shape[1]):
                 others = from_free * probability[FREE, r, c] + from_static * probability[STATIC, r, c]
@@ -101,16 +103,20 @@ def open_space(mixed):
     (2, H, W) float32
         P(FREE) + P(DYNAMIC); and the same with P(FREE) times (1 - the largest P(STATIC) of the four neighbours).
     """
-    room, (height, width) = np.empty((2, *mixed.shape[1:]), np.float32), mixed.shape[1:]
+    height, width = mixed.shape[1:]
+    room = np.empty((2, height, width), np.float32)
     for r in range(height):
         for c in range(width):
-            free, dynamic, beside = mixed[FREE, r, c], mixed[DYNAMIC, r, c], np.float32(0)
+            free = mixed[FREE, r, c]
+            dynamic = mixed[DYNAMIC, r, c]
+            beside = np.float32(0)
             if free > 0:
                 beside = max(beside, mixed[STATIC, r - 1, c] if r > 0 else beside)
                 beside = max(beside, mixed[STATIC, r + 1, c] if r + 1 < height else beside)
                 beside = max(beside, mixed[STATIC, r, c - 1] if c > 0 else beside)
                 beside = max(beside, mixed[STATIC, r, c + 1] if c + 1 < width else beside)
-            room[0, r, c], room[1, r, c] = free + dynamic, (1 - beside) * free + dynamic
+            room[0, r, c] = free + dynamic
+            room[1, r, c] = (1 - beside) * free + dynamic
     return room
 
 
@@ -143,23 +149,27 @@ def collide(mixed, newborn, going, stays, arrives, doubtful):
     less : (2, H, W) float32
         By how much these factors are smaller for the doubtful part of a weight; 0 for particles that stay.
     """
-    probability, born = np.empty_like(mixed), np.empty_like(newborn)
-    factor, less = np.empty((2, *newborn.shape), np.float32), np.zeros((2, *newborn.shape), np.float32)
+    probability = np.empty_like(mixed)
+    born = np.empty_like(newborn)
+    factor = np.empty((2, *newborn.shape), np.float32)
+    less = np.zeros((2, *newborn.shape), np.float32)
     for r in range(newborn.shape[0]):
         for c in range(newborn.shape[1]):
-            static, claim = mixed[STATIC, r, c], min(arrives[r, c], CERTAIN)
+            static = mixed[STATIC, r, c]
+            claim = min(arrives[r, c], CERTAIN)
             vacated = going[r, c] - stays[r, c]
             unseen = mixed[UNKNOWN, r, c] + vacated
             share = claim / arrives[r, c] if arrives[r, c] > 0 else 0.0
             struck = share * doubtful[r, c] * unseen
             consistent = 1 - claim * static - struck
-            own, arrived = (1 - claim) / consistent, max(claim * (1 - static) - struck, 0.0) / consistent
-            probability[FREE, r, c] = own * (mixed[FREE, r, c] + vacated)
-            probability[STATIC, r, c] = own * static
-            probability[DYNAMIC, r, c] = own * (newborn[r, c] + stays[r, c]) + arrived
-            probability[UNKNOWN, r, c] = own * mixed[UNKNOWN, r, c]
-            born[r, c] = own * newborn[r, c]
-            factor[0, r, c] = own
+            keep = (1 - claim) / consistent
+            arrived = max(claim * (1 - static) - struck, 0.0) / consistent
+            probability[FREE, r, c] = keep * (mixed[FREE, r, c] + vacated)
+            probability[STATIC, r, c] = keep * static
+            probability[DYNAMIC, r, c] = keep * (newborn[r, c] + stays[r, c]) + arrived
+            probability[UNKNOWN, r, c] = keep * mixed[UNKNOWN, r, c]
+            born[r, c] = keep * newborn[r, c]
+            factor[0, r, c] = keep
             factor[1, r, c] = share * (1 - static) / consistent
             less[1, r, c] = share * unseen / consistent
     return probability, born, factor, less
@@ -183,7 +193,8 @@ def bayes(prior, occupied, free):
     factor : (H, W) float64
         P(DYNAMIC | z) / P(DYNAMIC), the factor of the weights of the cell's particles.
     """
-    posterior, factor = np.empty_like(prior), np.empty(prior.shape[1:])
+    posterior = np.empty_like(prior)
+    factor = np.empty(prior.shape[1:])
     for r in range(prior.shape[1]):
         for c in range(prior.shape[2]):
             best = max(occupied[r, c], free[r, c])  # scale so that the better explanation is 1, however small both are
@@ -224,7 +235,8 @@ def clear_wakes(probability, left, hidden):
     cleared = probability.copy()
     for r in range(left.shape[0]):
         for c in range(left.shape[1]):
-            static, gone = probability[STATIC, r, c], min(left[r, c], CERTAIN) if hidden[r, c] else 0.0
+            static = probability[STATIC, r, c]
+            gone = min(left[r, c], CERTAIN) if hidden[r, c] else 0.0
             cleared[STATIC, r, c] = (1 - gone) * static / (1 - gone * static)
             cleared[FREE, r, c] += static - cleared[STATIC, r, c]
     return cleared
@@ -248,7 +260,8 @@ def rescale_weights(probability, carried):
     factor : (H, W) float64
         Factor of the weights of the cell's particles.
     """
-    represented, factor = probability.copy(), np.empty(carried.shape)
+    represented = probability.copy()
+    factor = np.empty(carried.shape)
     for r in range(carried.shape[0]):
         for c in range(carried.shape[1]):
             dynamic = np.float64(probability[DYNAMIC, r, c])

@@ -1,23 +1,27 @@
 """CMCDOT with compiled steps; another core computes the evidence of the scan at the same time."""
 
+import math
 from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.fast.occupancy._runtime import keep_memory, on_another_core, undo_after_errors
-from semgrid_edu.fast.occupancy.local_belief import local_belief, observe, velocity_moments
-from semgrid_edu.fast.occupancy.particles import cells_of, transform
-from semgrid_edu.fast.occupancy.planar_motion import look_up
+from semgrid_edu.fast.allocator import keep_step_memory
+from semgrid_edu.fast.occupancy.cells import look_up
+from semgrid_edu.fast.occupancy.particles import cells_of
+from semgrid_edu.fast.occupancy.sensor import compiled_twin
 from semgrid_edu.fast.occupancy.steps import move, predict, resample, update
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import cmcdot
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, scroll
-from semgrid_edu.occupancy.state import Belief, FilterState, Particles
+from semgrid_edu.occupancy.evidence import Observation, observe
+from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, scroll, turn_moments
+from semgrid_edu.occupancy.state import OUTSIDE, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
-from semgrid_edu.occupancy.world import CmcdotParams
+from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
 
 
 class Cmcdot(cmcdot.Cmcdot):
@@ -35,27 +39,34 @@ class Cmcdot(cmcdot.Cmcdot):
         keep_steps: bool = False,
     ) -> None:
         super().__init__(spec, params, seed, keep_steps)
-        keep_memory()
-
-    @property
-    def particles(self) -> Particles:
-        """The particles in the grid frame of the vehicle. Some are outside the grid, in the margin of the map."""
-        return transform(self._state.particles, self._pose)
+        keep_step_memory()
 
     def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> Belief:
         """Process one scan. Parameters, result and errors are those of `Cmcdot.step`."""
         shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
-        scan = observe, self.params.sensor, points_grid, pose, self.map_spec, self.spec  # called on another core below
         steps: dict[str, NDArray[np.float32]] = {}
-        with undo_after_errors(self._rng), on_another_core(*scan) as seen:
-            # One name for all intermediate states, so that the memory of each is freed and reused.
-            state = self._noted(steps, "move", move(self._state, self.map_spec, shift), pose)
-            state = predict(state, self.map_spec, self.params, dt, self._rng, motion.dx)
-            state = self._noted(steps, "predict", state, pose)
-            predicted = state.probability
-            state = self._noted(steps, "update", update(state, self.map_spec, seen.result().on_map, self.params), pose)
-            state = self._noted(steps, "resample", resample(state, self.map_spec, self.params, self._rng), pose)
-        self._state, self._pose = state, pose
+        generator = self._rng.bit_generator.state
+        try:
+            # Evidence doesn't depend on `move` and `predict`, and takes about as long. Compiled loops release Python's
+            # lock, so a thread is enough to use two cores.
+            with ThreadPoolExecutor(1) as thread:
+                sensor = compiled_twin(self.params.sensor)
+                seen = thread.submit(observe, sensor, points_grid, pose, self.map_spec, self.spec)
+                # One name for all intermediate states, so that the memory of each is freed and reused.
+                state = self._noted(steps, "move", move(self._state, self.map_spec, shift), pose)
+                state = predict(state, self.map_spec, self.params, dt, self._rng, motion.dx)
+                state = self._noted(steps, "predict", state, pose)
+                predicted = state.probability
+                state = update(state, self.map_spec, seen.result().on_map, self.params)
+                state = self._noted(steps, "update", state, pose)
+                state = resample(state, self.map_spec, self.params, self._rng)
+                state = self._noted(steps, "resample", state, pose)
+        except BaseException:
+            # `predict` has drawn already when a sensor or a resampling fails. A drive that goes on should be the same.
+            self._rng.bit_generator.state = generator
+            raise
+        self._state = state
+        self._pose = pose
         cells = cells_of(state.particles.position, self.map_spec)
         velocity = velocity_moments(state.particles, cells, self.map_spec.shape)
         belief = local_belief(predicted, velocity, seen.result(), self.map_spec, self.spec, self.params)
@@ -88,3 +99,68 @@ def track_drive(
     tracker = DriveTracker(spec, params, seed, keep_steps)
     for frame in frames:
         yield tracker.step(frame)
+
+
+def local_belief(
+    predicted: NDArray,
+    velocity: tuple[NDArray, NDArray],
+    seen: Observation,
+    map_spec: GridSpec,
+    spec: GridSpec,
+    world: WorldModel,
+) -> Belief:
+    """Look up the map at the vehicle's cells and update them. Parameters are those of `local_belief`."""
+    here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, seen.pose)
+    prior = FilterState(here, Particles.none(), np.zeros(spec.shape, np.float32))
+    probability = update(prior, spec, seen.in_grid, world).probability
+    mean, covariance = velocity
+    moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)])
+    moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, seen.pose)
+    moments[:, probability[State.DYNAMIC] == 0] = np.nan
+    return Belief(probability, *turn_moments(moments[:2], moments[2:].reshape(2, 2, *spec.shape), seen.pose))
+
+
+def velocity_moments(
+    particles: Particles, cells: NDArray, shape: tuple[int, int]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return mean and covariance of the velocities in each cell, weighted by the weights of the particles.
+
+    Parameters and result are those of `velocity_moments`; the result is float32.
+    """
+    mean, covariance = _moments(particles.velocity, particles.weight, cells, math.prod(shape))
+    return mean.reshape(2, *shape), covariance.reshape(2, 2, *shape)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _moments(velocity, weight, cells, n_cells):
+    """Sum in double precision, in two passes: the covariance from differences to the mean, to keep its digits."""
+    first = np.zeros((n_cells, 3))
+    second = np.zeros((n_cells, 3))
+    for i in range(len(cells)):
+        c = cells[i]
+        if c != OUTSIDE:
+            w = np.float64(weight[i])
+            first[c, 0] += w
+            first[c, 1] += w * velocity[i, 0]
+            first[c, 2] += w * velocity[i, 1]
+    for c in range(n_cells):
+        first[c, 1] /= first[c, 0]
+        first[c, 2] /= first[c, 0]
+    for i in range(len(cells)):
+        c = cells[i]
+        if c != OUTSIDE:
+            x = velocity[i, 0] - first[c, 1]
+            y = velocity[i, 1] - first[c, 2]
+            second[c, 0] += weight[i] * x * x
+            second[c, 1] += weight[i] * x * y
+            second[c, 2] += weight[i] * y * y
+    mean = np.empty((2, n_cells), np.float32)
+    covariance = np.empty((2, 2, n_cells), np.float32)
+    for c in range(n_cells):
+        mean[0, c] = first[c, 1]
+        mean[1, c] = first[c, 2]
+        covariance[0, 0, c] = second[c, 0] / first[c, 0]
+        covariance[0, 1, c] = second[c, 1] / first[c, 0]
+        covariance[1, 0, c] = covariance[0, 1, c]
+        covariance[1, 1, c] = second[c, 2] / first[c, 0]
+    return mean, covariance

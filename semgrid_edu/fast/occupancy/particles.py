@@ -5,7 +5,6 @@ contiguous and vectorises over particles.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -20,46 +19,6 @@ from semgrid_edu.occupancy.walls import Walls
 
 SLOW = np.float32(16)
 """exp(-16) is negligible beside 1 in single precision, so smaller exponentials needn't be computed."""
-
-
-class Pace(NamedTuple):
-    """How fast the vehicle drives, and which particles can keep pace with it.
-
-    Parameters
-    ----------
-    speed : float
-        Speed of the vehicle along the x axis of the map, m/s, negative backwards.
-    least : float
-        The least speed at which something has left its cells after `halt`, m/s. Slower things can't keep pace.
-    halt : float
-        How long ago a particle's past position is checked a second time, seconds.
-    """
-
-    speed: float
-    least: float
-    halt: float
-
-    @property
-    def matters(self) -> bool:
-        """Whether anything can keep pace: nothing can if the vehicle is stopped or crawls."""
-        return 2 * abs(self.speed) >= self.least and self.speed != 0
-
-
-def pace_of(walls: Walls, driven: float, dt: float, cell: float) -> Pace:
-    """Return how fast the vehicle drives, and which particles can keep pace with it.
-
-    Parameters
-    ----------
-    walls : Walls
-        How far the filter looks back.
-    driven, dt : float
-        How far the vehicle has driven, metres, and in what time, seconds.
-    cell : float
-        Side of a cell, metres.
-    """
-    halt = walls.second_look * walls.clearing_time
-    least = walls.clearing_cells * cell / halt if halt > 0 else np.inf
-    return Pace(float(driven) / dt if dt > 0 else 0.0, float(least), halt)
 
 
 def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int32]:
@@ -109,7 +68,8 @@ def scale_in_cells(weight: NDArray, cells: NDArray, factor: NDArray) -> NDArray[
     factor : (H, W) or (2, H, W) float
         The factor of each cell.
     """
-    scaled, flat = np.zeros(len(weight), np.float32), factor.ravel()
+    scaled = np.zeros(len(weight), np.float32)
+    flat = factor.ravel()
     for i in range(len(weight)):
         if cells[i] != OUTSIDE:
             scaled[i] = weight[i] * flat[cells[i]]
@@ -169,68 +129,87 @@ def cells_at(particles: Particles, cells: NDArray, spec: GridSpec, time: float, 
 def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
     there = np.empty(len(cells), np.int32)
     for i in range(len(cells)):
-        vx, vy = velocity[2 * i], velocity[2 * i + 1]
+        vx = velocity[2 * i]
+        vy = velocity[2 * i + 1]
         speed = math.sqrt(vx * vx + vy * vy)
         stretch = max(np.float32(1), least / (abs(time) * speed)) if time * speed != 0 else np.float32(0)
-        x, y = xy[2 * i] + stretch * time * vx, xy[2 * i + 1] + stretch * time * vy
+        x = xy[2 * i] + stretch * time * vx
+        y = xy[2 * i + 1] + stretch * time * vy
         then = cell_of(x, y, shape, x_max, y_max, cell)
         there[i] = then if then != cells[i] else OUTSIDE
     return there
 
 
-def keeps_pace(vx: NDArray, vy: NDArray, pace: Pace) -> NDArray[np.bool_]:
-    """Return which velocities differ from the vehicle's by at most the vehicle's speed, (N,).
-
-    A static thing differs by exactly this much.
+@njit(cache=True, nogil=True)
+def keeps_pace(vx, vy, car_speed, least):
+    """Return whether a particle moves at the vehicle's speed: its velocity differs by at most that speed.
 
     Parameters
     ----------
-    vx, vy : (N,) float
-        Velocities along the axes of the map, m/s; in compiled loops those of one particle.
-    pace : Pace
-        How fast the vehicle drives, and the least speed that counts. Nothing keeps pace with a stopped vehicle.
+    vx, vy : float
+        Velocity along the axes of the map, m/s. A static thing, seen from the vehicle, differs by exactly its speed.
+    car_speed : float
+        Speed of the vehicle along the x axis of the map, m/s, negative backwards. Nothing keeps pace when it is 0.
+    least : float
+        The least speed at which something leaves its cells soon enough, m/s. Slower things don't keep pace.
     """
-    slip, speed = (vx - pace.speed) ** 2 + vy**2, vx**2 + vy**2
-    return (slip <= pace.speed**2) & (speed >= pace.least**2) & (pace.speed != 0)
-
-
-_keeps_pace = njit(cache=True, nogil=True)(keeps_pace)
+    slip_squared = (vx - car_speed) ** 2 + vy**2
+    speed_squared = vx**2 + vy**2
+    return (slip_squared <= car_speed**2) & (speed_squared >= least**2) & (car_speed != 0)
 
 
 def doubt_arrivals(
-    particles: Particles, cells: NDArray, doubt: NDArray, ahead: NDArray, mixed: NDArray, spec: GridSpec, pace: Pace
+    particles: Particles,
+    cells: NDArray,
+    doubt: NDArray,
+    mixed: NDArray,
+    spec: GridSpec,
+    walls: Walls,
+    car_speed: float,
 ) -> NDArray[np.float32]:
-    """Return the part of each weight that comes out of a wall and moves along it at the vehicle's pace, (N,).
+    """Return the part of each weight that comes out of a wall and moves along it, (N,).
 
     Parameters
     ----------
     particles : Particles
         N particles after their flight.
-    cells, ahead : (N,) int32
-        The cell that each is in now, from `cells_of`, and will be in, from `cells_at`.
+    cells : (N,) int32
+        The cell that each is in now, from `cells_of`.
     doubt : (N,) float32
         The part of each weight that comes out of a wall, judged by its origin alone.
     mixed : (4, H, W) float32
         The four states before particles flew.
     spec : GridSpec
         The cells, (H, W).
-    pace : Pace
-        How fast the vehicle drives.
+    walls : Walls
+        How far the filter looks ahead and back.
+    car_speed : float
+        Speed of the vehicle along the x axis of the map, m/s.
     """
+    ahead = cells_at(particles, cells, spec, walls.clearing_time, walls.clearing_cells)
+    since = float(walls.second_look * walls.clearing_time)
+    least = walls.clearing_cells * spec.cell / since if since > 0 else np.inf
     now = particles.position.ravel(), particles.velocity.ravel(), particles.weight, cells
-    return _doubt_arrivals(*now, doubt, ahead, mixed[STATIC], open_space(mixed), pace, spec.shape, *spec.corner)
+    fields = doubt, ahead, mixed[STATIC], open_space(mixed)
+    return _doubt_arrivals(*now, *fields, float(car_speed), float(least), since, spec.shape, *spec.corner)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _doubt_arrivals(xy, velocity, weight, cells, doubt, ahead, static, room, pace, shape, x_max, y_max, cell):
-    doubted, standing, rooms = np.empty_like(doubt), static.ravel(), room.reshape(2, -1)
+def _doubt_arrivals(
+    xy, velocity, weight, cells, doubt, ahead, static, room, car_speed, least, since, shape, x_max, y_max, cell
+):
+    doubted = np.empty_like(doubt)
+    standing = static.ravel()
+    rooms = room.reshape(2, -1)
     for i in range(len(cells)):
-        vx, vy, solid = velocity[2 * i], velocity[2 * i + 1], doubt[i]
-        keeps = _keeps_pace(vx, vy, pace)
+        vx = velocity[2 * i]
+        vy = velocity[2 * i + 1]
+        solid = doubt[i]
+        keeps = keeps_pace(vx, vy, car_speed, least)
         if keeps:
-            halt = cell_of(xy[2 * i] - pace.halt * vx, xy[2 * i + 1] - pace.halt * vy, shape, x_max, y_max, cell)
-            if halt != OUTSIDE and halt != cells[i]:
-                solid = max(solid, weight[i] * standing[halt])
+            before = cell_of(xy[2 * i] - since * vx, xy[2 * i + 1] - since * vy, shape, x_max, y_max, cell)
+            if before != OUTSIDE and before != cells[i]:
+                solid = max(solid, weight[i] * standing[before])
         doubted[i] = solid - solid * rooms[int(keeps), ahead[i]] if ahead[i] != OUTSIDE else solid
     return doubted
 
@@ -246,8 +225,10 @@ def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random
 
 @njit(cache=True, nogil=True)
 def _fly(position, velocity, noise, max_change, dt):
-    flown, faster = np.empty_like(position), np.empty_like(velocity)
-    half, two = np.float32(0.5), np.float32(2)
+    flown = np.empty_like(position)
+    faster = np.empty_like(velocity)
+    half = np.float32(0.5)
+    two = np.float32(2)
     for i in range(len(position)):
         change = (two * noise[i] - np.float32(1)) * max_change
         flown[i] = position[i] + (velocity[i] + half * change) * dt
@@ -257,7 +238,8 @@ def _fly(position, velocity, noise, max_change, dt):
 
 def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: float) -> Particles:
     """Reduce each weight to the share that keeps moving. Parameters are those of `slow_down`."""
-    stops, scale = np.float32(stop_rate * dt), np.float32(0.5 / stop_speed**2)
+    stops = np.float32(stop_rate * dt)
+    scale = np.float32(0.5 / stop_speed**2)
     weight = _slow_down(particles.velocity, particles.weight, stops, scale)
     return Particles(particles.position, particles.velocity, weight)
 
@@ -283,9 +265,15 @@ def transform(particles: Particles, motion: PlanarMotion) -> Particles:
 
 @njit(cache=True, nogil=True)
 def _transform(position, velocity, dx, dy, cos, sin):
-    moved, turned = np.empty_like(position), np.empty_like(velocity)
+    moved = np.empty_like(position)
+    turned = np.empty_like(velocity)
     for i in range(0, len(position), 2):
-        x, y, vx, vy = position[i] - dx, position[i + 1] - dy, velocity[i], velocity[i + 1]
-        moved[i], moved[i + 1] = cos * x + sin * y, cos * y - sin * x
-        turned[i], turned[i + 1] = cos * vx + sin * vy, cos * vy - sin * vx
+        x = position[i] - dx
+        y = position[i + 1] - dy
+        vx = velocity[i]
+        vy = velocity[i + 1]
+        moved[i] = cos * x + sin * y
+        moved[i + 1] = cos * y - sin * x
+        turned[i] = cos * vx + sin * vy
+        turned[i + 1] = cos * vy - sin * vx
     return moved, turned

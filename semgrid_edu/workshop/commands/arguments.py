@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # a command that needs no drive starts faster without numpy
 LARGEST = 2**63 - 1
 """The largest integer that a command accepts, because PyTorch's generators accept no larger seed."""
 
-TOLD = 20
+SHOWN_DOUBTS = 20
 """Largest number of doubts of a kind that are shown one by one."""
 
 
@@ -96,10 +96,10 @@ def tell(doubts: Iterable[str]) -> None:
         Doubts from `drive_doubts`, `dataset_doubts` or `weights_doubts`.
     """
     doubts = list(doubts) if os.environ.get("RANK", "0") == "0" else []
-    for doubt in doubts[:TOLD]:
+    for doubt in doubts[:SHOWN_DOUBTS]:
         typer.echo(f"semgrid-edu: doubtful: {doubt}", err=True)
-    if len(doubts) > TOLD:
-        typer.echo(f"semgrid-edu: doubtful: and {len(doubts) - TOLD} more", err=True)
+    if len(doubts) > SHOWN_DOUBTS:
+        typer.echo(f"semgrid-edu: doubtful: and {len(doubts) - SHOWN_DOUBTS} more", err=True)
 
 
 def chosen_drive(kitti: dict[str, object], pandaset: dict[str, object], camera: str | None) -> "FrameSequence | None":

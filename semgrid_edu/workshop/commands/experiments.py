@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import semgrid_edu.workshop.paper
-from semgrid_edu.storage.files import check_ours, table_beside, write_json
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.commands.arguments import Commands
 
 reproduce = typer.Typer(cls=Commands, no_args_is_help=True, help="Run the experiments of the paper.")
@@ -26,34 +26,6 @@ def check(
 
     if not check_results(folder, typer.echo):
         raise typer.Exit(1)
-
-
-def keep_result(
-    out: Path,
-    compute: Callable[[], dict],
-    table: Callable[[dict], str],
-    goes_on: bool = False,
-    force: bool | None = None,
-) -> None:
-    """Compute an experiment's result, once it is known that the file can be written; write it, and print its table.
-
-    Parameters
-    ----------
-    out : Path
-        The file to write, as JSON.
-    compute : callable
-        Returns the result.
-    table : callable
-        Turns the result into text to print.
-    goes_on : bool
-        Whether `compute` resumes from the file, and so checks it itself.
-    force : bool, optional
-        Whether to replace the file of something else, see `check_ours`.
-    """
-    check_ours("" if goes_on else f'"command": "{Commands.asked} ', out, force=force)
-    result = compute()
-    write_json(out, result)
-    typer.echo(f"{table(result)}\n\nwritten to {out}")
 
 
 PAPER = {name: row["help"] for name, row in table_beside(semgrid_edu.workshop.paper.__file__, "experiments").items()}

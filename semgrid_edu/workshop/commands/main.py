@@ -16,7 +16,7 @@ from semgrid_edu.storage.files import CACHE_VARIABLE
 from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
-from semgrid_edu.workshop.commands.experiments import keep_result, reproduce
+from semgrid_edu.workshop.commands.experiments import reproduce
 
 app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was interrupted, if there is one.")]
@@ -169,7 +169,7 @@ def evaluate(
 ) -> None:
     """Score a trained network and the baselines on the test frames."""
     from semgrid_edu.networks.weights import weights_doubts
-    from semgrid_edu.storage.files import check_ours
+    from semgrid_edu.storage.files import check_ours, write_json
     from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
     from semgrid_edu.workshop.scoring.confusions import confusion_key, distance_band_names
     from semgrid_edu.workshop.scoring.evaluate import evaluate, scores_table
@@ -178,12 +178,11 @@ def evaluate(
         raise ArgumentError("--confusions", "a file that ends in .npz", confusions)
     if confusions:
         check_ours(confusion_key("network", "true", distance_band_names()[0]), confusions, force=force)
-
-    def scored() -> dict:
-        tell(dataset_doubts(data, "train", "test") + weights_doubts(weights))
-        return evaluate(data, weights, confusions_file=confusions)
-
-    keep_result(out, scored, lambda result: scores_table(result["scores"], result["intervals"]), force=force)
+    check_ours(f'"command": "{Commands.asked} ', out, force=force)
+    tell(dataset_doubts(data, "train", "test") + weights_doubts(weights))
+    result = evaluate(data, weights, confusions_file=confusions)
+    write_json(out, result)
+    typer.echo(f"{scores_table(result['scores'], result['intervals'])}\n\nwritten to {out}")
 
 
 def run() -> None:

@@ -13,7 +13,7 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import N_STATES
 
-AT_ONCE = 8
+CHUNK = 8
 """How many groups of inputs pass through the network together: more would take more memory and no less time."""
 
 
@@ -123,12 +123,12 @@ def contributions(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> 
         warnings.simplefilter("ignore")  # torch warns about max_unpool2d under vmap, and about its own code
         reduced = reduce(planes)
         inputs = joined(reduced, o).contiguous(memory_format=torch.channels_last)
-        of_planes = vmap(change_of_reduced, chunk_size=AT_ONCE)(_plane_groups(*planes.shape[1:3]))
+        of_planes = vmap(change_of_reduced, chunk_size=CHUNK)(_plane_groups(*planes.shape[1:3]))
         changes = [(change, torch.zeros_like(o)) for change in of_planes]
         changes += [(torch.zeros_like(reduced), _only(o, state)) for state in range(N_STATES)]
         changes = torch.cat([jvp(joined, (reduced, o), change)[1] for change in changes])
         changes = changes.contiguous(memory_format=torch.channels_last)  # vmap can't change the layout itself
-        parts = vmap(change_of_logits, chunk_size=AT_ONCE)(changes[:, None]).numpy()
+        parts = vmap(change_of_logits, chunk_size=CHUNK)(changes[:, None]).numpy()
         logits = last_layers(inputs)[0].numpy()
     n_scores, n_planes = planes.shape[1:3]
     return Contributions(logits, *np.split(parts, [n_planes, n_planes + n_scores]))

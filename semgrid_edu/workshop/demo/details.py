@@ -17,11 +17,14 @@ from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.planes import plane_pixels
 from semgrid_edu.plotting import STATE_COLOURS
-from semgrid_edu.workshop.demo.all_cells import frame_story
+from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.demo.contributions import Contributions
 from semgrid_edu.workshop.demo.evidence import VERDICTS, Sight
+from semgrid_edu.workshop.demo.stories import frame_story
 from semgrid_edu.workshop.demo.what_if import CHANGES, FAULTS
-from semgrid_edu.workshop.demo.words import SENTENCES
+
+SENTENCES = table_beside(__file__, "words")
+"""The sentences of a story by part and case; the page's script fills in the names in braces."""
 
 STEPS = {"part": 0.1, "reach": 0.5, "distance": 0.1, "pixel": 1 / 32, "message": 0.1}
 """The steps to which numbers are rounded: parts of a score, metres, pixels, and what neighbours add.
@@ -118,7 +121,7 @@ def frame_details(result: FrameResult, net: SemanticGridNet, past: Sequence[tupl
 
 
 def _memory(remembered: NDArray, sight: Sight, earlier: int) -> NDArray[np.uint8]:
-    """Return the numbers of `CellMemory`, in per cent and tenths of a second: kept, sure, known, then, ago, earlier."""
+    """Return class and per cent; frames since the last sight + 1, its class and tenths of a second; frames searched."""
     label = remembered.argmax(axis=0)
     probability = 100 * remembered.max(axis=0)
     numbers = [label, probability, sight.back + 1, sight.label, 10 * sight.seconds, np.full(label.shape, earlier)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, colour_legend
 from semgrid_edu.plotting.images import draw_image
-from semgrid_edu.workshop.demo.one_cell import CellStory
+from semgrid_edu.workshop.demo.stories import CellStory
 
 FOR, AGAINST = "#6a1b9a", "#d9902f"
 """Colours of parts that raise the score of a class and of those that lower it."""

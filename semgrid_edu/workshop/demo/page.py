@@ -13,9 +13,9 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.occupancy.cmcdot import LIDAR_PERIOD
 from semgrid_edu.plotting import DEPTH_RANGE, STATE_COLOURS, STATE_NAMES, depth_colours
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.demo.comparison import STAGE_WORDS, Comparison
 from semgrid_edu.workshop.demo.pictures import grid_svg
 from semgrid_edu.workshop.demo.record import YOURS, FrameView, Record
+from semgrid_edu.workshop.demo.stages_file import STAGE_WORDS, Comparison
 
 SCAN_MILLISECONDS = 1000 * LIDAR_PERIOD
 """Time from one scan of KITTI's LIDAR to the next, ms."""
@@ -57,7 +57,7 @@ def page_html(
     title: str,
     camera: Camera,
     network_size: tuple[int, int],
-    story: dict[str, object] | None = None,
+    story: dict[str, object],
     choice: str = "",
     broken: str = "",
     expected: str = "",
@@ -76,8 +76,8 @@ def page_html(
         The camera at the size of the drive's images.
     network_size : (int, int)
         Height and width of the image that the network sees, pixels.
-    story : dict of str to object, optional
-        `story_data`; without it, the page tells no stories of cells.
+    story : dict of str to object
+        `story_data`.
     choice : str
         Which frames of the drive are shown, from `ChosenFrames.told`.
     broken : str
@@ -107,11 +107,8 @@ def page_html(
         "page.html",
         title=escape(f"semgrid_edu: {title}"),
         style=_resource("page.css"),
-        script="\n".join(map(_resource, ("page.js", "story.js", "panel.js") if story else ("page.js",))),
-        panel=_filled("panel.html", whose=whose) if story else "",
-        switches=_resource("switches.html") if story else "",
-        brief='<div class="brief" id="brief"></div>' if story else "",
-        inset=_filled("inset.html", photo=first.images["photo"]) if story else "",
+        script="\n".join(map(_resource, ("page.js", "story.js", "panel.js"))),
+        whose=whose,
         column=_column_svg(camera),
         story=_json(story),
         lead=_lead(record, title, choice),

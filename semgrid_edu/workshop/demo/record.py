@@ -16,8 +16,8 @@ from semgrid_edu.pipeline import REMEMBER, STAGES, FrameResult
 from semgrid_edu.plotting import occupancy_colours
 from semgrid_edu.plotting.images import visible_points
 from semgrid_edu.workshop.demo import pictures
-from semgrid_edu.workshop.demo.comparison import Comparison, pictures_of
 from semgrid_edu.workshop.demo.details import frame_details
+from semgrid_edu.workshop.demo.stages_file import Comparison, pictures_of
 
 YOURS = "your_"
 """Prefix of the names of pictures that are made with a student's stages."""

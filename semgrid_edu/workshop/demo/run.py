@@ -20,12 +20,11 @@ from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.pipeline import FrameResult, Stages, run_pipeline
 from semgrid_edu.storage.files import check_ours, write_text
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.workshop.demo.comparison import Comparison
 from semgrid_edu.workshop.demo.details import story_data
 from semgrid_edu.workshop.demo.overview import save_overview
 from semgrid_edu.workshop.demo.page import page_html
 from semgrid_edu.workshop.demo.record import Record
-from semgrid_edu.workshop.demo.stages_file import load_stages
+from semgrid_edu.workshop.demo.stages_file import Comparison, load_stages
 
 SHOWN = 40
 """How many frames the page shows at most by default, evenly spaced, so that its size stays near 10 MB."""
@@ -176,7 +175,7 @@ def write_demo(
     stories = _stories_every(len(chosen.shown), spec)
     record = Record(spec, LABEL_SETS[net.architecture.label_set], chosen.shown, comparison, net, stories, memory)
     results = run_side_by_side((drive[k] for k in chosen.run), *runs)
-    with _compile_bar():
+    with compile_bar():
         broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
     words = {"expected": known or ("" if record.labelled else POOR), "credit": drive.credit}
     save_overview(record, picture, " ".join(filter(None, words.values())))
@@ -237,13 +236,23 @@ def run_side_by_side(frames: Iterable[Frame], *several: Stages) -> Iterator[tupl
     yield from zip(*(run_pipeline(*one) for one in zip(streams, several, strict=True)), strict=True)
 
 
-def _compile_bar() -> AbstractContextManager:
-    """Return a context that shows what numba compiles; without numba the book's stages run instead."""
+def compile_bar() -> AbstractContextManager:
+    """Return a context with a bar that counts the functions numba compiles: without it, the first run looks dead."""
     if find_spec("numba") is None:
-        return nullcontext()
-    from semgrid_edu.workshop.demo.compile_bar import counting_compiled
+        return nullcontext()  # the book's stages run, which need no compiler
+    from numba.core.event import Listener, install_listener
 
-    return counting_compiled()
+    class CompileBar(Listener):
+        bar: tqdm | None = None
+
+        def on_start(self, event: object) -> None:
+            if self.bar is None:
+                self.bar = tqdm(desc="compiling, only the first time", unit=" functions")
+
+        def on_end(self, event: object) -> None:
+            self.bar.update()
+
+    return install_listener("numba:compile", CompileBar())
 
 
 def _check_page(out: str | Path, force: bool | None) -> tuple[Path, Path]:

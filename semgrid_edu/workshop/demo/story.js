@@ -37,14 +37,14 @@ function parts(story, read, cell) {
 // A sentence of words.toml with the names in braces filled in.
 function filled(sentence, values) { return sentence.replace(/{(\w+)}/g, (_, name) => values[name]); }
 
-// How often each class occurs, the most frequent first: `counted` of words.py.
+// How often each class occurs, the most frequent first.
 function counted(classes, names) {
   const found = new Map();
   for (const c of classes) if (c < names.length) found.set(c, (found.get(c) ?? 0) + 1);
   return [...found].sort(([a, m], [b, n]) => n - m || a - b).map(([c, number]) => `${names[c]} (${number})`).join(", ");
 }
 
-// A cell's story in sentences, without its place and its numbers: `story_text` of words.py.
+// A cell's story in sentences, without its place and its numbers.
 function sentences(story, read, cell) {
   const said = story.sentences, [label, , refined, truth] = read("classes", cell), added = messages(story, read, cell);
   const otherwise = Object.fromEntries(story.changes.map((change, i) => [change, story.names[read("otherwise", cell)[i]]]));
@@ -63,7 +63,7 @@ function sentences(story, read, cell) {
   ].filter((sentence) => sentence);
 }
 
-// Where the class with memory comes from: `_memory` of words.py.
+// Where the class with memory comes from.
 function memory(story, read, cell) {
   const [kept, sure, known, then, tenths, earlier] = wide(read, "memory", cell), said = story.sentences.memory, back = known - 1;
   const values = { kept: story.names[kept], sure, then: story.names[then], label: story.names[read("classes", cell)[0]], seconds: (tenths / 10).toFixed(1), back, earlier };
@@ -71,7 +71,7 @@ function memory(story, read, cell) {
   return states(story, read, "shown", cell)[2] > 0.5 ? `${told} ${said.moves}` : told;
 }
 
-// Whether the image network is right at the pixels above a cell, and the filter about the cell: `_image_here` and `_occupancy_here` of words.py.
+// Whether the image network is right at the pixels above a cell, and the filter about the cell.
 function imageHere(story, called, shown) {
   const labelled = shown.map((c, i) => [c, called[i]]).filter(([c]) => c < story.names.length), wrong = labelled.filter(([a, b]) => a !== b).length;
   return filled(story.sentences.image_here[wrong ? "wrong" : labelled.length ? "right" : "unknown"], { wrong, labelled: labelled.length });

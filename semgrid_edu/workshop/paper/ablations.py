@@ -10,11 +10,10 @@ from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.paper.plans import table1_runs
 from semgrid_edu.workshop.paper.published import NETWORKS
 from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.paper.run_counts import RunCounts
-from semgrid_edu.workshop.paper.scales import Scale
+from semgrid_edu.workshop.paper.scales import Scale, table1_runs
 from semgrid_edu.workshop.paper.score_runs import WITH_CRF, WITH_SEARCHED, ScoreRun, by_seed
 from semgrid_edu.workshop.paper.tables import CELLS, beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.truth_costs import learned_from
@@ -30,7 +29,7 @@ VARIANTS = {name: Variant(**fields) for name, fields in _TABLES["variants"].item
 CALIBRATION_ERRORS = [CalibrationError(**{kind: size}) for kind, sizes in _TABLES["errors"].items() for size in sizes]
 """Errors in the calibration that the trained network is given when it is tested: degrees, metres."""
 
-FEW = 4
+FEWER_FRAMES = 4
 """The small training set has one frame in four."""
 
 NOTES = {"semantic": "", "all": " The truth of a cell without a semantic class is defined by the occupancy grid."}
@@ -59,8 +58,8 @@ def ablated_runs(scale: Scale, seeds: int) -> dict[str, dict[str, tuple[list[Sco
         By key of `SECTIONS` and by what the row is.
     """
     every = table1_runs(scale, seeds)
-    n_frames = max(scale.frames_to_train // FEW, 6)
     usual = every["segnet"]
+    n_frames = max(usual[0].network.arrays.n_labelled // FEWER_FRAMES, 6)
     scored = partial(scale.scored, scale.kitti, crf=False)
     variants = {"usual": usual}
     variants |= {name: scored("segnet", seeds, variant=variant) for name, variant in VARIANTS.items()}

@@ -31,7 +31,7 @@ by which labels ("readings"), for which "networks", and whether the paper states
 MARGIN = 0.005
 """Half a point: by less than that, a score counts as unchanged in claim 8."""
 
-STILL = 0.1
+CAR_MARGIN = 0.1
 """Ten points: by less than that, an overturned car is called car as an upright one is, in claim 6."""
 
 
@@ -229,7 +229,7 @@ def _overturned_cars(one: Reading) -> list[Statement]:
     upright = one.counted(one.runs.overturned, UPRIGHT)
     right = _right_of([KITTI_14.index("car")])
     return [
-        stated("called car: overturned cars - upright ones", right, lying, upright, limit=-STILL),
+        stated("called car: overturned cars - upright ones", right, lying, upright, limit=-CAR_MARGIN),
         stated("overturned cars called car: with occupancy grid - without", right, lying, blind),
         stated("overturned cars called car", right, lying, limit=0.5, judged=False),
         stated("upright cars called car", right, upright, limit=0.5, judged=False),

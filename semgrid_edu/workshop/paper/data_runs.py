@@ -102,3 +102,17 @@ class ArraysRun(Run):
         usual = architecture("segnet", self.preset)
         truth = chosen_truth(self.truth)
         return TrainingSet(self.data.dataset_dir(root), self.split, self.grid, usual.image_size, truth=truth)
+
+
+def frame_counts(data: str) -> dict[str, tuple[int, int]]:
+    """Return by split the numbers of labelled frames and of drives of a data set.
+
+    Parameters
+    ----------
+    data : str
+        A key of `RECIPE_OF`.
+    """
+    labelled: dict[str, list[int]] = {}
+    for route in RECIPE_OF[data].routes:
+        labelled.setdefault(route.split, []).append(len(route.labelled))
+    return {split: (sum(frames), len(frames)) for split, frames in labelled.items()}

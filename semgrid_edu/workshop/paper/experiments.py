@@ -1,19 +1,21 @@
 """The experiments of the paper, each with its runs and how its result is computed and written (section 4)."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from matplotlib.figure import Figure
 
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.paper import pictures, plans, tables
+from semgrid_edu.workshop.paper import figures, scales, tables, verdicts
 from semgrid_edu.workshop.paper.ablations import ablation_runs, ablations, ablations_markdown
+from semgrid_edu.workshop.paper.data_runs import RECIPE_OF, frame_counts
 from semgrid_edu.workshop.paper.published import TABLE_1_SCORES, TABLE_2_SCORES
 from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.scales import Scale
 from semgrid_edu.workshop.paper.truth_costs import truth_cost_runs, truth_costs, truth_costs_markdown
-from semgrid_edu.workshop.paper.verdicts import claims_markdown, judge_claims
+from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class Experiment:
         (scale, number of seeds, what is known about the runs) -> the result; JSON can hold it.
     markdown : callable
         result -> Markdown.
+    picture : callable, optional
+        (result, what is known about the runs) -> Figure, for what only a picture can show.
     title : str
         What it is called.
     field : str
@@ -38,65 +42,84 @@ class Experiment:
         In what it differs from the paper beside what all experiments on these data do, one sentence each.
     help : str
         The help of its command.
-    picture : callable, optional
-        (result, what is known about the runs) -> Figure, for what only a picture can show.
     """
 
     runs: Callable[[Scale, int], Sequence[Run]]
     result: Callable[[Scale, int, RunCounts], dict]
     markdown: Callable[[dict], str]
-    title: str
+    picture: Callable[[dict, RunCounts], Figure] | None = None
+    title: str = ""
     field: str = "kitti"
     seeds: str = "seeds"
     deviations: tuple[str, ...] = ()
     help: str = ""
-    picture: Callable[[dict, RunCounts], Figure] | None = None
 
 
-def _seed_by_seed(runs: Iterable[Sequence[Run]]) -> list[Run]:
-    """Return all runs of the first seed, then of the second: a plan that is stopped has whole seeds."""
-    return [run for alike in zip(*runs, strict=True) for run in alike]
-
-
-_WORDS = table_beside(__file__)
-
-
-def _accuracy(name: str, runs: Callable, paper: Mapping) -> Experiment:
-    """Return Table 1 or 2, from runs by image network and the paper's scores; baselines are those of SegNet."""
-
-    def result(scale: Scale, seeds: int, counted: RunCounts) -> dict:
-        networks = runs(scale, seeds)
-        return tables.accuracy_result(networks, counted, paper, plans.baselines_of(networks["segnet"]))
+def _table(name: str, runs: Callable, result: Callable, markdown: Callable) -> Experiment:
+    """Return one of Tables 1 to 3, whose networks are compared with baselines fitted to SegNet's training frames."""
 
     def plan(scale: Scale, seeds: int) -> list[Run]:
         networks = runs(scale, seeds)
-        return _seed_by_seed([*networks.values(), plans.baselines_of(networks["segnet"])])
+        by_seed = zip(*networks.values(), scales.baselines_of(networks["segnet"]), strict=True)
+        return [run for alike in by_seed for run in alike]  # a plan that is stopped has whole seeds
 
-    return Experiment(plan, result, tables.accuracy_markdown, **_WORDS[name])
+    def computed(scale: Scale, seeds: int, counted: RunCounts) -> dict:
+        networks = runs(scale, seeds)
+        return result(networks, counted, scales.baselines_of(networks["segnet"]))
 
-
-def _table3(scale: Scale, seeds: int, counted: RunCounts) -> dict:
-    networks = plans.table3_runs(scale, seeds)
-    return tables.confusion_result(networks, counted, plans.baselines_of(networks))
-
-
-def _table3_plan(scale: Scale, seeds: int) -> list[Run]:
-    networks = plans.table3_runs(scale, seeds)
-    return _seed_by_seed([networks, plans.baselines_of(networks)])
+    return Experiment(plan, computed, markdown, **_WORDS[name])
 
 
-_PARTS = {
-    "table3": (_table3_plan, _table3, tables.confusion_markdown),
-    "claims": (plans.claims_plan, judge_claims, claims_markdown),
+_WORDS = table_beside(__file__)
+_DIFFERENCES = table_beside(__file__, "deviations")
+_ACCURACY = {"table1": (scales.table1_runs, TABLE_1_SCORES), "table2": (scales.table2_runs, TABLE_2_SCORES)}
+_OTHERS = {
+    "claims": (verdicts.claims_plan, verdicts.judge_claims, verdicts.claims_markdown),
     "ablations": (ablation_runs, ablations, ablations_markdown),
     "truth-costs": (truth_cost_runs, truth_costs, truth_costs_markdown),
+    "figures": (figures.figure_runs, figures.shown_frames, figures.figures_markdown, figures.figures_picture),
 }
-_FIGURES = (plans.figure_runs, plans.shown_frames, pictures.figures_markdown)
 
 EXPERIMENTS = {
-    "table1": _accuracy("table1", plans.table1_runs, TABLE_1_SCORES),
-    "table2": _accuracy("table2", plans.table2_runs, TABLE_2_SCORES),
-    **{name: Experiment(*parts, **_WORDS[name]) for name, parts in _PARTS.items()},
-    "figures": Experiment(*_FIGURES, **_WORDS["figures"], picture=pictures.figures_picture),
+    **{
+        name: _table(name, runs, partial(tables.accuracy_result, paper=paper), tables.accuracy_markdown)
+        for name, (runs, paper) in _ACCURACY.items()
+    },
+    "table3": _table("table3", scales.table3_runs, tables.confusion_result, tables.confusion_markdown),
+    **{name: Experiment(*parts, **_WORDS[name]) for name, parts in _OTHERS.items()},
 }
 """Every experiment by the name of its command."""
+
+
+def deviations(scale: Scale, field: str, beside_gpu: list[str] | None = None) -> list[str]:
+    """Return in what an experiment differs from the paper's, one sentence each.
+
+    Parameters
+    ----------
+    scale : Scale
+        How large it is.
+    field : str
+        On which data: "kitti", "chroma" or "synthia".
+    beside_gpu : list of str, optional
+        The training runs that were done on the CPU when others were done on a GPU; None when all were done on the CPU.
+    """
+    data = getattr(scale, field)
+    preset = _DIFFERENCES[scale.preset]
+    counts = frame_counts(data)
+    numbers = {
+        "data": data,
+        "frames": " and ".join(f"{frames} to {split} in {n} drives" for split, (frames, n) in counts.items()),
+        "drives": counts["test"][1],
+        "image_steps": scale.image_iterations,
+        "grid_steps": scale.grid_iterations,
+    }
+    lines = [*_DIFFERENCES[field]["data"]]
+    if RECIPE_OF[data].rig == KITTI_AHEAD and not RECIPE_OF[data].dense:
+        lines.append(_DIFFERENCES["scanner"]["columns"])
+    lines += [*_DIFFERENCES[field]["labels"], *preset["networks"]]
+    if beside_gpu is not None:
+        names = dict.fromkeys(name.rsplit("-seed", 1)[0] for name in beside_gpu)
+        on_cpu = f" Trained on the CPU, in float32: {', '.join(names)}." if names else ""
+        lines.append(_DIFFERENCES["gpu"]["all"] + on_cpu)
+    lines += [*(preset["chosen"] if field == "kitti" else ()), *_DIFFERENCES[field]["numbers"]]
+    return [line.format(**numbers) for line in lines]

@@ -31,8 +31,8 @@ _ONE_AT_A_TIME = threading.Lock()
 def execute_plan(plan: Sequence[Run], root: str | Path, place: Workplace, device: str = "cpu") -> dict[Run, str]:
     """Do all runs that are left to do, each as soon as what it needs has ended.
 
-    A run that fails stops only those that need it. The command can be killed at any time: ended runs are kept, and a
-    training run resumes from its checkpoint when the same command is given again.
+    A run that fails stops only those that need it; a process that dies stops the plan. The command can be killed at any
+    time: ended runs are kept, and a training run resumes from its checkpoint when the same command is given again.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def execute_plan(plan: Sequence[Run], root: str | Path, place: Workplace, device
             ready = [run for run in waiting if missing.isdisjoint(run.needs)]
             for run in ready[: max(place.slots() - len(under_way), 0)]:
                 waiting.remove(run)
-                under_way[_submit(place, run, str(root), device)] = run
+                under_way[place.executor.submit(run_one, run, str(root), device)] = run
             bar.set_postfix_str(", ".join(run.name for run in under_way.values()))
             ended, _ = wait(under_way, return_when=FIRST_COMPLETED)
             for future in ended:
@@ -76,19 +76,11 @@ def execute_plan(plan: Sequence[Run], root: str | Path, place: Workplace, device
     return failed
 
 
-def _submit(place: Workplace, *arguments: object) -> Future:
-    """Hand a run to the workplace; if that has broken down, the future raises it."""
-    try:
-        return place.executor.submit(run_one, *arguments)
-    except BrokenExecutor as error:
-        future: Future = Future()
-        future.set_exception(error)
-        return future
-
-
 def _error(future: Future) -> str | None:
     """Return what went wrong in a run, or with the process that did it."""
     error = future.exception()
+    if isinstance(error, BrokenExecutor):  # no other run could start either
+        raise error
     return f"the process of the run ended: {type(error).__name__}: {error}" if error else future.result()
 
 

@@ -1,4 +1,4 @@
-"""Other runs of a trained network: overturned cars, its speed, and grids for the figures (sections 3.4, 4)."""
+"""Other runs of a trained network: overturned cars, and its speed (sections 3.4 and 4.4)."""
 
 import time
 from collections.abc import Iterator
@@ -20,14 +20,13 @@ from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.networks import SemanticGridNet, unit_image
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
-from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.paper.data_runs import ArraysRun
 from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.score_runs import CONFUSIONS
 from semgrid_edu.workshop.paper.training_runs import GridStageRun, NetworkRun, seconds_per_step
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions
-from semgrid_edu.workshop.scoring.grids import crf_refinement, learned_log_g
+from semgrid_edu.workshop.scoring.grids import learned_log_g
 from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval
 
 OVERTURNED = "overturned cars"
@@ -42,13 +41,6 @@ TIMES, ROUNDS, FRAMES_EACH, TRAINING_ROUNDS = "times.json", 12, 3, 6
 
 FRAME, STEP = "seconds per frame", "seconds per training step"
 """What that file holds."""
-
-GRIDS, SHOWN = "grids.npz", (1 / 6, 1 / 2, 5 / 6)
-"""The file with the grids, and which frames they are of: at these shares of the test frames, so that nobody chose them.
-"""
-
-KEPT = ("frame", "image", "truth", "true", "network", "refined")
-"""The arrays in that file, as `FigureRun.grids` returns them."""
 
 
 @dataclass(frozen=True)
@@ -194,8 +186,8 @@ def time_saved(rounds: NDArray) -> ScoreWithInterval:
         The interval is Student's, over the rounds, and "seeds" are the rounds.
     """
     saved = 1 - rounds[:, 0] / rounds[:, 1]
-    half = stats.t.ppf(0.975, len(saved) - 1) * saved.std(ddof=1) / np.sqrt(len(saved))
-    return {"mean": saved.mean(), "low": saved.mean() - half, "high": saved.mean() + half, "seeds": saved.tolist()}
+    low, high = stats.ttest_1samp(saved, 0).confidence_interval(0.95)
+    return {"mean": saved.mean(), "low": low, "high": high, "seeds": saved.tolist()}
 
 
 def p_not_saved(rounds: NDArray) -> float:
@@ -207,43 +199,3 @@ def p_not_saved(rounds: NDArray) -> float:
         As `time_saved` takes them.
     """
     return float(stats.ttest_1samp(1 - rounds[:, 0] / rounds[:, 1], 0, alternative="less").pvalue)
-
-
-@dataclass(frozen=True)
-class FigureRun(NetworkRun):
-    """Keep images, truth and grids of a few test frames to look at, for Figures 6 and 7 (sections 4.2 and 4.4)."""
-
-    kind, steps, trial_seconds = "figure", len(SHOWN), 1.0
-
-    def work(self, root: Path, device: str) -> None:
-        """Make the grids. Parameters are those of `Run.work`."""
-        frames = self.frames.frames(root)
-        net = self.network.trained(root, frames.camera)
-        refine = crf_refinement(frames.spec.cell)
-        numbers = [int(share * len(frames)) for share in SHOWN]
-        log_g = [learned_log_g(net, frames[k]) for k in numbers]
-        refined = [refine(g, frames.arrays["occupancy"][k]) for k, g in zip(numbers, log_g, strict=True)]
-        kept = {name: frames.arrays[name][numbers] for name in ("image", "truth", "true")}
-        called = {"network": np.argmax(log_g, axis=1), "refined": np.argmax(refined, axis=1)}
-        kept |= {name: classes.astype(np.uint8) for name, classes in called.items()}
-        write_arrays(self.folder(root) / GRIDS, {"frame": np.array(numbers), **kept})
-
-    def grids(self, counted: RunCounts) -> dict[str, NDArray]:
-        """Return what was kept.
-
-        Parameters
-        ----------
-        counted : RunCounts
-            What is known about the runs.
-
-        Returns
-        -------
-        dict of str to (N, ...) arrays
-            "frame" (N,), "image" (N, 3, h, w), and grids (N, H, W): "truth" as learnt, "true", "network", "refined".
-
-        Raises
-        ------
-        DataError
-            When the run hasn't ended, or its file is damaged.
-        """
-        return counted.of(self, KEPT, lambda root: read_arrays(self.folder(root) / GRIDS))

@@ -1,20 +1,123 @@
-"""Pictures of the tables, the paper's values beside ours with intervals and every seed; Figures 6 and 7 (section 4)."""
+"""Pictures of scores: forest plots, and Tables 1 to 3 beside the paper's values (sections 4.2 to 4.4)."""
+
+from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.figure import Figure, SubFigure
-from numpy.typing import NDArray
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import KITTI_14, SYNTHIA_10, LabelSet
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.plotting import class_legend, confusion, grid_labels
-from semgrid_edu.workshop.paper.forest import draw_scores, legend_entries
-from semgrid_edu.workshop.paper.plans import FIGURES, figure_runs
+from semgrid_edu.plotting import confusion
 from semgrid_edu.workshop.paper.published import NETWORKS
-from semgrid_edu.workshop.paper.run_counts import RunCounts
-from semgrid_edu.workshop.paper.scales import scale_named
-from semgrid_edu.workshop.scoring.score_with_interval import markdown_table
+from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval, shown
+
+SCORE_COLOUR, SEED_COLOUR = "#1f4e79", "#d95f02"
+"""The colours of interval and mean, and of single seeds."""
+_SEED_DROP = 0.24
+"""How far below the interval the seeds are drawn, rows."""
+
+
+def forest_plot(
+    rows: Mapping[str, ScoreWithInterval],
+    ax: Axes | None = None,
+    label: str = "score [%]",
+    reference: float | None = None,
+) -> Axes:
+    """Draw means with their confidence intervals, and below each the value of every seed.
+
+    Parameters
+    ----------
+    rows : mapping of str to dict
+        Scores from `score_with_interval` or differences from `compared` by name, from top to bottom.
+    ax : Axes, optional
+        Axes to draw into.
+    label : str
+        Label of the x axis, with the unit.
+    reference : float, optional
+        Where to draw a vertical line, a share as the scores are: 0 for differences.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no row.
+
+    Examples
+    --------
+    >>> rows = {name: score_with_interval(counts[name], pixel_accuracy) for name in counts}      # doctest: +SKIP
+    >>> forest_plot(rows, label="pixel accuracy [%]")                                            # doctest: +SKIP
+    """
+    if not rows:
+        raise ArgumentError("rows", "one or more", "none")
+    ax = ax or plt.subplots(figsize=(8, 1.2 + 0.5 * len(rows)), layout="constrained")[1]
+    if reference is not None:
+        ax.axvline(100 * reference, color="0.5", linewidth=1, linestyle="--", zorder=0)
+    draw_scores(ax, rows)
+    for number, value in enumerate(rows.values()):
+        ax.annotate(shown(value), (1.02, number), xycoords=("axes fraction", "data"), va="center", fontsize="small")
+    ax.set(xlabel=label, ylim=(len(rows) - 0.4, -0.6))
+    ax.tick_params(axis="y", length=0)
+    ax.spines[["left", "right", "top"]].set_visible(False)
+    legend = {"loc": "lower right", "bbox_to_anchor": (1, 1), "ncols": 3, "frameon": False, "fontsize": "small"}
+    ax.legend(*legend_entries(ax), **legend)
+    return ax
+
+
+def draw_scores(ax: Axes, rows: Mapping[str, ScoreWithInterval], **style: object) -> None:
+    """Draw scores line by line, each with its name on the vertical axis; `style` is that of the names.
+
+    Parameters
+    ----------
+    ax : Axes
+        The chart.
+    rows : mapping of str to dict
+        Scores from `score_with_interval` or differences from `compared` by name; the first at 0, the next at 1.
+    **style
+        Passed on to `Axes.set_yticks`.
+    """
+    for place, value in enumerate(rows.values()):
+        draw_score(ax, place, value)
+    ax.set_yticks(range(len(rows)), list(rows), **style)
+    ax.grid(axis="x", alpha=0.3)
+
+
+def draw_score(ax: Axes, place: float, value: ScoreWithInterval) -> None:
+    """Draw one score as a line of a chart, per cent: interval, mean, and below them a circle for every seed.
+
+    Parameters
+    ----------
+    ax : Axes
+        The chart.
+    place : float
+        Where the line is on the vertical axis.
+    value : dict
+        From `score_with_interval` or `compared`.
+    """
+    if value["mean"] is None:
+        return
+    if value["low"] is not None:
+        ends = [100 * value["low"], 100 * value["high"]]
+        ax.plot(ends, [place, place], color=SCORE_COLOUR, linewidth=2.5, alpha=0.6, label="95 % interval")
+    ax.plot(100 * value["mean"], place, "D", color=SCORE_COLOUR, markersize=6, label="mean")
+    seeds = [100 * seed for seed in value["seeds"] if seed is not None]
+    if len(seeds) > 1:
+        places = [place + _SEED_DROP] * len(seeds)
+        ax.plot(seeds, places, "o", color=SEED_COLOUR, markerfacecolor="none", markersize=5, label="one seed")
+
+
+def legend_entries(ax: Axes) -> tuple[list[Artist], list[str]]:
+    """Return the entries of a legend, each text once.
+
+    Parameters
+    ----------
+    ax : Axes
+        A chart on which many lines have the same label.
+    """
+    once = {text: drawn for drawn, text in zip(*ax.get_legend_handles_labels(), strict=True)}
+    return list(once.values()), list(once)
+
 
 PAPERS = "#c0392b"
 """The colour of the paper's values; their marker differs from ours too."""
@@ -58,64 +161,3 @@ def confusion_picture(result: dict) -> Figure:
         confusion(np.nan_to_num(shares), result["classes"], ax)
         ax.set_title(title)
     return figure
-
-
-TITLES = {"true": "true labels", "network": "SegNet"}
-"""The titles of the grids that both figures show."""
-
-_FIGURE_6 = (KITTI_14, {"truth": "labels made\nwith the LIDAR", **TITLES, "refined": "SegNet + CRF"})
-PARTS: dict[str, tuple[LabelSet, dict[str, str]]] = dict(
-    zip(FIGURES, (_FIGURE_6, _FIGURE_6, (SYNTHIA_10, TITLES)), strict=True)
-)
-"""The classes of each figure's part, and the titles of its grids from left to right."""
-
-
-def figures_picture(result: dict, counted: RunCounts) -> Figure:
-    """Draw the figures: one row per frame, the image and its grids.
-
-    Parameters
-    ----------
-    result : dict
-        From `shown_frames`, and the scale.
-    counted : RunCounts
-        What is known about the runs.
-    """
-    runs = dict(zip(FIGURES, figure_runs(scale_named(result["scale"]), result["seeds"]), strict=True))
-    figure = plt.figure(figsize=(13, 8.5 * len(runs)), layout="constrained")
-    for part, (name, run) in zip(figure.subfigures(len(runs), 1), runs.items(), strict=True):
-        part.suptitle(name, x=0.02, ha="left")
-        _draw(part, run.grids(counted), *PARTS[name])
-    return figure
-
-
-def _draw(part: SubFigure, grids: dict[str, NDArray], label_set: LabelSet, columns: dict[str, str]) -> None:
-    """Draw the rows of one figure."""
-    n_rows = len(grids["frame"])
-    shape = grids["true"].shape[1:]
-    spec = next(spec for spec in (GridSpec.compact(), GridSpec.paper()) if spec.shape == shape)
-    axes = part.subplots(n_rows, 1 + len(columns), width_ratios=[2.2] + [1] * len(columns), squeeze=False)
-    for row, line in enumerate(axes):
-        line[0].imshow(grids["image"][row].transpose(1, 2, 0))
-        line[0].set_axis_off()
-        line[0].set_title(f"test frame {grids['frame'][row]}", fontsize="medium")
-        for ax, (name, title) in zip(line[1:], columns.items(), strict=True):
-            grid_labels(spec, grids[name][row], label_set, ax=ax, legend=False)
-            ax.set_title(title if row == 0 else "", fontsize="medium")
-            outer_left = ax is line[1]
-            lowest = row == n_rows - 1  # only outer grids name their axes
-            ax.tick_params(labelleft=outer_left, labelbottom=lowest)
-            ax.set(xlabel=ax.get_xlabel() * lowest, ylabel=ax.get_ylabel() * outer_left)
-    class_legend(axes[0, -1], label_set, grids["true"])
-
-
-def figures_markdown(result: dict) -> str:
-    """Return which frames the figures show, as Markdown.
-
-    Parameters
-    ----------
-    result : dict
-        From `shown_frames`.
-    """
-    rows = [[name, ", ".join(map(str, shown["frames"]))] for name, shown in result["figures"].items()]
-    table = markdown_table([["", "test frames"], *rows])
-    return f"Frames at fixed shares of the test split; nobody chose them.\n\n{table}"

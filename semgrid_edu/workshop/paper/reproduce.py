@@ -11,8 +11,8 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import atomic_path, check_ours, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import versions
 from semgrid_edu.training.devices import choose_device
-from semgrid_edu.workshop.paper.deviations import deviations, frame_counts
-from semgrid_edu.workshop.paper.experiments import EXPERIMENTS, Experiment
+from semgrid_edu.workshop.paper.data_runs import frame_counts
+from semgrid_edu.workshop.paper.experiments import EXPERIMENTS, Experiment, deviations
 from semgrid_edu.workshop.paper.loop import execute_plan
 from semgrid_edu.workshop.paper.run import OUTPUT, Run, estimate, with_needs
 from semgrid_edu.workshop.paper.run_counts import RunCounts
@@ -107,27 +107,24 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
     for name in request.chosen:
         check_ours(f'"command": "semgrid-edu reproduce {name} ', *result_files(request.out, name))
     with nullcontext() if plan_only else sole_writer(root):
-        return _reproduced(request, root, echo, plan_only)
-
-
-def _reproduced(request: Request, root: Path, echo: Callable[[str], None], plan_only: bool) -> str:
-    """Plan, run and write, in a folder of runs that no other process writes to."""
-    plan = request.plan()
-    estimated = estimate(plan, root)
-    minutes = sum(estimated.values()) / (request.workers or usable_cores()) / 60
-    left = f"left: {len(estimated)} of {len(plan)} runs, about {minutes:.0f} min"
-    echo(f"{plan_table(plan, estimated)}\n\n{left}" + (" on this machine" if request.scheduler else ""))
-    if plan_only:
-        return ""
-    with workplace(request.workers, request.scheduler) as place:
-        failed = execute_plan(plan, root, place, request.device)
-    for name, experiment in request.chosen.items():
-        size = request.size(experiment)
-        if failed.keys().isdisjoint(with_needs(experiment.runs(*size))):
-            echo(write_result(name, experiment, *size, root, request.out))
-    return "\n".join(
-        f"{run.name}: {error.strip().splitlines()[-1]} ({run.folder(root) / OUTPUT})" for run, error in failed.items()
-    )
+        plan = request.plan()
+        echo("Estimating the time, which takes a few trial steps of each network ...")
+        estimated = estimate(plan, root)
+        minutes = sum(estimated.values()) / (request.workers or usable_cores()) / 60
+        left = f"left: {len(estimated)} of {len(plan)} runs, about {minutes:.0f} min"
+        echo(f"{plan_table(plan, estimated)}\n\n{left}" + (" on this machine" if request.scheduler else ""))
+        if plan_only:
+            return ""
+        with workplace(request.workers, request.scheduler) as place:
+            failed = execute_plan(plan, root, place, request.device)
+        for name, experiment in request.chosen.items():
+            size = request.size(experiment)
+            if failed.keys().isdisjoint(with_needs(experiment.runs(*size))):
+                echo(write_result(name, experiment, *size, root, request.out))
+        return "\n".join(
+            f"{run.name}: {error.strip().splitlines()[-1]} ({run.folder(root) / OUTPUT})"
+            for run, error in failed.items()
+        )
 
 
 def plan_table(plan: list[Run], seconds: dict[Run, float]) -> str:

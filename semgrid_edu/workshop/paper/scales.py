@@ -1,5 +1,6 @@
-"""The scales at which the paper's experiments can be done (section 4)."""
+"""The scales at which the paper's experiments can be done, and the runs of Tables 1 to 3 (section 4)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from semgrid_edu.datasets.label_policies import POLICIES
@@ -8,7 +9,7 @@ from semgrid_edu.networks import SEGMENTERS
 from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.paper.data_runs import ArraysRun, DataRun
 from semgrid_edu.workshop.paper.published import NETWORKS
-from semgrid_edu.workshop.paper.score_runs import ScoreRun
+from semgrid_edu.workshop.paper.score_runs import BaselineRun, ScoreRun
 from semgrid_edu.workshop.paper.training_runs import GridStageRun, ImageStageRun
 from semgrid_edu.workshop.paper.variants import USUAL, Variant
 
@@ -63,11 +64,6 @@ class Scale:
     def fine(self) -> "Scale":
         """The same with cells of 0.2 m."""
         return replace(self, fine_cells=self.preset != "paper")  # the preset "paper" has them already
-
-    @property
-    def frames_to_train(self) -> int:
-        """Number of labelled frames that Table 1's networks learn from."""
-        return self.arrays(self.kitti, "train", "true").n_labelled
 
     def grid_stage(
         self,
@@ -150,3 +146,43 @@ def scale_named(name: str) -> Scale:
             raise ArgumentError("--scale", f"after a plus one of {', '.join(SEGMENTERS)}", repr(other))
     scale = SCALES[known]
     return replace(scale, name=name, networks=tuple(dict.fromkeys((*scale.networks, *others))))
+
+
+def table1_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
+    """Return the runs of Table 1: by image network one per seed.
+
+    Parameters
+    ----------
+    scale : Scale
+        How large they are, and which image networks are compared.
+    seeds : int
+        Number of seeds.
+    """
+    return {name: scale.scored(scale.kitti, name, seeds) for name in scale.networks}
+
+
+def baselines_of(runs: Sequence[ScoreRun]) -> list[BaselineRun]:
+    """Return the runs of the baselines that networks are compared with: fitted to what these learn from.
+
+    Parameters
+    ----------
+    runs : sequence of ScoreRun
+        The networks, one per seed.
+    """
+    return [BaselineRun(run.network, run.frames) for run in runs]
+
+
+def table2_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
+    """Return the runs of Table 2: SegNet on routes that were never driven in training.
+
+    Parameters and result are those of `table1_runs`.
+    """
+    return {"segnet": scale.scored(scale.chroma, "segnet", seeds)}
+
+
+def table3_runs(scale: Scale, seeds: int) -> dict[str, list[ScoreRun]]:
+    """Return the runs of Table 3: SegNet on data without any error.
+
+    Parameters and result are those of `table1_runs`.
+    """
+    return {"segnet": scale.scored(scale.synthia, "segnet", seeds, "true", crf=False)}

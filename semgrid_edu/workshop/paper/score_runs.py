@@ -26,7 +26,7 @@ from semgrid_edu.workshop.paper.training_runs import NetworkRun
 from semgrid_edu.workshop.paper.variants import EXACT, CalibrationError
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
 from semgrid_edu.workshop.scoring.counting import Grids, count_grids, reliability_key, reliability_of_sums
-from semgrid_edu.workshop.scoring.flat_ground import WAYS, label_and_state
+from semgrid_edu.workshop.scoring.flat_ground import RULES, label_and_state
 from semgrid_edu.workshop.scoring.grids import MAJORITY, NETWORK, OCCUPANCY_ALONE, Refine, baseline_grids, network_grids
 
 CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
@@ -47,8 +47,8 @@ looked up where flat ground would be."""
 FITTED_BASELINES = {
     MAJORITY: MAJORITY,
     OCCUPANCY_ALONE: OCCUPANCY_ALONE,
-    **{f"{way} of label and state": label_and_state(way, f"{NETWORK} labels") for way in WAYS},
-    **{f"{way} of true label and state": label_and_state(way, "true labels") for way in WAYS},
+    **{f"{way} of label and state": label_and_state(way, f"{NETWORK} labels") for way in RULES},
+    **{f"{way} of true label and state": label_and_state(way, "true labels") for way in RULES},
 }
 """The baselines that are fitted to training frames, and what `baseline_grids` calls each. "Label" is the image's label
 where flat ground would be."""

@@ -106,8 +106,8 @@ def beside_usual_table(head: str, rows: Mapping[str, dict], truth: str, cells: s
 def accuracy_result(
     runs: Mapping[str, Sequence[ScoreRun]],
     counted: RunCounts,
+    baselines: Sequence[BaselineRun],
     paper: Mapping[tuple[str, bool], dict],
-    baselines: Sequence[BaselineRun] = (),
 ) -> dict[str, list[dict]]:
     """Return Table 1 or 2.
 
@@ -117,10 +117,10 @@ def accuracy_result(
         By image network one per seed.
     counted : RunCounts
         What is known about the runs.
+    baselines : sequence of S BaselineRun
+        The baselines of the same seeds, on the same frames, with which SegNet is compared.
     paper : mapping of (str, bool) to dict
         The paper's scores by image network and whether the CRF is used.
-    baselines : sequence of S BaselineRun
-        The baselines of the same seeds, on the same frames, with which SegNet is compared; none when left out.
 
     Returns
     -------
@@ -131,8 +131,7 @@ def accuracy_result(
     """
     pairs = {f"{NETWORKS[name]}: with CRF - without": (some, some, WITH_CRF) for name, some in runs.items()}
     pairs |= {f"{NETWORKS[a]} - {NETWORKS[b]}": (runs[a], runs[b]) for a, b in pairwise(runs)}
-    names = BASELINES if baselines else ()
-    pairs |= {f"{NETWORKS['segnet']} - {name}": (runs["segnet"], baselines, NETWORK, name) for name in names}
+    pairs |= {f"{NETWORKS['segnet']} - {name}": (runs["segnet"], baselines, NETWORK, name) for name in BASELINES}
     unknown = dict.fromkeys(METRICS)
     return {
         "rows": [
@@ -141,7 +140,8 @@ def accuracy_result(
             for crf, method in ((False, NETWORK), (True, WITH_CRF))
         ],
         "baselines": [
-            {"network": name, "CRF": False, "paper": unknown, **_counted(baselines, counted, name)} for name in names
+            {"network": name, "CRF": False, "paper": unknown, **_counted(baselines, counted, name)}
+            for name in BASELINES
         ],
         "differences": [{"what": what, "scores": differences_by_truth(counted, *pair)} for what, pair in pairs.items()],
     }
@@ -161,7 +161,7 @@ def accuracy_markdown(result: dict) -> str:
     result : dict
         From `accuracy_result`.
     """
-    rows = [*result["rows"], *result.get("baselines", ())]
+    rows = [*result["rows"], *result["baselines"]]
     sections = [
         f"Against {words}, {which}:\n\n{_beside_paper(rows, truth, cells)}"
         for truth, words in TRUTHS.items()
@@ -176,8 +176,7 @@ def accuracy_markdown(result: dict) -> str:
             f"Paired differences (same seeds, same drives), all labelled cells, against {words}, points:\n\n"
             + markdown_table([["difference", *METRICS], *gains])
         )
-    sections += [_WORDS["baselines"]["what"]] * bool(result.get("baselines"))
-    return "\n\n".join(sections)
+    return "\n\n".join([*sections, _WORDS["baselines"]["what"]])
 
 
 def score_cells(found: dict[str, ScoreWithInterval], digits: int = 1) -> list[str]:
@@ -215,18 +214,18 @@ def _beside_paper(rows: list[dict], truth: str, cells: str) -> str:
 
 
 def confusion_result(
-    runs: Sequence[ScoreRun], counted: RunCounts, baselines: Sequence[BaselineRun] = ()
+    runs: Mapping[str, Sequence[ScoreRun]], counted: RunCounts, baselines: Sequence[BaselineRun]
 ) -> dict[str, object]:
     """Return our Table 3 beside the paper's.
 
     Parameters
     ----------
-    runs : sequence of S ScoreRun
-        One per seed.
+    runs : mapping of str to sequence of S ScoreRun
+        Under "segnet" one per seed.
     counted : RunCounts
         What is known about the runs.
     baselines : sequence of S BaselineRun
-        The baselines of the same seeds, on the same frames; none when left out.
+        The baselines of the same seeds, on the same frames.
 
     Returns
     -------
@@ -235,11 +234,11 @@ def confusion_result(
         seeds, None in the row of a class that doesn't occur. "confusion" counts the cells of all seeds. "baselines", by
         name: "scores", and "differences", ours minus the baseline's.
     """
-    found = by_seed(runs, counted, NETWORK, "true")
+    found = by_seed(runs["segnet"], counted, NETWORK, "true")
     counts = found.sum(axis=1)
     with np.errstate(invalid="ignore"):  # NaN in the row of a class that doesn't occur
         shares = np.mean(100 * counts / counts.sum(axis=2, keepdims=True), axis=0)
-    others = {name: by_seed(baselines, counted, name, "true") for name in FITTED_BASELINES if baselines}
+    others = {name: by_seed(baselines, counted, name, "true") for name in FITTED_BASELINES}
     return {
         "classes": list(SYNTHIA_10.names),
         "paper": {"scores": TABLE_3_SCORES, "matrix": TABLE_3_CONFUSION},
@@ -269,7 +268,7 @@ def confusion_markdown(result: dict) -> str:
         From `confusion_result`.
     """
     ours = result["ours"]["scores"]
-    baselines = result.get("baselines", {})
+    baselines = result["baselines"]
     rows = {"": METRICS, "paper": map(per_cent, _metrics(result["paper"]["scores"])), "ours": score_cells(ours)}
     rows["every seed"] = map(shown_seeds, _metrics(ours))
     rows |= {name: score_cells(one["scores"]) for name, one in baselines.items()}
@@ -279,7 +278,7 @@ def confusion_markdown(result: dict) -> str:
         "Row: truth, column: detected, per cent of the row; mean over the seeds.",
         *("Ours:", _matrix(result["classes"], result["ours"]["matrix"])),
         *("The paper's:", _matrix(result["classes"], result["paper"]["matrix"])),
-        *[_WORDS["baselines"]["what"]] * bool(baselines),
+        _WORDS["baselines"]["what"],
     ]
     return "\n\n".join(sections)
 

@@ -7,10 +7,9 @@ from semgrid_edu.datasets.label_policies import POLICIES
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS, class_iou, pixel_accuracy
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.paper.plans import table1_runs
 from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.paper.run_counts import RunCounts
-from semgrid_edu.workshop.paper.scales import Scale
+from semgrid_edu.workshop.paper.scales import Scale, table1_runs
 from semgrid_edu.workshop.paper.score_runs import LABELS, LabelsRun, ScoreRun, by_seed
 from semgrid_edu.workshop.paper.tables import TRUTHS, beside_usual, beside_usual_table
 from semgrid_edu.workshop.scoring.confusions import distance_band_names

@@ -18,13 +18,20 @@ as expected".
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import chain
 from types import SimpleNamespace
 
 from semgrid_edu.workshop.paper.claims import CLAIMS, STATEMENTS, Reading, Statement
-from semgrid_edu.workshop.paper.deviations import frame_counts
-from semgrid_edu.workshop.paper.plans import runs_of_claims
+from semgrid_edu.workshop.paper.data_runs import frame_counts
+from semgrid_edu.workshop.paper.other_runs import OverturnedRun, TimeRun
+from semgrid_edu.workshop.paper.published import NETWORKS
+from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.paper.run_counts import RunCounts
-from semgrid_edu.workshop.paper.scales import Scale
+from semgrid_edu.workshop.paper.scales import Scale, baselines_of, table1_runs, table2_runs
+from semgrid_edu.workshop.paper.score_runs import BaselineRun, ScoreRun
+from semgrid_edu.workshop.paper.variants import CalibrationError, Variant
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, shown
 from semgrid_edu.workshop.scoring.statistics import MIN_DRIVES
 
@@ -113,6 +120,9 @@ def verdict(statements: Sequence[Statement], seeds: int, drives: int, expectatio
     return EXPECTED.get(said, said) if expectation else said
 
 
+WRONG_CALIBRATION = CalibrationError(pitch=1.0)
+"""The error of calibration that geometry and network are compared with."""
+
 HOLDS = {True: "yes", False: "no", None: "cannot tell"}
 """How a statement's result is written."""
 
@@ -125,6 +135,64 @@ READINGS = {
     for judged in LABELS
 }
 """The columns of the table of verdicts."""
+
+
+def claims_plan(scale: Scale, seeds: int) -> list[Run]:
+    """Return all runs of the claims. Parameters are those of `runs_of_claims`."""
+    parts = vars(runs_of_claims(scale, seeds)).values()
+    return [run for part in parts for run in (chain(*part.values()) if isinstance(part, dict) else part)]
+
+
+def runs_of_claims(scale: Scale, seeds: int) -> SimpleNamespace:
+    """Return the runs of the claims, one per seed in each list.
+
+    Parameters
+    ----------
+    scale : Scale
+        How large they are.
+    seeds : int
+        Number of seeds. Claims about Table 1 alone have its number of seeds, when that is larger.
+
+    Returns
+    -------
+    SimpleNamespace
+        "networks", those of Table 1 by name, and of these the "usual" one, SegNet, with as many seeds as all others,
+        and "usual_of_all_seeds"; "taught_true", SegNet that learns from true labels; "new_routes", Table 2's network on
+        routes that nobody has driven in training; "table2" itself; "perfect", SegNet on data without any error, cells
+        of 0.2 m; "overturned" and "overturned_blind", cars on their tops: the usual network, and one without the
+        occupancy grid; "unreduced", without the 1x1 reduction; "times", of the usual network and of that one;
+        "two_stages", "unbalanced" and "one_plane", trained so; "baselines", what learns no fusion; "baselines_off" and
+        "usual_off", with the wrong calibration; "baselines_dense", with the depth of every pixel.
+    """
+    all_seeds = max(seeds, scale.table1_seeds if seeds == scale.seeds else seeds)
+    networks = table1_runs(replace(scale, networks=tuple(NETWORKS)), all_seeds)
+    usual = networks["segnet"][:seeds]
+    scored = partial(scale.scored, scale.kitti, "segnet", crf=False)
+    unreduced = scored(all_seeds, variant=Variant(reduces=False))
+    taught = (scale.grid_stage(scale.kitti, "segnet", seed, "true") for seed in range(seeds))
+    blind = [scale.grid_stage(scale.kitti, "segnet", seed, variant=Variant(occupancy=False)) for seed in range(seeds)]
+    routes = scale.arrays(scale.chroma_routes, "test", "lidar")
+    lying = scale.arrays(scale.overturned, "test", "true")
+    return SimpleNamespace(
+        networks=networks,
+        usual=usual,
+        usual_of_all_seeds=networks["segnet"],
+        table2=table2_runs(scale, seeds)["segnet"],
+        taught_true=[ScoreRun(network, one.frames) for network, one in zip(taught, usual, strict=True)],
+        unreduced=unreduced,
+        times=[TimeRun(usual[0].network, unreduced[0].network, usual[0].frames)],
+        two_stages=scored(seeds, variant=Variant(end_to_end=False)),
+        unbalanced=scored(seeds, variant=Variant(balanced=False)),
+        one_plane=scored(seeds, variant=Variant(n_planes=1)),
+        new_routes=[ScoreRun(scale.grid_stage(scale.chroma, "segnet", seed), routes) for seed in range(seeds)],
+        perfect=scale.fine.scored(scale.synthia_routes, "segnet", seeds, "true", crf=False),
+        overturned=[OverturnedRun(run.network, lying) for run in usual],
+        overturned_blind=[OverturnedRun(network, lying) for network in blind],
+        baselines=baselines_of(usual),
+        baselines_off=[BaselineRun(run.network, run.frames, WRONG_CALIBRATION) for run in usual],
+        baselines_dense=[BaselineRun(run.network, run.frames, dense=True) for run in usual],
+        usual_off=[ScoreRun(run.network, run.frames, crf=False, calibration=WRONG_CALIBRATION) for run in usual],
+    )
 
 
 def judge_claims(scale: Scale, seeds: int, counted: RunCounts) -> dict:

@@ -163,7 +163,7 @@ def naive_bayes(counts: NDArray) -> NDArray[np.int64]:
     return (of_class * label[:, None] * state[None]).argmax(axis=2)
 
 
-WAYS = {"table": joint_table, "naive Bayes": naive_bayes}
+RULES = {"table": joint_table, "naive Bayes": naive_bayes}
 """Methods to predict the class from label and state, by name."""
 
 
@@ -173,7 +173,7 @@ def label_and_state(way: str, labels: str) -> str:
     Parameters
     ----------
     way : str
-        A key of `WAYS`.
+        A key of `RULES`.
     labels : str
         Name of the image labels, such as "true labels".
     """
@@ -183,7 +183,7 @@ def label_and_state(way: str, labels: str) -> str:
 def fitted_tables(
     frames: TrainingSet, labellers: Mapping[str, Labeller], places: NDArray
 ) -> dict[str, dict[str, NDArray[np.int64]]]:
-    """Return the class for each label and state, (C + 1, 4), by labeller and by key of `WAYS`.
+    """Return the class for each label and state, (C + 1, 4), by labeller and by key of `RULES`.
 
     Parameters
     ----------
@@ -196,4 +196,4 @@ def fitted_tables(
         The pixel that sees each cell's ground, from `ground_pixels`.
     """
     counts = {name: count_labels_and_states(frames, one, places) for name, one in labellers.items()}
-    return {name: {way: table(one) for way, table in WAYS.items()} for name, one in counts.items()}
+    return {name: {way: table(one) for way, table in RULES.items()} for name, one in counts.items()}

@@ -147,7 +147,7 @@ def baseline_grids(
     callable
         k -> classes (H, W) of frame k: "majority class" per cell; "occupancy alone", the majority class per cell and
         state; and, for the "true" image labels and the labels of each image network, the grids of `carried_grids` and
-        the predictions of `WAYS` from flat-ground label and occupancy state.
+        the predictions of `RULES` from flat-ground label and occupancy state.
     """
     truths = training.arrays["truth"]
     returns = returns or frames.returns

@@ -1,6 +1,7 @@
 """Confidence intervals for scores and score differences, over drives and seeds (section 4.2)."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -204,12 +205,19 @@ def _checked(name: str, confusions: ArrayLike) -> NDArray:
 
 def _left_out(confusions: NDArray, metric: Metric) -> tuple[NDArray, NDArray]:
     """Return each seed's metric on all drives (S,), and with each drive left out (S, V)."""
-    totals = confusions.sum(axis=1)
-    scores = np.array([metric(total) for total in totals])
-    without = np.array([[metric(matrix) for matrix in matrices] for matrices in totals[:, None] - confusions])
+    scores, without = _jackknife(metric, confusions.tobytes(), confusions.dtype.str, confusions.shape)
     if not (np.isfinite(scores).all() and np.isfinite(without).all()):
         raise ArgumentError("metric", "a finite number for all drives, and for all but one of them", "NaN or infinity")
     return scores, without
+
+
+@lru_cache(maxsize=64)  # a table compares many methods with the same one
+def _jackknife(metric: Metric, content: bytes, dtype: str, shape: tuple[int, ...]) -> tuple[NDArray, NDArray]:
+    """Compute what `_left_out` returns; arrays can't be looked up, but their bytes can."""
+    confusions = np.frombuffer(content, dtype).reshape(shape)
+    totals = confusions.sum(axis=1)
+    scores = np.array([metric(total) for total in totals])
+    return scores, np.array([[metric(matrix) for matrix in matrices] for matrices in totals[:, None] - confusions])
 
 
 def _estimate(scores: NDArray, without: NDArray) -> EstimatedMean:

@@ -19,6 +19,8 @@ def simulate(
 ) -> "SimulatedDrive":
     """Simulate a drive. The same arguments give the same drive.
 
+    The street is as long as the distance driven, so another number of frames gives another street.
+
     Parameters
     ----------
     seed : int or numpy.random.SeedSequence
@@ -26,11 +28,11 @@ def simulate(
     n_frames : int
         Number of frames, ten a second.
     street : str or Wishes, optional
-        A street that is hard for occupancy filters, one of `named_streets.TEST_STREETS`; or the properties to fix.
+        A street that is hard for occupancy filters, one of `street.plan.TEST_STREETS`; or the properties to fix.
         By default the whole street is random.
     rig : Rig, optional
-        The sensors on the recording car. By default the sensors of the simulated data sets, or
-        `named_streets.KITTI_RIG` on a named street.
+        The sensors on the recording car. By default the sensors of the simulated data sets, or `KITTI_RIG` on a named
+        street.
 
     Returns
     -------
@@ -44,9 +46,11 @@ def simulate(
     MissingExtraError
         When trimesh or embreex isn't installed.
     """
-    from semgrid_edu.workshop.simulation import drive, named_streets
-    from semgrid_edu.workshop.simulation.street.plan import ANY
+    from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+    from semgrid_edu.workshop.simulation.sensors.rig import KITTI_RIG
+    from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, draw_test_street
 
     if isinstance(street, str):
-        return named_streets.named_street(street, seed, n_frames, rig or named_streets.KITTI_RIG)
-    return drive.SimulatedDrive(seed, n_frames, street or ANY, rig)
+        seed, street = draw_test_street(street, seed)
+        rig = rig or KITTI_RIG
+    return SimulatedDrive(seed, n_frames, street or RANDOM_STREET, rig)

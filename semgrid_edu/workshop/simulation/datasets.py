@@ -18,9 +18,8 @@ from semgrid_edu.storage.provenance import versions, write_provenance
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.simulation import writer
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
-from semgrid_edu.workshop.simulation.named_streets import SAMPLE_WISHES, wishes_of
 from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD, SAMPLE_RIG, Rig
-from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes
+from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, SAMPLE_STREET, Wishes
 from semgrid_edu.workshop.workplace import check_workers, workplace
 
 FORMAT = 2
@@ -37,24 +36,21 @@ class Route:
         Its split, such as "train".
     n_frames : int
         Number of frames, ten a second.
-    all_labelled : bool
-        Whether all frames have labels. If not, only the last one has.
+    every : int
+        Label every n-th frame: 1 labels all, and `n_frames` only the last.
     wishes : Wishes
         The fixed properties of the street; the rest is random.
-    every : int
-        With `all_labelled`, label every n-th frame; 1 labels all of them.
     """
 
     split: str
     n_frames: int
-    all_labelled: bool
-    wishes: Wishes = ANY
     every: int = 1
+    wishes: Wishes = RANDOM_STREET
 
     @property
     def labelled(self) -> range:
         """Numbers of the labelled frames."""
-        return range(self.every - 1 if self.all_labelled else self.n_frames - 1, self.n_frames, self.every)
+        return range(self.every - 1, self.n_frames, self.every)
 
 
 @dataclass(frozen=True)
@@ -97,7 +93,7 @@ def read_recipes(name: str) -> dict[str, DatasetRecipe]:
     for data, row in table_beside(__file__, name).items():
         routes: list[Route] = []
         for times, route, *each in row["routes"]:
-            routes += [Route(**route, wishes=wishes_of(wishes)) for wishes in each] * times
+            routes += [Route(**route, wishes=Wishes(**wishes)) for wishes in each] * times
         rig = {"rig": Rig()} if row.get("coarse") else {}
         recipes[data] = DatasetRecipe(data, row["label_set"], tuple(routes), row.get("dense", False), **rig)
     return recipes
@@ -105,7 +101,7 @@ def read_recipes(name: str) -> dict[str, DatasetRecipe]:
 
 RECIPES = read_recipes("recipes")
 RECIPES["sample"] = DatasetRecipe(
-    "sample", "KITTI-14", (Route("drive", 20, True, SAMPLE_WISHES),), rig=SAMPLE_RIG, edition=1
+    "sample", "KITTI-14", (Route("drive", 20, 1, SAMPLE_STREET),), rig=SAMPLE_RIG, edition=1
 )
 """Numbers of frames as in the paper: KITTI 142 + 110 labelled frames, INRIA-Chroma 146 + 130 in 3 + 2 routes.
 "validation" has drives like minikitti's, half as many as in its training split. It serves to tune parameters after the
@@ -218,8 +214,8 @@ def _make_drive(recipe: DatasetRecipe, root: Path, seed: int, drive: str) -> Non
     """Simulate and write one drive. Its random numbers depend only on data set, seed and drive number."""
     index = int(drive) - 1
     route = recipe.routes[index]
-    own_seed = np.random.SeedSequence([seed, recipe.edition, *recipe.name.encode()], spawn_key=(index,))
-    simulated = SimulatedDrive(own_seed, route.n_frames, route.wishes, recipe.rig)
+    drive_seed = np.random.SeedSequence([seed, recipe.edition, *recipe.name.encode()], spawn_key=(index,))
+    simulated = SimulatedDrive(drive_seed, route.n_frames, route.wishes, recipe.rig)
     writer.write_drive(root, drive, simulated, route.labelled, LABEL_SETS[recipe.label_set], recipe.dense)
 
 

@@ -11,10 +11,10 @@ from semgrid_edu.workshop.simulation.sensors.camera import Picture, take_picture
 from semgrid_edu.workshop.simulation.sensors.lidar import labelled_scan
 from semgrid_edu.workshop.simulation.sensors.raycast import Instant, PorousMesh, RayMesh
 from semgrid_edu.workshop.simulation.sensors.rig import Geodesy, Rig
-from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_kinds, visible_cells, world_cells
+from semgrid_edu.workshop.simulation.sensors.truth import BirdseyeTruth, birdseye_truth
+from semgrid_edu.workshop.simulation.street import road_users
 from semgrid_edu.workshop.simulation.street.footprints import footprint_table
-from semgrid_edu.workshop.simulation.street.plan import ANY, Wishes, draw_plan
-from semgrid_edu.workshop.simulation.street.road_users import fill_street
+from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, Wishes, draw_plan
 from semgrid_edu.workshop.simulation.street.scenery import build_scenery
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
 from semgrid_edu.workshop.simulation.street.trajectories import ActorPace, Ego
@@ -78,7 +78,7 @@ class SimulatedDrive:
     """
 
     def __init__(
-        self, seed: int | np.random.SeedSequence, n_frames: int, wishes: Wishes = ANY, rig: Rig | None = None
+        self, seed: int | np.random.SeedSequence, n_frames: int, wishes: Wishes = RANDOM_STREET, rig: Rig | None = None
     ) -> None:
         rng = np.random.default_rng(seed)
         self.n_frames = n_frames
@@ -91,7 +91,8 @@ class SimulatedDrive:
         self.geodesy = Geodesy.random(rng)
         builder = build_scenery(self.plan, rng)
         traffic = Traffic(builder, self.ego.trajectory, duration)
-        (wishes.cast or fill_street)(traffic)
+        cast = getattr(road_users, wishes.cast) if isinstance(wishes.cast, str) else wishes.cast
+        cast(traffic)
         self.moving = traffic.moving
         self.parked = traffic.parked
         self.static = RayMesh.of(*zip(*builder.solid, strict=True))
@@ -145,7 +146,7 @@ class SimulatedDrive:
         actors = self.parked + self.moving
         centres = [transform_points(T, actor.middle(road, t)) for actor in actors]
         inside = LABEL_GRID.cells(np.reshape(centres, (-1, 3)))[2]
-        return [actor.described(road, t, T) for actor, held in zip(actors, inside, strict=True) if held]
+        return [actor.described(road, t, T) for actor, is_inside in zip(actors, inside, strict=True) if is_inside]
 
     def footprints(self, t: float) -> NDArray[np.float64]:
         """Return the footprints of all objects at one instant, static and moving, (K, 9), see `footprint_table`.
@@ -167,27 +168,20 @@ class SimulatedDrive:
         instances : (710, 310) int32
             Number of the car, pedestrian or bicycle; 0 for anything else.
         """
-        footprints = self.footprints(t)
-        kinds, which = birdseye_kinds(world_cells(self.pose(t), self.rig), footprints, self.plan.road)
-        return kinds, np.where(which >= 0, footprints[which, 7], 0).astype(np.int32)
+        truth = self.truth(t)
+        return truth.kinds, truth.instances
 
-    def truth(self, t: float, picture: Picture) -> BirdseyeTruth:
-        """Return the content of every cell and whether the camera sees it.
+    def truth(self, t: float, picture: Picture | None = None) -> BirdseyeTruth:
+        """Return the content of every cell of `LABEL_GRID`, and whether the camera sees it.
 
         Parameters
         ----------
         t : float
             Seconds since the drive began.
-        picture : Picture
+        picture : Picture, optional
             The picture that the camera took at that instant.
         """
-        road = self.plan.road
-        pose = self.pose(t)
-        footprints = self.footprints(t)
-        cells = world_cells(pose, self.rig)
-        kinds, which = birdseye_kinds(cells, footprints, road)
-        seen = visible_cells(cells, kinds, which, footprints, road, picture, pose, self.rig.camera)
-        return BirdseyeTruth(kinds, seen)
+        return birdseye_truth(self.footprints(t), self.plan.road, self.pose(t), self.rig, picture)
 
     def frame(self, index: int, labelled: bool) -> SimulatedFrame:
         """Record one frame. Its noise depends only on its number, not on the frames recorded before.
@@ -219,7 +213,7 @@ class SimulatedDrive:
         """
         t = index * PERIOD
         half = self.rig.packet_interval / 2
-        points, _ = self._labelled_scan(t, self._noise(index, 1))
+        points, _ = self.labelled_scan(index)
         nearest = t + float(self._noise(index, 2).uniform(-half, half)) if half else t
         return Frame(None, points, self.rig.camera, self.pose(nearest), t)
 

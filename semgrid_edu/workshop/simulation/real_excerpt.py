@@ -104,7 +104,7 @@ def needed_returns(points: NDArray) -> NDArray[np.bool_]:
     beyond = np.maximum(np.abs(x - LABEL_GRID.x_max / 2) - LABEL_GRID.x_max / 2, np.abs(y) - LABEL_GRID.y_max)
     kept = beyond < AROUND
     ahead = ~kept & (x > -BEHIND)
-    bins = np.minimum(far / sensor.ground.bin, sensor.ground.bins - 1).astype(np.int64)
+    bins = np.minimum(far / sensor.ground.bin_length, sensor.ground.bins - 1).astype(np.int64)
     bins += beams_of(x, y, sensor.ground.sectors).astype(np.int64) * sensor.ground.bins
     # In float32, as in the filter, because many returns are on the border between two beams.
     beam = beams_of(points[:, 0], points[:, 1], sensor.beams)
@@ -164,7 +164,7 @@ def _write(excerpt: _FixedRig, scene: str, n_frames: int, folder: Path) -> Path:
     drive = scene.zfill(4)
     K = excerpt.camera.K
     T = excerpt.camera.T_camera_from_lidar
-    rig = SimpleNamespace(image_size=IMAGE_SIZE, R_rect=np.eye(3), T_camera0_from_lidar=T, T_lidar_from_imu=np.eye(4))
+    rig = SimpleNamespace(camera=excerpt.camera, R_rect=np.eye(3), T_camera0_from_lidar=T, T_lidar_from_imu=np.eye(4))
     rig.P_rect = lambda _: np.column_stack([K, np.zeros(3)])  # KITTI has four cameras, and this one is camera 2
     write_calibration(folder, rig, date)
     label_set = f"{KITTI_14.name}\n{WITH_GAPS}"

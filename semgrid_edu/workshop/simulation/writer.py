@@ -88,7 +88,7 @@ def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
     """
     day = Path(root) / date
     time = "calib_time: 01-Jan-2026 09:00:00\n"
-    height, width = rig.image_size
+    height, width = rig.camera.size
     text = time + _row("corner_dist", (0.0995,))
     for index in range(4):
         P = rig.P_rect(index)

@@ -4,9 +4,8 @@ Importing this package registers the reader "synthia" for dataset.json.
 """
 
 from semgrid_edu.datasets.index import READERS, Reader
-from semgrid_edu.workshop.paper.datasets.kitti_tracking import KittiTrackingRun
+from semgrid_edu.workshop.paper.datasets.kitti_tracking import KittiTrackingRun, ZhangDrive, ZhangLabels
 from semgrid_edu.workshop.paper.datasets.synthia import SynthiaSequence
-from semgrid_edu.workshop.paper.datasets.zhang import ZhangDrive, ZhangLabels
 
 __all__ = ["KittiTrackingRun", "SynthiaSequence", "ZhangDrive", "ZhangLabels"]
 

@@ -59,13 +59,17 @@ VIEW = "Stereo_Left/Omni_F"
 SYNTHIA_PERIOD = 0.2
 """Seconds between frames: 5 frames per second according to the readme."""
 
+LOWEST_CAMERA = 0.5
+"""No car's camera is lower, metres."""
+
 GROUND_RANGE = 20.0
 """Road pixels of the first image closer than this, metres, determine the height of the camera."""
 
-STANDING = 0.05
-MOSTLY = 0.9
-"""STANDING: a camera that moves less than this counts as stationary, metres per frame. MOSTLY: minimum for the forward
-share of a moving camera's steps (median)."""
+STATIONARY_STEP = 0.05
+"""A camera that moves less than this from frame to frame counts as stationary, metres."""
+
+FORWARD_SHARE = 0.9
+"""The smallest plausible forward share of a moving camera's steps (median)."""
 
 _CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """From axes forward, left, up to camera axes."""
@@ -197,21 +201,23 @@ class SynthiaSequence(FrameSequence):
         poses = [self._pose(k) for k in range(len(self))]
         steps = np.array([(invert_rigid(a) @ b)[:3, 3] for a, b in pairwise(poses)]).reshape(-1, 3)
         lengths = np.linalg.norm(steps, axis=1)
-        ahead = steps[lengths > STANDING, 0] / lengths[lengths > STANDING]
-        if ahead.size and np.median(ahead) < MOSTLY:
+        ahead = steps[lengths > STATIONARY_STEP, 0] / lengths[lengths > STATIONARY_STEP]
+        if ahead.size and np.median(ahead) < FORWARD_SHARE:
             found = f"of a step of the camera {np.median(ahead):.2f} ahead (median)"
-            raise DataError(self.folder / "CameraParams", f"steps of which at least {MOSTLY} are ahead", found)
+            raise DataError(self.folder / "CameraParams", f"steps of which at least {FORWARD_SHARE} are ahead", found)
 
     def _frame(self, k: int) -> Frame:
         size = self.camera.size
         depth = read_synthia_depth(self._file("Depth", k), size)
+        points = depth_scan(depth, self.camera)
         return Frame(
             image=read_png(self._file("RGB", k), "RGB", size),
-            points=depth_scan(depth, self.camera),
+            points=points,
             camera=self.camera,
             T_world_from_lidar=invert_rigid(self._pose(0)) @ self._pose(k),
             time=k * SYNTHIA_PERIOD,
             labels=self._labels(read_synthia_labels(self._file("GT/LABELS", k), size), depth),
+            vehicle_returns=np.zeros(len(points), np.bool_),  # a depth image doesn't show the vehicle
         )
 
     @cached_property
@@ -235,6 +241,9 @@ class SynthiaSequence(FrameSequence):
         height = float(np.median((rows - K[1, 2]) / K[1, 1] * depth[road]))
         if height <= 0:
             raise DataError(path, "road below the camera", f"road {-height:.2f} m above it")
+        if height < LOWEST_CAMERA:
+            expected = f"a camera at least {LOWEST_CAMERA} m above the road"
+            raise DataError(path, expected, f"{height:.2g} m: is the depth in metres, not in centimetres?")
         return height
 
     def _labels(self, classes: NDArray[np.uint8], depth: NDArray[np.float32]) -> FrameLabels:

@@ -1,7 +1,6 @@
 """The camera: renders the world at one instant and records what each pixel shows."""
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numba import njit
@@ -18,6 +17,10 @@ _SKY_STEP = 3
 """Sky visibility is sampled at every third pixel of every third row, because it varies slowly."""
 _SUBPIXELS = ((-0.33, 0.33), (0.33, -0.33))
 """Antialiasing: offsets, right and down in pixels, of two extra rays for each pixel on an edge."""
+_NOISE = 0.8
+"""Standard deviation of the pixel noise at mid grey, in steps of 1/255."""
+_BITS = 6
+"""Bits per colour channel: few, to keep PNG files small."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +43,6 @@ class Picture:
     kind: NDArray[np.uint8]
     depth: NDArray[np.float32]
     instance: NDArray[np.int32]
-
-
-_rays = cache(Rig.pixel_directions)
 
 
 def _discontinuities(triangle: NDArray, distance: NDArray, kind: NDArray, material: NDArray) -> NDArray[np.bool_]:
@@ -85,14 +85,14 @@ def _open(
 
     Each chosen hit casts one ray, starting slightly off the surface, along `axis` plus the normal plus random scatter.
     """
-    luck = rng.random((len(chosen), 3), dtype=np.float32)
+    scatter = rng.random((len(chosen), 3), dtype=np.float32)
     normal = instant.normals[hits.triangle[chosen]]
     ray = hits.directions[chosen]
     away = normal[:, 0] * ray[:, 0] + normal[:, 1] * ray[:, 1] + normal[:, 2] * ray[:, 2] > 0
     facing = np.where(away, -1.0, 1.0)[:, None] * normal
     offset = 0.004 + 0.0006 * hits.distance[chosen, None].astype(np.float64)
     starts = (hits.position[chosen] + offset * (facing - ray)).astype(np.float32)
-    rays = (np.float32(axis) + along_normal * facing + spread * (luck - 0.5)).astype(np.float32)
+    rays = (np.float32(axis) + along_normal * facing + spread * (scatter - 0.5)).astype(np.float32)
     length = np.sqrt((rays**2).sum(axis=1, keepdims=True, dtype=np.float64))
     result = np.full(len(hits.distance), -1, np.float32)
     result[chosen] = ~instant.blocked(starts, (rays / length).astype(np.float32))
@@ -116,29 +116,27 @@ def _sun_and_sky(
     return sunlit.ravel(), open_sky.ravel()
 
 
-def _lens(radiance: NDArray[np.float32], centre: float) -> NDArray[np.float32]:
-    """Blur the picture like a lens: along each axis a pixel keeps the share `centre`, its neighbours get the rest."""
-    middle = np.float32(centre)
-    side = np.float32((1.0 - centre) / 2)
+def _lens(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Blur the picture like a lens: along each axis a pixel gives 14 % of its light to each neighbour."""
     for axis in (1, 0):
         at = np.arange(radiance.shape[axis])
         neighbours = radiance.take(at - 1, axis, mode="clip") + radiance.take(at + 1, axis, mode="clip")
-        radiance = middle * radiance + side * neighbours
+        radiance = np.float32(0.72) * radiance + np.float32(0.14) * neighbours
     return radiance
 
 
-def _expose(radiance: NDArray, light: Light, rig: Rig, rng: np.random.Generator) -> NDArray[np.uint8]:
+def _expose(radiance: NDArray, light: Light, rng: np.random.Generator) -> NDArray[np.uint8]:
     """Turn radiance into pixel values: lens blur, exposure, vignette, tone curve, noise, quantisation."""
-    height, width = rig.image_size
+    height, width, _ = radiance.shape
     v, u = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
     gain = light.exposure * (1 - 0.18 * (u**2 + 0.3 * v**2))[..., None] * np.asarray(light.balance)
-    exposed = (_lens(radiance, 0.72) * gain.astype(np.float32)).clip(0)
+    exposed = (_lens(radiance) * gain.astype(np.float32)).clip(0)
     grey = 255 * (1 - np.exp(-1.25 * exposed)) ** np.float32(1 / 2.0)
-    sigma = rig.camera_noise * (0.6 + 0.6 * np.sqrt(grey / 128))
+    sigma = _NOISE * (0.6 + 0.6 * np.sqrt(grey / 128))
     noisy = grey + sigma * rng.standard_normal(grey.shape, dtype=np.float32)
-    step = 2 ** (8 - rig.bits)
+    step = 2 ** (8 - _BITS)
     levels = np.floor(noisy.clip(0, 255) / step)
-    return (levels * (255 / (2**rig.bits - 1))).clip(0, 255).astype(np.uint8)
+    return (levels * (255 / (2**_BITS - 1))).clip(0, 255).astype(np.uint8)
 
 
 def take_picture(
@@ -153,7 +151,7 @@ def take_picture(
     T_world_from_lidar : (4, 4) float
         Pose of the LIDAR, metres.
     rig : Rig
-        The camera's pose and noise.
+        The camera and its pose.
     road : Road
         The street, for the type of ground.
     light : Light
@@ -161,10 +159,10 @@ def take_picture(
     rng : numpy.random.Generator
         Source of the sensor noise and of the scattered rays for soft shadows.
     """
-    shape = rig.image_size
+    shape = rig.camera.size
     rotation = T_world_from_lidar[:3, :3].astype(np.float32)
     eye = transform_points(T_world_from_lidar @ rig.T_lidar_from_camera, np.zeros(3))
-    rays = _rays(rig)
+    rays = rig.pixel_directions()
     hits = instant.cast(eye, turned(rays, rotation), rng)
     sunlit, open_sky = _sun_and_sky(hits, instant, light, shape, rng)
     pixel = 1.0 / rig.camera.K[0, 0]
@@ -174,13 +172,13 @@ def take_picture(
     distance = hits.distance.reshape(shape)
     edges = np.flatnonzero(_discontinuities(triangles, distance, instant.kind, instant.material))
     for du, dv in _SUBPIXELS:
-        beside = instant.cast(eye, turned(_rays(rig, du, dv)[edges], rotation), rng)
+        beside = instant.cast(eye, turned(rig.pixel_directions(du, dv)[edges], rotation), rng)
         radiance[edges] += shade(beside, instant, road, light, sunlit[edges], open_sky[edges], pixel)[0]
     radiance[edges] /= 1 + len(_SUBPIXELS)
 
     ahead = (rays @ rig.camera.T_camera_from_lidar[2, :3]).astype(np.float32) * hits.distance
     return Picture(
-        image=_expose(radiance.reshape(*shape, 3), light, rig, rng),
+        image=_expose(radiance.reshape(*shape, 3), light, rng),
         kind=kind.reshape(shape),
         depth=np.where(hits.triangle < 0, np.float32(np.nan), ahead).reshape(shape),
         instance=np.where(hits.triangle < 0, 0, instant.instance[hits.triangle]).reshape(shape),

@@ -5,12 +5,14 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.workshop.simulation.sensors.raycast import MISS, Hits, Instant, turned
+from semgrid_edu.workshop.simulation.sensors.raycast import Hits, Instant, turned
 from semgrid_edu.workshop.simulation.sensors.rig import Lidar
 from semgrid_edu.workshop.simulation.street.ground import ground_kinds
 from semgrid_edu.workshop.simulation.street.layout import Road
 from semgrid_edu.workshop.simulation.things.materials import REFLECTANCE, Kind, Material
 
+_RANGE = 100.0
+"""Maximum range, metres. The HDL-64E sees dark surfaces up to 80 m and bright ones up to 120 m."""
 _SECTOR = 30.0
 """Road users are frozen while the scanner turns by this angle, degrees. At 14 m/s they would move 12 cm."""
 
@@ -21,10 +23,10 @@ def labelled_scan(
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:  # fmt: skip
     """Record one LIDAR scan, and label each return with what it hit.
 
-    With a rolling scan (`Lidar.turn` > 0) each column is measured from the pose at its own time and stored in the LIDAR
-    frame of that time, like KITTI's raw scans. A return is lost when too little light comes back. So dark, distant and
-    grazing surfaces lose more returns. Glass reflects the light away from the sensor, and car paint scatters little of
-    it.
+    In a rolling scan (`Lidar.revolution` > 0) each column is measured from the pose at its own time, and stored in the
+    LIDAR frame of that time, like KITTI's raw scans. A return is lost when too little light comes back, so dark,
+    distant and grazing surfaces lose more. Glass reflects the light away from the sensor, and car paint scatters little
+    of it.
 
     Parameters
     ----------
@@ -47,16 +49,19 @@ def labelled_scan(
         Members of `Kind`.
     """
     rays = lidar.directions
-    met = [np.concatenate(part) for part in zip(*_sectors(world, pose, lidar, road, rng), strict=True)]
-    near, distance, cosine, reflectance, kinds = (part[np.argsort(met[0])] for part in met)
-    luck = rng.random(len(rays), dtype=np.float32)
+    parts = zip(*_sectors(world, pose, lidar, road, rng), strict=True)
+    number, *measured = (np.concatenate(part) for part in parts)
+    order = np.argsort(number)
+    number = number[order]
+    distance, cosine, reflectance, kinds = (column[order] for column in measured)
+    draws = rng.random(len(rays), dtype=np.float32)
     range_noise = rng.standard_normal(len(rays), dtype=np.float32)
-    glow = rng.standard_normal(len(rays), dtype=np.float32)
+    gain_noise = rng.standard_normal(len(rays), dtype=np.float32)
     signal = reflectance * (0.15 + 0.85 * cosine) * (25.0 / np.maximum(distance, 8.0)) ** 2
-    kept = luck[near] > lidar.drop + np.exp(-signal / lidar.weakest)
-    measured = distance + lidar.range_sigma * range_noise[near]
-    intensity = (reflectance * (0.4 + 0.6 * cosine) * (1 + 0.15 * glow[near])).clip(0, 0.99)
-    points = np.column_stack([rays[near] * measured[:, None], np.round(intensity, 2)])
+    kept = draws[number] > lidar.dropout + np.exp(-signal / lidar.weak_signal)
+    measured_range = distance + lidar.range_sigma * range_noise[number]
+    intensity = (reflectance * (0.4 + 0.6 * cosine) * (1 + 0.15 * gain_noise[number])).clip(0, 0.99)
+    points = np.column_stack([rays[number] * measured_range[:, None], np.round(intensity, 2)])
     return points[kept].astype(np.float32), kinds[kept]
 
 
@@ -64,37 +69,34 @@ def _sectors(
     world: Callable[[float], Instant], pose: Callable[[float], NDArray], lidar: Lidar, road: Road,
     rng: np.random.Generator,
 ) -> Iterator[tuple[NDArray, ...]]:  # fmt: skip
-    """Yield the hits of each sector of a scan, from `_met`; one sector if the whole scan is instantaneous."""
+    """Yield number, distance, |cos|, reflectance and kind of the rays that hit something, sector by sector.
+
+    An instantaneous scan is one sector.
+    """
     times = lidar.times
     rays = lidar.directions
-    poses = np.stack([pose(t) for t in times]) if lidar.turn else pose(0.0)[None]
-    sector = np.floor(lidar.azimuths / _SECTOR) * bool(lidar.turn)
-    for one in np.unique(sector):
-        columns = np.flatnonzero(sector == one)
+    poses = np.stack([pose(t) for t in times]) if lidar.revolution else pose(0.0)[None]
+    sector = np.floor(lidar.azimuths / _SECTOR) * bool(lidar.revolution)
+    for current in np.unique(sector):
+        columns = np.flatnonzero(sector == current)
         chosen = (columns + len(times) * np.arange(len(lidar.elevations))[:, None]).ravel()
-        here = poses[chosen % len(times) if lidar.turn else 0]
+        here = poses[chosen % len(times) if lidar.revolution else 0]
         instant = world(float(times[columns].mean()))
         hits = instant.cast(here[..., :3, 3], turned(rays[chosen], here[..., :3, :3].astype(np.float32)), rng)
-        yield _met(instant, hits, chosen, lidar, road)
+        near = np.flatnonzero(hits.distance < _RANGE)
+        yield chosen[near], hits.distance[near], *_surface(instant, hits, near, road)
 
 
-def _met(
-    instant: Instant, hits: Hits, rays: NDArray[np.int64], lidar: Lidar, road: Road
-) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Return number, distance, |cos|, reflectance and kind of the rays that hit something within range."""
-    near = np.flatnonzero(hits.distance < min(lidar.range_max, MISS))
+def _surface(
+    instant: Instant, hits: Hits, near: NDArray[np.int64], road: Road
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]:
+    """Return |cos|, reflectance and kind of some hits. Lane marks are bright; grass is brighter than asphalt."""
     triangle = hits.triangle[near]
-    normals = instant.looked_up("normals", triangle)
-    material = instant.looked_up("material", triangle)
-    kinds = instant.looked_up("kind", triangle)
+    kinds = instant.kind[triangle]
+    material = instant.material[triangle]
     ground = material == Material.GROUND
     kinds[ground] = ground_kinds(road, hits.position[near[ground], :2].astype(np.float64))
-    cosine = np.abs((normals * hits.directions[near]).sum(axis=1))
-    return rays[near], hits.distance[near], cosine, _reflectance(material, kinds), kinds
-
-
-def _reflectance(material: NDArray, kinds: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return the reflectance of hits. On the ground, lane marks are bright, and grass is brighter than asphalt."""
-    by_kind = np.full(256, 0.2, np.float32)
-    by_kind[[Kind.LANE, Kind.SIDEWALK, Kind.GRASS]] = 0.75, 0.3, 0.45
-    return np.where(material == Material.GROUND, by_kind[kinds], REFLECTANCE[material])
+    cosine = np.abs((instant.normals[triangle] * hits.directions[near]).sum(axis=1))
+    of_ground = np.full(256, 0.2, np.float32)
+    of_ground[[Kind.LANE, Kind.SIDEWALK, Kind.GRASS]] = 0.75, 0.3, 0.45
+    return cosine, np.where(ground, of_ground[kinds], REFLECTANCE[material]), kinds

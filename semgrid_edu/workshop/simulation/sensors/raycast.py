@@ -61,7 +61,7 @@ class RayMesh:
 
 
 @dataclass(frozen=True, eq=False)
-class PorousMesh:
+class PorousMesh(RayMesh):
     """Surfaces and volumes that stop a ray with some probability.
 
     A ray passes with probability exp(-depth), where `depth` is the optical depth along its path:
@@ -73,13 +73,12 @@ class PorousMesh:
 
     Parameters
     ----------
-    mesh : RayMesh
-        All F triangles in the world.
+    shape, instance
+        As in `RayMesh`.
     opacity : (F,) float32
         Opacity of each triangle: 1/m for wire and twigs, dimensionless for panes.
     """
 
-    mesh: RayMesh
     opacity: NDArray[np.float32]
 
     @classmethod
@@ -93,8 +92,8 @@ class PorousMesh:
         opacities : sequence of float
             Opacity of each shape.
         """
-        faces = [len(shape.faces) for shape in shapes]
-        return cls(RayMesh.of(shapes, [0] * len(shapes)), np.repeat(np.asarray(opacities, np.float32), faces))
+        opacity = np.repeat(np.asarray(opacities, np.float32), [len(s.faces) for s in shapes])
+        return cls(merge(shapes), np.zeros(len(opacity), np.int32), opacity)
 
     def stop(
         self, origins: NDArray, directions: NDArray, ends: NDArray, rng: np.random.Generator
@@ -120,7 +119,7 @@ class PorousMesh:
         distance : (M,) float32
             Distances at which they stop, metres.
         triangle : (M,) int32
-            Triangles of `mesh` that stop them.
+            The triangles that stop them.
         """
         rays, start = np.arange(len(ends)), np.zeros(len(ends), np.float32)
         rays, start, crossing, triangle = self._next(origins, directions, rays, start)
@@ -138,7 +137,7 @@ class PorousMesh:
 
     def _next(self, origins: NDArray, directions: NDArray, rays: NDArray, start: NDArray) -> tuple[NDArray, ...]:
         """Return the rays that hit a surface beyond `start`, their start, and the surface's distance and triangle."""
-        hits = self.mesh.embree.run(origins[rays] + start[:, None] * directions[rays], directions[rays], output=1)
+        hits = self.embree.run(origins[rays] + start[:, None] * directions[rays], directions[rays], output=1)
         met = hits["primID"] >= 0
         return rays[met], start[met], start[met] + hits["tfar"][met], hits["primID"][met]
 
@@ -149,9 +148,9 @@ class PorousMesh:
 
         The path is inside a volume if the ray exits one at the next surface.
         """
-        shape, opacity = self.mesh.shape, self.opacity[triangle]
-        cosine = (shape.normals[triangle] * directions).sum(axis=1)
-        material = shape.material[triangle]
+        opacity = self.opacity[triangle]
+        cosine = (self.shape.normals[triangle] * directions).sum(axis=1)
+        material = self.shape.material[triangle]
         length = np.where(cosine > 0, crossing - start, np.float32(0))
         across = np.where(material == Material.WIRE, crossing, np.float32(1)) / np.maximum(np.abs(cosine), _GRAZING)
         volume = material == Material.TWIGS
@@ -224,7 +223,7 @@ class Instant:
     @property
     def meshes(self) -> list[RayMesh]:
         """All meshes, in the order of the tables."""
-        return [mesh for mesh in (self.static, self.moving, self.porous and self.porous.mesh) if mesh]
+        return [mesh for mesh in (self.static, self.moving, self.porous) if mesh]
 
     def cast(self, origin: NDArray, directions: NDArray, rng: np.random.Generator) -> Hits:
         """Cast rays and return their first hits.
@@ -253,24 +252,6 @@ class Instant:
             distance[rays], triangle[rays] = at, face + len(self.instance) - len(self.porous.opacity)
         position = origins + np.minimum(distance, 1e4)[:, None] * directions
         return Hits(directions, distance, triangle, position)
-
-    def looked_up(self, name: str, triangle: NDArray[np.int32]) -> NDArray:
-        """Return rows of one of the tables, without building the whole table.
-
-        Parameters
-        ----------
-        name : str
-            "normals", "colour", "material" or "kind".
-        triangle : (N,) int32
-            The rows.
-        """
-        parts = [getattr(mesh.shape, name) for mesh in self.meshes]
-        first = np.cumsum([0] + [len(part) for part in parts])
-        out = np.empty((len(triangle), *parts[0].shape[1:]), parts[0].dtype)
-        for part, start in zip(parts, first[:-1], strict=True):
-            mine = (triangle >= start) & (triangle < start + len(part))
-            out[mine] = part[triangle[mine] - start]
-        return out
 
     def blocked(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
         """Return which rays hit anything solid, (N,).

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,8 @@ KITTI_ELEVATIONS = (
 _CAMERA_AXES = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 _KITTI_K = np.array([[721.5377, 0.0, 609.5593], [0.0, 721.5377, 172.8540], [0.0, 0.0, 1.0]])
 _KITTI_SIZE = (375, 1242)
+_IMAGE_SIZE = (188, 621)
+"""Height and width of the images, pixels: half of KITTI's."""
 
 
 @dataclass(frozen=True)
@@ -39,16 +42,14 @@ class Lidar:
     azimuth_min, azimuth_max, azimuth_step : float
         Horizontal angles of a scan, degrees, positive to the left. The default covers the half-plane ahead in steps of
         0.9 degrees, which keeps data sets small; the HDL-64E at 10 Hz has -180, 180 and 0.18.
-    range_max : float
-        Maximum range, metres. The HDL-64E sees dark surfaces up to 80 m and bright ones up to 120 m.
     range_sigma : float
         Standard deviation of the range noise, metres: 2 cm according to the manual.
-    drop : float
+    dropout : float
         Share of returns that are lost on any surface, 0..1.
-    weakest : float
-        Sensitivity: at this signal strength, 1 return in e is lost. At 25 m and perpendicular incidence, the signal
-        equals the reflectance.
-    turn : float
+    weak_signal : float
+        Signal strength at which 1 return in e is lost. At 25 m and perpendicular incidence, the signal equals the
+        reflectance.
+    revolution : float
         Duration of one clockwise revolution, seconds; 0 for an instantaneous scan.
     """
 
@@ -56,11 +57,10 @@ class Lidar:
     azimuth_min: float = -90.0
     azimuth_max: float = 90.0
     azimuth_step: float = 0.9
-    range_max: float = 100.0
     range_sigma: float = 0.02
-    drop: float = 0.03
-    weakest: float = 0.05
-    turn: float = 0.0
+    dropout: float = 0.03
+    weak_signal: float = 0.05
+    revolution: float = 0.0
 
     @cached_property
     def azimuths(self) -> NDArray[np.float64]:
@@ -70,7 +70,7 @@ class Lidar:
     @cached_property
     def times(self) -> NDArray[np.float64]:
         """(A,): time of each column, seconds, 0 when the LIDAR points ahead."""
-        return -self.azimuths / 360 * self.turn
+        return -self.azimuths / 360 * self.revolution
 
     @cached_property
     def directions(self) -> NDArray[np.float32]:
@@ -83,7 +83,7 @@ class Lidar:
 
 HDL64E = Lidar(azimuth_min=-180.0, azimuth_max=180.0, azimuth_step=0.18)
 """KITTI's scanner at 10 Hz: 360 degrees, full resolution, instantaneous."""
-HDL64E_AHEAD = Lidar(KITTI_ELEVATIONS, azimuth_step=0.18, weakest=0.015, turn=0.1)
+HDL64E_AHEAD = Lidar(KITTI_ELEVATIONS, azimuth_step=0.18, weak_signal=0.015, revolution=0.1)
 """KITTI's scanner in the simulated data sets: the half-plane ahead, scanned while the vehicle moves."""
 
 
@@ -93,43 +93,32 @@ class Rig:
 
     Parameters
     ----------
-    image_size : (int, int)
-        Height and width of camera 2's image; by default half of KITTI's, (188, 621).
     lidar : Lidar
         Directions and noise of the LIDAR.
-    camera_noise : float
-        Standard deviation of the pixel noise at mid grey, in steps of 1/255.
-    bits : int
-        Bits per colour channel; 6 keep the PNG files small.
     packet_interval : float
         Time between two GPS/IMU packets, seconds. A scan gets the pose of the nearest packet. KITTI's interval is 0.01,
         so a pose is up to 5 ms off, which is 5 cm at 11 m/s. 0 gives the exact pose of the scan.
     """
 
-    image_size: tuple[int, int] = (188, 621)
     lidar: Lidar = Lidar()
-    camera_noise: float = 0.8
-    bits: int = 6
     packet_interval: float = 0.0
 
-    @cached_property
-    def R_rect(self) -> NDArray[np.float64]:
-        """(3, 3): from camera 0 to its rectified frame."""
-        return Rotation.from_euler("xyz", [0.25, -0.42, 0.56], degrees=True).as_matrix()
+    R_rect: ClassVar[NDArray[np.float64]] = Rotation.from_euler("xyz", [0.25, -0.42, 0.56], degrees=True).as_matrix()
+    """(3, 3): from camera 0 to its rectified frame."""
+    T_camera0_from_lidar: ClassVar[NDArray[np.float64]] = rigid_transform(
+        Rotation.from_euler("xyz", [-0.25, 0.35, -0.5], degrees=True).as_matrix() @ _CAMERA_AXES,
+        np.array([-0.004, -0.076, -0.272]),
+    )
+    """(4, 4): camera 0 is 0.27 m ahead of the LIDAR and 0.08 m lower."""
+    T_lidar_from_imu: ClassVar[NDArray[np.float64]] = rigid_transform(
+        Rotation.from_euler("xyz", [0.85, 0.12, 0.045], degrees=True).as_matrix(), np.array([-0.81, 0.32, -0.80])
+    )
+    """(4, 4): the IMU is 0.81 m behind the LIDAR, 0.32 m to its right and 0.8 m lower."""
+    T_grid_from_lidar: ClassVar[NDArray[np.float64]] = invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT))
+    """(4, 4): a translation up by the LIDAR's height."""
 
-    @cached_property
-    def T_camera0_from_lidar(self) -> NDArray[np.float64]:
-        """(4, 4): camera 0 is 0.27 m ahead of the LIDAR and 0.08 m lower."""
-        tilt = Rotation.from_euler("xyz", [-0.25, 0.35, -0.5], degrees=True).as_matrix()
-        return rigid_transform(tilt @ _CAMERA_AXES, np.array([-0.004, -0.076, -0.272]))
-
-    @cached_property
-    def T_lidar_from_imu(self) -> NDArray[np.float64]:
-        """(4, 4): the IMU is 0.81 m behind the LIDAR, 0.32 m to its right and 0.8 m lower."""
-        turn = Rotation.from_euler("xyz", [0.85, 0.12, 0.045], degrees=True).as_matrix()
-        return rigid_transform(turn, np.array([-0.81, 0.32, -0.80]))
-
-    def P_rect(self, index: int) -> NDArray[np.float64]:
+    @staticmethod
+    def P_rect(index: int) -> NDArray[np.float64]:
         """Return the projection matrix of a rectified camera, with the baselines of KITTI's cameras.
 
         Parameters
@@ -142,7 +131,7 @@ class Rig:
         (3, 4) float64
             From the rectified frame of camera 0, metres, to pixels.
         """
-        K = Camera(_KITTI_K, np.eye(4), _KITTI_SIZE).resized(self.image_size).K
+        K = Camera(_KITTI_K, np.eye(4), _KITTI_SIZE).resized(_IMAGE_SIZE).K
         baseline = (0.0, -0.5372, 0.0622, -0.4706)[index]
         return np.column_stack([K, [K[0, 0] * baseline, 0.0, 0.0]])
 
@@ -152,18 +141,14 @@ class Rig:
         P = self.P_rect(2)
         shift = rigid_transform(np.eye(3), np.array([P[0, 3] / P[0, 0], 0.0, 0.0]))
         T = shift @ rigid_transform(self.R_rect, np.zeros(3)) @ self.T_camera0_from_lidar
-        return Camera(P[:, :3], T, self.image_size)
+        return Camera(P[:, :3], T, _IMAGE_SIZE)
 
     @cached_property
     def T_lidar_from_camera(self) -> NDArray[np.float64]:
         """(4, 4): the inverse of the camera's pose."""
         return invert_rigid(self.camera.T_camera_from_lidar)
 
-    @cached_property
-    def T_grid_from_lidar(self) -> NDArray[np.float64]:
-        """(4, 4): a translation up by the LIDAR's height."""
-        return invert_rigid(lidar_from_grid(KITTI_LIDAR_HEIGHT))
-
+    @cache  # noqa: B019 (there are few rigs)
     def pixel_directions(self, du: float = 0.0, dv: float = 0.0) -> NDArray[np.float32]:
         """Return the viewing direction of every pixel of camera 2.
 
@@ -177,7 +162,7 @@ class Rig:
         (h w, 3) float32
             Unit vectors in the LIDAR frame, row by row.
         """
-        height, width = self.image_size
+        height, width = self.camera.size
         v, u = np.mgrid[:height, :width]
         pixels = np.stack([u + du, v + dv, np.ones_like(u)], axis=-1).reshape(-1, 3)
         rays = pixels @ np.linalg.inv(self.camera.K).T @ self.T_lidar_from_camera[:3, :3].T
@@ -186,6 +171,8 @@ class Rig:
 
 KITTI_AHEAD = Rig(lidar=HDL64E_AHEAD)
 """The sensors of the simulated data sets."""
+KITTI_RIG = Rig(lidar=HDL64E, packet_interval=0.01)
+"""KITTI's scanner with a pose packet every 10 ms."""
 SAMPLE_RIG = Rig(lidar=replace(HDL64E_AHEAD, azimuth_step=0.45))
 """The sensors of the shipped drive: fewer LIDAR columns, to keep it small."""
 

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.camera import Camera, transform_points
+from semgrid_edu.camera import transform_points
 from semgrid_edu.frame import LABEL_GRID
 from semgrid_edu.workshop.simulation.sensors.camera import Picture
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
@@ -28,58 +28,54 @@ _LOOKS_LIKE[Kind.SIGN] = Kind.POLE
 
 @dataclass(frozen=True, eq=False)
 class BirdseyeTruth:
-    """Bird's-eye ground truth of a frame over `LABEL_GRID`.
+    """Bird's-eye ground truth at one instant over `LABEL_GRID`.
 
     Parameters
     ----------
     kinds : (710, 310) uint8
         The `Kind` of each cell.
-    visible : (710, 310) bool
-        Whether the camera sees it.
+    instances : (710, 310) int32
+        Number of the car, pedestrian or bicycle in each cell; 0 for anything else.
+    visible : (710, 310) bool or None
+        Whether the camera sees each cell; None without a picture.
     """
 
     kinds: NDArray[np.uint8]
-    visible: NDArray[np.bool_]
+    instances: NDArray[np.int32]
+    visible: NDArray[np.bool_] | None
 
 
-def world_cells(T_world_from_lidar: NDArray, rig: Rig) -> NDArray[np.float64]:
-    """Return the cell centres of `LABEL_GRID` in the world, (710, 310, 2), metres.
-
-    Parameters
-    ----------
-    T_world_from_lidar : (4, 4) float
-        Pose of the LIDAR, metres.
-    rig : Rig
-        Gives the height of the LIDAR above the grid.
-    """
-    T = T_world_from_lidar @ np.linalg.inv(rig.T_grid_from_lidar)
-    on_plane = np.concatenate([LABEL_GRID.centers(), np.zeros((*LABEL_GRID.shape, 1))], axis=-1)
-    return transform_points(T, on_plane)[..., :2]
-
-
-def birdseye_kinds(cells: NDArray, footprints: NDArray, road: Road) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-    """Return the kind of the object between the ground and 2.5 m in every cell, or else the kind of the ground.
+def birdseye_truth(
+    footprints: NDArray, road: Road, T_world_from_lidar: NDArray, rig: Rig, picture: Picture | None = None
+) -> BirdseyeTruth:
+    """Return the content of every cell: the object between the ground and 2.5 m, or else the ground.
 
     Parameters
     ----------
-    cells : (H, W, 2) float
-        Cell centres in the world, metres, from `world_cells`.
     footprints : (K, 9) float
         From `footprint_table`; where several overlap, the last one wins.
     road : Road
         The street, for the ground.
-
-    Returns
-    -------
-    kinds : (H, W) uint8
-        Members of `Kind`.
-    which : (H, W) int32
-        Row of the footprint that covers the cell; -1 for bare ground.
+    T_world_from_lidar : (4, 4) float
+        Pose of the LIDAR at that instant, metres.
+    rig : Rig
+        Gives the calibration of the camera, and the height of the LIDAR above the grid.
+    picture : Picture, optional
+        The picture that the camera took at that instant, to find out what it sees.
     """
-    which = np.full(cells.shape[:2], -1, np.int32)
+    T_world_from_grid = T_world_from_lidar @ np.linalg.inv(rig.T_grid_from_lidar)
+    on_plane = np.concatenate([LABEL_GRID.centers(), np.zeros((*LABEL_GRID.shape, 1))], axis=-1)
+    cells = transform_points(T_world_from_grid, on_plane)[..., :2]
+    which = np.full(LABEL_GRID.shape, -1, np.int32)
     stamp(footprints, cells, LABEL_GRID.cell, which)
     ground = ground_kinds(road, cells.reshape(-1, 2)).reshape(which.shape)
-    return np.where(which >= 0, footprints[which, 6].astype(np.uint8), ground), which
+    kinds = np.where(which >= 0, footprints[which, 6].astype(np.uint8), ground)
+    instances = np.where(which >= 0, footprints[which, 7], 0).astype(np.int32)
+    visible = None
+    if picture:
+        T_camera_from_world = rig.camera.T_camera_from_lidar @ np.linalg.inv(T_world_from_lidar)
+        visible = _visible_cells(cells, kinds, which, footprints, road, picture, T_camera_from_world, rig.camera.K)
+    return BirdseyeTruth(kinds, instances, visible)
 
 
 @njit(cache=True)
@@ -138,46 +134,22 @@ def _visible(cells, kinds, which, footprints, road, T, K, pixel_kinds, depth, se
                     break
 
 
-def visible_cells(
+def _visible_cells(
     cells: NDArray, kinds: NDArray, which: NDArray, footprints: NDArray, road: Road,
-    picture: Picture, T_world_from_lidar: NDArray, camera: Camera,
+    picture: Picture, T_camera_from_world: NDArray, K: NDArray,
 ) -> NDArray[np.bool_]:  # fmt: skip
     """Return whether the camera sees the content of each cell.
 
     A cell is seen if one of its points projects to a pixel with the same kind at the same depth. Bare ground has one
     such point, an object has eight at different heights. A numbered object (car, pedestrian, bicycle) counts as seen
     completely when the image shows 12 of its pixels. A house or hedge counts as seen to 0.35 m behind its surface.
-
-    Parameters
-    ----------
-    cells : (H, W, 2) float
-        Cell centres in the world, metres.
-    kinds : (H, W) uint8
-        Kind of each cell, from `birdseye_kinds`.
-    which : (H, W) int32
-        Row of the footprint in each cell, -1 for none, from `birdseye_kinds`.
-    footprints : (K, 9) float
-        From `footprint_table`.
-    road : Road
-        The street, for the height of the ground.
-    picture : Picture
-        The picture that the camera took.
-    T_world_from_lidar : (4, 4) float
-        Pose of the LIDAR at that instant, metres.
-    camera : Camera
-        Calibration of the picture.
-
-    Returns
-    -------
-    (H, W) bool
     """
-    T = camera.T_camera_from_lidar @ np.linalg.inv(T_world_from_lidar)
     highest = int(max(footprints[:, 7].max(initial=0), picture.instance.max()))
     seen = np.bincount(picture.instance.ravel(), minlength=highest + 1) >= _SEEN_PIXELS
     out = np.zeros(kinds.shape, np.bool_)
     depth = np.nan_to_num(picture.depth, nan=1e9)
     _visible(
-        cells, _LOOKS_LIKE[kinds], which, footprints, road, T, camera.K,
+        cells, _LOOKS_LIKE[kinds], which, footprints, road, T_camera_from_world, K,
         _LOOKS_LIKE[picture.kind], depth, seen, _SOLID_DEPTH, out,
     )  # fmt: skip
     return out

@@ -9,18 +9,19 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from semgrid_edu.workshop.simulation.street.builder import Builder
-from semgrid_edu.workshop.simulation.street.footprints import Footprint
 from semgrid_edu.workshop.simulation.things import roadside
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
-from semgrid_edu.workshop.simulation.things.shapes import Shape, box, tube
+from semgrid_edu.workshop.simulation.things.shapes import box, tube
 
 _SIGNS = {"limit": 0.3, "no-entry": 0.2, "parking": 0.25, "warning": 0.15, "direction": 0.1}
 """Relative frequency of each sign."""
 _THIN_HALF = 0.08
-_PLASTER, _PLANK = (0.62, 0.6, 0.56), (0.26, 0.16, 0.09)
+"""Half-width of the footprint of thin things, metres."""
+_PLASTER = (0.62, 0.6, 0.56)
+_PLANK = (0.26, 0.16, 0.09)
 
 
-def stand_lamps(builder: Builder, sign: int) -> None:
+def add_lamps(builder: Builder, sign: int) -> None:
     """Put a row of street lamps at the kerb; one side in four, at random, has none.
 
     Parameters
@@ -31,29 +32,29 @@ def stand_lamps(builder: Builder, sign: int) -> None:
         1 for the left side, -1 for the right one.
     """
     rng = builder.rng
-    extent = builder.plan.extent
+    plan = builder.plan
     if rng.random() < 0.25:
         return
     side = builder.road.side(sign)
     step = rng.uniform(22, 34)
     shape = roadside.lamp(float(rng.choice([5.5, 7.5])))
-    for s in np.arange(extent.start + rng.uniform(0, step), extent.end, step):
+    for s in np.arange(plan.start + rng.uniform(0, step), plan.end, step):
         builder.try_post(shape, s, sign * (side.edge + 0.6), np.pi if sign > 0 else 0.0, Kind.POLE, 0.11)
 
 
-def stand_signs(builder: Builder, sign: int) -> None:
-    """Put traffic signs at the kerb, facing the traffic on that side. Parameters are those of `stand_lamps`."""
+def add_signs(builder: Builder, sign: int) -> None:
+    """Put traffic signs at the kerb, facing the traffic on that side. Parameters are those of `add_lamps`."""
     rng = builder.rng
-    extent = builder.plan.extent
+    plan = builder.plan
     d = sign * (builder.road.side(sign).edge + 0.75)
     yaw = 0.0 if sign < 0 else np.pi
-    for s in np.arange(extent.start, extent.end, 16.0):
+    for s in np.arange(plan.start, plan.end, 16.0):
         if rng.random() < 0.45:
             shape = roadside.sign(str(rng.choice(list(_SIGNS), p=list(_SIGNS.values()))))
             builder.try_post(shape, s + rng.uniform(0, 12), d, yaw + rng.normal(0, 0.08), Kind.SIGN, 0.08)
 
 
-def stand_signals(builder: Builder) -> None:
+def add_junction_signs(builder: Builder) -> None:
     """Put traffic lights or priority signs at the corners of the junction, if there is one.
 
     Parameters
@@ -98,26 +99,30 @@ def _pieces(s0: float, s1: float, d: float, jog: float, step: float, rng: np.ran
             at = at + aside
 
 
-def _fit(builder: Builder, piece: Piece, kind: Kind, half: float, top: float) -> Footprint | None:
-    """Return the footprint of a piece of a border, or None if there is no room for it."""
+def _claim(builder: Builder, piece: Piece, kind: Kind, half_width: float, top: float) -> bool:
+    """Reserve the ground for a piece of a border; return whether it was free and off the asphalt."""
     *place, length = piece
-    foot = builder.footprint(*place, kind, (length / 2, half), offset=(length / 2, 0.0), top=top)
-    return foot if builder.off_asphalt(foot) and builder.free(foot, -0.1) else None
-
-
-def _stand(builder: Builder, piece: Piece, kind: Kind, half: float, top: float, porous: Shape, opacity: float) -> bool:
-    """Add a porous piece of a border, unless its place is taken."""
-    if foot := _fit(builder, piece, kind, half, top):
+    foot = builder.footprint(*place, kind, (length / 2, half_width), offset=(length / 2, 0.0), top=top)
+    fits = builder.off_asphalt(foot) and builder.free(foot, -0.1)
+    if fits:
         builder.footprints.append(foot)
-        builder.add_porous(porous, opacity, *piece[:3])
-    return bool(foot)
+    return fits
 
 
-def _stand_fence(builder: Builder, piece: Piece, style: str, opacity: float) -> None:
-    """Add a piece of wire mesh or a pane with its frame, unless its place is taken."""
-    frame, sheet = roadside.sheet_fence(style, piece[3])
-    if _stand(builder, piece, Kind.FENCE, _THIN_HALF, roadside.SHEETS[style].height, sheet, opacity):
-        builder.add(frame, *piece[:3])
+def _try_fence(builder: Builder, piece: Piece, style: str, opacity: float) -> None:
+    """Add a piece of wire mesh or a pane with its frame, if it fits."""
+    *place, length = piece
+    if _claim(builder, piece, Kind.FENCE, _THIN_HALF, roadside.SHEETS[style].height):
+        frame, sheet = roadside.sheet_fence(style, length)
+        builder.add_porous(sheet, opacity, *place)
+        builder.add(frame, *place)
+
+
+def _try_wall(builder: Builder, piece: Piece, height: float, *look) -> None:
+    """Add a wall, 0.25 m thick, if it fits; `look` is its colour, material and kind."""
+    *place, length = piece
+    if _claim(builder, piece, look[-1], 0.13, height):
+        builder.add(box((length / 2, 0, height / 2 - 0.3), (length, 0.25, height + 0.6), *look), *place)
 
 
 def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -139,7 +144,7 @@ def wire_mesh(builder: Builder, s0: float, s1: float, d: float) -> None:
     opacity = rng.uniform(0.008, 0.02)
     step = rng.choice([2.0, 2.5, 3.0])
     for piece in _pieces(s0, s1, d, 2.5, step, rng):
-        _stand_fence(builder, piece, "wire", opacity)
+        _try_fence(builder, piece, "wire", opacity)
 
 
 def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -155,8 +160,9 @@ def twig_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
         if rng.random() > 0.04:
             wide = thickness * rng.uniform(0.8, 1.1)
             high = height * rng.uniform(0.9, 1.1)
-            body = roadside.porous_hedge(piece[3], wide, high)
-            _stand(builder, piece, Kind.PLANT, wide / 2, high, body, opacity * rng.uniform(0.7, 1.4))
+            dense = opacity * rng.uniform(0.7, 1.4)
+            if _claim(builder, piece, Kind.PLANT, wide / 2, high):
+                builder.add_porous(roadside.porous_hedge(piece[3], wide, high), dense, *piece[:3])
 
 
 def mesh_and_hedge(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -177,11 +183,12 @@ def _rows(builder: Builder, s0: float, s1: float, d: float) -> None:
     rng = builder.rng
     opacity = rng.uniform(3.0, 6.0)
     height = rng.uniform(1.3, 1.9)
-    long = rng.uniform(2.5, 4.0)
+    length = rng.uniform(2.5, 4.0)
     for s in np.arange(s0, s1, rng.uniform(2.8, 4.0)):
-        body = roadside.porous_hedge(round(long, 3), 0.7, height * rng.uniform(0.9, 1.1))
-        piece = (s, d + np.sign(d) * 1.6, np.sign(d) * np.pi / 2, long)
-        _stand(builder, piece, Kind.PLANT, 0.35, height, body, opacity)
+        body = roadside.porous_hedge(round(length, 3), 0.7, height * rng.uniform(0.9, 1.1))
+        piece = (s, d + np.sign(d) * 1.6, np.sign(d) * np.pi / 2, length)
+        if _claim(builder, piece, Kind.PLANT, 0.35, height):
+            builder.add_porous(body, opacity, *piece[:3])
 
 
 def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -191,7 +198,7 @@ def panes(builder: Builder, s0: float, s1: float, d: float) -> None:
     step = rng.uniform(1.3, 2.2)
     for piece in _pieces(s0, s1, d, 0.8, step, rng):
         if rng.random() > 0.1:
-            _stand_fence(builder, piece, "pane", opacity)
+            _try_fence(builder, piece, "pane", opacity)
 
 
 def post_row(builder: Builder, s0: float, s1: float, d: float) -> None:
@@ -216,23 +223,15 @@ def walls_behind_gaps(builder: Builder, s0: float, s1: float, d: float) -> None:
     while s < s1:
         run = rng.uniform(4, 10)
         gap = rng.uniform(7, 15)
-        _wall(builder, (s, d, 0.0, run), 2.2, _PLANK, Material.WOOD, Kind.FENCE)
+        _try_wall(builder, (s, d, 0.0, run), 2.2, _PLANK, Material.WOOD, Kind.FENCE)
         start = s + run + rng.uniform(0.3, 1.0) * gap
         yaw = sign * np.pi / 2 + rng.uniform(-0.5, 0.5)
         across = (start, d + sign * rng.uniform(0.5, 2.0), yaw, rng.uniform(5, 11))
-        _wall(builder, across, rng.uniform(1.9, 3.0), _PLASTER, Material.PLASTER, Kind.BUILDING)
+        _try_wall(builder, across, rng.uniform(1.9, 3.0), _PLASTER, Material.PLASTER, Kind.BUILDING)
         s += run + gap
 
 
-def _wall(builder: Builder, piece: Piece, height: float, colour: tuple, material: Material, kind: Kind) -> None:
-    """Add a wall, 0.25 m thick."""
-    *place, length = piece
-    if foot := _fit(builder, piece, kind, 0.13, height):
-        body = box((length / 2, 0, height / 2 - 0.3), (length, 0.25, height + 0.6), colour, material, kind)
-        builder.add(body, *place, foot)
-
-
-def stand_pillars(builder: Builder, s0: float, s1: float, d: float) -> None:
+def add_pillars(builder: Builder, s0: float, s1: float, d: float) -> None:
     """Put thick pillars, such as overgrown trunks, in front of a border. Parameters are those of `wire_mesh`.
 
     As the recording car passes, the edge of a pillar's shadow sweeps along the border behind it.

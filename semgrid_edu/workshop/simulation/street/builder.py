@@ -33,8 +33,6 @@ class Builder:
         The porous objects, each with its opacity as in `PorousMesh`.
     footprints : list of Footprint
         The occupied ground.
-    next_instance : int
-        Number of the next object.
     """
 
     def __init__(self, plan: Plan, rng: np.random.Generator) -> None:
@@ -44,7 +42,6 @@ class Builder:
         self.solid: list[tuple[Shape, int]] = []
         self.porous: list[tuple[Shape, float]] = []
         self.footprints: list[Footprint] = []
-        self.next_instance = 1
 
     def place(self, s: float, d: float, yaw: float = 0.0) -> tuple[np.ndarray, float]:
         """Return an object's pose in the world: its point on the ground, (3,), metres, and its direction, rad.

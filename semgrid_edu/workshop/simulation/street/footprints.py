@@ -137,9 +137,9 @@ def collides(footprint: Footprint, others: NDArray | list[Footprint], margin: fl
     others = footprint_table(others)
     reach = np.hypot(others[:, 2], others[:, 3]) + np.hypot(f.half_length, f.half_width) + margin
     near = others[np.hypot(others[:, 0] - f.x, others[:, 1] - f.y) < reach]
-    mine = footprint_table([f._replace(half_length=f.half_length + margin, half_width=f.half_width + margin)])[0]
+    widened = footprint_table([f._replace(half_length=f.half_length + margin, half_width=f.half_width + margin)])[0]
     points = outline(f, margin)
-    return any(_any_inside(other, points) or _any_inside(mine, outline(Footprint(*other))) for other in near)
+    return any(_any_inside(other, points) or _any_inside(widened, outline(Footprint(*other))) for other in near)
 
 
 @njit(cache=True)

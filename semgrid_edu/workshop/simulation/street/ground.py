@@ -1,7 +1,5 @@
 """The ground on and beside a road: its kind, its height, lane marks, and its mesh."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -29,7 +27,7 @@ def ground_kind(road: Road, s: float, d: float) -> int:
 
 
 @njit(cache=True)
-def road_height(road: Road, s: float, d: float) -> float:
+def _road_height(road: Road, s: float, d: float) -> float:
     """Return the height of the carriageway at a place, or of its edge if the place is outside, metres in the world.
 
     Along the road the height starts at 0 and follows the grade; across the road it falls from the crown.
@@ -50,7 +48,7 @@ def ground_height(road: Road, s: float, d: float) -> float:
     All objects and road users use this height, and so do the mesh and the ground truth.
     """
     e = outside_asphalt(road, s, d)
-    height = road_height(road, s, d)
+    height = _road_height(road, s, d)
     if e <= 0.0:
         return height
     side = road.left if d > 0 else road.right
@@ -187,20 +185,6 @@ _OUTWARD = np.array(
 """Distances of the mesh vertices from the edge of the asphalt, metres."""
 
 
-@dataclass(frozen=True)
-class Extent:
-    """The extent of a world along its road.
-
-    Parameters
-    ----------
-    start, end : float
-        Smallest and largest s, metres.
-    """
-
-    start: float
-    end: float
-
-
 def _across(road: Road) -> NDArray[np.float64]:
     """Return the d coordinates of the mesh, dense at kerbs and at the rounded corners of a junction."""
     rim = np.arange(0, road.corner + 0.3, 0.3) if road.side_half else []
@@ -209,9 +193,9 @@ def _across(road: Road) -> NDArray[np.float64]:
     return np.unique(np.round(np.concatenate([-right, [0.0], left]), 3))
 
 
-def _along(road: Road, extent: Extent) -> NDArray[np.float64]:
+def _along(road: Road, start: float, end: float) -> NDArray[np.float64]:
     """Return the s coordinates of the mesh."""
-    lines = [np.arange(extent.start, extent.end + 4, 4.0)]
+    lines = [np.arange(start, end + 4, 4.0)]
     if road.side_half:
         beyond = road.corner + np.array([1, 2, 3, 4, 6, 8, 11])
         out = np.concatenate([np.arange(0, road.corner + 0.3, 0.3), [0.03, 0.18], beyond])
@@ -231,7 +215,7 @@ def _vertices(road: Road, s: NDArray, d: NDArray) -> NDArray:
     return out
 
 
-def ground_mesh(road: Road, extent: Extent) -> Shape:
+def ground_mesh(road: Road, start: float, end: float) -> Shape:
     """Build the mesh of the ground, in world coordinates.
 
     The whole mesh has one colour and one kind. `shade` looks up the kind where a ray hits the ground, so lane marks
@@ -241,10 +225,11 @@ def ground_mesh(road: Road, extent: Extent) -> Shape:
     ----------
     road : Road
         The street.
-    extent : Extent
-        Extent of the ground along the street.
+    start, end : float
+        Smallest and largest s of the mesh, metres.
     """
-    s, d = _along(road, extent), _across(road)
+    s = _along(road, start, end)
+    d = _across(road)
     if road.curvature:
         inner = 0.8 / abs(road.curvature)
         d = d[np.sign(road.curvature) * d < inner]

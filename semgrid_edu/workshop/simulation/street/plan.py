@@ -1,12 +1,12 @@
-"""The plan of a street: the properties of a world, random unless a wish fixes them."""
+"""The plan of a street: the properties of a world, random unless a wish fixes them; and the named streets."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.simulation.street.ground import Extent
 from semgrid_edu.workshop.simulation.street.layout import Road, Side
 from semgrid_edu.workshop.simulation.street.light import Light
 from semgrid_edu.workshop.simulation.things.roadside import FENCES
@@ -45,8 +45,8 @@ class Wishes:
         Mean speed of the recording car, m/s.
     ego_lane : int or None
         Lane of the recording car; 0 is next to the centre line.
-    cast : callable or None
-        Function that takes the drive's `Traffic` and puts road users on the street, instead of `fill_street`.
+    cast : str or callable
+        Function that takes the drive's `Traffic` and puts road users on the street, or its name in `road_users`.
     relief : dict or None
         Crown, grades and crest, as fields of `Road`. With {} the asphalt is flat, and the recording car hardly sways.
     """
@@ -60,11 +60,11 @@ class Wishes:
     density: float | None = None
     speed: float | None = None
     ego_lane: int | None = None
-    cast: Callable | None = None
+    cast: str | Callable = "fill_street"
     relief: dict[str, float] | None = None
 
 
-ANY = Wishes()
+RANDOM_STREET = Wishes()
 """No wishes: everything is random."""
 
 
@@ -76,8 +76,8 @@ class Plan:
     ----------
     road : Road
         The street.
-    extent : Extent
-        Extent of the world along the street.
+    start, end : float
+        Smallest and largest s of the world, metres.
     styles : (str, str)
         Left and right side, members of `STYLES`, or `YARD`.
     borders : (str, str)
@@ -94,7 +94,8 @@ class Plan:
     """
 
     road: Road
-    extent: Extent
+    start: float
+    end: float
     styles: tuple[str, str]
     borders: tuple[str, str]
     parking: tuple[bool, bool]
@@ -182,4 +183,39 @@ def draw_plan(rng: np.random.Generator, length: float, wishes: Wishes) -> Plan:
     light = wishes.light or Light.random(rng)
     drawn = float(rng.uniform(0.15, 1.0))
     density = drawn if wishes.density is None else wishes.density
-    return Plan(road, Extent(-45.0, length + 210.0), styles, borders, parking, light, density, foliage)
+    return Plan(road, -45.0, length + 210.0, styles, borders, parking, light, density, foliage)
+
+
+_TABLES = table_beside(__file__, "streets")
+_STREETS = {name: _TABLES[common] | row for name, (common, row) in _TABLES["streets"].items()}
+"""Per street: fields of `Wishes`, and the range of the recording car's mean speed, m/s."""
+TEST_STREETS = tuple(_STREETS)
+"""The names of ten streets that are hard for occupancy filters, each for its own reason."""
+SAMPLE_STREET = Wishes(**_TABLES["sample"], light=Light(**_TABLES["sunny"]))
+"""The street of the shipped sample drive: it has one of everything that the course discusses."""
+
+
+def draw_test_street(name: str, seed: int) -> tuple[np.random.SeedSequence, Wishes]:
+    """Return seed and properties of a drive through a test street.
+
+    On streets with a border, the recording car drives at 12 to 14 m/s, 3 to 6 m to the left of the border.
+
+    Parameters
+    ----------
+    name : str
+        One of `TEST_STREETS`.
+    seed : int
+        Seed for the drive. With the same seed, different names still give different streets.
+
+    Raises
+    ------
+    ArgumentError
+        When there is no such street.
+    """
+    if name not in _STREETS:
+        raise ArgumentError("street", " or ".join(_STREETS), name)
+    row = dict(_STREETS[name])
+    speeds = row.pop("speeds")
+    root = np.random.SeedSequence([seed, *name.encode()])
+    speed = float(np.random.default_rng(root.spawn(1)[0]).uniform(*speeds))
+    return root, Wishes(**row, speed=speed)

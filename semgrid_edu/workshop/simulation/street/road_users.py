@@ -7,7 +7,7 @@ import numpy as np
 
 from semgrid_edu.workshop.simulation.street.layout import Side
 from semgrid_edu.workshop.simulation.street.traffic import Traffic
-from semgrid_edu.workshop.simulation.street.trajectories import STAND, ActorPace, Departure, Trajectory
+from semgrid_edu.workshop.simulation.street.trajectories import STANDSTILL, ActorPace, Departure, Trajectory
 from semgrid_edu.workshop.simulation.things.cars_and_people import car_size
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
@@ -28,14 +28,14 @@ def park_cars(traffic: Traffic) -> None:
     """Fill the parking bays. Parameters are those of `fill_street`."""
     road = traffic.road
     rng = traffic.rng
-    extent = traffic.plan.extent
-    for sign, bays in zip((1, -1), traffic.plan.parking, strict=True):
+    plan = traffic.plan
+    for sign, bays in zip((1, -1), plan.parking, strict=True):
         if not bays:
             continue
         share = rng.uniform(0.35, 0.9)
-        s = extent.start + 5
+        s = plan.start + 5
         middle = road.side(sign).edge - 1.06
-        while s < extent.end - 60:
+        while s < plan.end - 60:
             s += rng.uniform(5.7, 6.6)
             near = road.side_half and abs(s - road.junction) < road.side_half + road.corner + 9
             if rng.random() > share or near:
@@ -44,7 +44,7 @@ def park_cars(traffic: Traffic) -> None:
             away = (sign > 0) != (rng.random() < 0.12)
             d = sign * (middle + rng.normal(0, 0.05))
             yaw = rng.normal(0, 0.02) + np.pi * away
-            traffic.park(Kind.CAR, car_size(body), Trajectory(s, d, 1, 0, STAND, yaw), (body, traffic.paint()))
+            traffic.park(Kind.CAR, Trajectory(s, d, 1, 0, STANDSTILL, yaw), (body, traffic.paint()))
 
 
 def _park_bicycles(traffic: Traffic) -> None:
@@ -58,8 +58,8 @@ def _park_bicycles(traffic: Traffic) -> None:
             n = rng.integers(1, 4)
             for k in range(n):
                 d = sign * (side.edge + side.strip + rng.choice([0.5, side.walk - 0.35]))
-                place = Trajectory(s + 0.75 * k, d, 1, 0, STAND, rng.normal(0, 0.15) + (1.3 if n > 1 else 0))
-                traffic.park(Kind.BICYCLE, (1.78, 0.4, 1.05), place, ("bicycle", traffic.paint()))
+                place = Trajectory(s + 0.75 * k, d, 1, 0, STANDSTILL, rng.normal(0, 0.15) + (1.3 if n > 1 else 0))
+                traffic.park(Kind.BICYCLE, place, ("bicycle", traffic.paint()))
 
 
 def _lanes(traffic: Traffic) -> None:
@@ -67,13 +67,13 @@ def _lanes(traffic: Traffic) -> None:
     road = traffic.road
     rng = traffic.rng
     ego = traffic.ego
-    stands = ego.pace.mean == 0
+    waiting = ego.pace.mean == 0
     ego_lane = round(-ego.d / road.lane - 0.5)
     for index in range(road.lanes_right):
         faster = rng.uniform(2.5, 7.0) if index < ego_lane else -rng.uniform(1.0, 2.5)
-        pace = ego.pace if index == ego_lane or stands else ActorPace(max(ego.pace.mean + faster, 3.0))
+        pace = ego.pace if index == ego_lane or waiting else ActorPace(max(ego.pace.mean + faster, 3.0))
         _fill_lane(traffic, -(index + 0.5) * road.lane, 1, pace)
-    overtaken = road.lanes_right == 1 and not stands and rng.random() < 0.22
+    overtaken = road.lanes_right == 1 and not waiting and rng.random() < 0.22
     for index in range(road.lanes_left):
         d = (index + 0.5) * road.lane
         if overtaken and index == 0:
@@ -81,7 +81,7 @@ def _lanes(traffic: Traffic) -> None:
             pace = ActorPace(ego.pace.mean + rng.uniform(4, 7))
             traffic.drive_car(at_end - pace.distance(traffic.duration), d, 1, 0, pace)
         else:
-            _fill_lane(traffic, d, -1, STAND if stands else ActorPace(rng.uniform(7, 14)))
+            _fill_lane(traffic, d, -1, STANDSTILL if waiting else ActorPace(rng.uniform(7, 14)))
 
 
 def _fill_lane(traffic: Traffic, d: float, along: int, pace: ActorPace) -> None:
@@ -110,7 +110,7 @@ def _cross_traffic(traffic: Traffic) -> None:
         edge = road.side(sign).edge
         back = edge + road.corner + 3.5
         for _ in range(rng.integers(0, 1 + round(3 * traffic.plan.density))):
-            traffic.drive_car(towards, sign * back, 0, -sign, STAND)
+            traffic.drive_car(towards, sign * back, 0, -sign, STANDSTILL)
             back += rng.uniform(6.0, 9.0)
         if rng.random() < 0.6:
             start = edge + rng.uniform(6, 40)
@@ -145,7 +145,7 @@ def _pedestrians(traffic: Traffic) -> None:
             s = here + rng.uniform(3, 55)
             along = int(rng.choice([-1, 1]))
             if rng.random() < 0.15:
-                traffic.walk(s, d, 1, 0, STAND, rng.uniform(-np.pi, np.pi))
+                traffic.walk(s, d, 1, 0, STANDSTILL, rng.uniform(-np.pi, np.pi))
                 continue
             pace = ActorPace(float(np.clip(rng.normal(1.4, 0.18), 1.0, 1.9)))
             if traffic.walk(s, d, along, 0, pace) and rng.random() < 0.35:
@@ -183,6 +183,11 @@ def _convoy(traffic: Traffic, s: float, d: float, along: int, pace: ActorPace, c
         look = (traffic.body(), traffic.paint())
         traffic.drive_car(s, d, along, 0, pace, look)
         s -= along * (car_size(look[0])[0] + traffic.rng.uniform(8, 20))
+
+
+def _walking(rng: np.random.Generator) -> ActorPace:
+    """Draw a walking speed."""
+    return ActorPace(float(np.clip(rng.normal(1.4, 0.2), 0.9, 2.0)))
 
 
 def _on_sidewalk(side: Side, rng: np.random.Generator) -> float:
@@ -251,12 +256,31 @@ def overturned_car(traffic: Traffic) -> None:
         angle = rng.uniform(-0.5, 0.5)
         s = traffic.ends_at + rng.uniform(10, 22)
         direction = (float(np.cos(angle)), float(np.sin(angle)))
-        place = Trajectory(s, 0.5 * traffic.road.lane, *direction, STAND)
-        if traffic.park(Kind.CAR, car_size(look[0]), place, look, overturned=True):
+        place = Trajectory(s, 0.5 * traffic.road.lane, *direction, STANDSTILL)
+        if traffic.park(Kind.CAR, place, look, overturned=True):
             break
     fill_street(traffic)
 
 
-def _walking(rng: np.random.Generator) -> ActorPace:
-    """Draw a walking speed."""
-    return ActorPace(float(np.clip(rng.normal(1.4, 0.2), 0.9, 2.0)))
+def sample_traffic(traffic: Traffic) -> None:
+    """Put an overtaking and an oncoming car, a cyclist and pedestrians in view of the camera, then fill the street.
+
+    Parameters are those of `fill_street`.
+    """
+    road = traffic.road
+    end = traffic.duration
+    here = traffic.ends_at
+    overtaking = ActorPace(traffic.ego.pace.mean + 6.0)
+    oncoming = ActorPace(9.0)
+    cycling = ActorPace(5.0)
+    red = ("estate", (0.35, 0.02, 0.02))
+    blue = ("hatchback", (0.05, 0.12, 0.35))
+    traffic.drive_car(here + 9.0 - overtaking.distance(end), -0.5 * road.lane, 1, 0, overtaking, red)
+    traffic.drive_car(here + 14.0 + oncoming.distance(end), 0.5 * road.lane, -1, 0, oncoming, blue)
+    traffic.ride(here + 9.0 - cycling.distance(end), -(road.lanes_right * road.lane - 0.45), 1, cycling)
+    for sign, ahead in ((-1, 12.0), (1, 17.0)):
+        side = road.side(sign)
+        walk = sign * (side.edge + side.strip + 0.6 * side.walk)
+        traffic.walk(here + ahead, walk, sign, 0, ActorPace(1.4))
+        traffic.walk(here + ahead + 9.0, walk, -sign, 0, STANDSTILL, 1.0)
+    fill_street(traffic)

@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 
+from semgrid_edu.storage.files import named_rows, table_beside
 from semgrid_edu.workshop.simulation.street import borders
 from semgrid_edu.workshop.simulation.street.builder import Builder
 from semgrid_edu.workshop.simulation.street.ground import ground_mesh
@@ -11,6 +12,8 @@ from semgrid_edu.workshop.simulation.street.plan import YARD, Plan
 from semgrid_edu.workshop.simulation.things import roadside
 from semgrid_edu.workshop.simulation.things.buildings import House, build_house
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
+
+_HOUSES = named_rows(table_beside(__file__))
 
 
 def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
@@ -24,13 +27,13 @@ def build_scenery(plan: Plan, rng: np.random.Generator) -> Builder:
         Source of randomness.
     """
     builder = Builder(plan, rng)
-    builder.solid.append((ground_mesh(plan.road, plan.extent), 0))
-    borders.stand_signals(builder)
+    builder.solid.append((ground_mesh(plan.road, plan.start, plan.end), 0))
+    borders.add_junction_signs(builder)
     for sign, style in zip((1, -1), plan.styles, strict=True):
-        borders.stand_lamps(builder, sign)
+        borders.add_lamps(builder, sign)
         _street_trees(builder, sign)
         _LINE_SIDE[style](builder, sign)
-        borders.stand_signs(builder, sign)
+        borders.add_signs(builder, sign)
     _side_street(builder)
     _horizon(builder)
     return builder
@@ -53,7 +56,7 @@ def _tree(builder: Builder, s: float, d: float, species: str | None = None) -> N
     rng = builder.rng
     plan = builder.plan
     species = species or str(rng.choice(roadside.TREES, p=[0.5, 0.15, 0.2, 0.15]))
-    far = abs(d) > 35 or s > plan.extent.end - 120
+    far = abs(d) > 35 or s > plan.end - 120
     shape = roadside.tree(species, int(rng.integers(3)), 350 if far else 1500)
     scale = rng.uniform(0.75, 1.25)
     season = (1, 1, 1) if species == "conifer" else plan.foliage
@@ -82,34 +85,28 @@ def _house(builder: Builder, house: House, s: float, d: float, yaw: float, acros
         builder.add(build_house(house), s, d, yaw, foot)
 
 
-def _town_house(rng: np.random.Generator) -> House:
-    """Draw a house of 2 to 5 storeys; every second one has a shop."""
+def _draw_house(style: str, rng: np.random.Generator) -> House:
+    """Draw a house for a town or a suburb; in a town every second one has a shop."""
+    spec = _HOUSES[style]
     seed = int(rng.integers(2**31))
-    roof = str(rng.choice(["flat", "hip", "gable"], p=[0.45, 0.3, 0.25]))
-    width = rng.uniform(9, 17)
-    depth = rng.uniform(9, 12)
-    storeys = int(rng.integers(2, 6))
-    return House(width, depth, storeys, roof, bool(rng.random() < 0.5), seed)
-
-
-def _suburb_house(rng: np.random.Generator) -> House:
-    """Draw a house of 1 or 2 storeys."""
-    seed = int(rng.integers(2**31))
-    roof = str(rng.choice(["gable", "hip", "flat"], p=[0.65, 0.25, 0.1]))
-    return House(rng.uniform(8, 12), rng.uniform(7.5, 10.5), int(rng.integers(1, 3)), roof, False, seed)
+    roof = str(rng.choice(list(spec.roofs), p=list(spec.roofs.values())))
+    width = rng.uniform(*spec.width)
+    depth = rng.uniform(*spec.depth)
+    storeys = int(rng.integers(spec.storeys[0], spec.storeys[1] + 1))
+    return House(width, depth, storeys, roof, style == "town" and bool(rng.random() < 0.5), seed)
 
 
 def _house_row(builder: Builder, sign: int, town: bool) -> None:
     """Line one side with facades at the sidewalk, or with houses in gardens behind fences and hedges."""
     rng = builder.rng
     side = builder.road.side(sign)
-    extent = builder.plan.extent
+    plan = builder.plan
     border = builder.plan.border(sign)
     line = side.strip + side.walk
     setback = rng.uniform(0.0, 0.4) if town else rng.uniform(3.5, 8.0)
-    s = extent.start + rng.uniform(0, 8)
-    while s < extent.end - 20:
-        house = (_town_house if town else _suburb_house)(rng)
+    s = plan.start + rng.uniform(0, 8)
+    while s < plan.end - 20:
+        house = _draw_house("town" if town else "suburb", rng)
         gap = rng.uniform(2.5, 9.0) if not town else 0.02 if rng.random() < 0.75 else rng.uniform(2, 6)
         end = s + house.width + gap
         if not _meets_side_road(builder, s, s + house.width, sign, line + 0.8):
@@ -131,10 +128,10 @@ def _tall_houses(
 ) -> None:
     """Scatter town houses `behind` a line along the road, metres, so that gaps show houses instead of nothing."""
     rng = builder.rng
-    extent = builder.plan.extent
-    for s in np.arange(extent.start, extent.end, step):
+    plan = builder.plan
+    for s in np.arange(plan.start, plan.end, step):
         if rng.random() < share:
-            house = _town_house(rng)
+            house = _draw_house("town", rng)
             s = s + rng.uniform(0, along)
             _house(builder, house, s, sign * (line + rng.uniform(*behind)), _facing(sign))
 
@@ -173,12 +170,12 @@ def _garden(builder: Builder, s0: float, s1: float, sign: int, offset: float, de
 def _park(builder: Builder, sign: int) -> None:
     """Cover one side with trees and bushes on its bank, sometimes with a fence."""
     rng = builder.rng
-    extent = builder.plan.extent
+    plan = builder.plan
     line = builder.road.side(sign).line
     if rng.random() < 0.65:
         style = str(rng.choice(roadside.FENCES, p=[0.2, 0.25, 0.4, 0.15]))
-        _border(builder, extent.start, extent.start + 150, sign, line + rng.uniform(0.8, 2.5), style)
-    for s in np.arange(extent.start, extent.end, 5.5):
+        _border(builder, plan.start, plan.start + 150, sign, line + rng.uniform(0.8, 2.5), style)
+    for s in np.arange(plan.start, plan.end, 5.5):
         for _ in range(2):
             offset = line + rng.uniform(1.8, 26)
             (_tree if rng.random() < 0.62 else _bush)(builder, s + rng.uniform(0, 5), sign * offset)
@@ -188,11 +185,11 @@ def _park(builder: Builder, sign: int) -> None:
 def _yard(builder: Builder, sign: int) -> None:
     """Build a border along one side, and scatter bushes and trees behind it."""
     rng = builder.rng
-    extent = builder.plan.extent
+    plan = builder.plan
     line = builder.road.side(sign).line + 0.35
-    borders.YARD_BORDERS[builder.plan.border(sign)](builder, extent.start, extent.end - 60, sign * line)
-    borders.stand_pillars(builder, extent.start, extent.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
-    for s in np.arange(extent.start, extent.end, 6.0):
+    borders.YARD_BORDERS[builder.plan.border(sign)](builder, plan.start, plan.end - 60, sign * line)
+    borders.add_pillars(builder, plan.start, plan.end - 60, sign * (line - rng.uniform(0.4, 0.8)))
+    for s in np.arange(plan.start, plan.end, 6.0):
         _bush(builder, s + rng.uniform(0, 6), sign * (line + rng.uniform(3, 15)))
         _tree(builder, s + rng.uniform(0, 6), sign * (line + rng.uniform(6, 30)))
 
@@ -210,12 +207,12 @@ def _street_trees(builder: Builder, sign: int) -> None:
     """Plant a row of trees of one species in the strip beside the kerb."""
     rng = builder.rng
     side = builder.road.side(sign)
-    extent = builder.plan.extent
+    plan = builder.plan
     if side.strip < 1.2:
         return
     species = str(rng.choice(["broad", "tall", "birch"]))
     step = rng.uniform(8, 15)
-    for s in np.arange(extent.start + rng.uniform(0, step), extent.end, step):
+    for s in np.arange(plan.start + rng.uniform(0, step), plan.end, step):
         if rng.random() < 0.9:
             _tree(builder, s, sign * (side.edge + 0.55 * side.strip), species)
 
@@ -233,7 +230,7 @@ def _side_street(builder: Builder) -> None:
         for flank in (-1, 1):
             d = side.edge + 8
             while d < 70:
-                house = (_town_house if town else _suburb_house)(rng)
+                house = _draw_house("town" if town else "suburb", rng)
                 place = (road.junction + flank * back, sign * (d + house.width / 2), -flank * np.pi / 2)
                 _house(builder, house, *place)
                 if rng.random() < 0.5:
@@ -244,12 +241,12 @@ def _side_street(builder: Builder) -> None:
 def _horizon(builder: Builder) -> None:
     """Close the horizon with distant trees and houses."""
     rng = builder.rng
-    extent = builder.plan.extent
+    plan = builder.plan
     for _ in range(70):
-        s, d = rng.uniform(extent.start, extent.end + 60), rng.choice([-1, 1]) * rng.uniform(38, 110)
+        s, d = rng.uniform(plan.start, plan.end + 60), rng.choice([-1, 1]) * rng.uniform(38, 110)
         _tree(builder, s, d)
     for d in np.arange(-70, 70, 3.5):
-        _tree(builder, extent.end - 8 + rng.uniform(-12, 10), d + rng.uniform(-1, 1))
+        _tree(builder, plan.end - 8 + rng.uniform(-12, 10), d + rng.uniform(-1, 1))
     for d in np.arange(-60, 60, 17):
-        s = extent.end - 2 + rng.uniform(0, 8)
-        _house(builder, _town_house(rng), s, d + rng.uniform(-4, 4), -np.pi / 2, across_road=True)
+        s = plan.end - 2 + rng.uniform(0, 8)
+        _house(builder, _draw_house("town", rng), s, d + rng.uniform(-4, 4), -np.pi / 2, across_road=True)

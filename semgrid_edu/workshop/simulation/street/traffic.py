@@ -24,12 +24,11 @@ from semgrid_edu.workshop.simulation.things.cars_and_people import (
 from semgrid_edu.workshop.simulation.things.materials import Kind, Material
 from semgrid_edu.workshop.simulation.things.shapes import Shape
 
-Size = tuple[float, float, float]
 Look = tuple[str, tuple[float, float, float]] | Person
 MOVING_SPEED = 0.05
 """Speed, m/s, above which an actor counts as moving."""
-EGO_SIZE = (4.5, 1.85, 1.5)
-"""Length, width and height of the recording car, metres; its own sensors don't see it."""
+_EGO_SIZE = (4.5, 1.85, 1.5)
+"""Length, width and height of the recording car, metres; its sensors don't see it."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +41,6 @@ class Actor:
         Its number in the world.
     kind : Kind
         Its kind; a cyclist is a `Kind.BICYCLE`.
-    size : (float, float, float)
-        Length, width and height, metres.
     trajectory : Trajectory
         Its position over time.
     look : (str, (float, float, float)) or Person
@@ -56,11 +53,18 @@ class Actor:
 
     instance: int
     kind: Kind
-    size: Size
     trajectory: Trajectory
     look: Look
     phase: float = 0.0
     overturned: bool = False
+
+    @property
+    def size(self) -> tuple[float, float, float]:
+        """Length, width and height, metres."""
+        if isinstance(self.look, Person):
+            return (0.7, 0.6, self.look.height) if self.kind == Kind.PEDESTRIAN else (1.78, 0.6, 1.8)
+        model = self.look[0]
+        return (1.78, 0.4, 1.05) if model == "bicycle" else car_size(model)
 
     def shape(self, road: Road, t: float) -> Shape:
         """Return its shape in the world at one instant.
@@ -89,12 +93,7 @@ class Actor:
 
     def footprint(self, road: Road, t: float) -> footprints.Footprint:
         """Return the ground that it covers at one instant. Parameters are those of `Actor.shape`."""
-        (x, y, _), yaw = self.trajectory.pose(road, t)
-        exponent = {Kind.CAR: footprints.ROUNDED, Kind.PEDESTRIAN: footprints.ROUND}.get(self.kind, footprints.SQUARE)
-        length, width, height = self.size
-        half = (length / 2, width / 2)
-        top = min(height, OVERHEAD)
-        return footprints.Footprint(x, y, *half, yaw, exponent, int(self.kind), self.instance, top)
+        return _footprint(self.kind, self.size, self.instance, *self.trajectory.pose(road, t))
 
     def middle(self, road: Road, t: float) -> NDArray[np.float64]:
         """Return the centre of its box in the world, (3,), metres. Parameters are those of `Actor.shape`."""
@@ -130,6 +129,14 @@ class Actor:
             "moving": bool(np.hypot(*velocity[:2]) > MOVING_SPEED),
             **({"overturned": True} if self.overturned else {}),
         }
+
+
+def _footprint(kind: Kind, size: tuple, instance: int, position: NDArray, yaw: float) -> footprints.Footprint:
+    """Return the ground that a road user covers."""
+    exponent = {Kind.CAR: footprints.ROUNDED, Kind.PEDESTRIAN: footprints.ROUND}.get(kind, footprints.SQUARE)
+    length, width, height = size
+    x, y, _ = position
+    return footprints.Footprint(x, y, length / 2, width / 2, yaw, exponent, int(kind), instance, min(height, OVERHEAD))
 
 
 def _rounded(values: ArrayLike) -> list[float]:
@@ -170,19 +177,16 @@ class Traffic:
         self.moving: list[Actor] = []
         self.parked: list[Actor] = []
         self._times = np.linspace(0, duration, 6 if duration < 2 else 25)
-        ego_actor = Actor(0, Kind.CAR, EGO_SIZE, ego, ("sedan", PAINTS[0]))
-        self._taken = [[ego_actor.footprint(self.road, t)] for t in self._times]
+        self._others = [[_footprint(Kind.CAR, _EGO_SIZE, 0, *ego.pose(self.road, t))] for t in self._times]
         self._static = footprints.footprint_table(builder.footprints)
 
-    def add(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look, margin: float = 0.25) -> bool:
+    def add(self, kind: Kind, trajectory: Trajectory, look: Look, margin: float = 0.25) -> bool:
         """Add a road user, unless it would collide with something; return whether it was added.
 
         Parameters
         ----------
         kind : Kind
             Its kind.
-        size : (float, float, float)
-            Length, width and height, metres.
         trajectory : Trajectory
             Its position over time.
         look : (str, (float, float, float)) or Person
@@ -190,19 +194,18 @@ class Traffic:
         margin : float
             Minimum distance to other road users, metres.
         """
-        actor = Actor(self.builder.next_instance, kind, size, trajectory, look, float(self.rng.uniform(0, 3)))
+        actor = Actor(self._next_instance(), kind, trajectory, look, float(self.rng.uniform(0, 3)))
         feet = [actor.footprint(self.road, t) for t in self._times]
-        near = footprints.collides
-        pairs = zip(feet, self._taken, strict=True)
-        if any(near(foot, taken, margin) or near(foot, self._static, 0.05) for foot, taken in pairs):
+        pairs = list(zip(feet, self._others, strict=True))
+        collides = footprints.collides
+        if any(collides(foot, others, margin) or collides(foot, self._static, 0.05) for foot, others in pairs):
             return False
-        self.builder.next_instance += 1
         self.moving.append(actor)
-        for foot, taken in zip(feet, self._taken, strict=True):
-            taken.append(foot)
+        for foot, others in pairs:
+            others.append(foot)
         return True
 
-    def park(self, kind: Kind, size: Size, trajectory: Trajectory, look: Look, overturned: bool = False) -> bool:
+    def park(self, kind: Kind, trajectory: Trajectory, look: Look, overturned: bool = False) -> bool:
         """Park a car or a bicycle for the whole drive, unless the place is taken; return whether it was added.
 
         Parameters not named here are those of `Traffic.add`.
@@ -210,20 +213,23 @@ class Traffic:
         Parameters
         ----------
         trajectory : Trajectory
-            Its place, with the pace `STAND`.
+            Its place, with the pace `STANDSTILL`.
         overturned : bool
             Whether it is upside down.
         """
-        actor = Actor(self.builder.next_instance, kind, size, trajectory, look, overturned=overturned)
+        actor = Actor(self._next_instance(), kind, trajectory, look, overturned=overturned)
         foot = actor.footprint(self.road, 0.0)
-        if any(footprints.collides(foot, *other) for other in ((self._static, 0.1), *((t, 0.2) for t in self._taken))):
+        collides = footprints.collides
+        if collides(foot, self._static, 0.1) or any(collides(foot, others, 0.2) for others in self._others):
             return False
         self.parked.append(actor)
-        self.builder.next_instance += 1
         self.builder.solid.append((actor.shape(self.road, 0.0), actor.instance))
         self.builder.footprints.append(foot)
         self._static = footprints.footprint_table(self.builder.footprints)
         return True
+
+    def _next_instance(self) -> int:
+        return 1 + len(self.moving) + len(self.parked)
 
     def paint(self) -> tuple[float, float, float]:
         """Draw the paint of a car, (3,) linear albedo; common colours are more likely."""
@@ -246,12 +252,12 @@ class Traffic:
         along, across : float
             Direction in (s, d), as in `Trajectory`.
         pace : ActorPace
-            Its speed over time; `STAND` for a car that doesn't move.
+            Its speed over time; `STANDSTILL` for a car that doesn't move.
         look : (str, (float, float, float)), optional
             Body and paint; random by default.
         """
         look = look or (self.body(), self.paint())
-        return self.add(Kind.CAR, car_size(look[0]), Trajectory(s, d, along, across, pace), look, 0.3)
+        return self.add(Kind.CAR, Trajectory(s, d, along, across, pace), look, 0.3)
 
     def walk(self, s: float, d: float, along: float, across: float, pace: ActorPace, turn: float = 0.0) -> bool:
         """Add a walking or standing person, unless they would collide; return whether they were added.
@@ -263,12 +269,11 @@ class Traffic:
         turn : float
             Angle between this direction and the direction that the person faces, rad.
         """
-        person = Person.random(self.rng)
-        return self.add(Kind.PEDESTRIAN, (0.7, 0.6, person.height), Trajectory(s, d, along, across, pace, turn), person)
+        return self.add(Kind.PEDESTRIAN, Trajectory(s, d, along, across, pace, turn), Person.random(self.rng))
 
     def ride(self, s: float, d: float, along: float, pace: ActorPace) -> bool:
         """Add a cyclist who rides along the road, unless they would collide; return whether they were added.
 
         Parameters are those of `Traffic.drive_car`.
         """
-        return self.add(Kind.BICYCLE, (1.78, 0.6, 1.8), Trajectory(s, d, along, 0.0, pace), Person.random(self.rng))
+        return self.add(Kind.BICYCLE, Trajectory(s, d, along, 0.0, pace), Person.random(self.rng))

@@ -10,10 +10,13 @@ from semgrid_edu.workshop.simulation.street.ground import on_ground, on_wheels
 from semgrid_edu.workshop.simulation.street.layout import Road, to_world
 from semgrid_edu.workshop.simulation.things.shapes import rotation_matrix
 
+_RATE = 0.8
+"""Angular frequency at which a speed oscillates, rad/s."""
+
 
 @dataclass(frozen=True)
 class ActorPace:
-    """A speed over time, mean + swing sin(rate t + phase), and the distance travelled, its integral in closed form.
+    """A speed over time, mean + swing sin(0.8 t + phase), and its integral, the distance travelled.
 
     Parameters
     ----------
@@ -21,15 +24,12 @@ class ActorPace:
         Mean speed, m/s.
     swing : float
         Amplitude of the oscillation, m/s.
-    rate : float
-        Angular frequency of the oscillation, rad/s.
     phase : float
         Phase of the oscillation at t = 0, rad.
     """
 
     mean: float
     swing: float = 0.0
-    rate: float = 0.8
     phase: float = 0.0
 
     @classmethod
@@ -47,7 +47,7 @@ class ActorPace:
         mean = drawn if mean is None else mean
         swing = float(rng.uniform(0.0, 0.12)) * mean
         phase = float(rng.uniform(0, 6.28))
-        return cls(mean, swing, 0.8, phase)
+        return cls(mean, swing, phase)
 
     def distance(self, t: float) -> float:
         """Return the distance travelled since t = 0, metres.
@@ -57,20 +57,20 @@ class ActorPace:
         t : float
             Time, seconds.
         """
-        return self.mean * t + self.swing / self.rate * (np.cos(self.phase) - np.cos(self.rate * t + self.phase))
+        return self.mean * t + self.swing / _RATE * (np.cos(self.phase) - np.cos(_RATE * t + self.phase))
 
     def speed(self, t: float) -> float:
         """Return the speed at one instant, m/s. Parameters are those of `ActorPace.distance`."""
-        return self.mean + self.swing * np.sin(self.rate * t + self.phase)
+        return self.mean + self.swing * np.sin(_RATE * t + self.phase)
 
 
-STAND = ActorPace(0.0)
+STANDSTILL = ActorPace(0.0)
 """The pace of an object that doesn't move."""
 
 
 @dataclass(frozen=True)
 class Departure:
-    """A pace that waits, accelerates at a constant rate, and then keeps its speed.
+    """A pace that is zero at first, rises at a constant rate, and then stays constant.
 
     Parameters
     ----------

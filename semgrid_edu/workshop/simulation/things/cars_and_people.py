@@ -99,10 +99,10 @@ def car(body: str) -> Shape:
     body : str
         One of `BODIES`.
     """
-    its = _BODIES[body]
+    spec = _BODIES[body]
     rear = ("van", "ends") if body == "van" else ("ends",)
-    sides = _boxes(its, ("side",), -1) + _boxes(its, ("side",))
-    return merge([*_loft(its), *_wheels(its), *sides, *_boxes(its, rear)])
+    sides = _boxes(spec, ("side",), -1) + _boxes(spec, ("side",))
+    return merge([*_loft(spec), *_wheels(spec), *sides, *_boxes(spec, rear)])
 
 
 _BLACK, _GREY = (0.02, 0.02, 0.02), (0.25, 0.25, 0.25)

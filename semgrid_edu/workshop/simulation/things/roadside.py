@@ -37,20 +37,20 @@ def fence(style: str, length: float) -> Shape:
     if style == "wall":
         cap = _fence_box((middle, 0, 1.0), (length, 0.34, 0.1), (0.45, 0.43, 0.4), Material.PLASTER)
         return merge([_fence_box((middle, 0, 0.1), (length, 0.25, 1.8), _STONE, Material.BRICK), cap])
-    its = _FENCES[style]
-    look = its.colour, Material[its.material]
+    spec = _FENCES[style]
+    look = spec.colour, Material[spec.material]
     parts = [
-        _fence_box((x, 0.03, its.height / 2 - 0.4), (0.09, 0.09, its.height + 0.9), *look)
+        _fence_box((x, 0.03, spec.height / 2 - 0.4), (0.09, 0.09, spec.height + 0.9), *look)
         for x in np.linspace(0.0, length, max(round(length / 2.5), 1) + 1)
     ]
     if style == "mesh":
-        z = np.arange(0.1, its.height, 0.2)
+        z = np.arange(0.1, spec.height, 0.2)
         parts.append(_fence_quads(np.stack([0 * z, 0 * z, z], 1), [length, 0, 0], [0, 0, 0.02], *look))
     else:
-        parts += [_fence_box((middle, 0.03, z), (length, 0.04, 0.07), *look) for z in (0.3, 0.92 * its.height)]
-    x = np.arange(its.step / 2, length, its.step)
-    corner = np.stack([x - its.width / 2, 0 * x, 0 * x + its.low], axis=1)
-    slats = _fence_quads(corner, [its.width, 0, 0], [0, 0, its.height - its.low], its.slats, look[1])
+        parts += [_fence_box((middle, 0.03, z), (length, 0.04, 0.07), *look) for z in (0.3, 0.92 * spec.height)]
+    x = np.arange(spec.step / 2, length, spec.step)
+    corner = np.stack([x - spec.width / 2, 0 * x, 0 * x + spec.low], axis=1)
+    slats = _fence_quads(corner, [spec.width, 0, 0], [0, 0, spec.height - spec.low], spec.slats, look[1])
     return merge([*parts, slats])
 
 
@@ -70,11 +70,14 @@ def sheet_fence(style: str, length: float) -> tuple[Shape, Shape]:
     frame, sheet : Shape
         The post at the origin with the rails, and the porous sheet.
     """
-    its = SHEETS[style]
-    look = (SHEETS[style].colour, Material.METAL)
-    post = _fence_box((0, 0, its.post[0]), (0.06, 0.06, its.post[1]), *look)
-    rails = [_fence_box((length / 2, 0, z), (length, wide, high), *look) for z, wide, high in its.rails]
-    sheet = _fence_quads((0, 0, its.sheet[0]), (length, 0, 0), (0, 0, its.sheet[1]), its.colour, Material[its.material])
+    spec = SHEETS[style]
+    metal = (spec.colour, Material.METAL)
+    middle, size = spec.post
+    post = _fence_box((0, 0, middle), (0.06, 0.06, size), *metal)
+    rails = [_fence_box((length / 2, 0, z), (length, wide, high), *metal) for z, wide, high in spec.rails]
+    bottom, height = spec.sheet
+    porous = (spec.colour, Material[spec.material])
+    sheet = _fence_quads((0, 0, bottom), (length, 0, 0), (0, 0, height), *porous)
     return merge([post, *rails]), sheet
 
 
@@ -235,16 +238,16 @@ def tree(species: str, variant: int, n_leaves: int = 1500) -> Shape:
         Number of foliage triangles; distant trees need fewer.
     """
     rng = np.random.default_rng([TREES.index(species), variant, 77])
-    its = _SPECIES[species]
+    spec = _SPECIES[species]
     size = 0.24 * (1500 / n_leaves) ** 0.5
-    trunk = _bark((0, 0, -0.8), (0, 0, 4.2), (its.trunk * 1.2, its.trunk * 0.6), its.bark, sides=9)
-    if not its.crown:
-        return merge([_cone(n_leaves, size, its.leaf, rng), trunk])
-    centre = rng.uniform(-1, 1, (7, 3)) * its.crown + [0, 0, its.height]
+    trunk = _bark((0, 0, -0.8), (0, 0, 4.2), (spec.trunk * 1.2, spec.trunk * 0.6), spec.bark, sides=9)
+    if not spec.crown:
+        return merge([_cone(n_leaves, size, spec.leaf, rng), trunk])
+    centre = rng.uniform(-1, 1, (7, 3)) * spec.crown + [0, 0, spec.height]
     radii = rng.uniform(0.95, 1.55, (7, 1)) * [1, 1, 0.85]
-    foliage = _crown(centre, radii, n_leaves, size, its.leaf, rng)
-    fork = (its.trunk * 0.5, its.trunk * 0.25)
-    forks = [_bark((0, 0, 2.4), (*rng.uniform(-1.2, 1.2, 2), 4.6), fork, its.bark, sides=5) for _ in range(3)]
+    foliage = _crown(centre, radii, n_leaves, size, spec.leaf, rng)
+    fork = (spec.trunk * 0.5, spec.trunk * 0.25)
+    forks = [_bark((0, 0, 2.4), (*rng.uniform(-1.2, 1.2, 2), 4.6), fork, spec.bark, sides=5) for _ in range(3)]
     return merge([foliage, trunk, *forks])
 
 

@@ -1,63 +1,38 @@
-"""A cell's story in words: what it is called, which stage is to blame, and what each stage saw (paper, Fig. 2)."""
+"""A cell's story in sentences, written independently of the page's script, which must say the same."""
 
 from collections import Counter
 from collections.abc import Iterable
+from types import SimpleNamespace
 
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import State
-from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.demo.one_cell import CellStory
+from semgrid_edu.workshop.demo.details import SENTENCES
+from semgrid_edu.workshop.demo.stories import CellStory
 from semgrid_edu.workshop.demo.what_if import NO_IMAGE, NO_OCCUPANCY, TRUE_BOTH
 
-SENTENCES = table_beside(__file__)
-"""The sentences by part and case, from `words.toml`; names in braces are filled in. The page's script uses them too."""
+
+def told_story(story: CellStory, memory: SimpleNamespace | None = None) -> list[str]:
+    """The sentences that the page's panel shows for a cell; `memory` is from `memory_of`."""
+    return list(filter(None, (_fault(story), _image(story), _memory(story, memory), _otherwise(story))))
 
 
-def story_text(story: CellStory) -> str:
-    """Tell a cell's story in sentences, the numbers last.
-
-    Parameters
-    ----------
-    story : CellStory
-        The story.
-    """
-    parts = (_place, _called, _fault, _image, _memory, _scan, _otherwise, _numbers)
-    return "\n".join(filter(None, (part(story) for part in parts)))
+def memory_of(remembered, sight, cell: tuple[int, int], earlier: int) -> SimpleNamespace:
+    """What a cell is called with memory, and when one of the frames last gave its place a class by itself."""
+    distribution = remembered[:, *cell]
+    back, seconds, then = (values[cell].item() for values in sight)
+    label = int(distribution.argmax())
+    probability = float(distribution[label])
+    return SimpleNamespace(label=label, probability=probability, back=back, seconds=seconds, then=then, earlier=earlier)
 
 
 def counted(classes: Iterable[int], names: tuple[str, ...]) -> str:
-    """Return how often each class occurs, the most frequent first.
-
-    Parameters
-    ----------
-    classes : iterable of int
-        Class numbers; a number without a name isn't counted.
-    names : tuple of str
-        The names of the classes.
-
-    Examples
-    --------
-    >>> counted([0, 3, 3, 255], ("road", "sidewalk", "vegetation", "car"))
-    'car (2), road (1)'
-    """
+    """How often each class occurs, the most frequent first; a number without a name isn't counted."""
     found = Counter(int(c) for c in classes if 0 <= c < len(names))
     return ", ".join(f"{names[c]} ({number})" for c, number in sorted(found.items(), key=lambda one: (-one[1], one[0])))
 
 
-def _place(story: CellStory) -> str:
-    row, col = story.cell
-    x, y = story.xy
-    side = "right" if y < 0 else "left"
-    return SENTENCES["place"]["cell"].format(row=row, col=col, ahead=f"{x:.1f}", aside=f"{abs(y):.1f}", side=side)
-
-
-def _called(story: CellStory) -> str:
-    case = "unsure" if story.truth is None else "right" if story.refined == story.truth else "wrong"
-    sure = round(100 * float(story.after[story.refined]))
-    return SENTENCES["called"][case].format(sure=sure, **_classes(story))
-
-
 def _classes(story: CellStory) -> dict[str, str | None]:
-    """Return the names of the classes that the sentences mention."""
+    """The names of the classes that the sentences mention."""
     truth = None if story.truth is None else story.names[story.truth]
     return {"label": story.names[story.label], "refined": story.names[story.refined], "truth": truth}
 
@@ -75,7 +50,7 @@ def _fault(story: CellStory) -> str:
 
 
 def _image_here(story: CellStory) -> str:
-    """Say whether the image network is right at the pixels above the cell."""
+    """Whether the image network is right at the pixels above the cell."""
     labelled = story.shown < len(story.names)
     wrong = int((story.called != story.shown)[labelled].sum())
     case = "wrong" if wrong else "right" if labelled.any() else "unknown"
@@ -83,13 +58,13 @@ def _image_here(story: CellStory) -> str:
 
 
 def _occupancy_here(story: CellStory) -> str:
-    """Say whether the filter is right about the cell: the ground should be FREE, and a thing shouldn't."""
+    """Whether the filter is right about the cell: the ground should be FREE, and a thing shouldn't."""
     state = State(int(story.steps["shown"].argmax()))
     if state == State.UNKNOWN:
         return SENTENCES["occupancy_here"]["unknown"]
     truth = story.names[story.truth]
     semantic = not truth.startswith("unknown")
-    case = "wrong" if semantic and (truth in story.flat) != (state == State.FREE) else "right"
+    case = "wrong" if semantic and (truth in KITTI_14.flat) != (state == State.FREE) else "right"
     return SENTENCES["occupancy_here"][case].format(state=state.name)
 
 
@@ -111,8 +86,7 @@ def _image(story: CellStory) -> str:
     return f"{said} {words['partly' if partly else 'shown'].format(shows=shows)}"
 
 
-def _memory(story: CellStory) -> str:
-    memory = story.memory
+def _memory(story: CellStory, memory: SimpleNamespace | None) -> str:
     if memory is None:
         return ""
     words = SENTENCES["memory"]
@@ -129,20 +103,6 @@ def _memory(story: CellStory) -> str:
     return f"{said} {words['moves']}" if story.steps["shown"][State.DYNAMIC] > 0.5 else said
 
 
-def _scan(story: CellStory) -> str:
-    words = SENTENCES["scan"]
-    returns = story.scan.obstacles if story.scan.verdict == "hit" else story.scan.ground
-    states = ", ".join(f"{s.name} {100 * story.steps['shown'][s]:.0f} %" for s in State)
-    return f"{words[story.scan.verdict].format(returns=returns)} {words['states'].format(states=states)}"
-
-
 def _otherwise(story: CellStory) -> str:
     no_image, no_occupancy = (story.names[story.otherwise[change]] for change in (NO_IMAGE, NO_OCCUPANCY))
     return SENTENCES["otherwise"]["removed"].format(no_image=no_image, no_occupancy=no_occupancy)
-
-
-def _numbers(story: CellStory) -> str:
-    why = story.why
-    parts = {"planes": why.planes.sum(), "occupancy": why.occupancy.sum(), "rest": why.rest, "score": why.score}
-    words = {name: f"{part:+.1f}" for name, part in parts.items()}
-    return SENTENCES["numbers"]["sum"].format(label=story.names[story.label], rival=story.names[story.rival], **words)
