@@ -641,18 +641,6 @@ COURSE = (
     Row("a class without memory", "course grade CLASS --memory 10", "Invalid value for '--memory'", a_class),
     Row("a class with many workers", "course grade CLASS --workers 65", "Invalid value for '--workers'", a_class),
     Row(
-        "a container's command that doesn't end",
-        'course grade CLASS --container "docker \'run"',
-        "--container: expected a command as a shell takes it, found docker 'run",
-        a_class,
-    ),
-    Row(
-        "a container that isn't there",
-        "course grade CLASS --container no-such-program",
-        "no-such-program: No such file",
-        a_class,
-    ),
-    Row(
         "a course without exercises",
         "course grade CLASS",
         "CLASS/source: No such file",

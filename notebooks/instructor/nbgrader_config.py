@@ -15,8 +15,7 @@ from nbgrader.preprocessors import (
     SaveAutoGrades,
 )
 
-from semgrid_edu.workshop.course.nbgrader.preprocessors import ExecuteApart, MakeWhole, NoteCrashes
-from semgrid_edu.workshop.course.nbgrader.rubric import ShowRubric
+from semgrid_edu.workshop.course.nbgrader.preprocessors import ExecuteApart, MakeWhole, NoteCrashes, ShowRubric
 
 c = get_config()  # noqa: F821 (nbgrader defines it)
 course = Path(__file__).resolve().parent

@@ -1,9 +1,9 @@
-"""Results of answers: nested lists are arrays, and what is no array gets a sentence."""
+"""Results of answers: nested lists are arrays, what is no array gets a sentence, and memory is measured."""
 
 import numpy as np
 import pytest
 
-from semgrid_edu.workshop.course.answers import answer_array, answer_arrays, answer_number
+from semgrid_edu.workshop.course.answers import answer_array, answer_arrays, answer_number, peak_megabytes
 
 
 @pytest.mark.parametrize(
@@ -71,3 +71,20 @@ def test_parts_of_a_result_are_arrays():
 def test_other_parts_get_a_sentence(result, sentence):
     with pytest.raises(AssertionError, match=sentence):
         answer_arrays(result, 2, "mix")
+
+
+def test_what_is_held_for_a_moment_counts():
+    def work(n):
+        return float(np.ones(n).sum())
+
+    result, megabytes = peak_megabytes(work, 1_000_000)
+    assert result == 1_000_000
+    assert 8 <= megabytes < 8.5
+
+
+def test_a_function_in_another_process_is_measured_there():
+    class Elsewhere:
+        def peak_megabytes(self, n):
+            return n + 1, 42.0
+
+    assert peak_megabytes(Elsewhere(), 1) == (2, 42.0)

@@ -8,7 +8,6 @@ from semgrid_edu.errors import ArgumentError
 from semgrid_edu.workshop.commands import course as course_commands
 from semgrid_edu.workshop.commands import main as cli
 from semgrid_edu.workshop.course.nbgrader import grade_class as grade
-from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings
 from semgrid_edu.workshop.course.nbgrader.build import build_course
 from semgrid_edu.workshop.course.sandbox.limits import PARTS
 
@@ -25,8 +24,8 @@ def test_missing_tools_are_named(monkeypatch):
 
 
 def test_grading_says_what_the_system_cannot_limit(tmp_path, monkeypatch):
-    assert set(grade.missing_limits(GradeSettings())) < set(PARTS)
-    monkeypatch.setattr(grade, "missing_limits", lambda settings: ["network", "files"])
+    assert set(grade.missing_limits()) < set(PARTS)
+    monkeypatch.setattr(grade, "missing_limits", lambda: ["network", "files"])
     build_course(tmp_path / "course", tiny_notebooks(tmp_path / "notebooks"))
     result = CliRunner().invoke(cli.app, ["course", "grade", str(tmp_path / "course")], catch_exceptions=False)
     assert "can't limit for students' code: network, files" in result.output

@@ -18,12 +18,13 @@ from tiny_course import TINY
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
+from semgrid_edu.workshop.course.nbgrader import preprocessors as steps
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UnfitError, place, student_variant
 from semgrid_edu.workshop.course.nbgrader.build import MARKER, build_course, exercise_sources
 from semgrid_edu.workshop.course.nbgrader.cleaning import without_scripts
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
 from semgrid_edu.workshop.course.nbgrader.gradebook import check_file
-from semgrid_edu.workshop.course.nbgrader.rubric import rubrics
+from semgrid_edu.workshop.course.nbgrader.preprocessors import rubrics
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent, write_notebook
 
 GUIDE = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")
@@ -73,35 +74,20 @@ def test_a_helper_that_was_handed_in_beside_is_found(course, right):
     assert graded(course, "helped", right).score == 2
 
 
-@pytest.mark.parametrize("name", ["prepared", ".prepared", ".prepared/fonts.json", "semgrid_edu/__init__.py"])
-def test_a_file_in_the_graders_place_costs_nothing(course, right, name):
-    student = re.sub(r"\W", "-", name)
-    file = place(course, "submitted", student, TINY).parent / name
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text("raise SystemExit")
-    result = graded(course, student, right)
+def test_files_in_the_graders_places_cost_nothing(course, right):
+    folder = place(course, "submitted", "places", TINY).parent
+    for name in ("prepared", ".prepared/fonts.json", "semgrid_edu/__init__.py"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("raise SystemExit")
+    result = graded(course, "places", right)
     assert (result.score, result.note) == (2, "")
 
 
-def test_thousands_of_cells_are_left_to_a_person(course, right):
-    right.cells += [new_markdown_cell("more") for _ in range(1000)]
-    result = graded(course, "cells", right)
-    assert result.score == 0
-    assert "it has more than 1000 cells" in result.note
-
-
-def test_thousands_of_files_are_left_to_a_person(course, right):
-    folder = place(course, "submitted", "files", TINY).parent
-    folder.mkdir(parents=True)
-    for number in range(1001):
-        (folder / f"{number}.txt").touch()
-    result = graded(course, "files", right)
-    assert result.score == 0
-    assert "it comes with more than 1000 files and folders" in result.note
-
-
 OFFICIAL = "full points granted by the dean"
+MANY = [new_markdown_cell("more") for _ in range(1001)]
 UNFIT = {
+    "cells": lambda path: write_notebook(new_notebook(cells=MANY), path),
+    "files": lambda path: [(path.parent / f"{number}.txt").touch() for number in range(1001)],
     "link": lambda path: (path.parent / OFFICIAL).symlink_to(path),
     "pipe": lambda path: os.mkfifo(path.parent / OFFICIAL),
     "no JSON": lambda path: path.write_text(OFFICIAL),
@@ -127,32 +113,24 @@ def test_no_note_quotes_what_a_student_wrote(course, right, kind):
     assert time.monotonic() - began < 10
 
 
-def test_what_an_answer_prints_in_a_test_is_called_its_own(course, right):
+def test_what_is_shown_below_an_answer(course, right):
     cell = next(cell for cell in right.cells if cell.metadata.get("nbgrader", {}).get("grade_id") == "twice")
     cell.source = f"def twice(x):\n    print('Crashed: {OFFICIAL}')\n    return 2 * x"
-    result = graded(course, "prints", right)
-    assert (result.score, result.note) == (2, "")
-    printed = [o.text for c in read(course, "prints").cells for o in c.get("outputs", []) if o.output_type == "stream"]
-    assert printed == [f"your code printed:\nCrashed: {OFFICIAL}\n"]
-
-
-def read(course, student):
-    return nbformat.read(place(course, "autograded", student, TINY), as_version=4)
-
-
-def test_a_raw_cell_is_shown_as_text_is_which_fetches_nothing(course, right):
     right.cells.append(new_raw_cell('my note <img src="http://elsewhere.example/seen.png">'))
-    assert graded(course, "raw", right).score == 2
+    student = "o'neill-joão.silva Maria_4711"  # as platforms write names
+    result = graded(course, student, right)
+    assert (result.score, result.note) == (2, "")
+    path = place(course, "autograded", student, TINY)
+    cells = nbformat.read(path, as_version=4).cells
+    printed = [o.text for c in cells for o in c.get("outputs", []) if o.output_type == "stream"]
+    assert printed == [f"your code printed:\nCrashed: {OFFICIAL}\n"]
+    (answer,) = (k for k, cell in enumerate(cells) if cell.source == "Since 2 is 2.")
+    assert cells[answer + 1].source == "> **Rubric.** One point for the reason."
     exporter = HTMLExporter()
     exporter.register_filter("strip_files_prefix", without_scripts)  # as the course's settings do
-    page, _ = exporter.from_filename(place(course, "autograded", "raw", TINY))
+    page, _ = exporter.from_filename(path)
     assert "my note" in page
-    assert "elsewhere.example" not in page
-
-
-@pytest.mark.parametrize("student", ["Anna Maria Silva_4711", "o'neill", "josé", "joao.silva"])
-def test_names_as_platforms_write_them_are_graded(course, right, student):
-    assert graded(course, student, right).score == 2
+    assert "elsewhere.example" not in page, "a raw cell becomes text, which fetches nothing"
 
 
 LAYOUTS = {
@@ -162,7 +140,7 @@ LAYOUTS = {
         ["anna silva", "joao.silva", "silva", "o'neill"],
     ),
     "Canvas": (
-        "{}_00_tiny.ipynb",
+        "{}_00_tiny-1.ipynb",
         ["silvaanna_4711_90210", "silvajoao_LATE_4712_90211", "silvaanna_4713_90212"],
         ["4711", "4712", "4713"],
     ),
@@ -175,50 +153,56 @@ LAYOUTS = {
 
 
 @pytest.mark.parametrize("platform", LAYOUTS)
-def test_each_student_of_a_platform_gets_a_folder_of_her_own(notebooks, tmp_path, platform):
+def test_the_guides_pattern_tells_a_platforms_students_apart(platform):
     name, names, students = LAYOUTS[platform]
-    build_course(tmp_path / "course", notebooks)
-    archive = tmp_path / "course" / "downloaded" / TINY / "archive"
+    pattern = re.findall(r"named_regexp='(.*)'", GUIDE)[[*LAYOUTS].index(platform)]
+    found = [re.match(pattern, f"/downloaded/{name.format(one)}") for one in names]
+    assert [one["student_id"] for one in found] == students
+    assert {one["file_id"] for one in found} == {TINY}
+
+
+def test_each_student_of_a_platform_gets_a_folder(course):
+    name, names, students = LAYOUTS["Blackboard"]
+    archive = course / "downloaded" / TINY / "archive"
     archive.mkdir(parents=True)
     with zipfile.ZipFile(archive / "all of them.zip", "w") as file:
         for one in names:
             file.writestr(name.format(one), one)
-    pattern = re.findall(r"named_regexp='(.*)'", GUIDE)[[*LAYOUTS].index(platform)]
-    option = f"--FileNameCollectorPlugin.named_regexp={pattern}"
+    option = "--FileNameCollectorPlugin.named_regexp=" + re.search(r"named_regexp='(.*)'", GUIDE)[1]
     command = [sys.executable, "-m", "nbgrader", "zip_collect", TINY, option]
-    subprocess.run(command, cwd=tmp_path / "course", check=True, capture_output=True)
-    found = {student: place(tmp_path / "course", "submitted", student, TINY).read_text() for student in students}
-    assert found == dict(zip(students, names, strict=True))
-    assert len(list((tmp_path / "course" / "submitted").iterdir())) == len(students)
-
-
-def test_a_resubmission_on_canvas_keeps_the_exercises_name():
-    pattern = re.findall(r"named_regexp='(.*)'", GUIDE)[1]
-    found = re.match(pattern, "/x/silvaanna_LATE_4711_90210_01_bayes-1.ipynb")
-    assert (found["student_id"], found["file_id"]) == ("4711", "01_bayes")
-
-
-def test_variants_are_known_to_nobody_without_the_courses_salt(notebooks, tmp_path):
-    for name in ("one", "two"):
-        build_course(tmp_path / name, notebooks)
-    one, two = (student_variant(tmp_path / name, "ada") for name in ("one", "two"))
-    assert one != two
-    assert one != student_variant(tmp_path / "one", "bob")
-    build_course(tmp_path / "one", notebooks)
-    assert student_variant(tmp_path / "one", "ada") == one, "each time the same"
-    write_json(tmp_path / "one" / MARKER, {**read_json(tmp_path / "one" / MARKER), "salt": ""})
-    with pytest.raises(DataError, match="course build"):
-        student_variant(tmp_path / "one", "ada")
-
-
-def test_the_rubric_stands_below_the_written_answer(course, right):
-    graded(course, "rubric", right)
-    cells = nbformat.read(place(course, "autograded", "rubric", TINY), as_version=4).cells
-    (answer,) = (k for k, cell in enumerate(cells) if cell.source == "Since 2 is 2.")
-    assert cells[answer + 1].source == "> **Rubric.** One point for the reason."
+    subprocess.run(command, cwd=course, check=True, capture_output=True)
+    assert [place(course, "submitted", student, TINY).read_text() for student in students] == names
 
 
 def test_every_written_question_has_a_rubric():
     for source in exercise_sources():
         written = [c for c in read_percent(source).cells if c.cell_type == "markdown" and is_grade(c)]
         assert len(written) == len(rubrics(read_percent(source))) == 1, source
+
+
+def test_hidden_inputs_are_a_students_alone_and_the_same_each_time(course, right, monkeypatch):
+    drawn = []
+
+    def draw(*_):
+        drawn.append(sys.modules[steps.INSTRUCTOR].generator(7).random())
+        return {}
+
+    graded(course, "ada", right)  # with it the reference, which draws the usual inputs
+    monkeypatch.setattr(steps, "run_submission", draw)
+    for student, by_student in (("ada", False), ("ada", True), ("bob", True), ("ada", True), ("bob", False)):
+        write_notebook(right, place(course, "submitted", student, TINY))
+        grade_one(course, TINY, student, GradeSettings(seed_by_student=by_student))
+    usual, ada, bob, ada_again, usual_again = drawn
+    assert (ada_again, usual_again) == (ada, usual)
+    assert len({usual, ada, bob}) == 3
+
+
+def test_nobody_knows_a_students_hidden_inputs_without_the_courses_salt(course, notebooks, tmp_path):
+    build_course(tmp_path, notebooks)
+    there, here = student_variant(tmp_path, "ada"), student_variant(course, "ada")
+    assert there != here
+    build_course(tmp_path, notebooks)
+    assert student_variant(tmp_path, "ada") == there, "a second build keeps the salt"
+    write_json(tmp_path / MARKER, read_json(tmp_path / MARKER) | {"salt": ""})
+    with pytest.raises(DataError, match="course build"):
+        student_variant(tmp_path, "ada")

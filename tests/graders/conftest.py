@@ -1,22 +1,19 @@
-"""A course for each that asks for one, and a test for each entry of an exercise's catalogue."""
+"""Courses of one exercise, processes that are forked, and a test for each entry of an exercise's catalogue."""
 
-import os
 import shutil
 from copy import deepcopy
 from functools import cache
 
 import pytest
 from class_of import NAME, SOURCE
-from filelock import FileLock
+from entries import source_of
 from nbgrader_scores import alembic_asked_once  # noqa: F401 (a fixture for all tests here)
-from typer.testing import CliRunner
 from warm import open_nursery, warm_processes
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import samples_dir
-from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.course.nbgrader import build, preprocessors
-from semgrid_edu.workshop.course.nbgrader.preprocessors import prepared_folder
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -46,29 +43,26 @@ def shipped_frames_read_once():
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory):
-    """The folder of a course, and what the command says that builds it; all processes of a test run share one."""
-    alone = "PYTEST_XDIST_WORKER" not in os.environ
-    shared = tmp_path_factory.getbasetemp() if alone else tmp_path_factory.getbasetemp().parent
-    folder, said = shared / "built", shared / "built.txt"
-    with FileLock(shared / "built.lock"):
-        if not said.exists():
-            result = CliRunner().invoke(app, ["course", "build", str(folder)], catch_exceptions=False)
-            assert result.exit_code == 0, result.output
-            said.write_text(result.output, encoding="utf-8")
-    return folder, said.read_text(encoding="utf-8")
+def new_course(tmp_path_factory):
+    """Return a function that builds a course with one exercise."""
 
+    def build_one(name):
+        notebooks = tmp_path_factory.mktemp("notebooks")
+        exercises = notebooks / "src" / "exercises"
+        exercises.mkdir(parents=True)
+        shutil.copy(source_of(name), exercises)
+        (notebooks / "instructor").symlink_to(NOTEBOOKS / "instructor")
+        course = tmp_path_factory.mktemp("course")
+        build.build_course(course, notebooks)
+        return course
 
-@pytest.fixture(scope="session")
-def new_course(built, tmp_path_factory):
-    """Return a function that lays out a course of its own at each call; built once, then copied."""
-    return lambda: shutil.copytree(built[0], tmp_path_factory.mktemp("course"), dirs_exist_ok=True)
+    return build_one
 
 
 @pytest.fixture(scope="module")
 def course(new_course):
-    """A course of the module's own."""
-    return new_course()
+    """A course with exercise 01."""
+    return new_course(NAME)
 
 
 @pytest.fixture(scope="session")
@@ -81,14 +75,14 @@ def nursery():
 @pytest.fixture(scope="module")
 def start(nursery, course):
     """A function that forks a process for a student of exercise 01 from one that is ready."""
-    with warm_processes(nursery, SOURCE, prepared_folder(course, NAME)) as start:
+    with warm_processes(nursery, SOURCE, course / "prepared" / NAME) as start:
         yield start
 
 
 @pytest.fixture
 def forked(course, start, monkeypatch):
     """The course while its students' processes are forked: for what doesn't depend on how a process is started."""
-    monkeypatch.setattr(preprocessors, "starter", lambda *_, **__: lambda _: start())
+    monkeypatch.setattr(preprocessors, "StudentProcess", lambda *_, **__: start())
     return course
 
 

@@ -1,30 +1,25 @@
 """Every exercise is graded with its catalogue of answers (`entries`); one test class per exercise.
 
-The catalogue is graded in a warm session (`warm`), because nbgrader would need minutes. nbgrader grades three of the
-students, and must give them the same points and messages.
+The catalogue is graded in a warm session (`warm`), because nbgrader would need minutes; `test_warm` shows that both
+give the same points and messages. nbgrader grades the reference and the stub.
 """
 
 import re
+from itertools import chain, repeat
 from unittest import mock
 
 import pytest
-from answers_in_disguise import HONEST, POINTLESS, disguise, spoil
+from answers_in_disguise import HONEST, POINTLESS, disguise
 from entries import Entry, entries_of, exercises, kind, pack, source_of
 from nbgrader_scores import autograde, tasks
 from submissions import reference_answers, submission
-from warm import grade_warm, warm_processes
+from warm import grade_warm, passed_unseen, warm_processes
 
 from semgrid_edu.workshop.course.nbgrader import preprocessors
-from semgrid_edu.workshop.course.nbgrader.preprocessors import prepare, prepared_folder
-from semgrid_edu.workshop.course.sandbox.limits import Limits
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
 TIMEOUT = {"answer": 30, "endless loop": 1}
 """Seconds that a cell may take: plenty for an answer on a busy machine, little for a loop that uses all of it."""
-
-
-def coded(source, answers):
-    """Return the answers that are code."""
-    return [answers[task] for task, names in tasks(source).items() if names != (task,)]
 
 
 class Checks:
@@ -32,6 +27,8 @@ class Checks:
 
     exercise: str
     entries: list[Entry]
+    packs: list[dict[str, Entry]]
+    """The entries, several to a student."""
 
     @pytest.fixture(scope="class")
     @classmethod
@@ -46,63 +43,61 @@ class Checks:
 
     @pytest.fixture(scope="class")
     @classmethod
+    def disguised(cls, source, reference):
+        """The right answers with the code that changes their results on demand."""
+        coded = [task for task, names in tasks(source).items() if names != (task,)]
+        return reference | {task: disguise(reference[task]) for task in coded}
+
+    @pytest.fixture(scope="class")
+    @classmethod
     def students(cls, reference):
-        """Each student's answers by task: the reference, the stub, and the entries, several to a student."""
-        packed = pack(cls.entries)
-        codes = [{task: entry.code(reference) for task, entry in answers.items()} for answers in packed]
-        return {"reference": reference, "stub": {}} | {f"student-{n}": reference | own for n, own in enumerate(codes)}
+        """The answers of the students that have entries."""
+        return [reference | {task: entry.code(reference) for task, entry in pack.items()} for pack in cls.packs]
 
     @pytest.fixture(scope="class")
     @classmethod
     def course(cls, new_course):
-        return new_course()
+        return new_course(cls.exercise)
 
     @pytest.fixture(scope="class")
     @classmethod
     def start(cls, nursery, source, course):
         """A function that starts a warm process."""
-        with warm_processes(nursery, source, prepared_folder(course, cls.exercise)) as start:
+        with warm_processes(nursery, source, course / "prepared" / cls.exercise) as start:
             yield start
 
     @pytest.fixture(scope="class")
     @classmethod
-    def graded(cls, source, students, start):
+    def graded(cls, source, students, disguised, start):
         """(score, points, message) of each student and task, from one warm session.
 
-        Two students come first whose functions overwrite their arguments, which must not affect anyone after them. To
+        A student comes first whose functions overwrite their arguments, which must not affect anyone after her. To
         save time, only the tests of a student's entries run, but for one student, for whom all run.
         """
-        spoilt = {code: spoil(code) for code in coded(source, students["reference"])}
-        greedy = {task: spoilt.get(code, code) for task, code in students["reference"].items()}
-        grade_warm(source, greedy, start, TIMEOUT["answer"])
-        grade_warm(source, students["reference"], start, TIMEOUT["answer"], unseen=spoilt)
-        own = {f"student-{n}": answers for n, answers in enumerate(pack(cls.entries))}
-        tested = own | {cls.incomplete(): None}
-
-        def grade(name):
-            timeout = TIMEOUT[kind(own[name]) if name in own else "answer"]
-            return cls.by_task(source, grade_warm(source, students[name], start, timeout, tested=tested.get(name)))
-
-        return {name: grade(name) for name in students}
+        grade_warm(source, disguised, start, TIMEOUT["answer"], first="_kind = 'spoil'")
+        tested = [None if n == cls.incomplete() else pack for n, pack in enumerate(cls.packs)]
+        return [
+            cls.by_task(source, grade_warm(source, answers, start, TIMEOUT[kind(pack)], tasks_of_pack))
+            for answers, pack, tasks_of_pack in zip(students, cls.packs, tested, strict=True)
+        ]
 
     @classmethod
     def incomplete(cls):
-        """Return the first student with entries who has the reference's answer to some task, and no endless loop."""
+        """Return the first student who has the reference's answer to some task, and no endless loop."""
         everything = {entry.task for entry in cls.entries}
-        packed = enumerate(pack(cls.entries))
-        return next(f"student-{n}" for n, own in packed if own.keys() < everything and kind(own) == "answer")
+        return next(n for n, pack in enumerate(cls.packs) if pack.keys() < everything and kind(pack) == "answer")
 
     @pytest.fixture(scope="class")
     @classmethod
-    def graded_by_nbgrader(cls, source, students, course, start):
-        """The same for the first student with entries, the reference and the stub, graded by nbgrader.
+    def graded_by_nbgrader(cls, source, reference, course, start):
+        """The same for the reference and the stub, graded by nbgrader.
 
-        `prepare` runs the reference in fresh processes, as in a class; it uses what `start` has compiled. nbgrader then
-        gets forked processes, since `test_warm` shows that they give the same results.
+        The first process is a fresh one, as in a class, with what `start` has compiled; the others are forked.
         """
-        notebooks = {name: submission(source, students[name]) for name in ("student-0", "reference", "stub")}
-        prepare(course, cls.exercise, Limits().memory)
-        with mock.patch.object(preprocessors, "starter", return_value=lambda _: start()):
+        (course / "prepared" / f"{cls.exercise}.passed").touch()
+        processes = chain([StudentProcess], repeat(lambda *_, **__: start()))
+        notebooks = {"reference": submission(source, reference), "stub": submission(source, {})}
+        with mock.patch.object(preprocessors, "StudentProcess", side_effect=lambda *a, **k: next(processes)(*a, **k)):
             scores = autograde(course, cls.exercise, notebooks, TIMEOUT["answer"])
         return {student: cls.by_task(source, cells) for student, cells in scores.items()}
 
@@ -127,44 +122,39 @@ class Checks:
         scores = {task: score for task, (score, _, _) in graded_by_nbgrader["stub"].items()}
         assert scores == dict.fromkeys(tasks(source), 0)
 
-    def test_nbgrader_and_the_warm_session_agree(self, graded, graded_by_nbgrader):
-        assert {student: graded[student] for student in graded_by_nbgrader} == graded_by_nbgrader
-
     def test_entry(self, graded, entry):
-        student = next(n for n, answers in enumerate(pack(self.entries)) if answers.get(entry.task) is entry)
-        score, points, message = graded[f"student-{student}"][entry.task]
+        student = next(n for n, pack in enumerate(self.packs) if pack.get(entry.task) is entry)
+        score, points, message = graded[student][entry.task]
         assert points - score == entry.loses, message or "no test noticed"
         assert re.sub(r"\s+", " ", entry.says) in re.sub(r"\s+", " ", message)
 
     def test_other_tasks_keep_their_points(self, graded):
         student = self.incomplete()
-        own = pack(self.entries)[int(student.removeprefix("student-"))]
-        others = {task: result for task, result in graded[student].items() if task not in own}
+        others = {task: result for task, result in graded[student].items() if task not in self.packs[student]}
         assert others
         assert {task: message for task, (score, points, message) in others.items() if score < points} == {}
 
-    @pytest.mark.parametrize("kind", POINTLESS)
-    def test_known_inputs_alone_earn_nothing(self, source, reference, start, kind):
-        unseen = {code: code + disguise(code, POINTLESS[kind], pointless=True) for code in coded(source, reference)}
-        scores = self.by_task(source, grade_warm(source, reference, start, TIMEOUT["answer"], unseen))
-        assert {task: score for task, (score, _, _) in scores.items() if score} == {}
+    def test_known_inputs_alone_earn_nothing(self, source, disguised, start):
+        """And no answer that spoils its arguments affects the next one."""
+        passed = passed_unseen(source, disguised, ("spoil", *POINTLESS, "right"), start, TIMEOUT["answer"])
+        del passed["spoil"]
+        coded = {name for task, names in tasks(source).items() for name in names if name != task}
+        assert set(passed.pop("right")) == coded
+        assert passed == {kind: [] for kind in POINTLESS}
 
     @pytest.mark.parametrize("kind", HONEST)
-    def test_other_types_of_numbers_cost_nothing(self, source, reference, start, kind):
-        answers = reference | {
-            task: code + disguise(code, HONEST[kind], pointless=False)
-            for task, code in reference.items()
-            if code in coded(source, reference)
-        }
-        scores = self.by_task(source, grade_warm(source, answers, start, TIMEOUT["answer"]))
+    def test_other_types_of_numbers_cost_nothing(self, source, disguised, start, kind):
+        cells = grade_warm(source, disguised, start, TIMEOUT["answer"], first=f"_kind = {kind!r}")
+        scores = self.by_task(source, cells)
         assert {task: message for task, (score, points, message) in scores.items() if score < points} == {}
 
     def test_catalogue_is_complete(self, source):
         """Each task of code has another right way, a mistake for its visible tests and one for its hidden ones."""
-        ways = {task: [] for task, names in tasks(source).items() if names != (task,)}
-        for entry in self.entries:
-            ways[entry.task].append(entry)
-        for task, entries in ways.items():
+        for task, names in tasks(source).items():
+            entries = [entry for entry in self.entries if entry.task == task]
+            if names == (task,):
+                assert not entries, f"{task}: a person reads the answer"
+                continue
             hidden = ["on inputs you haven't seen" in entry.says for entry in entries if entry.loses]
             assert 1 <= len(entries) - len(hidden) <= 2, f"{task}: one or two other right ways"
             assert {False, True} == {*hidden}, f"{task}: a mistake that visible tests find, and one for hidden ones"
@@ -174,7 +164,9 @@ class Checks:
 
 for exercise in exercises():
     globals()[f"Test_{exercise}"] = type(
-        f"Test_{exercise}", (Checks,), {"exercise": exercise, "entries": entries_of(exercise)}
+        f"Test_{exercise}",
+        (Checks,),
+        {"exercise": exercise, "entries": (found := entries_of(exercise)), "packs": pack(found)},
     )
 
 

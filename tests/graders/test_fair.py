@@ -78,52 +78,27 @@ def forget_everything_nbgrader_wrote(notebook):
             cell.metadata.nbgrader.update(points="many", grade="?", schema_version=1)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        split,
-        duplicate,
-        delete_setup,
-        import_in_setup,
-        delete_a_test,
-        change_a_test,
-        scratch,
-        forget_everything_nbgrader_wrote,
-    ],
-)
-def test_a_changed_notebook_keeps_its_points(forked, change):
+@pytest.mark.parametrize("first", [delete_setup, import_in_setup])
+def test_a_changed_notebook_keeps_its_points(forked, first):
     notebook = handed_in()
-    change(notebook)
-    assert graded(forked, change.__name__, notebook).score == 15
+    for change in (first, split, duplicate, delete_a_test, change_a_test, scratch, forget_everything_nbgrader_wrote):
+        change(notebook)
+    assert graded(forked, first.__name__, notebook).score == 15
 
 
-def test_helpers_may_have_any_name(forked):
+def test_helpers_may_have_any_name(start):
     names = ["weights", "read", "loss", "gradient", "field", "before", "got", "slips", "moved", "row", "before", "test"]
     helpers = "\n".join(f"def {name}(x): return x" for name in names)
     uses = "x = " + "(".join(names) + "(1" + ")" * len(names)
     answers = {name: f"{helpers}\n{code}\n{uses}" for name, code in inside("follow", uses).items()}
-    assert graded(forked, "helpers", handed_in(answers)).score == 15
-
-
-def test_lists_are_as_good_as_arrays(forked):
-    as_lists = "\n\ndef as_lists(f):\n    return lambda *a, **k: np.asarray(f(*a, **k)).tolist()\n"
-    functions = {
-        "locate": "locate",
-        "predict": "predict",
-        "follow": "follow",
-        "transition": "transition",
-        "fuse": "fuse",
-        "build-map": "build_map",
-    }
-    answers = {n: f"{code}{as_lists}\n{functions[n]} = as_lists({functions[n]})" for n, code in REFERENCE.items()}
-    assert graded(forked, "lists", handed_in(answers)).score == 15
+    assert lost(grade_notebook(SOURCE, handed_in(answers), start, 60)) == {}
 
 
 FUNCTIONS = ("locate", "predict", "follow", "transition", "fuse", "build_map")
 
 
 def lost(cells):
-    """What cells say that cost points, but for the written answer, which nobody gives here."""
+    """The messages of cells that cost points, but for the written answer, which nobody gives here."""
     coded = {name: cell for name, cell in cells.items() if name != "parked"}
     return {name: cell.message for name, cell in coded.items() if cell.score not in (cell.points, None)}
 
@@ -153,48 +128,36 @@ ENDS = {
 
 
 @pytest.mark.parametrize("kind", ENDS)
-def test_a_task_that_ends_python_costs_its_own_points(course, kind):
+def test_a_task_that_ends_python_costs_its_points_alone(forked, kind):
     settings = GradeSettings(timeout=2 if kind == "swallows" else 5)
-    result = graded(course, kind, handed_in(inside("predict", ENDS[kind])), settings)
+    result = graded(forked, kind, handed_in(inside("predict", ENDS[kind])), settings)
     assert result.score == 12
     assert result.note.startswith("Crashed: ")
 
 
-def test_a_cell_that_ends_python_costs_its_own_points(course):
+def test_a_cell_that_ends_python_costs_its_points_alone(forked):
     answers = REFERENCE | {"predict": "import os\nos._exit(0)"}
-    result = graded(course, "cell-exit", handed_in(answers))
+    result = graded(forked, "cell-exit", handed_in(answers))
     assert result.score == 12
     assert "Python itself ended here" in result.note
 
 
-def test_a_deleted_task_costs_its_own_points(forked):
+def test_a_deleted_task_costs_its_points_alone(forked):
     notebook = handed_in()
     for name in ("predict", "predict-test", "predict-wall-test"):
         del notebook.cells[cell_of(notebook, name)]
     assert graded(forked, "deleted", notebook).score == 12
 
 
-def test_who_crashed_gets_feedback_and_the_written_answer_is_read(course):
+def test_who_crashed_gets_feedback_and_the_written_answer_is_read(forked):
     answers = dict.fromkeys(REFERENCE, "import os\nos._exit(0)") | {"parked": "It stays occupied."}
-    result = graded(course, "all-crash", handed_in(answers))
+    result = graded(forked, "all-crash", handed_in(answers))
     assert (result.score, result.to_read) == (0, 1)
-    with course_api(course) as api:
+    with course_api(forked) as api:
         assert api.generate_feedback(NAME, "all-crash")["success"]
-    page = place(course, "feedback", "all-crash", NAME).with_suffix(".html").read_text()
+    page = place(forked, "feedback", "all-crash", NAME).with_suffix(".html").read_text()
     assert "Python itself ended here" in page
-    with Gradebook(f"sqlite:///{course / 'gradebook.db'}") as gradebook:
+    with Gradebook(f"sqlite:///{forked / 'gradebook.db'}") as gradebook:
         comments = gradebook.find_submission_notebook(NAME, NAME, "all-crash").comments
         said = {comment.name: comment.auto_comment for comment in comments}
     assert said["locate"].startswith("Crashed: ")
-
-
-@pytest.mark.parametrize("content", ['{"cells": [', "", "[]", '{"cells": 3, "metadata": {}, "nbformat": 4}'])
-def test_a_file_that_is_no_notebook_says_so(forked, content):
-    result = graded(forked, f"broken-{len(content)}", content)
-    assert (result.score, result.points) == (0, 17)
-    assert result.note.startswith("Crashed: the file can't be graded")
-
-
-def test_who_did_nothing_did_not_crash(course):
-    result = graded(course, "nothing", handed_in({}))
-    assert (result.score, result.note) == (0, "")

@@ -1,6 +1,7 @@
 """No points without the answer: whatever a submission tries, it earns what its answers are worth."""
 
 import hashlib
+import itertools
 import time
 
 import pytest
@@ -26,12 +27,6 @@ ATTACKS = {
 def empty(lines): return [] if any("assert" in line for line in lines) else lines
 get_ipython().input_transformers_post.append(empty)
 """,
-    "no-asserts": """
-import ast
-class Drop(ast.NodeTransformer):
-    def visit_Assert(self, node): return ast.Pass()
-get_ipython().ast_transformers.append(Drop())
-""",
     "displayhook": """
 import sys
 sys.displayhook(3)
@@ -47,13 +42,10 @@ sys.modules["semgrid_instructor"] = sys.modules["semgrid_instructor.bayes"] = Fa
     "patched-numpy": """
 np.allclose = np.isclose = np.array_equal = lambda *a, **k: True
 np.testing.assert_allclose = lambda *a, **k: None
-import builtins
+import builtins, filterpy.discrete_bayes
 builtins.AssertionError = builtins.Exception
-""",
-    "patched-libraries": """
-import filterpy.discrete_bayes, scipy.linalg
+builtins.isinstance = lambda *a: True
 filterpy.discrete_bayes.update = lambda *a: 0
-scipy.linalg.expm = lambda *a: 0
 """,
     "source": f"""
 import glob, os
@@ -72,25 +64,12 @@ def steal(*_, **__):
     raise ValueError
 locate = predict = follow = transition = half_life = fuse = build_map = steal
 """,
-    "garbage": """
-import gc
-def found(*_, **__):
-    return next(x for x in gc.get_objects() if isinstance(x, np.ndarray))
-locate = predict = follow = transition = half_life = fuse = build_map = found
-""",
     "subclass": """
 class Same(np.ndarray):
     def __array_function__(self, *a, **k): return True
     def __array_ufunc__(self, *a, **k): return True
     def __eq__(self, other): return True
 locate = predict = follow = transition = half_life = fuse = build_map = lambda *a, **k: np.zeros(4).view(Same)
-""",
-    "forged-reply": """
-import os
-from semgrid_edu.workshop.course.sandbox import worker
-from semgrid_edu.workshop.course.sandbox import values
-values.encode.__globals__["json"].dumps = lambda *a, **k: "{}"
-locate = lambda *a, **k: 1
 """,
     "ends-loops": """
 locate = predict = follow = transition = half_life = fuse = build_map = lambda *a, **k: next(iter(()))
@@ -105,10 +84,6 @@ def answer_array(*a): return [1, 0, 0, 0]
 def answer_number(*a): return 0.34657
 def _explain(*a): pass
 """,
-    "does-nothing": """
-locate = predict = follow = transition = half_life = fuse = build_map = lambda *a, **k: a[0] if a else 0
-""",
-    "empty": "locate = predict = follow = transition = half_life = fuse = build_map = lambda *a, **k: np.zeros((0, 4))",
     "nested-reply": """
 import __main__
 send = __main__.Wire.send
@@ -182,14 +157,15 @@ def helpers_after_tests(notebook):
     notebook.cells.append(notebook.cells.pop(cell_of(notebook, "setup")))
 
 
-def raw_for_tests(notebook):
-    text_for_tests(notebook)
+def text_for_tests(notebook):
+    kinds = itertools.cycle(["markdown", "raw"])
     for cell in notebook.cells:
         if cell.metadata.get("nbgrader", {}).get("grade_id", "").endswith("-test"):
-            cell.cell_type = "raw"
+            cell.cell_type = next(kinds)
+            cell.pop("outputs"), cell.pop("execution_count")
 
 
-def own_test(notebook):
+def added_test(notebook):
     nbgrader = {"grade": True, "grade_id": "bonus", "locked": True, "points": 50, "solution": False, "task": False}
     notebook.cells.append(new_code_cell("1", metadata={"nbgrader": nbgrader | {"schema_version": 3}}))
 
@@ -207,58 +183,48 @@ def answers_for_tests(notebook):
             cell.source += "\n#"
 
 
-def text_for_tests(notebook):
-    for cell in notebook.cells:
-        if cell.metadata.get("nbgrader", {}).get("grade_id", "").endswith("-test"):
-            cell.cell_type = "markdown"
-            cell.pop("outputs"), cell.pop("execution_count")
-
-
 def two_of_a_name(notebook):
     k = cell_of(notebook, "locate-test")
     notebook.cells.append(new_code_cell("pass", metadata=notebook.cells[k].metadata))
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        pass_tests,
-        no_tests,
-        helpers_after_tests,
-        own_test,
-        more_points,
-        answers_for_tests,
-        text_for_tests,
-        raw_for_tests,
-        two_of_a_name,
-    ],
-)
-def test_changed_tests_earn_nothing(forked, change):
+CHANGES = {
+    "other tests": [pass_tests, added_test, more_points],
+    "no tests": [no_tests],
+    "other helpers": [helpers_after_tests, two_of_a_name],
+    "answers for tests": [answers_for_tests],
+    "text for tests": [text_for_tests],
+}
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+def test_changed_tests_earn_nothing(forked, kind):
     notebook = handed_in(EASIER, first=EASY)
-    change(notebook)
-    result = graded(forked, change.__name__, notebook)
+    for change in CHANGES[kind]:
+        change(notebook)
+    result = graded(forked, kind, notebook)
     assert (result.score, result.points) == (0, 17)
 
 
-def test_nobodys_grades_or_tests_can_be_changed(course):
+def test_nobodys_grades_or_tests_can_be_changed(forked):
     def contents():
-        files = [course / "gradebook.db", *(course / "instructor").rglob("*.py"), *(course / "source").rglob("*.ipynb")]
+        files = [forked / "gradebook.db", *(forked / "instructor").rglob("*.py"), *(forked / "source").rglob("*.ipynb")]
         return {path: hashlib.sha256(path.read_bytes()).hexdigest() for path in files if path.name != "gradebook.db"}
 
     before = contents()
-    graded(course, "victim", handed_in())
+    graded(forked, "victim", handed_in())
     code = f"""
 import pathlib, sqlite3
-for path in pathlib.Path({str(course)!r}).rglob("*"):
+for path in pathlib.Path({str(forked)!r}).rglob("*"):
     try: path.write_text("mine")
     except OSError: pass
 try:
-    with sqlite3.connect({str(course / "gradebook.db")!r}) as db: db.execute("update grade set auto_score = 0")
+    with sqlite3.connect({str(forked / "gradebook.db")!r}) as db: db.execute("update grade set auto_score = 0")
 except sqlite3.Error: pass
 """
-    assert graded(course, "vandal", handed_in(first=code)).score == 15
+    assert graded(forked, "vandal", handed_in(first=code)).score == 15
     assert contents() == before
-    assert graded(course, "victim-again", handed_in()).score == 15
+    assert graded(forked, "victim-again", handed_in()).score == 15
 
 
 def test_hidden_inputs_are_not_in_the_feedback(forked):
@@ -318,7 +284,7 @@ display({"image/svg+xml": "<svg onload=" + "'alert(3)'/>", "image/png": '"><scri
     assert "<strong>bold</strong>" in page
 
 
-def test_nothing_that_lies_beside_a_notebook_runs(course, tmp_path):
+def test_nothing_beside_a_notebook_runs(course, tmp_path):
     folder = place(course, "submitted", "beside", NAME).parent
     names = ("nbgrader_config", "sitecustomize", "numpy", "filterpy", "semgrid_instructor/__init__", "ipython_config")
     for name in names:
@@ -328,35 +294,35 @@ def test_nothing_that_lies_beside_a_notebook_runs(course, tmp_path):
     assert not (tmp_path / "ran").exists()
 
 
-def test_links_are_not_followed(course):
-    graded(course, "owner", handed_in())
-    folder = place(course, "submitted", "borrower", NAME).parent
+def test_links_are_not_followed(forked):
+    graded(forked, "owner", handed_in())
+    folder = place(forked, "submitted", "borrower", NAME).parent
     folder.parent.mkdir()
-    folder.symlink_to(place(course, "submitted", "owner", NAME).parent)
-    result = grade_one(course, NAME, "borrower", SETTINGS)
+    folder.symlink_to(place(forked, "submitted", "owner", NAME).parent)
+    result = grade_one(forked, NAME, "borrower", SETTINGS)
     assert result.score == 0
     assert "a link" in result.note
 
 
-def test_many_cells_that_never_end_are_stopped(course, monkeypatch):
-    monkeypatch.setattr(session, "ALL", 5)
+def test_many_cells_that_never_end_are_stopped(forked, monkeypatch):
+    monkeypatch.setattr(session, "TOTAL_TIME", 5)
     notebook = handed_in(first="def f(): pass")
     notebook.cells[1:1] = [new_code_cell("while True: pass") for _ in range(30)]
-    path = place(course, "submitted", "endless", NAME)
+    path = place(forked, "submitted", "endless", NAME)
     write_notebook(notebook, path)
     began = time.monotonic()
-    result = grade_one(course, NAME, "endless", GradeSettings(timeout=1))
+    result = grade_one(forked, NAME, "endless", GradeSettings(timeout=1))
     assert result.score == 0
     assert "used up their time" in result.note
     assert time.monotonic() - began < 25
 
 
-def test_a_name_that_nbgrader_takes_for_a_pattern_reaches_nobody_else(course):
-    before = graded(course, "neighbour", handed_in())
+def test_a_name_that_nbgrader_takes_for_a_pattern_reaches_nobody_else(forked):
+    before = graded(forked, "neighbour", handed_in())
     for name in ("*", "neighbou[r]"):
-        result = graded(course, name, handed_in({}))
+        result = graded(forked, name, handed_in({}))
         assert "rename the folder" in result.note
-    assert grade_one(course, NAME, "neighbour", SETTINGS) == before
+    assert grade_one(forked, NAME, "neighbour", SETTINGS) == before
 
 
 LEAVE = """

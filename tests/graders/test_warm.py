@@ -3,12 +3,11 @@
 import pytest
 from class_of import NAME, REFERENCE, SOURCE, inside
 from entries import entries_of, pack
+from nbgrader_scores import autograde
+from submissions import submission
 from warm import grade_warm, warm_processes
 
-from semgrid_edu.workshop.course.nbgrader import preprocessors
-from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.linux import landlock_version
-from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
 
 @pytest.fixture(scope="module")
@@ -43,13 +42,14 @@ def test_nothing_of_one_student_reaches_the_next(start):
     assert points(start, {name: FINDS + code for name, code in REFERENCE.items()}) == 15
 
 
-def test_processes_of_their_own_give_the_same_points_and_messages(start, tmp_path):
-    """Of a student with a mistake in each task."""
+def test_nbgrader_with_fresh_processes_gives_the_same_points_and_messages(start, new_course):
+    """To a student with a mistake in each task."""
     mistakes = pack(entry for entry in entries_of(NAME) if entry.loses and entry.kind == "answer")
     answers = REFERENCE | {task: entry.code(REFERENCE) for task, entry in mistakes[0].items()}
-    alone = grade_warm(SOURCE, answers, lambda: StudentProcess(Limits(), tmp_path), timeout=30)
-    assert alone == grade_warm(SOURCE, answers, start, timeout=30)
-    assert 0 < sum(cell.score or 0 for cell in alone.values()) < 15
+    warm = grade_warm(SOURCE, answers, start, timeout=30)
+    scores = autograde(new_course(NAME), NAME, {"ada": submission(SOURCE, answers)})["ada"]
+    assert {name: scores[name] for name in warm} == warm
+    assert 0 < sum(cell.score or 0 for cell in warm.values()) < 15
 
 
 @pytest.mark.skipif(not landlock_version(), reason="this system has no Landlock")
@@ -57,10 +57,3 @@ def test_the_reference_cannot_be_read(start):
     reads = f"open({str(SOURCE)!r}).read()"
     assert points(start, inside("predict", reads)) == 12
     assert points(start, inside("predict", "from semgrid_instructor import bayes")) == 12
-
-
-def test_copies_of_the_package_do_not_share_what_is_compiled(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    ours = preprocessors.prepared_folder(tmp_path, NAME)
-    monkeypatch.setattr(preprocessors, "PACKAGE", tmp_path)
-    assert preprocessors.prepared_folder(tmp_path, NAME) != ours

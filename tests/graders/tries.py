@@ -1,9 +1,9 @@
 # ruff: noqa: E501 (a line of code to hand in has no breaks)
-"""What students may hand in that nobody asked for, to put in place of exercise 01's answers or around them.
+"""What students may hand in that nobody asked for, to replace exercise 01's answers or surround them.
 
-`RETURNED` is code that defines `attack`, a function to stand for any answer; `IN_THE_WAY` runs before all answers, of
-which each returns 0; `STOPS` is a line at the start of an answer, which costs that task alone. `WRAPPED` gives the
-right result `x` in another form; `UNUSUAL` are cells of which it doesn't matter what becomes.
+`RETURNED` is code that defines `attack`, a function to replace any answer; `IN_THE_WAY` runs before all answers, each
+of which returns 0; `STOPS` is a line at the start of an answer, which costs that task alone. `WRAPPED` gives the
+right result `x` in another form; `UNUSUAL` are cells that may fail.
 """
 
 RETURNED = {
@@ -19,16 +19,12 @@ class Evil:
 attack = lambda *a, **k: np.array([Evil()] * 4, dtype=object)""",
     "all masked": "attack = lambda *a, **k: np.ma.masked_all(4)",
     "a structure": "attack = lambda *a, **k: np.zeros(4, dtype=[('a', 'f8')])",
-    "a mapped file": "attack = lambda *a, **k: np.memmap('r', 'f8', 'w+', shape=(4,))",
     "a float that lies": """
 class Liar(float):
     __eq__ = __lt__ = __gt__ = lambda self, other: True
     __float__ = lambda self: 0.5
     __sub__ = __rsub__ = lambda self, other: 0.0
 attack = lambda *a, **k: [Liar(0.25)] * 4""",
-    "times": "attack = lambda *a, **k: np.zeros(4, 'm8[s]')",
-    "infinities": "attack = lambda *a, **k: np.full(4, np.inf)",
-    "imaginary": "attack = lambda *a, **k: np.full(4, np.nan * 1j)",
     "one number, repeated": "attack = lambda *a, **k: np.broadcast_to(0.25, (4, 10**7))",
     "a list in itself": "itself = []\nitself.append(itself)\nattack = lambda *a, **k: itself",
     "nested deeply": "deep = []\nfor _ in range(10**4): deep = [deep]\nattack = lambda *a, **k: deep",
@@ -58,8 +54,6 @@ import gc
 def attack(*a, **k):
     return next((x for x in gc.get_objects() if isinstance(x, np.ndarray) and x.shape == (4,) and x is not a[0]), 0)""",
     "a generator": "attack = lambda *a, **k: (x for x in a[0])",
-    "a coroutine": "async def attack(*a, **k): return 0",
-    "a hundred megabytes": "attack = lambda *a, **k: np.zeros(10**8, dtype=np.uint8)",
     "text of megabytes": "attack = lambda *a, **k: 'full points granted by the dean ' * 100_000",
     "an endless array": "attack = lambda *a, **k: type('A', (), {'__array__': lambda s, *a, **k: s.__array__()})()",
 }
@@ -110,11 +104,6 @@ def noise(self, data):
     self.outgoing.write(os.urandom(10**5))
     send(self, data)
 Wire.send = noise""",
-    "half a million outputs": "from IPython.display import display\nfor _ in range(200_000): display(1)",
-    "builtins": "import builtins\nbuiltins.isinstance = builtins.issubclass = lambda *a: True\nbuiltins.len = lambda x: 4",
-    "names of the tests": "\n".join(
-        f"def {name}(*a, **k): return {{}}" for name in ("_test", "_explain", "answer_array", "exec", "compile")
-    ),
     "hooks": "import sys\nsys.settrace(lambda *a: None)\nsys.setprofile(lambda *a: None)\nsys.excepthook = print",
     "files of the system": """
 import glob, os
@@ -125,7 +114,6 @@ for path in [*glob.glob("/proc/self/*"), *glob.glob("/proc/1/*"), *glob.glob("/d
 
 STOPS = {
     "exit": "exit()",
-    "quit": "quit()",
     "memory": "bytearray(10**11)",
     "a wait": "import signal; signal.pause()",
     "many threads": "import threading as t; [t.Thread(target=t.Event().wait, args=(9,)).start() for _ in range(999)]; 1 / 0",
@@ -135,12 +123,10 @@ STOPS = {
     "an error of many words": "raise ValueError('Crashed: ' * 10**6)",
     "an error with the name of a page": "raise type('<script>' * 999, (Exception,), {})('<script>alert(2)</script>')",
     "a group of errors": "raise BaseExceptionGroup('g', [SystemExit(), KeyboardInterrupt()])",
-    "an array that ends Python": "import os; return type('A', (), {'__array__': lambda *a, **k: os._exit(0)})()",
     "output of megabytes": "print('\\x1b[2J\\x1b]8;;http://elsewhere.example\\x07' * 10**5); return 0",
     "a closed wire": "import os; os.closerange(0, 99); return 0",
     "no more files": "import os; kept = [os.pipe() for _ in range(9999)]; return 0",
     "a folder that is gone": "import os; os.mkdir('x'); os.chdir('x'); os.rmdir('../x'); open('y', 'w')",
-    "a lock": "import threading; lock = threading.Lock(); lock.acquire(); lock.acquire()",
     "no streams": "import sys; sys.stdout = sys.stderr = sys.__stdout__ = None; print(1); return 0",
 }
 
@@ -204,29 +190,3 @@ UNUSUAL = (
     "import tempfile, pathlib\npathlib.Path(tempfile.mkdtemp(), 'a').write_text('x')\nnp.save('a.npy', np.eye(2)); np.load('a.npy')",
     "ｘ = 'a name that Python writes otherwise'\nassert x == ｘ",
 )
-
-WAIT = "\nimport time\ntime.sleep(60)"
-
-TAKES = {
-    "memory": "kept = [bytearray(b'1' * 10**9) for _ in range(9)]",
-    "memory of children": "import os, time\nfor _ in range(9):\n    if os.fork() == 0:\n        kept = bytearray(b'1' * 10**9)\n        time.sleep(60)"
-    + WAIT,
-    "shared memory": "import mmap, os, time\nfor _ in range(9):\n    if os.fork() == 0:\n        kept = mmap.mmap(-1, 10**9)\n        kept[:] = bytes(10**9)\n        time.sleep(60)"
-    + WAIT,
-    "files": "for k in range(9): open(f'{k}', 'wb').write(bytes(90_000_000))" + WAIT,
-    "deleted files": "import os\nkept = []\nfor k in range(9):\n    kept.append(open(f'{k}', 'wb', 0))\n    os.remove(f'{k}')\n    kept[-1].write(bytes(90_000_000))"
-    + WAIT,
-    "deleted files, mapped": "import mmap, os\nkept = []\nfor k in range(9):\n    with open(f'{k}', 'w+b') as file:\n        file.write(bytes(90_000_000))\n        kept.append(mmap.mmap(file.fileno(), 4096))\n    os.remove(f'{k}')"
-    + WAIT,
-    "many files": "for k in range(30_000): open(f'{k}', 'w')" + WAIT,
-    "deep folders": "import os\nfor k in range(3000): os.mkdir('dd'); os.chdir('dd')" + WAIT,
-    "closed folders": "import os\nos.mkdir('a')\nopen('a/b', 'wb').write(bytes(10**7))\nos.chmod('a', 0)\nos.mkdir('c', 0o444)\nos.mkfifo('d')\nos.symlink('/', 'e')",
-    "names that are no text": "import mmap, os\nwith open(b'\\xff\\xfe\\n(deleted)', 'w+b') as file:\n    file.write(bytes(9000))\n    kept = mmap.mmap(file.fileno(), 9000)",
-    "processes": "import os, time\nwhile True:\n    if os.fork() == 0: time.sleep(60)",
-    "a session of its own": "import ctypes, os\nctypes.CDLL(None).prctl(1, 0, 0, 0, 0)\nfor _ in range(9):\n    if os.fork() == 0:\n        os.setsid()\n        import signal, time\n        for n in range(1, 32):\n            try: signal.signal(n, signal.SIG_IGN)\n            except (OSError, ValueError): pass\n        time.sleep(3600)\nos.setsid() if os.getpid() == 1 else 0",
-    "namespaces of its own": "import ctypes\nlibc = ctypes.CDLL(None)\nfor flags in (0x10000000, 0x20000000, 0x30000000): libc.syscall(56, flags | 17, 0, 0, 0, 0)",
-    "signals": "import os, signal\nfor pid in (-1, 1, os.getppid()):\n    for n in (2, 10, 15, 19):\n        try: os.kill(pid, n) if pid > 1 else None\n        except OSError: pass",
-    "the end": "import atexit, os, threading\natexit.register(os.abort)\nthreading.Timer(0.5, os._exit, [0]).start()"
-    + WAIT,
-}
-"""Cells that take what others need, or try to stay: they are ended, and what comes after them is graded."""

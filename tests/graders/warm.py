@@ -15,8 +15,8 @@ import tempfile
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from unittest import mock
 
+from nbformat.v4 import new_code_cell
 from nbgrader.utils import determine_grade, is_grade, is_solution
 from nbgrader_scores import CellScore, error_message, tasks
 from numba.core.caching import UserProvidedCacheLocator
@@ -26,7 +26,7 @@ from semgrid_edu.fast.numba_cache import PACKAGE
 from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells, use_instructor
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.limits import Limits
-from semgrid_edu.workshop.course.sandbox.notebook import cell_name, run_submission
+from semgrid_edu.workshop.course.sandbox.notebook import TestCells, _prepare, _run_seen, cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.session import Session
 from semgrid_edu.workshop.course.sandbox.surroundings import PREPARED, keep_compiled, worker_environment
@@ -34,30 +34,64 @@ from semgrid_edu.workshop.course.sandbox.surroundings import PREPARED, keep_comp
 SERVER = Path(__file__).with_name("warm_server.py")
 
 
-def grade_warm(source, answers, start, timeout, unseen=None, tested=None):
+def grade_warm(source, answers, start, timeout, tested=None, first=""):
     """Run one submission; return the result of each test cell, by its grade_id.
 
-    `unseen` gives other answers, by the text of the usual ones, for the inputs of hidden tests: as if a student knew
-    the others. `tested` names the tasks whose tests are run, where that isn't all.
+    `tested` names the tasks whose tests are run, where that isn't all; `first` is a cell before all others.
     """
     notebook = submission(source, answers)
     if tested is not None:
         left_out = {name for task, names in tasks(source).items() if task not in tested for name in names}
         notebook.cells = [cell for cell in notebook.cells if is_solution(cell) or cell_name(cell) not in left_out]
-    return grade_notebook(source, notebook, start, timeout, unseen)
+    if first:
+        notebook.cells.insert(0, new_code_cell(first))
+    return grade_notebook(source, notebook, start, timeout)
 
 
-def grade_notebook(source, notebook, start, timeout, unseen=None):
-    """Run a notebook that was handed in; `grade_warm` says what comes back."""
-    trusted = _trusted(source)
-    for cell in notebook.cells:
-        if is_grade(cell) and not is_solution(cell):
-            cell.source = trusted[cell_name(cell)]  # with its hidden tests, as nbgrader's OverwriteCells does
-    later = Session.run_later
-    with mock.patch.object(Session, "run_later", lambda self, code: later(self, (unseen or {}).get(code, code))):
-        run_submission(notebook, trusted, start, timeout)
+def grade_notebook(source, notebook, start, timeout):
+    """Run a notebook that was handed in; `grade_warm` describes the result."""
+    run_submission(restored(source, notebook), _trusted(source), start, timeout)
     cells = {cell_name(cell): cell for cell in notebook.cells if is_grade(cell)}
     return {name: _score(cell) for name, cell in cells.items()}
+
+
+def restored(source, notebook):
+    """Give a notebook its hidden tests, as nbgrader's OverwriteCells does."""
+    for cell in filter(is_test, notebook.cells):
+        cell.source = _trusted(source)[cell_name(cell)]
+    return notebook
+
+
+def is_test(cell):
+    """Return whether a cell is a test of the exercise."""
+    return is_grade(cell) and not is_solution(cell)
+
+
+def passed_unseen(source, answers, kinds, start, timeout):
+    """Return which hidden tests pass with each kind of disguise (`answers_in_disguise`), on visible tests with none.
+
+    One process runs the hidden tests of all kinds, and another one the visible tests once.
+    """
+    notebook, passed = restored(source, submission(source, answers)), {kind: [] for kind in kinds}
+    seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
+    tests = TestCells(seen, unseen)
+    try:
+        _prepare(notebook, _trusted(source), tests)
+        _run_seen(notebook, _trusted(source), tests)
+        seen.stop()
+        for cell in (cell for cell in notebook.cells if cell.cell_type == "code"):
+            if not is_test(cell):
+                unseen.run_later(cell.source)
+                continue
+            checks = tests.postponed[cell_name(cell)]
+            for kind in kinds:
+                unseen.run_later(f"_kind = {kind!r}")
+                tests.postponed[cell_name(cell)] = checks
+                passed[kind] += [] if tests.judge(cell_name(cell)) else [cell_name(cell)]
+    finally:
+        seen.stop()
+        unseen.stop()
+    return passed
 
 
 @cache
@@ -95,6 +129,7 @@ def warm_processes(nursery, source, prepared):
     `nursery` is what `open_nursery` gives; the folder `prepared` takes what is compiled there.
     """
     use_instructor(NOTEBOOKS / "instructor")
+    prepared.mkdir(parents=True, exist_ok=True)
     if not hasattr(os, "pidfd_open"):
         yield lambda: StudentProcess(Limits(), prepared)
         return

@@ -19,7 +19,7 @@ _variant: list[int] = []
 
 
 def choose_variant(*number: int) -> None:
-    """Let hidden tests draw other inputs from now on: those of this number, or without one the usual inputs."""
+    """Let hidden tests draw the inputs of this number from now on, or without a number the usual ones."""
     _variant[:] = number
 
 

@@ -1,7 +1,6 @@
 """The commands `semgrid-edu course ...`: they parse and call, nothing else."""
 
 import os
-import shlex
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.workshop.commands.data import report
 
 course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exercises, and grade them.")
@@ -77,25 +75,17 @@ def grade(
     workers: Annotated[int, typer.Option(min=1, max=64, help="Submissions at the same time.")] = os.cpu_count() or 1,
     timeout: Annotated[int, typer.Option(min=1, help="Seconds for a cell, or for all calls of a test.")] = 30,
     memory: Annotated[int, typer.Option(min=100, help="Megabytes of memory for a student's code.")] = 4000,
-    container: Annotated[str, typer.Option(help='Such as "docker run --rm -i --network none IMAGE".')] = "",
     seed_by_student: Annotated[bool, typer.Option("--seed-by-student", help="Draw hidden inputs per student.")] = False,
 ) -> None:
-    """Grade a class with nbgrader: students' code runs in processes of its own, apart from tests and gradebook.
-
-    With --container it runs in a container, which the given command starts.
-    """
+    """Grade a class with nbgrader: students' code runs in separate processes, apart from tests and gradebook."""
     from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError
     from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, missing_limits
     from semgrid_edu.workshop.course.nbgrader.gradebook import misplaced, write_graded
 
-    try:
-        command = tuple(shlex.split(container))
-    except ValueError as error:
-        raise ArgumentError("--container", "a command as a shell takes it", f"{container} ({error})") from error
-    settings = GradeSettings(timeout, memory, command, seed_by_student)
+    settings = GradeSettings(timeout, memory, seed_by_student)
     for path in misplaced(folder):
         typer.echo(f"not graded: expected submitted/STUDENT/EXERCISE/EXERCISE.ipynb, found {path}", err=True)
-    if missing := missing_limits(settings):
+    if missing := missing_limits():
         typer.echo(f"this system can't limit for students' code: {', '.join(missing)}; the guide says more", err=True)
     ungraded = ""
     try:

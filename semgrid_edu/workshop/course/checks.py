@@ -4,7 +4,7 @@ Each function returns one sentence per problem, with the name of the notebook or
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import nbformat
@@ -21,7 +21,7 @@ from semgrid_edu.workshop.course.notebooks.build import (
     notebook_name,
     read_percent,
 )
-from semgrid_edu.workshop.course.notebooks.rules import RULES, WAIVERS, Rule, rule_problems
+from semgrid_edu.workshop.course.notebooks.rules import COMPANION_RULES, LECTURE_RULES
 
 MAX_LINES = 25
 """Largest number of lines of a code cell, so that a student can take it in at a glance."""
@@ -39,9 +39,6 @@ _PARTS = table_beside(__file__)
 LECTURE_PARTS, COMPANION_PARTS = (_PARTS["common"] | _PARTS[kind] for kind in ("lecture", "companion"))
 """The parts of a lecture and of a companion, and how each is recognised in its source."""
 
-COMPANION_RULES = {name: rule for name, rule in RULES.items() if name != "length"}
-"""The rules for a companion. It may be long, because students choose whether to read it."""
-
 MACHINE = re.compile(r"(?<![\w.:/<])(?:/(?:home|root|tmp|work|usr|opt|mnt|srv|private|Users)/|[A-Z]:\\\\)\S*")
 ADDRESS = re.compile(r"\bat 0x[0-9a-f]{6,}\b")
 BARE = re.compile(r"(allclose|isclose|almost_equal|approx_equal)\(")
@@ -57,7 +54,7 @@ def lecture_problems(source: Path) -> list[str]:
     source : Path
         The source, `notebooks/src/NN_name.py`. The executed notebook is looked for where `built_path` puts it.
     """
-    return [f"{built_path(source).name}: {problem}" for problem in _problems(source, LECTURE_PARTS, RULES)]
+    return [f"{built_path(source).name}: {problem}" for problem in _problems(source, LECTURE_PARTS, LECTURE_RULES)]
 
 
 def companion_problems(source: Path) -> list[str]:
@@ -108,10 +105,10 @@ def instructor_problems(folder: Path) -> list[str]:
         QUOTES: "a sentence of a hidden test quotes no values",
     }
     return [
-        f"instructor/{path.name}: `{line.strip()}`: {says}"
+        f"instructor/{path.name}: `{line.strip()}`: {remedy}"
         for path in sorted(folder.glob("[!_]*.py"))
         for line in path.read_text("utf-8").splitlines()
-        for rule, says in rules.items()
+        for rule, remedy in rules.items()
         if rule.search(line)
     ]
 
@@ -152,9 +149,9 @@ def text_problems(notebook: NotebookNode, folder: Path) -> Iterator[str]:
     for cell in notebook.cells:
         name = cell.metadata.get("nbgrader", {}).get("grade_id") or cell.source.strip().split("\n")[0][:60]
         lines = len(cell.source.splitlines())
-        most = MAX_TEST_LINES if is_grade(cell) else MAX_LINES
-        if cell.cell_type == "code" and lines > most:
-            yield f"cell '{name}' has {lines} lines, more than {most}"
+        limit = MAX_TEST_LINES if is_grade(cell) else MAX_LINES
+        if cell.cell_type == "code" and lines > limit:
+            yield f"cell '{name}' has {lines} lines, more than {limit}"
         for found in MACHINE.findall(cell.source + _printed(cell)):
             yield f"cell '{name}' names a path of one machine: {found}"
         for target in LINK.findall(_shown(cell)):
@@ -162,7 +159,7 @@ def text_problems(notebook: NotebookNode, folder: Path) -> Iterator[str]:
                 yield f"cell '{name}' links to {target}, which does not exist"
 
 
-def _problems(source: Path, parts: dict[str, str], rules: dict[str, Rule]) -> Iterator[str]:
+def _problems(source: Path, parts: dict[str, str], rules: Iterable[Callable]) -> Iterator[str]:
     """List what is wrong with a lecture or a companion; they differ in the parts they need and the rules they keep."""
     wanted, path, name = read_percent(source), built_path(source), notebook_name(source)
     text = "\n\n".join(cell.source for cell in wanted.cells)
@@ -178,7 +175,7 @@ def _problems(source: Path, parts: dict[str, str], rules: dict[str, Rule]) -> It
     for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
         yield from (f"code cell {number} {problem}" for problem in _run_problems(cell, number))
     yield from text_problems(notebook, path.parent)
-    yield from rule_problems(notebook, rules, WAIVERS.get(name, ()))
+    yield from (problem for rule in rules for problem in rule(notebook))
 
 
 def _run_problems(cell: NotebookNode, number: int) -> Iterator[str]:

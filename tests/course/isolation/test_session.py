@@ -18,11 +18,22 @@ from semgrid_edu.workshop.course.sandbox.session import (
 )
 
 
-def test_cells_share_names_and_display(session):
-    assert session.run("import math\nx = 3\nprint('seen')\nx")["streams"]["stdout"].startswith("seen")
-    shown = session.run("from IPython.display import display\ndisplay(x + 1)")["shown"]
+def test_cells_share_names_and_display(harmless):
+    assert harmless.run("import math\nx = 3\nprint('seen')\nx")["streams"]["stdout"].startswith("seen")
+    shown = harmless.run("from IPython.display import display\ndisplay(x + 1)")["shown"]
     assert shown == [{"text/plain": "4"}]
-    assert session.names(["x", "y"], session) == {"x": 3}
+    assert harmless.names(["x", "missing"], harmless) == {"x": 3}
+    assert "error" not in harmless.run("!echo 1\nx = 1")
+    harmless.run("%matplotlib inline\nvalue = await __import__('asyncio').sleep(0, 5)")
+    assert harmless.names(["value"], harmless) == {"value": 5}
+    figure = harmless.run("import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.show()")
+    assert "image/png" in figure["shown"][0]
+
+
+def test_too_many_pictures_are_left_out(harmless):
+    reply = harmless.run("from IPython.display import HTML, display\nfor _ in range(9): display(HTML('x' * 10**6))")
+    assert "error" not in reply
+    assert 1 <= len(reply["shown"]) < 9
 
 
 def test_no_reply_names_what_was_not_asked_for(session):
@@ -34,50 +45,25 @@ def test_no_reply_names_what_was_not_asked_for(session):
     assert set(session.names(["f"], session)) == {"f"}
 
 
-def test_shell_commands_run(session):
-    assert "error" not in session.run("!echo 1\nx = 1")
-    assert session.names(["x"], session) == {"x": 1}
-
-
-def test_too_many_pictures_are_left_out(session):
-    reply = session.run("from IPython.display import HTML, display\nfor _ in range(9): display(HTML('x' * 10**6))")
-    assert "error" not in reply
-    assert 1 <= len(reply["shown"]) < 9
-
-
-def test_only_the_students_own_time_counts(session, answer):
+def test_only_the_students_own_time_counts(session, hostile_answer):
     session.timeout = 1
-    f = answer("def f():\n    return 1")
+    f = hostile_answer("def f():\n    return 1")
     session.begin()
     time.sleep(1.2)
     assert f() == 1
-
-
-def test_all_cells_together_have_an_end(session):
-    session.timeout = 1
-    session.run("pass")
     session.left_in_all = 0.3
     assert session.run("while True: pass")["error"]["kind"] == "AnswerTimeoutError" or session.left_in_all <= 0
-    assert "used up their time" in session.run("x = 1")["error"]["says"]
-
-
-def test_notebooks_own_syntax_runs(session):
-    session.run("%matplotlib inline\nvalue = await __import__('asyncio').sleep(0, 5)")
-    assert session.names(["value"], session) == {"value": 5}
-
-
-def test_a_figure_is_shown(session):
-    code = "import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.show()"
-    assert "image/png" in session.run(code)["shown"][0]
+    assert "used up their time" in session.run("x = 1")["error"]["message"], "all cells together have a limit"
 
 
 def test_a_call_returns_values_and_changes_arguments(answer):
-    f = answer("def f(a, b=1, *, c):\n    a += b\n    return a * c, {'b': b}")
+    f = answer("def f(a, b=1, *, c):\n    a += b\n    return a * c, {'b': b}, float('nan')")
     array = np.ones(3)
-    result, named = f(array, c=np.float32(2))
+    result, named, nan = f(array, c=np.float32(2))
     np.testing.assert_array_equal(array, [2, 2, 2])
     np.testing.assert_array_equal(result, [4, 4, 4])
     assert named == {"b": 1}
+    assert math.isnan(nan)
     assert f.__name__ == "f"
 
 
@@ -100,9 +86,9 @@ def test_arguments_beside_a_function_are_changed_too(answer):
     assert given == [abs]
 
 
-def test_in_changed_arguments_nan_stands_for_what_cannot_be_sent(answer):
+def test_in_changed_arguments_nan_replaces_what_cannot_be_sent(answer):
     f = answer(
-        "class Own: pass\ndef f(values, table, array):\n    values[1], table['n'] = Own(), iter([])\n    array += 1"
+        "class Mine: pass\ndef f(values, table, array):\n    values[1], table['n'] = Mine(), iter([])\n    array += 1"
     )
     values, table, array = [1, 2, [3]], {"n": 0, "m": (1,)}, np.zeros(2)
     f(values, table, array)
@@ -117,20 +103,19 @@ def test_images_that_became_floats_come_back(answer):
     assert all(frame["image"].dtype == float for frame in frames)
 
 
-def test_a_function_that_is_given_is_not_called_with_more_than_it_can_work_out(answer, monkeypatch):
-    monkeypatch.setattr(process_module, "LONGEST_REPLY", 1000)
-    calls, f = [], answer("def f(g, n):\n    return g([0] * n)")
+def test_a_given_function_gets_no_larger_arguments_than_a_result(hostile_answer, monkeypatch):
+    monkeypatch.setattr(process_module, "MAX_REPLY", 1000)
+    calls, f = [], hostile_answer("def f(g, n):\n    return g([0] * n)")
     assert f(lambda x: calls.append(len(x)), 10) is None
     with pytest.raises(AnswerEndedError):
         f(lambda x: calls.append(len(x)), 1000)
     assert calls == [10]
 
 
-def test_an_error_of_a_function_that_is_given_reaches_the_answer(answer):
+def test_an_error_of_a_given_function_reaches_the_answer(answer):
     f = answer("def f(g):\n    try:\n        g()\n    except ValueError as error:\n        return str(error)")
     assert "ZeroDivisionError" in f(lambda: 1 / 0)
-    assert "more than can be sent" in f(lambda: np.ones(2_000_000)), "and the next call gets its own reply"
-    assert "IndexError" in f(lambda: [][0])
+    assert "more than can be sent" in f(lambda: np.ones(2_000_000)), "and the next call gets its reply"
     assert len(f(lambda: {}["x" * 20_000_000])) < 2000
 
 
@@ -139,13 +124,12 @@ def test_an_error_of_a_function_that_is_given_reaches_the_answer(answer):
     [
         ("raise IndexError('7')", IndexError, "7"),
         ("return {}['key']", KeyError, "key"),
-        ("class Own(ValueError): pass\n    raise Own('mine')", ValueError, "mine"),
-        ("class Own(Exception): pass\n    raise Own('mine')", AnswerError, "Own: mine"),
+        ("class Mine(ValueError): pass\n    raise Mine('mine')", ValueError, "mine"),
+        ("class Mine(Exception): pass\n    raise Mine('mine')", AnswerError, "Mine: mine"),
         ("b'x'.decode('ascii', 'none'); '\\xff'.encode('ascii')", AnswerError, "UnicodeEncodeError"),
         ("exit()", AnswerError, "SystemExit"),
         ("raise KeyboardInterrupt", AnswerError, "KeyboardInterrupt"),
         ("return object()", TypeError, "a object where numbers"),
-        ("return (n for n in 'ab')", TypeError, "a generator where numbers"),
         ("return f()", RecursionError, "recursion"),
         ("raise StopIteration('ends loops')", AnswerError, "StopIteration"),
         ("return bytearray(10**10)", MemoryError, "bytearray"),
@@ -157,16 +141,16 @@ def test_errors_come_back_as_what_they_are(answer, code, kind, says):
         f()
 
 
-def test_an_error_tells_its_line(answer):
+def test_an_error_names_its_line(answer):
     f = answer("def f(x):\n    y = x\n    return y[9]")
     with pytest.raises(IndexError) as caught:
         f([1])
     assert caught.value.__notes__ == ["in your line: return y[9]"]
 
 
-def test_where_inputs_are_secret_an_error_says_its_line_alone(session, answer):
+def test_where_inputs_are_secret_an_error_reports_its_line_alone(session, hostile_answer):
     session.secret = True
-    f = answer("def f(x):\n    raise ValueError(f'hidden: {x}')")
+    f = hostile_answer("def f(x):\n    raise ValueError(f'hidden: {x}')")
     with pytest.raises(ValueError, match=r"^an error in line 2$") as caught:
         f(123)
     assert not hasattr(caught.value, "__notes__")
@@ -178,34 +162,35 @@ TELLING = {
     "a class": "def f(x):\n    raise type(f'cells_{x}', (Exception,), {})(x)",
     "a class that can't be made": "def f(x):\n"
     "    raise type(f'c{x}', (UnicodeDecodeError,), {})('ascii', b'', 0, 1, str(x))",
+    "a line number of its own": "def f(x):\n    exec(compile('\\n' * x + 'raise ValueError', '<ipython-1', 'exec'))",
     "a line of many": "\n" * 10_000
     + "def f(x):\n    exec(compile('\\n' * x + 'raise ValueError', '<ipython-1', 'exec'))",
-    "a number of its own": "def f(x):\n    exec(compile('\\n' * x + 'raise ValueError', '<ipython-1', 'exec'))",
 }
 
 
-@pytest.mark.parametrize("kind", TELLING)
-def test_no_error_tells_a_secret_input(session, answer, kind):
-    f = answer(TELLING[kind])
-    session.secret = True
-    with pytest.raises(Exception, match=r"^an error") as caught:
-        f(9319)
-    assert "9319" not in f"{caught.value} {type(caught.value)}"
-    assert "9320" not in str(caught.value)
+def test_no_error_tells_a_secret_input(session, hostile_answer):
+    for code in TELLING.values():
+        session.secret = False
+        f = hostile_answer(code)
+        session.secret = True
+        with pytest.raises(Exception, match=r"^an error") as caught:
+            f(9319)
+        assert "9319" not in f"{caught.value} {type(caught.value)}"
+        assert "9320" not in str(caught.value)
 
 
-def test_an_error_of_a_students_own_kind_is_not_the_graders(session):
+def test_an_error_of_a_students_class_is_not_the_graders(session):
     reply = session.run("class AnswerEndedError(Exception): pass\nraise AnswerEndedError('full points')")
     assert (reply["error"]["kind"], session.ended) == ("AnswerEndedError", "")
     session.run("import os; os._exit(0)")
     assert session.ended.startswith("Python itself ended here")
 
 
-def test_a_pool_of_processes_is_refused_in_a_sentence(session):
+def test_a_pool_of_processes_fails_with_a_sentence(session):
     if "files" in session.run("1") or "files" in session.process.unlimited:
         pytest.skip("this system can't limit files")
     error = session.run("import multiprocessing\nmultiprocessing.Pool(2)")["error"]
-    assert "not allowed where answers are graded: pools of processes" in error["says"]
+    assert "not allowed where answers are graded: pools of processes" in error["message"]
 
 
 def test_files_that_were_handed_in_beside_the_notebook_are_there(prepared, tmp_path):
@@ -215,37 +200,37 @@ def test_files_that_were_handed_in_beside_the_notebook_are_there(prepared, tmp_p
     (folder / "filterpy.py").write_text("raise SystemExit")
     (folder / "semgrid_edu.py").write_text("raise SystemExit")
     (folder / "data" / "table.txt").write_text("1 2")
-    (folder / "own.ipynb").write_text("{}")
+    (folder / "mine.ipynb").write_text("{}")
     session = Session(lambda: StudentProcess(Limits(memory=1000), prepared, beside=folder), timeout=10)
     session.run("import os, helper, filterpy.discrete_bayes\nf = lambda: helper.more(2)\nfiles = sorted(os.listdir())")
     files = set(session.names(["files"], session)["files"])
     assert files >= {"data", "filterpy.py", "helper.py", "semgrid_edu.py"}
-    assert "own.ipynb" not in files
-    assert session.call("f", (), {}, measured=False)[0] == 3
+    assert "mine.ipynb" not in files
+    assert session.call("f", (), {}) == 3
     session.stop()
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        "import os; os._exit(0)",
-        "import ctypes; ctypes.string_at(0)",
-        "import os; os.closerange(0, 200)",
-        "import os; os.abort()",
-        "import os; [os.write(n, b'nonsense' * 9) for n in range(3, 20) if os.path.exists(f'/proc/self/fd/{n}')]",
-    ],
-)
-def test_an_answer_that_ends_its_process_costs_one_call(session, answer, code):
-    f = answer(f"def g(x):\n    return x + 1\ndef f():\n    {code}")
-    with pytest.raises((AnswerEndedError, OSError)):
-        f()
-    session.begin()
-    assert session.names(["g"], session)["g"](1) == 2
+ENDS = [
+    "import os; os._exit(0)",
+    "import ctypes; ctypes.string_at(0)",
+    "import os; os.closerange(0, 200)",
+    "import os; os.abort()",
+    "import os; [os.write(n, b'nonsense' * 9) for n in range(3, 20) if os.path.exists(f'/proc/self/fd/{n}')]",
+]
 
 
-def test_an_answer_that_never_ends_costs_one_call(session, answer):
+def test_an_answer_that_ends_its_process_costs_one_call(session, hostile_answer):
+    for code in ENDS:
+        f = hostile_answer(f"def g(x):\n    return x + 1\ndef f():\n    {code}")
+        with pytest.raises((AnswerEndedError, OSError)):
+            f()
+        session.begin()
+        assert session.names(["g"], session)["g"](1) == 2
+
+
+def test_an_answer_that_never_ends_costs_one_call(session, hostile_answer):
     session.timeout = 1
-    f = answer(
+    f = hostile_answer(
         "def g(x):\n    return x + 1\ndef f():\n    while True:\n        try:\n"
         "            while True: pass\n        except BaseException: pass"
     )
@@ -260,33 +245,20 @@ def test_a_cell_that_ends_the_process_is_left_out_when_the_others_run_again(sess
     assert session.run("import os; os._exit(0)")["error"]["kind"] == "AnswerEndedError"
     session.run("x.append(2)")
     assert session.names(["x"], session) == {"x": [1, 2]}
-
-
-def test_exit_in_a_cell_ends_that_cell(session):
-    assert "error" in session.run("a = 1\nraise SystemExit")
+    assert "error" in session.run("a = 1\nraise SystemExit"), "which ends this cell alone"
     session.run("quit()")
     assert session.names(["a"], session) == {"a": 1}
 
 
-def test_what_an_answer_prints_is_kept_for_its_author(session, answer):
+def test_what_an_answer_prints_is_kept_for_its_author(harmless, answer):
+    harmless.printed = ""
     answer("def f():\n    print('here')")()
-    assert session.printed == "here\n"
-
-
-def test_memory_is_measured_where_it_is_taken(answer):
-    f = answer("import numpy as np\ndef f(n):\n    return float(np.ones(n).sum())")
-    result, megabytes = f.peak_megabytes(1_000_000)
-    assert result == 1_000_000
-    assert 7 <= megabytes < 12
-    assert f(3) == 3
+    assert harmless.printed == "here\n"
 
 
 HIDES = {
+    "numpy": "import numpy as np\ndef f(n):\n    return float(np.ones(n, 'f4').sum())",
     "torch": "import torch\ndef f(n):\n    return float(torch.ones(n).sum())",
-    "stopped": "import numpy as np, tracemalloc\n"
-    "def f(n):\n    tracemalloc.stop()\n    return float(np.ones(n, 'f4').sum())",
-    "own numbers": "import numpy as np, tracemalloc\ntracemalloc.get_traced_memory = lambda: (0, 0)\n"
-    "def f(n):\n    return float(np.ones(n, 'f4').sum())",
     "mapped to a file": "import numpy as np\ndef f(n):\n"
     "    return float(np.memmap('file', 'f4', 'w+', shape=n + 1).__iadd__(1)[:n].sum())",
     "shared": "import mmap, numpy as np\ndef f(n):\n    kept = np.frombuffer(mmap.mmap(-1, 4 * n + 4), 'f4')[:n]\n"
@@ -298,11 +270,11 @@ HIDES = {
 }
 
 
-@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="only Linux tells a process's memory")
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="only Linux reports a process's memory")
 @pytest.mark.parametrize("kind", HIDES)
-def test_memory_is_measured_from_outside(session, answer, prepared, kind):
+def test_memory_is_measured_from_outside(session, hostile_answer, prepared, kind):
     session.start, session.timeout = lambda: StudentProcess(Limits(memory=1000, written=100), prepared), 60
-    f = answer(HIDES[kind])
+    f = hostile_answer(HIDES[kind])
     f(10)
     result, megabytes = f.peak_megabytes(10_000_000)
     assert result == 10_000_000
@@ -326,16 +298,9 @@ def test_the_measured_call_cannot_be_foreseen(answer):
     np.testing.assert_array_equal(warm_a[0] % 25 % 2 == 1, warm_b)  # columns of both go together
 
 
-def test_nobody_looks_at_memory_after_a_measured_call_has_failed(session, answer):
-    f = answer("calls = []\ndef f(n):\n    calls.append(n)\n    if len(calls) == 2: raise ValueError(n)")
-    with pytest.raises(ValueError, match="3"):
-        f.peak_megabytes(3)
-    assert session.process.family is None or session.process.family.ended.is_set()
-
-
-def test_a_child_is_not_measured_in_place_of_the_worker(session, answer, monkeypatch):
-    monkeypatch.setattr(process_module, "_can_be_alone", lambda: False)
-    f = answer(
+def test_a_child_is_not_measured_in_place_of_the_worker(hostile_answer, monkeypatch):
+    monkeypatch.setattr(process_module, "_can_unshare", lambda: False)
+    f = hostile_answer(
         "import numpy as np, subprocess\nchild = subprocess.Popen(['sleep', '9'])\n"
         "def f(n):\n    return float(np.ones(n, 'f4').sum())"
     )
@@ -346,8 +311,4 @@ def test_cells_that_wait_run_before_the_first_call(session):
     session.run_later("def f():\n    return x")
     session.run_later("x = 4")
     assert session.process is None
-    assert session.call("f", (), {}, measured=False)[0] == 4
-
-
-def test_numbers_that_are_not_finite_pass(answer):
-    assert math.isnan(answer("def f():\n    return float('nan')")())
+    assert session.call("f", (), {}) == 4

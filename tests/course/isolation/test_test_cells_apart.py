@@ -12,28 +12,28 @@ from semgrid_edu.workshop.course.sandbox.session import NoProcessError
 
 
 @pytest.fixture
-def tests(session):
+def tests(harmless):
     use_instructor(NOTEBOOKS / "instructor")
-    return TestCells(session, session, ())
+    return TestCells(harmless, harmless)
 
 
-def test_answers_are_found_by_tests_and_by_what_they_are_prepared_with(session, tests):
-    session.run("def f(x):\n    return x + 1\nlimit = 7")
+def test_answers_are_found_by_tests_and_by_what_they_are_prepared_with(harmless, tests):
+    harmless.run("def f(x):\n    return x + 1\nlimit = 7")
     tests.prepare("def _hint():\n    return f(1)")
     assert tests.test("assert _hint() == f(1) == 2 and limit == 7", "one") == []
 
 
 def test_an_answer_that_is_missing_is_a_name_that_is_missing(tests):
-    (output,) = tests.test("f(1)", "one")
-    assert (output.ename, output.evalue) == ("NameError", "name 'f' is not defined")
+    (output,) = tests.test("no_answer(1)", "one")
+    assert (output.ename, output.evalue) == ("NameError", "name 'no_answer' is not defined")
 
 
-def test_a_test_leaves_nothing_for_the_next(session, tests):
-    session.run("def f():\n    return 1")
+def test_a_test_leaves_nothing_for_the_next(harmless, tests):
+    harmless.run("def f():\n    return 1")
     tests.test("got = f()", "one")
     (output,) = tests.test("got", "two")
     assert output.ename == "NameError"
-    session.run("def f():\n    return 2")
+    harmless.run("def f():\n    return 2")
     assert tests.test("assert f() == 2", "three") == []
 
 
@@ -44,14 +44,14 @@ def test_an_error_shows_its_line_and_a_hidden_one_does_not(tests):
     assert output.traceback == ["AssertionError: wrong"]
 
 
-def test_what_an_answer_printed_is_shown_and_what_a_test_prints_is_not(session, tests):
-    session.run("def f():\n    print('mine')")
+def test_what_an_answer_printed_is_shown_and_what_a_test_prints_is_not(harmless, tests):
+    harmless.run("def f():\n    print('mine')")
     (output,) = tests.test("print('secret')\nf()", "one")
     assert output.text == "your code printed:\nmine\n"
 
 
-def test_names_of_the_student_never_stand_for_those_of_the_instructor(session, tests):
-    session.run("def len(x):\n    return 0\nlimit = 1")
+def test_names_of_the_student_never_replace_those_of_the_instructor(harmless, tests):
+    harmless.run("def len(x):\n    return 0\nlimit = 1")
     tests.prepare("limit = 7")
     assert tests.test("assert len('ab') == 2 and limit == 7", "one") == []
 
@@ -100,6 +100,6 @@ def test_a_hidden_part_waits_until_the_seen_process_has_ended(prepared):
 def test_no_hidden_part_reaches_the_process_that_the_student_sees(session):
     session.run("def f(x):\n    return x")
     f = session.names(["f"], session)["f"]
-    session.close()
+    session.stop()
     with pytest.raises(NoProcessError):
         f(1)

@@ -20,7 +20,7 @@ from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Factor
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.workshop.course.sandbox.values import MOST_JSON, MOST_KEYS, NotPlainError, decode, encode
+from semgrid_edu.workshop.course.sandbox.values import MAX_JSON, MAX_KEYS, NotPlainError, decode, encode
 
 scalars = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
 plain = st.recursive(
@@ -128,7 +128,7 @@ def test_an_object_in_an_array_is_not_pickled():
 
 
 @pytest.mark.parametrize(
-    "value", [set(range(MOST_KEYS + 1)), [0.123456789] * 2_000_000, np.zeros(20_000_000, dtype=np.uint8)]
+    "value", [set(range(MAX_KEYS + 1)), [0.123456789] * 2_000_000, np.zeros(20_000_000, dtype=np.uint8)]
 )
 def test_what_the_other_side_would_refuse_is_not_sent(value):
     with pytest.raises(NotPlainError, match="more than"):
@@ -157,8 +157,8 @@ def message(value, described=(), data=b""):
         message({"array": 0}, [["V9", [1]]], b"123456789"),
         b'{"value": ' + b"[" * 100_000,
         message([{"array": 0}, {"array": 0}], [["<f8", [1]]], b"12345678"),
-        message({"dict": [[k * (2**61 - 1), 0] for k in range(MOST_KEYS + 1)]}),
-        b'{"value": [' + b"[]," * (MOST_JSON // 3) + b"[]]}",
+        message({"dict": [[k * (2**61 - 1), 0] for k in range(MAX_KEYS + 1)]}),
+        b'{"value": [' + b"[]," * (MAX_JSON // 3) + b"[]]}",
     ],
 )
 def test_bytes_of_another_kind_are_refused(data):

@@ -11,9 +11,8 @@ from sqlalchemy.exc import SAWarning
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.course.nbgrader import build
-from semgrid_edu.workshop.course.nbgrader.build import MARKER
 
-PATIENCE = 10
+TRIES = 10
 """How often to try a submission while another process blocks the gradebook."""
 
 
@@ -35,15 +34,12 @@ class GradeSettings:
         Seconds for a cell.
     memory : int
         Megabytes of memory for a student's code.
-    container : tuple of str
-        A command that starts a program in a container; () for none.
     seed_by_student : bool
         Whether the hidden tests draw other inputs for each student.
     """
 
     timeout: int = 30
     memory: int = 4000
-    container: tuple[str, ...] = ()
     seed_by_student: bool = False
 
 
@@ -73,9 +69,9 @@ def autograde_one(
     with build.course_api(course) as api, warnings.catch_warnings():
         # nbgrader 0.9.6 builds a submission outside its database session.
         warnings.filterwarnings("ignore", "Object of type <Submitted", SAWarning)
-        api.config.ExecuteApart.merge(asdict(settings) | {"container": list(settings.container)})
+        api.config.ExecuteApart.merge(asdict(settings))
         api.coursedir.submitted_directory = submitted
-        for _ in range(PATIENCE):
+        for _ in range(TRIES):
             with build.caught_errors(api.log) as errors:
                 result = api.autograde(assignment, student)
             if result["success"] or not any(map(_may_pass, errors)):
@@ -107,7 +103,7 @@ def place(course: Path, step: str, student: str, assignment: str) -> Path:
 
 
 def student_variant(course: Path, student: str) -> int:
-    """Return which inputs a student's hidden tests draw: the same each time, and unknown without the salt.
+    """Return the number that chooses the inputs of a student's hidden tests: always the same, and secret like the salt.
 
     Parameters
     ----------
@@ -121,7 +117,8 @@ def student_variant(course: Path, student: str) -> int:
     DataError
         When the course has no salt.
     """
-    salt = read_json(course / MARKER).get("salt")
+    marker = course / build.MARKER
+    salt = read_json(marker).get("salt")
     if not salt:
-        raise DataError(course / MARKER, "a salt, which `semgrid-edu course build` adds", "none")
+        raise DataError(marker, "a salt, which `semgrid-edu course build` adds", "none")
     return int.from_bytes(hashlib.sha256(f"{salt} {student}".encode()).digest()[:8], "big")

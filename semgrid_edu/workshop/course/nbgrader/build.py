@@ -116,7 +116,7 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
         When the folder contains something else, there are no exercises, or nbgrader can't release one.
     """
     directory = Path(directory).resolve()
-    _refuse_other_folders(directory)
+    _check_folder(directory)
     sources = exercise_sources(folder)
     if not sources:
         raise DataError(folder / "src" / "exercises", "the sources of the exercises", "none")
@@ -134,7 +134,7 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
     return BuiltCourse(names, kept)
 
 
-def _refuse_other_folders(directory: Path) -> None:
+def _check_folder(directory: Path) -> None:
     """Raise an error if a folder contains anything but a course that `build_course` wrote."""
     if directory.is_file():
         raise DataError(directory, "a folder", "a file")
@@ -145,7 +145,7 @@ def _refuse_other_folders(directory: Path) -> None:
 def _course_files(folder: Path, sources: list[Path], lectures: str) -> dict[str, str]:
     """Return the text of each file of a course, by its path in it."""
     instructor = folder / "instructor"
-    files = {name: instructor / name for name in ("nbgrader_config.py", "README.md", "Containerfile")}
+    files = {name: instructor / name for name in ("nbgrader_config.py", "README.md")}
     files |= {f"instructor/{path.relative_to(instructor).as_posix()}": path for path in instructor.glob("*/*.py")}
     texts = {name: path.read_text(encoding="utf-8") for name, path in files.items()}
     return texts | {f"source/{s.stem}/{s.stem}.ipynb": _source_text(s, lectures) for s in sources}
@@ -267,8 +267,8 @@ def failure_reason(result: dict, errors: list[BaseException]) -> str:
     errors : list of BaseException
         What `caught_errors` collected. The last one counts; without any, the last line of nbgrader's message.
     """
-    said = result.get("error") or result.get("log") or "no reason"
-    return one_line(errors[-1]) if errors else said.strip().splitlines()[-1]
+    log = result.get("error") or result.get("log") or "no reason"
+    return one_line(errors[-1]) if errors else log.strip().splitlines()[-1]
 
 
 def one_line(error: BaseException) -> str:
@@ -280,6 +280,6 @@ def one_line(error: BaseException) -> str:
         The error.
     """
     # It may quote what a student wrote, and some characters control terminals.
-    says = "".join(one if one.isprintable() else "?" for one in [*str(error).splitlines(), ""][0][:300])
+    message = "".join(one if one.isprintable() else "?" for one in [*str(error).splitlines(), ""][0][:300])
     ours = type(error).__module__.startswith("semgrid_edu.")
-    return says if ours else f"{type(error).__name__}: {says}".removesuffix(": ")
+    return message if ours else f"{type(error).__name__}: {message}".removesuffix(": ")

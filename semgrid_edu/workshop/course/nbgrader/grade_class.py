@@ -6,7 +6,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
 from glob import has_magic
-from multiprocessing import get_context
+from multiprocessing import get_all_start_methods, get_context
 from pathlib import Path
 
 import nbformat
@@ -23,10 +23,11 @@ from semgrid_edu.workshop.course.nbgrader.autograde import (
 )
 from semgrid_edu.workshop.course.nbgrader.build import one_line
 from semgrid_edu.workshop.course.nbgrader.gradebook import Graded, submissions
-from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED, prepare, starter
+from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
 from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_grader
-from semgrid_edu.workshop.course.sandbox.taken import delete_folder
+from semgrid_edu.workshop.course.sandbox.process import StudentProcess
+from semgrid_edu.workshop.course.sandbox.resources import delete_folder
 
 KILLED = "the file can't be graded: twice it ended the process that grades, perhaps for want of memory"
 """The note on a submission that ended the grader twice: among others, and alone."""
@@ -71,15 +72,13 @@ def grade_course(
     wanted = submissions(course, assignments) if again else book.ungraded(course, assignments)
     yield from _in_pools(course, wanted, settings, workers, failed)
     if failed:
-        raise UngradedError("\n".join(f"{which}: {says}" for which, says in failed.items()))
+        raise UngradedError("\n".join(f"{which}: {message}" for which, message in failed.items()))
 
 
 def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int, failed: dict) -> Iterator[Graded]:
     """Yield results; if a process died, grade its submissions again one by one, to find the culprit."""
     with _pool(workers) as pool:
-        failed |= _failing_references(pool, course, settings, [assignment for assignment, _ in wanted])
-        ready = [one for one in wanted if one[0] not in failed]
-        waiting = {pool.submit(grade_one, course, *one, settings): one for one in ready}
+        waiting = {pool.submit(grade_one, course, *one, settings): one for one in wanted}
         left = yield from _as_they_end(course, waiting, failed)
     begun = [one for one in left if book.has_begun(course, *one)]
     if begun and len(wanted) == 1:
@@ -94,11 +93,16 @@ def _in_pools(course: Path, wanted: list, settings: GradeSettings, workers: int,
 
 @contextmanager
 def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """Start processes that grade, with temporary files in a folder that is always deleted at the end."""
+    """Start processes that grade, with temporary files in a folder that is always deleted at the end.
+
+    They are forked from a process that has loaded what they need, where the system can fork.
+    """
+    context = get_context("forkserver" if "forkserver" in get_all_start_methods() else "spawn")
+    context.set_forkserver_preload([__name__])
     with ExitStack() as stack:
         folder = tempfile.mkdtemp(prefix="semgrid-grading-")
         stack.callback(delete_folder, Path(folder))
-        pool = ProcessPoolExecutor(workers, get_context("spawn"), _begin, (folder,))
+        pool = ProcessPoolExecutor(workers, context, _begin, (folder,))
         stack.callback(pool.shutdown, cancel_futures=True)
         yield pool
 
@@ -118,7 +122,7 @@ def _as_they_end(course: Path, waiting: dict[Future, tuple[str, str]], failed: d
         except BrokenProcessPool:
             left.append(waiting[done])
         except Exception as error:
-            book.forget(course, *waiting[done])
+            book.delete_unfinished(course, *waiting[done])
             failed[_which(waiting[done])] = one_line(error)
     return left
 
@@ -128,32 +132,15 @@ def _which(submission: tuple[str, str]) -> str:
     return ", ".join(reversed(submission))
 
 
-def _failing_references(
-    pool: ProcessPoolExecutor, course: Path, settings: GradeSettings, assignments: Sequence[str]
-) -> dict[str, str]:
-    """Grade the reference answers of exercises; return the errors of those that fail."""
-    trials = {
-        name: pool.submit(prepare, course, name, settings.memory, settings.container)
-        for name in dict.fromkeys(assignments)
-    }
-    errors = {name: trial.exception() for name, trial in trials.items()}
-    return {name: one_line(error) for name, error in errors.items() if error is not None}
-
-
-def missing_limits(settings: GradeSettings) -> list[str]:
+def missing_limits() -> list[str]:
     """Start a process as for a student's code, and return which of `limits.PARTS` can't be limited.
-
-    Parameters
-    ----------
-    settings : GradeSettings
-        How a class is graded. With a container nothing is missing, because its command sets the limits.
 
     Raises
     ------
     OSError
-        When the process or the container doesn't start.
+        When the process doesn't start.
     """
-    process = starter(settings.memory, settings.container)(None)
+    process = StudentProcess(Limits())
     process.stop()
     return process.unlimited
 
@@ -180,40 +167,29 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
         return Graded(student, assignment, 0, 0, 0, note)
     try:
         with book.unfinished(course, assignment, student):
-            if fault := _graded_or_fault(course, assignment, student, settings):
-                note = f"{CRASHED}the file can't be graded: {fault}"
+            path = place(course, "submitted", student, assignment)
+            book.check_time(path)
+            try:
+                book.check_file(path)
+                autograde_one(course, assignment, student, settings)
+            except UnfitError as error:
+                note = f"{CRASHED}the file can't be graded: {error}"
                 return _grade_stand_in(course, assignment, student, settings, note)
-            return book.result_of(course, assignment, student)
+            with book.open_gradebook(course) as gradebook:
+                return book.result_of(gradebook, assignment, student)
     except Exception as error:
         raise UngradedError(one_line(error)) from error
 
 
-def _graded_or_fault(course: Path, assignment: str, student: str, settings: GradeSettings) -> str:
-    """Grade a submission; return what is wrong with its file, without quoting it, or "" if it has been graded."""
-    path = place(course, "submitted", student, assignment)
-    book.check_time(path)
-    try:
-        book.check_file(path)
-        autograde_one(course, assignment, student, settings)
-    except UnfitError as error:
-        return str(error)
-    return ""
-
-
 def _grade_stand_in(course: Path, assignment: str, student: str, settings: GradeSettings, note: str) -> Graded:
-    """Grade the empty exercise in place of a file that can't be graded, with a note in the gradebook."""
-    _stand_in(course, assignment, student, note)
+    """Grade the empty exercise in place of a file that can't be graded, with a note in it and in the gradebook."""
+    notebook = nbformat.read(course / "release" / assignment / f"{assignment}.ipynb", as_version=4)
+    notebook.cells.insert(0, new_markdown_cell(f"**{note}**"))
+    write_notebook(notebook, place(course, UNREADABLE, student, assignment))
     with book.unfinished(course, assignment, student):
         autograde_one(course, assignment, student, settings, UNREADABLE)
         with book.open_gradebook(course) as gradebook:
             for comment in gradebook.find_submission_notebook(assignment, assignment, student).comments:
                 comment.auto_comment = note
             gradebook.db.commit()
-    return book.result_of(course, assignment, student)
-
-
-def _stand_in(course: Path, assignment: str, student: str, note: str) -> None:
-    """Write the empty exercise, with a note, in place of a file that can't be graded."""
-    notebook = nbformat.read(course / "release" / assignment / f"{assignment}.ipynb", as_version=4)
-    notebook.cells.insert(0, new_markdown_cell(f"**{note}**"))
-    write_notebook(notebook, place(course, UNREADABLE, student, assignment))
+            return book.result_of(gradebook, assignment, student)

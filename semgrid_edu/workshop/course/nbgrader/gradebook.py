@@ -5,7 +5,7 @@ import io
 import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
 import nbformat
@@ -18,10 +18,10 @@ from semgrid_edu.workshop.course.nbgrader.autograde import UnfitError, place
 from semgrid_edu.workshop.course.nbgrader.build import MARKER
 from semgrid_edu.workshop.course.nbgrader.preprocessors import CRASHED
 
-LARGEST = 100_000_000
+MAX_BYTES = 100_000_000
 """Limit for a submission with all its files, bytes."""
 
-MOST = 1000
+MAX_PARTS = 1000
 """Limit for the files and folders of a submission, and for the cells of its notebook: each takes nbgrader time."""
 
 GRADED = "graded.csv"
@@ -52,7 +52,7 @@ class Graded:
     score: float
     points: float
     to_read: int
-    note: str = field(default="")
+    note: str = ""
 
 
 def submissions(course: Path, assignments: Sequence[str] = ()) -> list[tuple[str, str]]:
@@ -106,7 +106,7 @@ def check_file(path: Path) -> None:
     ------
     UnfitError
         When it isn't a notebook, has thousands of cells or files, is huge with the files beside it, or contains links,
-        which nbgrader would follow to other people's files, or pipes and the like, which would block it.
+        which nbgrader would follow to other people's files, or pipes and devices, which would block it.
     """
     folder = path.parent
     files = [*folder.rglob("*")]
@@ -114,10 +114,10 @@ def check_file(path: Path) -> None:
         raise UnfitError("it comes with a link in place of a file or folder")
     if not all(one.is_file() or one.is_dir() for one in files) or not path.is_file():
         raise UnfitError("it comes with a pipe, a device or a folder in place of a file")
-    if len(files) > MOST:
-        raise UnfitError(f"it comes with more than {MOST} files and folders")
-    if sum(one.lstat().st_size for one in files) > LARGEST:
-        raise UnfitError(f"it has more than {LARGEST} bytes with all files beside it")
+    if len(files) > MAX_PARTS:
+        raise UnfitError(f"it comes with more than {MAX_PARTS} files and folders")
+    if sum(one.lstat().st_size for one in files) > MAX_BYTES:
+        raise UnfitError(f"it has more than {MAX_BYTES} bytes with all files beside it")
     try:
         notebook = nbformat.read(path, as_version=4)
         nbformat.validate(notebook)
@@ -126,12 +126,12 @@ def check_file(path: Path) -> None:
         raise
     except Exception as error:
         raise UnfitError(f"it is no notebook ({type(error).__name__})") from error
-    if len(notebook.cells) > MOST:
-        raise UnfitError(f"it has more than {MOST} cells")
+    if len(notebook.cells) > MAX_PARTS:
+        raise UnfitError(f"it has more than {MAX_PARTS} cells")
 
 
 def check_time(path: Path) -> None:
-    """Check that the instructor's note on the time of a submission can be read.
+    """Check that the instructor's note on the time of a submission can be read; nbgrader's own error hides the reason.
 
     Parameters
     ----------
@@ -168,11 +168,11 @@ def unfinished(course: Path, assignment: str, student: str) -> Iterator[None]:
         yield
         mark.unlink(missing_ok=True)
     except BaseException:
-        forget(course, assignment, student)
+        delete_unfinished(course, assignment, student)
         raise
 
 
-def forget(course: Path, assignment: str, student: str) -> None:
+def delete_unfinished(course: Path, assignment: str, student: str) -> None:
     """Delete the files of an unfinished grading, so that nbgrader doesn't consider the submission graded.
 
     Parameters
@@ -194,7 +194,10 @@ def _mark(course: Path, assignment: str, student: str) -> Path:
 
 
 def has_begun(course: Path, assignment: str, student: str) -> bool:
-    """Return whether the grading of a submission has begun and not ended. Parameters are those of `forget`."""
+    """Return whether the grading of a submission has begun and not ended.
+
+    Parameters are those of `delete_unfinished`.
+    """
     return _mark(course, assignment, student).exists()
 
 
@@ -224,22 +227,16 @@ def _has_scores(gradebook: Gradebook, assignment: str, student: str) -> bool:
     return all(grade.needs_manual_grade or (grade.auto_score, grade.manual_score) != (None, None) for grade in grades)
 
 
-def result_of(course: Path, assignment: str, student: str) -> Graded:
-    """Read the result of a graded submission from the gradebook.
+def result_of(gradebook: Gradebook, assignment: str, student: str) -> Graded:
+    """Read the result of a graded submission.
 
     Parameters
     ----------
-    course : Path
-        The course.
+    gradebook : Gradebook
+        From `open_gradebook`.
     assignment, student : str
         Whose submission.
     """
-    with open_gradebook(course) as gradebook:
-        return _row(gradebook, assignment, student)
-
-
-def _row(gradebook: Gradebook, assignment: str, student: str) -> Graded:
-    """Read the result of a submission."""
     found = gradebook.find_submission_notebook(assignment, assignment, student)
     crashes = [comment.auto_comment for comment in found.comments if (comment.auto_comment or "").startswith(CRASHED)]
     to_read = sum(grade.needs_manual_grade for grade in found.grades)
@@ -279,6 +276,6 @@ def write_graded(course: Path) -> Path:
     table.writerow(column.name for column in fields(Graded))
     with open_gradebook(course) as gradebook:
         for one in sorted({*submissions(course)} - {*ungraded(course)}):
-            table.writerow(astuple(_row(gradebook, *one)))
+            table.writerow(astuple(result_of(gradebook, *one)))
     write_text(course / GRADED, text.getvalue())
     return course / GRADED

@@ -3,6 +3,7 @@
 import re
 import sys
 from collections.abc import Callable
+from functools import partial
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
@@ -15,26 +16,27 @@ from nbgrader.api import Gradebook, SourceCell
 from nbgrader.preprocessors import NbGraderPreprocessor
 from nbgrader.utils import is_grade, is_solution
 from traitlets import Bool, Integer, Unicode
-from traitlets import List as ListTrait
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.fast.numba_cache import PACKAGE, takes_files, user_cache
 from semgrid_edu.workshop.course.nbgrader.autograde import UnfitError, student_variant
 from semgrid_edu.workshop.course.sandbox.limits import Limits
-from semgrid_edu.workshop.course.sandbox.notebook import INSTRUCTOR, cell_name, run_submission
+from semgrid_edu.workshop.course.sandbox.notebook import cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 
-CRASHED = "Crashed: "
-"""The beginning of a comment that says what ended Python."""
+INSTRUCTOR = "semgrid_instructor"
+"""The instructor's module, with the hidden tests."""
 
-KEPT = ("kernelspec",)
-"""The metadata of a notebook that are kept; nbgrader replaces them by the exercise's."""
+CRASHED = "Crashed: "
+"""The beginning of a comment on what ended Python."""
 
 CRASHES = "crashes"
-"""The name under which `ExecuteApart` tells `NoteCrashes` what ended a student's process."""
+"""The name under which `ExecuteApart` leaves for `NoteCrashes` what ended a student's process."""
 
-PATIENCE = 600.0
+REFERENCE_TIMEOUT = 600.0
 """Time limit of a reference cell, seconds: it compiles functions that submissions then reuse."""
+
+RUBRIC = re.compile(r"\b(One|Half a) point for\b")
+"""The beginning of a rubric, which is the rest of the model answer's cell."""
 
 FONTS = "import matplotlib.pyplot"
 """Makes matplotlib look for the system's fonts, which takes seconds."""
@@ -60,12 +62,12 @@ class MakeWhole(NbGraderPreprocessor):
         with Gradebook(where["db_url"]) as gradebook:
             exercise = gradebook.find_notebook(where["notebook"], where["assignment"])
             blanks = {cell.name: _blank(cell, exercise) for cell in exercise.source_cells}
-        # All other metadata would be the student's, such as widgets or a title, and shown in feedback.
-        nb.metadata = NotebookNode({name: nb.metadata[name] for name in KEPT if name in nb.metadata})
+        # Other metadata, such as widgets or a title, would be the student's and shown in feedback.
+        nb.metadata = NotebookNode({name: nb.metadata[name] for name in nb.metadata if name == "kernelspec"})
         if not any(cell_name(cell) in blanks for cell in nb.cells):
             _recognise(nb.cells, [blank for blank in blanks.values() if is_solution(blank)])
         _mark(nb.cells, blanks)
-        nb.cells = _with_own_versions(nb.cells, blanks)
+        nb.cells = _with_students_versions(nb.cells, blanks)
         _insert_missing(nb.cells, blanks)
         return nb, resources
 
@@ -119,7 +121,7 @@ def _mark(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> None:
             cell.metadata["nbgrader"] = blank.metadata.nbgrader.copy()
 
 
-def _with_own_versions(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> list[NotebookNode]:
+def _with_students_versions(cells: list[NotebookNode], blanks: dict[str, NotebookNode]) -> list[NotebookNode]:
     """Return the cells, with the student's version after each locked cell that she changed, unless it is a test."""
     found = []
     for cell in cells:
@@ -148,60 +150,44 @@ class ExecuteApart(NbGraderPreprocessor):
     course = Unicode(help="The folder of the course.").tag(config=True)
     timeout = Integer(30, help="Seconds for a cell, or for all calls of a test.").tag(config=True)
     memory = Integer(4000, help="Megabytes of memory for a student's code.").tag(config=True)
-    container = ListTrait(Unicode(), help="A command that starts a program in a container.").tag(config=True)
-    seed_by_student = Bool(help="Whether each student's hidden tests draw inputs of their own.").tag(config=True)
+    seed_by_student = Bool(help="Whether the hidden tests draw other inputs for each student.").tag(config=True)
 
     def preprocess(self, nb: NotebookNode, resources: ResourcesDict) -> tuple[NotebookNode, ResourcesDict]:
         """Run one notebook. Parameters are those of `MakeWhole.preprocess`."""
         where, course = resources["nbgrader"], Path(self.course)
-        prepared = prepare(course, where["assignment"], self.memory, tuple(self.container))
+        prepared = prepare(course, where["assignment"], self.memory)
+        if self.seed_by_student:
+            use_instructor(course / "instructor", student_variant(course, where["student"]))
         with Gradebook(where["db_url"]) as gradebook:
             exercise = gradebook.find_notebook(where["notebook"], where["assignment"])
             trusted = {cell.name: cell.source for cell in exercise.source_cells}
-        variant = (student_variant(course, where["student"]),) if self.seed_by_student else ()
-        start = starter(self.memory, tuple(self.container), beside=Path(resources["metadata"]["path"]))
-        resources[CRASHES] = run_submission(nb, trusted, lambda: start(prepared), self.timeout, variant)
+        limits, beside = Limits(memory=self.memory), Path(resources["metadata"]["path"])
+        start = partial(StudentProcess, limits, prepared, beside=beside)
+        resources[CRASHES] = run_submission(nb, trusted, start, self.timeout)
         return nb, resources
 
 
-def use_instructor(folder: Path) -> None:
+def use_instructor(folder: Path, *variant: int) -> None:
     """Make test cells import the hidden tests of this course, and of no other.
 
     Parameters
     ----------
     folder : Path
         The folder `instructor` of a course.
+    *variant : int
+        A number that chooses the inputs of hidden tests; without one they draw the usual ones.
     """
     place = folder / INSTRUCTOR / "__init__.py"
-    if getattr(sys.modules.get(INSTRUCTOR), "__file__", None) == str(place):
-        return
-    for name in [name for name in sys.modules if name.partition(".")[0] == INSTRUCTOR]:
-        del sys.modules[name]
-    spec = spec_from_file_location(INSTRUCTOR, place)
-    sys.modules[INSTRUCTOR] = module_from_spec(spec)
-    spec.loader.exec_module(sys.modules[INSTRUCTOR])
+    if getattr(sys.modules.get(INSTRUCTOR), "__file__", None) != str(place):
+        for name in [name for name in sys.modules if name.partition(".")[0] == INSTRUCTOR]:
+            del sys.modules[name]
+        spec = spec_from_file_location(INSTRUCTOR, place)
+        sys.modules[INSTRUCTOR] = module_from_spec(spec)
+        spec.loader.exec_module(sys.modules[INSTRUCTOR])
+    sys.modules[INSTRUCTOR].choose_variant(*variant)
 
 
-def starter(
-    memory: int, container: tuple[str, ...], keeps: bool = False, beside: Path | None = None
-) -> Callable[[Path | None], StudentProcess]:
-    """Return a function that takes a folder of compiled functions and starts a process for a student's code.
-
-    Parameters
-    ----------
-    memory : int
-        Megabytes of memory for the process.
-    container : tuple of str
-        A command that starts a program in a container; () for none.
-    keeps : bool
-        Whether the process adds what it compiles to that folder.
-    beside : Path, optional
-        The folder of a submission, for the files that were handed in beside it.
-    """
-    return lambda prepared: StudentProcess(Limits(memory=memory), prepared, keeps, container, beside)
-
-
-def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ...] = ()) -> Path:
+def prepare(course: Path, assignment: str, memory: int) -> Path:
     """Grade the reference answers once in each course; return the folder of the functions that they compiled.
 
     Parameters
@@ -212,8 +198,6 @@ def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ..
         The exercise.
     memory : int
         Megabytes of memory for the process.
-    container : tuple of str
-        A command that starts a program in a container, where the answers are graded separately; () for none.
 
     Raises
     ------
@@ -221,39 +205,22 @@ def prepare(course: Path, assignment: str, memory: int, container: tuple[str, ..
         When the reference answers don't pass their own tests.
     """
     use_instructor(course / "instructor")
-    folder = prepared_folder(course, assignment)
-    passed = course / "prepared" / f"{assignment} passed{' in a container' if container else ''}"
-    passed.parent.mkdir(exist_ok=True)
+    folder = course / "prepared" / assignment
+    folder.mkdir(parents=True, exist_ok=True)
+    passed = folder.with_suffix(".passed")
     with FileLock(folder.with_suffix(".lock")):
         if not passed.exists():
-            _grade_reference(course, assignment, folder, starter(memory, container, keeps=True))
+            _grade_reference(course, assignment, partial(StudentProcess, Limits(memory=memory), folder, keeps=True))
             passed.touch()
     return folder
 
 
-def prepared_folder(course: Path, assignment: str) -> Path:
-    """Return the folder of compiled functions: in the user's cache, one for each copy of the package, or in the course.
-
-    Parameters
-    ----------
-    course : Path
-        A course that `build_course` wrote.
-    assignment : str
-        The exercise.
-    """
-    # Numba identifies a function by its file, so one copy of the package can't use what another one compiled.
-    shared = user_cache().joinpath("semgrid_edu", "prepared", *PACKAGE.parts[1:], assignment)
-    folder = shared if takes_files(shared) else course / "prepared" / assignment
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
-
-
-def _grade_reference(course: Path, assignment: str, folder: Path, start: Callable[[Path], StudentProcess]) -> None:
+def _grade_reference(course: Path, assignment: str, start: Callable[[], StudentProcess]) -> None:
     """Run an exercise with the instructor's answers."""
     path = course / "source" / assignment / f"{assignment}.ipynb"
     notebook = nbformat.read(path, as_version=4)
     notebook.cells.insert(0, new_code_cell(FONTS))
-    run_submission(notebook, instructors_cells(notebook), lambda: start(folder), PATIENCE)
+    run_submission(notebook, instructors_cells(notebook), start, REFERENCE_TIMEOUT)
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     if errors := [f"{output.ename}: {output.evalue}" for output in outputs if output.output_type == "error"]:
         raise DataError(path, "reference answers that pass their tests", "; ".join(errors))
@@ -294,3 +261,32 @@ class NoteCrashes(NbGraderPreprocessor):
                     comment.auto_comment = CRASHED + resources[CRASHES][name]
             gradebook.db.commit()
         return nb, resources
+
+
+class ShowRubric(NbGraderPreprocessor):
+    """Inserts the rubric below each written answer, because Formgrader and feedback show what is in the notebook."""
+
+    course = Unicode(help="The folder of the course.").tag(config=True)
+
+    def preprocess(self, nb: NotebookNode, resources: ResourcesDict) -> tuple[NotebookNode, ResourcesDict]:
+        """Add the rubrics to one notebook. Parameters are those of `MakeWhole.preprocess`."""
+        where = resources["nbgrader"]
+        source = Path(self.course) / "source" / where["assignment"] / f"{where['notebook']}.ipynb"
+        known = rubrics(nbformat.read(source, as_version=4))
+        for place in reversed(range(len(nb.cells))):
+            if rubric := known.get(cell_name(nb.cells[place])):
+                nb.cells.insert(place + 1, new_markdown_cell(f"> **Rubric.** {rubric}"))
+        return nb, resources
+
+
+def rubrics(notebook: NotebookNode) -> dict[str, str]:
+    """Return the rubrics of an exercise by the grade_id of the written answer.
+
+    Parameters
+    ----------
+    notebook : NotebookNode
+        The exercise's source. A model answer without a sentence that matches `RUBRIC` has no rubric.
+    """
+    written = (c for c in notebook.cells if c.cell_type == "markdown" and is_grade(c) and is_solution(c))
+    found = {cell_name(cell): (cell.source, RUBRIC.search(cell.source)) for cell in written}
+    return {name: " ".join(text[match.start() :].split()) for name, (text, match) in found.items() if match}

@@ -41,10 +41,10 @@ def alternative_text(cell: NotebookNode, figure: NotebookNode) -> str:
     cell : NotebookNode
         The code cell that draws the figure. The text is the entry `alt` of its metadata, as in nbconvert.
     figure : NotebookNode
-        One of the cell's outputs. It may carry its own text, as animations do.
+        One of the cell's outputs. It may have a text itself, as animations do.
     """
-    own = [about.get("alt") for about in figure.metadata.values() if isinstance(about, dict)]
-    return next(filter(None, own), None) or cell.metadata.get("alt", "")
+    texts = [about.get("alt") for about in figure.metadata.values() if isinstance(about, dict)]
+    return next(filter(None, texts), None) or cell.metadata.get("alt", "")
 
 
 def resolution(png: bytes) -> int | None:

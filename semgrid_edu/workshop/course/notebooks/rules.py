@@ -2,12 +2,11 @@
 
 import ast
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator
 
 from nbformat import NotebookNode
 
 from semgrid_edu.plotting import FIGURE_DPI, MAX_ANIMATION_BYTES
-from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.course.notebooks.figures import PNG, alternative_text, figures, moves, png_bytes, resolution
 from semgrid_edu.workshop.course.notebooks.minutes import PREDICTION, reading_time, stated_minutes
 
@@ -128,22 +127,18 @@ def unfit_animations(notebook: NotebookNode) -> Iterator[str]:
             yield f"the animation of cell {name} has {len(png) // 1000} kB, more than {limit}"
 
 
-Rule = Callable[[NotebookNode], Iterator[str]]
-"""A function that takes an executed notebook and yields what is wrong, one sentence per problem."""
+COMPANION_RULES: tuple[Callable[[NotebookNode], Iterator[str]], ...] = (
+    dishonest_minutes,
+    answers_in_sight,
+    plot_code_in_sight,
+    missing_alternative_texts,
+    coarse_figures,
+    unfit_animations,
+)
+"""The rules for a companion: functions that take an executed notebook and yield one sentence per problem."""
 
-RULES: dict[str, Rule] = {
-    "minutes": dishonest_minutes,
-    "length": too_long,
-    "predictions": answers_in_sight,
-    "plot code": plot_code_in_sight,
-    "alternative texts": missing_alternative_texts,
-    "resolution": coarse_figures,
-    "animations": unfit_animations,
-}
-"""All rules, by the names that waivers use."""
-
-WAIVERS: Mapping[str, tuple[str, ...]] = table_beside(__file__)
-"""The rules that each lecture may break, from `rules.toml`."""
+LECTURE_RULES = (*COMPANION_RULES, too_long)
+"""The rules for a lecture. A companion may be long, because students choose whether to read it."""
 
 
 def _figures(notebook: NotebookNode) -> Iterator[tuple[NotebookNode, NotebookNode]]:
@@ -170,24 +165,3 @@ def _only_plots(source: str) -> bool:
 def _first_line(cell: NotebookNode) -> str:
     """Name a cell by its first line."""
     return f"'{cell.source.strip().splitlines()[0][:60]}'"
-
-
-def rule_problems(notebook: NotebookNode, rules: Mapping[str, Rule] = RULES, waived: Collection[str] = ()) -> list[str]:
-    """List where a notebook breaks a rule without a waiver, and the waivers that it no longer needs.
-
-    Parameters
-    ----------
-    notebook : NotebookNode
-        An executed notebook.
-    rules : mapping of str to Rule
-        The rules to check, by name.
-    waived : collection of str
-        Names of the rules that this notebook may break.
-    """
-    problems = []
-    for name, rule in rules.items():
-        found = [*rule(notebook)]
-        if name in waived and not found:
-            problems.append(f"keeps the rule on {name}; take its waiver out of workshop/course/notebooks/rules.toml")
-        problems += [] if name in waived else found
-    return problems

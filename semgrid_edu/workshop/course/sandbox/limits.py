@@ -9,11 +9,10 @@ from pathlib import Path
 import semgrid_edu
 from semgrid_edu.storage.files import shipped_folder, table_beside
 from semgrid_edu.workshop.course.sandbox import linux
+from semgrid_edu.workshop.course.sandbox.resources import MEGABYTE
 
 PARTS = ("memory", "written files", "processes", "files", "modes and dates of files", "network", "signals")
 """Everything that is limited here; the grader's process limits time."""
-
-MEGABYTE = 1_000_000
 
 SYSTEM: tuple[str, ...] = table_beside(__file__)["system"]
 """The parts of a Linux system that programs need."""
@@ -64,15 +63,15 @@ def _limit_resources(limits: Limits) -> list[str]:
         return []
     import resource
 
-    wanted = {
+    kinds = {
         "memory": (resource.RLIMIT_AS, _held() + limits.memory * MEGABYTE),
         "written files": (resource.RLIMIT_FSIZE, limits.written * MEGABYTE),
     }
     _set(resource.RLIMIT_CORE, 0)
     # The superuser is exempt from this one.
     if os.getuid():
-        wanted["processes"] = resource.RLIMIT_NPROC, limits.processes
-    return [part for part, (kind, value) in wanted.items() if _set(kind, value)]
+        kinds["processes"] = resource.RLIMIT_NPROC, limits.processes
+    return [part for part, (kind, value) in kinds.items() if _set(kind, value)]
 
 
 def limit_grader(megabytes: int) -> None:
@@ -86,9 +85,9 @@ def limit_grader(megabytes: int) -> None:
     if sys.platform != "win32":
         import resource
 
-        most = resource.getrlimit(resource.RLIMIT_AS)[1]
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
         with suppress(ValueError, OSError):
-            resource.setrlimit(resource.RLIMIT_AS, (_held() + megabytes * MEGABYTE, most))
+            resource.setrlimit(resource.RLIMIT_AS, (_held() + megabytes * MEGABYTE, hard))
 
 
 def _held() -> int:

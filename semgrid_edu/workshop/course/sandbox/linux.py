@@ -45,7 +45,7 @@ LOAD, EQUAL, AT_LEAST, ANY_BIT, RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 NUMBER, ARCHITECTURE, FIRST = 0, 4, 16
 """Offsets of the number of a call, its processor, and the low word of its first argument in struct seccomp_data."""
 
-ALLOW, IDLE, REFUSE, UNKNOWN = 0x7FFF0000, 0x00050000, 0x00050000 | errno.EPERM, 0x00050000 | errno.ENOSYS
+ALLOW, IDLE, DENY, UNKNOWN = 0x7FFF0000, 0x00050000, 0x00050000 | errno.EPERM, 0x00050000 | errno.ENOSYS
 """The filter's verdicts: do it, do nothing and report success, or fail."""
 
 SET_SECCOMP, FILTER = 22, 2
@@ -135,15 +135,15 @@ def give_up_calls() -> bool:
     return LIBRARY.prctl(SET_SECCOMP, FILTER, described, 0, 0) == 0
 
 
-def _filter(audit: int, refused: dict[str, int], unknown: dict, idle: dict, refused_if: dict) -> bytes:
+def _filter(audit: int, denied: dict[str, int], unknown: dict, idle: dict, denied_if: dict) -> bytes:
     """Return the filter's instructions: a code, how many to skip if it is true and if it is not, and a number."""
-    lines = [(LOAD, 0, 0, ARCHITECTURE), (EQUAL, 1, 0, audit), (RETURN, 0, 0, REFUSE), (LOAD, 0, 0, NUMBER)]
+    lines = [(LOAD, 0, 0, ARCHITECTURE), (EQUAL, 1, 0, audit), (RETURN, 0, 0, DENY), (LOAD, 0, 0, NUMBER)]
     lines += [(AT_LEAST, 0, 1, NEWER), (RETURN, 0, 0, UNKNOWN)]
-    for calls, verdict in ((refused, REFUSE), (unknown, UNKNOWN), (idle, IDLE)):
+    for calls, verdict in ((denied, DENY), (unknown, UNKNOWN), (idle, IDLE)):
         for number in calls.values():
             lines += [(EQUAL, 0, 1, number), (RETURN, 0, 0, verdict)]
-    for call in refused_if.values():
+    for call in denied_if.values():
         compare = ANY_BIT if "bits" in call else EQUAL
         lines += [(EQUAL, 0, 4, call["call"]), (LOAD, 0, 0, FIRST), (compare, 0, 1, call.get("bits") or call["value"])]
-        lines += [(RETURN, 0, 0, REFUSE), (LOAD, 0, 0, NUMBER)]
+        lines += [(RETURN, 0, 0, DENY), (LOAD, 0, 0, NUMBER)]
     return b"".join(struct.pack("HBBI", *line) for line in [*lines, (RETURN, 0, 0, ALLOW)])

@@ -10,7 +10,6 @@ import traceback
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
-from importlib import import_module
 from types import CodeType
 from typing import Any
 
@@ -22,20 +21,14 @@ from nbgrader.utils import is_grade, is_solution
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.session import AnswerEndedError, AnswerTimeoutError, NoProcessError, Session
 
-INSTRUCTOR = "semgrid_instructor"
-"""The instructor's module, with the hidden tests; their lines aren't shown."""
-
-MOST_PRINTED = 2000
+MAX_PRINTED = 2000
 """How many characters are kept of what an answer printed during a test."""
 
 PRINTED = "your code printed:\n"
 """The heading above it, so that it can't be mistaken for the grader's words."""
 
-MOST_OUTPUT = 30_000_000
+MAX_OUTPUT_TEXT = 30_000_000
 """How many characters of outputs are kept in a notebook."""
-
-STREAMS = "stdout", "stderr"
-"""The streams of a cell."""
 
 PICTURES, BASE64 = ("image/png", "image/jpeg"), re.compile(r"[A-Za-z0-9+/=\s]*")
 """The kinds of pictures that are kept, and the form of their data."""
@@ -49,7 +42,6 @@ def run_submission(
     trusted: Mapping[str, str],
     start: Callable[[], StudentProcess],
     timeout: float,
-    variant: tuple[int, ...] = (),
 ) -> dict[str, str]:
     """Run a submission, and write outputs below its cells.
 
@@ -63,8 +55,6 @@ def run_submission(
         () -> StudentProcess.
     timeout : float
         How long a cell may take, seconds.
-    variant : tuple of int
-        Which inputs the hidden tests draw: see `semgrid_instructor.choose_variant`.
 
     Returns
     -------
@@ -74,15 +64,15 @@ def run_submission(
     Raises
     ------
     ChildProcessError
-        When no process could be started for her code, which says nothing about her answers.
+        When no process could be started for her code, which proves nothing about her answers.
     """
     seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
-    tests = TestCells(seen, unseen, variant)
+    tests = TestCells(seen, unseen)
     try:
         _prepare(notebook, trusted, tests)
         ended = _run_seen(notebook, trusted, tests)
         # Hidden inputs are sent only after the process whose output the student sees has ended.
-        seen.close()
+        seen.stop()
         _run_unseen(notebook, tests)
         return ended
     except NoProcessError as error:
@@ -112,14 +102,12 @@ class TestCells:
     ----------
     seen, unseen : Session
         The student's notebook in two processes: for the tests that she can read, and for the hidden ones.
-    variant : tuple of int
-        Which inputs the hidden tests draw.
     """
 
     __test__ = False  # for pytest
 
-    def __init__(self, seen: Session, unseen: Session, variant: tuple[int, ...]) -> None:
-        self.seen, self.unseen, self.variant = seen, unseen, variant
+    def __init__(self, seen: Session, unseen: Session) -> None:
+        self.seen, self.unseen = seen, unseen
         self.names: dict[str, Any] = {"__name__": "__main__"}
         self.used: set[str] = set()
         self.postponed: dict[str, list[Callable[[], str]]] = {}
@@ -159,7 +147,7 @@ class TestCells:
         self.seen.begin()
         error = self._run_among(code, answers)
         self.postponed[name] = self.seen.postponed if error is None else []
-        printed = self.seen.printed[:MOST_PRINTED]
+        printed = self.seen.printed[:MAX_PRINTED]
         outputs = [new_output("stream", name="stdout", text=PRINTED + printed)] if printed else []
         return outputs + ([] if error is None else [_as_output(error, file)])
 
@@ -171,13 +159,12 @@ class TestCells:
         name : str
             The cell's grade_id.
         """
-        import_module(INSTRUCTOR).choose_variant(*self.variant)
         self.unseen.begin()
         complaints: list[str] = []
         error = _run(lambda: complaints.extend(check() for check in self.postponed.pop(name, [])))
         if error is not None:
             return [_as_output(error, "")]
-        return [_error("AssertionError", says) for says in complaints[:] if says][:1]
+        return [_error("AssertionError", message) for message in complaints[:] if message][:1]
 
     def _run_among(self, code: CodeType, answers: dict[str, Any]) -> Exception | None:
         """Run a test in the namespace of the instructor's functions, which call answers too; then restore it."""
@@ -222,7 +209,7 @@ def _as_output(error: Exception, file: str) -> NotebookNode:
 
 def _run_seen(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -> dict[str, str]:
     """Run each cell, and the visible part of tests; return what ended the student's process, by grade_id."""
-    room, ended = MOST_OUTPUT, {}
+    room, ended = MAX_OUTPUT_TEXT, {}
     for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
         cell.execution_count, tests.seen.ended = number, ""
         cell.outputs, room = _shortened(_outputs(cell, trusted, tests), room)
@@ -261,14 +248,13 @@ def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -
 
 def _as_outputs(reply: dict) -> list[NotebookNode]:
     """Return what a cell put out as outputs of a notebook."""
-    streams = [
-        new_output("stream", name=k, text=reply["streams"][k]) for k in STREAMS if reply.get("streams", {}).get(k)
-    ]
+    printed = reply.get("streams", {})
+    streams = [new_output("stream", name=k, text=printed[k]) for k in ("stdout", "stderr") if printed.get(k)]
     shown = [new_output("display_data", data=data) for data in map(_harmless, reply.get("shown", [])) if data]
     error = reply.get("error")
     if error is None:
         return streams + shown
-    return [*streams, *shown, _error(error.get("kind", ""), error.get("says", ""), error.get("traceback", []))]
+    return [*streams, *shown, _error(error.get("kind", ""), error.get("message", ""), error.get("traceback", []))]
 
 
 def _harmless(shown: dict[str, str]) -> dict[str, str]:
@@ -281,10 +267,10 @@ def _shortened(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNod
     size = len(json.dumps(outputs))
     if size <= room:
         return outputs, room - size
-    says = "all outputs together are too long to be shown"
-    return [_error(one.ename[:99], says) for one in outputs if one.output_type == "error"], room
+    message = "all outputs together are too long to be shown"
+    return [_error(one.ename[:99], message) for one in outputs if one.output_type == "error"], room
 
 
-def _error(kind: str, says: str, lines: Sequence[str] = ()) -> NotebookNode:
+def _error(kind: str, message: str, lines: Sequence[str] = ()) -> NotebookNode:
     """Return an error as an output of a notebook."""
-    return new_output("error", ename=kind, evalue=says, traceback=[*lines] or [f"{kind}: {says}"])
+    return new_output("error", ename=kind, evalue=message, traceback=[*lines] or [f"{kind}: {message}"])

@@ -2,7 +2,6 @@
 
 import os
 import queue
-import shlex
 import shutil
 import signal
 import subprocess
@@ -20,41 +19,40 @@ from typing import Any
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.course.sandbox import surroundings as around
-from semgrid_edu.workshop.course.sandbox.limits import MEGABYTE, PARTS, Limits
-from semgrid_edu.workshop.course.sandbox.taken import (
-    Sampled,
+from semgrid_edu.workshop.course.sandbox.limits import PARTS, Limits
+from semgrid_edu.workshop.course.sandbox.resources import (
+    MEGABYTE,
+    PeakMemory,
     delete_folder,
     deleted_bytes,
+    exceeds_disk_limits,
     has_ended,
     memory_held,
-    memory_of,
     namespace_of,
-    processes_below,
     processes_in,
-    takes_too_much,
     threads_of,
 )
-from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES, MOST_INPUT, Wire, check_reply, decode, encode
+from semgrid_edu.workshop.course.sandbox.values import MAX_BYTES, MAX_INPUT, Wire, check_reply, decode, encode
 
-WORKER = ("-m", "semgrid_edu.workshop.course.sandbox.worker")
-"""The arguments with which Python is started."""
+WORKER = (sys.executable, "-m", "semgrid_edu.workshop.course.sandbox.worker")
+"""The command that starts a worker."""
 
-ALONE: tuple[str, ...] = table_beside(__file__)["alone"]
+UNSHARE: tuple[str, ...] = table_beside(__file__)["unshare"]
 """Starts a program without network that sees no other processes, and ends with this one (util-linux)."""
 
-WATCHED = 0.5
+WATCH_INTERVAL = 0.5
 """Seconds between two checks of what a process uses."""
 
-STARTED = 60.0
+START_TIMEOUT = 60.0
 """How many seconds a process may take to start."""
 
-ENDING = 5.0
+END_TIMEOUT = 5.0
 """How many seconds the system may take to end a process."""
 
-LONGEST_REPLY = 2 * MOST_BYTES
+MAX_REPLY = 2 * MAX_BYTES
 """Limit for a message without changed arguments, bytes: results, and arguments of callbacks, are shorter."""
 
-MOST_SAID = 1000
+MAX_ERROR_TEXT = 1000
 """How many characters of an error are sent back to a student's process: it may quote that process's arguments."""
 
 
@@ -63,7 +61,7 @@ class ProcessEndedError(Exception):
 
 
 class StudentProcess:
-    """A separate process for one student's code, in a fresh folder.
+    """A separate process for one student's code, in a fresh folder, in its own namespaces where the system allows it.
 
     Parameters
     ----------
@@ -73,9 +71,6 @@ class StudentProcess:
         A folder that is copied into the fresh one, with compiled functions and fonts.
     keeps : bool
         Whether what is compiled in the fresh folder is copied back at the end; for trusted code only.
-    container : tuple of str
-        A prefix that starts the worker in a container, such as ("docker", "run", ...). Without one the worker gets
-        namespaces of its own where the system allows it.
     beside : Path, optional
         A folder with a notebook and the files that were handed in with it, which are copied beside the student's code.
 
@@ -87,7 +82,7 @@ class StudentProcess:
     Attributes
     ----------
     unlimited : list of str
-        Which of `PARTS` could not be limited. A container is assumed to limit everything.
+        Which of `PARTS` could not be limited.
     """
 
     def __init__(
@@ -95,30 +90,27 @@ class StudentProcess:
         limits: Limits,
         prepared: Path | None = None,
         keeps: bool = False,
-        container: tuple[str, ...] = (),
         beside: Path | None = None,
     ) -> None:
-        self.prepared, self.keeps, self.contained, self.namespace = prepared, keeps, bool(container), ""
-        self.family: Sampled | None = None
+        self.prepared, self.keeps, self.namespace = prepared, keeps, ""
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
         if prepared is not None:
             shutil.copytree(prepared, self.folder / around.PREPARED, ignore=around.ONLY_WHOLE)
-        alone = () if container or not _can_be_alone() else ALONE
-        # A container has its own Python.
-        self.process = self._started([*container, *alone, "python" if container else sys.executable, *WORKER])
+        unshare = UNSHARE if _can_unshare() else ()
+        self.process = self._started([*unshare, *WORKER])
         self.wire = Wire(self.process.stdout, self.process.stdin)
         self.sent: queue.Queue[bytes | None] = queue.Queue()
         self.received: queue.Queue[bytes | None] = queue.Queue()
         self.speaker = threading.Thread(target=self._speak, daemon=True)
         self.speaker.start()
-        self.unlimited = self._greeted(limits, alone, container)
+        self.unlimited = self._limit(limits, bool(unshare))
         if beside is not None:
-            self.ask({"do": "beside", "files": around.files_beside(beside)}, time.monotonic() + STARTED)
+            self.ask({"do": "beside", "files": around.files_beside(beside)}, time.monotonic() + START_TIMEOUT)
         self.namespace = namespace_of(self.process.pid)
         threading.Thread(target=self._watch, args=(limits,), daemon=True).start()
 
     def _started(self, command: Sequence[str]) -> subprocess.Popen:
-        """Start the worker in a session of its own, with a pipe in each direction."""
+        """Start the worker in a new session, with a pipe in each direction."""
         return subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
@@ -129,27 +121,20 @@ class StudentProcess:
             start_new_session=True,
         )
 
-    def _greeted(self, limits: Limits, alone: tuple[str, ...], container: tuple[str, ...]) -> list[str]:
-        """Wait for the first reply; return what could not be limited."""
-        try:
-            if not container:
-                return self._limit(limits, alone)
-            self.ask({"do": "names", "wanted": []}, time.monotonic() + STARTED)
-            return []
-        except (ProcessEndedError, TimeoutError):
-            command = shlex.join(container or (sys.executable, *WORKER))
-            raise ChildProcessError(f"no Python that answers was started by: {command}") from None
-        except KeyboardInterrupt:
-            self.stop()
-            raise
-
-    def _limit(self, limits: Limits, alone: tuple[str, ...]) -> list[str]:
+    def _limit(self, limits: Limits, unshared: bool) -> list[str]:
         """Let the process limit itself; return what it couldn't limit."""
         ours = threads_of(Path("/proc").glob("[0-9]*"), os.getuid()) if hasattr(os, "getuid") else 0
         limits = replace(limits, processes=limits.processes + ours)
         message = {"do": "limit", "limits": asdict(limits), "folder": str(self.folder)}
-        done = self.ask(message, time.monotonic() + STARTED)["done"]
-        return [part for part in PARTS if part not in (*done, *(("network", "processes", "signals") if alone else ()))]
+        try:
+            done = self.ask(message, time.monotonic() + START_TIMEOUT)["done"]
+        except (ProcessEndedError, TimeoutError):
+            raise ChildProcessError(f"this command starts no Python that answers: {' '.join(WORKER)}") from None
+        except KeyboardInterrupt:
+            self.stop()
+            raise
+        done += ["network", "processes", "signals"] if unshared else []
+        return [part for part in PARTS if part not in done]
 
     def _speak(self) -> None:
         """Send and receive in a thread, so that neither a full pipe nor a silent process blocks the grader."""
@@ -162,23 +147,23 @@ class StudentProcess:
 
     def _watch(self, limits: Limits) -> None:
         """End the process if it and everything that it has started use too much together."""
-        most = memory_held(processes_in(self.namespace)) + limits.memory * MEGABYTE
+        memory = memory_held(processes_in(self.namespace)) + limits.memory * MEGABYTE
         while self.process.poll() is None:
             try:
-                too_much = self._takes_more(limits, most)
+                too_much = self._uses_too_much(limits, memory)
             except Exception:
                 too_much = True  # a process that can't be watched must not go on
             if too_much:
                 self._kill()
-            time.sleep(WATCHED)
+            time.sleep(WATCH_INTERVAL)
 
-    def _takes_more(self, limits: Limits, memory: int) -> bool:
+    def _uses_too_much(self, limits: Limits, memory: int) -> bool:
         """Return whether there are too many processes or files, or they are too large together."""
         running = processes_in(self.namespace)
         if threads_of(running) > limits.processes or memory_held(running) > memory:
             return True
         each = limits.written * MEGABYTE
-        return takes_too_much(self.folder, 3 * each - deleted_bytes(running, each))
+        return exceeds_disk_limits(self.folder, 3 * each - deleted_bytes(running, each))
 
     def _kill(self) -> None:
         """End the process, and all processes in its session and in its namespace."""
@@ -208,7 +193,7 @@ class StudentProcess:
             When the process has ended, or sends something that isn't a message.
         """
         callbacks = [] if callbacks is None else callbacks
-        data = encode(message, callbacks, MOST_INPUT)
+        data = encode(message, callbacks, MAX_INPUT)
         while True:
             reply = self._exchange(data, deadline, callbacks)
             if "callback" not in reply:
@@ -226,46 +211,30 @@ class StudentProcess:
         try:
             reply = dict(decode(received or b"", callbacks.__getitem__))
             check_reply(reply)
-            if "changed" not in reply and len(received) > LONGEST_REPLY:
+            if "changed" not in reply and len(received) > MAX_REPLY:
                 raise ValueError(f"{len(received)} bytes")
             return reply
         except (ArgumentError, TypeError, ValueError):
             self.stop()
             raise ProcessEndedError from None
 
-    def begin_measuring(self) -> bool:
-        """Reset the process's peak of memory, measured from outside; return False if the system can't measure it."""
+    def peak_memory(self) -> PeakMemory:
+        """Return a block that measures the growth of the worker's memory."""
+        outer = self.process.pid
+        if not self.namespace:
+            return PeakMemory(outer)
         try:
-            outer = self.process.pid
-            # The program that makes the namespaces has the worker as its only child.
-            self.inner = int(Path(f"/proc/{outer}/task/{outer}/children").read_text()) if self.namespace else outer
-            Path(f"/proc/{self.inner}/clear_refs").write_text("5")
-            self.held = memory_of(self.inner)["VmRSS"]
-        except (OSError, ValueError, KeyError):
-            return False
-        self.family = Sampled(self._with_children, memory_held([Path(f"/proc/{self.inner}")]) / MEGABYTE)
-        return not self.contained
-
-    def _with_children(self) -> float:
-        """Return the megabytes that the process and its descendants hold together, 0 without descendants."""
-        below = processes_below(self.inner)
-        return memory_held([Path(f"/proc/{self.inner}"), *below]) / MEGABYTE if below else 0
-
-    def megabytes(self) -> float:
-        """Return the most memory that the process has held since `begin_measuring`, beyond what it held then.
-
-        Mapped files and the memory of descendants count.
-        """
-        return max((memory_of(self.inner)["VmHWM"] - self.held) / 1000, self.family.growth())
+            # `unshare` has the worker as its only child.
+            return PeakMemory(int(Path(f"/proc/{outer}/task/{outer}/children").read_text()))
+        except (OSError, ValueError):
+            return PeakMemory(0)  # it has ended, as the next call will tell
 
     def stop(self) -> None:
         """End the process with everything that it has started, and delete its folder."""
-        if self.family:
-            self.family.ended.set()
         self.sent.put(None)
         self._kill()
         self.process.wait()
-        self._wait_for_the_last()
+        self._wait_for_descendants()
         self.speaker.join(timeout=1)
         if not self.speaker.is_alive():
             for pipe in (self.process.stdin, self.process.stdout):
@@ -275,9 +244,9 @@ class StudentProcess:
             around.keep_compiled(self.folder / around.PREPARED, self.prepared)
         delete_folder(self.folder)
 
-    def _wait_for_the_last(self) -> None:
+    def _wait_for_descendants(self) -> None:
         """Wait, at most some seconds, until the system has ended everything that the process has started."""
-        until = time.monotonic() + ENDING
+        until = time.monotonic() + END_TIMEOUT
         while not all(map(has_ended, processes_in(self.namespace))) and time.monotonic() < until:
             time.sleep(0.01)
 
@@ -287,10 +256,10 @@ def _called(callbacks: list[Callable], reply: dict) -> bytes:
     try:
         return encode({"result": callbacks[reply["callback"]](*reply["arguments"], **reply["named"])})
     except Exception as error:
-        return encode({"error": f"{type(error).__name__}: {error}"[:MOST_SAID]})
+        return encode({"error": f"{type(error).__name__}: {error}"[:MAX_ERROR_TEXT]})
 
 
 @cache
-def _can_be_alone() -> bool:
-    """Return whether this system allows a program namespaces of its own."""
-    return bool(shutil.which(ALONE[0])) and not subprocess.run([*ALONE, "true"], capture_output=True).returncode
+def _can_unshare() -> bool:
+    """Return whether this system lets a program have its own namespaces."""
+    return bool(shutil.which(UNSHARE[0])) and not subprocess.run([*UNSHARE, "true"], capture_output=True).returncode

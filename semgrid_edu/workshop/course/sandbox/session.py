@@ -11,10 +11,10 @@ import numpy as np
 from semgrid_edu.workshop.course.sandbox.process import ProcessEndedError, StudentProcess
 from semgrid_edu.workshop.course.sandbox.values import put_back
 
-ALL = 20
+TOTAL_TIME = 20
 """All cells and calls together may take this many times the time limit of a cell."""
 
-MOST_LINES = 300
+MAX_LINE = 300
 """With secret inputs, errors name no line beyond this one: a longer cell could report any number by its line."""
 
 
@@ -66,8 +66,8 @@ class Session:
         self.waiting: list[str] = []
         self.printed = ""
         self.postponed: list[Callable[[], str]] = []
-        self.closed = False
-        self.left_in_all = ALL * timeout
+        self.stopped = False
+        self.left_in_all = TOTAL_TIME * timeout
         self.begin()
 
     def begin(self) -> None:
@@ -91,8 +91,8 @@ class Session:
         try:
             reply = self._ask({"do": "run", "code": code})
         except (AnswerTimeoutError, AnswerEndedError) as error:
-            said = {"kind": type(error).__name__, "says": str(error), "line": "", "traceback": []}
-            return {"streams": {}, "shown": [], "error": said}
+            report = {"kind": type(error).__name__, "message": str(error), "line": "", "traceback": []}
+            return {"streams": {}, "shown": [], "error": report}
         self.cells.append(code)
         return reply
 
@@ -121,8 +121,8 @@ class Session:
         functions = {name: RemoteFunction(self, name, unseen) for name in reply.get("functions", []) if name in wanted}
         return {name: value for name, value in reply.get("values", {}).items() if name in wanted} | functions
 
-    def call(self, name: str, arguments: tuple, named: dict, measured: bool) -> tuple[Any, float]:
-        """Call a function of the notebook, and apply the changes that it makes to its arguments.
+    def call(self, name: str, arguments: tuple, named: dict) -> Any:
+        """Call a function of the notebook, apply the changes that it makes to its arguments, and return its result.
 
         Parameters
         ----------
@@ -130,15 +130,6 @@ class Session:
             The function.
         arguments, named : tuple, dict
             What it is called with.
-        measured : bool
-            Whether its memory is measured, which makes it slower.
-
-        Returns
-        -------
-        result : object
-            What it returns.
-        megabytes : float
-            The most memory that it held; NaN if that was not measured.
 
         Raises
         ------
@@ -146,24 +137,35 @@ class Session:
             What it raises, if that is a standard error; otherwise AnswerError, AnswerTimeoutError or AnswerEndedError.
         """
         self._catch_up()
-        inside = measured and not self._alive().begin_measuring()
-        message = {"do": "call", "name": name, "arguments": arguments, "named": named, "measured": inside}
-        reply = self._ask(message, [])
+        reply = self._ask({"do": "call", "name": name, "arguments": arguments, "named": named}, [])
         self.printed += reply.get("streams", {}).get("stdout", "")
         if "changed" in reply:
             put_back((arguments, named), reply["changed"])
-        megabytes = self._alive().megabytes() if measured and not inside else reply.get("megabytes", float("nan"))
         if "error" in reply:
             raise self._as_error(reply["error"])
-        return reply["result"], megabytes
+        return reply["result"]
+
+    def measured_call(self, name: str, arguments: tuple) -> tuple[Any, float]:
+        """Call a function of the notebook; return its result, and the growth of its memory to the peak, megabytes.
+
+        Parameters
+        ----------
+        name : str
+            The function.
+        arguments : tuple
+            What it is called with.
+        """
+        self._catch_up()
+        with self._alive().peak_memory() as peak:
+            return self.call(name, arguments, {}), peak.megabytes()
 
     def _as_error(self, error: dict[str, Any]) -> Exception:
         """Return the error that an answer raised; with secret inputs, only its line."""
         if self.secret:
-            lines = min(MOST_LINES, max((cell.count("\n") + 1 for cell in self.cells), default=0))
-            says = f"an error in line {error['number']}" if error["number"] in range(1, lines + 1) else "an error"
-            found = _standard_error(error | {"kind": "", "says": says, "line": ""})
-            found.secret = says
+            lines = min(MAX_LINE, max((cell.count("\n") + 1 for cell in self.cells), default=0))
+            message = f"an error in line {error['number']}" if error["number"] in range(1, lines + 1) else "an error"
+            found = _standard_error(error | {"kind": "", "message": message, "line": ""})
+            found.secret = message
             return found
         # A line number outside all cells was forged to smuggle out a value.
         known = any(error["line"] in cell for cell in self.cells)
@@ -179,7 +181,7 @@ class Session:
     def _ask(self, message: dict, callbacks: list[Callable] | None = None) -> dict[str, Any]:
         """Ask the process, which is started if need be; only the time of the reply counts as the student's."""
         if self.left_in_all <= 0:
-            self.ended = f"all cells together have used up their time, {ALL * self.timeout:g} s"
+            self.ended = f"all cells together have used up their time, {TOTAL_TIME * self.timeout:g} s"
             raise AnswerTimeoutError(self.ended)
         process, began = self._alive(), time.monotonic()
         try:
@@ -196,7 +198,7 @@ class Session:
 
     def _alive(self) -> StudentProcess:
         """Return the process; if there is none, start one and run the earlier cells in it."""
-        if self.closed:
+        if self.stopped:
             raise NoProcessError("a hidden test calls an answer whose output the student sees")
         if self.process is None:
             self._start_again()
@@ -216,15 +218,11 @@ class Session:
         self.begin()
 
     def stop(self) -> None:
-        """End the process."""
+        """End the process for good."""
+        self.stopped = True
         if self.process is not None:
             self.process.stop()
             self.process = None
-
-    def close(self) -> None:
-        """End the process for good."""
-        self.stop()
-        self.closed = True
 
 
 class RemoteFunction:
@@ -251,7 +249,7 @@ class RemoteFunction:
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         """Call the function; parameters and result are those of `Session.call`."""
-        return self.session.call(self.__name__, arguments, named, measured=False)[0]
+        return self.session.call(self.__name__, arguments, named)
 
     def judge_later(self, check: Callable[[], str]) -> str:
         """Postpone a check of this answer until the process whose output the student sees has ended.
@@ -270,7 +268,7 @@ class RemoteFunction:
         return ""
 
     def peak_megabytes(self, *arguments: Any) -> tuple[Any, float]:
-        """Call the function; return its result and how much memory it held, as `Session.call` does.
+        """Call the function; return its result and its peak of memory, as `Session.measured_call` does.
 
         Parameters
         ----------
@@ -281,7 +279,7 @@ class RemoteFunction:
         order = cache(np.random.default_rng().permutation)  # axes of the same length are shuffled in the same way
         arrays = (one[np.ix_(*map(order, one.shape))] if isinstance(one, np.ndarray) else one for one in arguments)
         self(*arrays)
-        return self.session.call(self.__name__, arguments, {}, measured=True)
+        return self.session.measured_call(self.__name__, arguments)
 
 
 def _standard_error(reported: dict[str, Any]) -> Exception:
@@ -289,11 +287,11 @@ def _standard_error(reported: dict[str, Any]) -> Exception:
     kind = getattr(builtins, reported["standard"], Exception)
     # A StopIteration would silently end a loop of the test.
     if not issubclass(kind, Exception) or kind is Exception or issubclass(kind, StopIteration | StopAsyncIteration):
-        kind, reported = AnswerError, reported | {"says": f"{reported['kind']}: {reported['says']}".removeprefix(": ")}
+        kind = None
     try:
-        error = kind(reported["says"])
-    except TypeError:
-        error = AnswerError(f"{reported['kind']}: {reported['says']}".removeprefix(": "))
+        error = kind(reported["message"])
+    except TypeError:  # no standard error, or one that isn't made of a message
+        error = AnswerError(f"{reported['kind']}: {reported['message']}".removeprefix(": "))
     if reported["line"]:
         error.add_note(f"in your line: {reported['line']}")
     return error

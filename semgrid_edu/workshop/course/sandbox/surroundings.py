@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.storage.files import atomic_path
-from semgrid_edu.workshop.course.sandbox.values import MOST_BYTES
+from semgrid_edu.workshop.course.sandbox.values import MAX_BYTES
 
 INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
 """The environment variables that a student's process inherits."""
@@ -61,7 +61,7 @@ def files_beside(folder: Path) -> dict[str, NDArray]:
     folder : Path
         The notebook's folder.
     """
-    found, room = {}, MOST_BYTES
+    found, room = {}, MAX_BYTES
     for path in sorted(one for one in folder.rglob("*") if one.is_file() and not one.is_symlink()):
         if path.suffix != ".ipynb" and PREPARED not in path.relative_to(folder).parts and path.stat().st_size <= room:
             found[path.relative_to(folder).as_posix()] = np.fromfile(path, np.uint8)

@@ -23,16 +23,16 @@ RECORDS: tuple[str, ...] = table_beside(__file__)["records"]
 KINDS = "?biufcUS"
 """The kinds of array that may pass, in numpy's letters: booleans, numbers and texts."""
 
-MOST_BYTES = 10_000_000
+MAX_BYTES = 10_000_000
 """Limit for all arrays of a result, bytes. It is 100 times what exercises return, as tests may broadcast results."""
 
-MOST_INPUT = 150_000_000
+MAX_INPUT = 150_000_000
 """Limit for all arrays among arguments, bytes: several frames of a drive, with images, are larger than a result."""
 
-MOST_JSON = 10_000_000
+MAX_JSON = 10_000_000
 """Limit for a message without its arrays, bytes: room for lists of half a million numbers."""
 
-MOST_KEYS = 20_000
+MAX_KEYS = 20_000
 """Limit for the entries of a set or dict: keys that are chosen to collide take quadratic time."""
 
 REPLIES: dict[str, type | tuple[type, ...]] = {
@@ -40,11 +40,10 @@ REPLIES: dict[str, type | tuple[type, ...]] = {
     **dict.fromkeys(("streams", "error", "values"), dict),
     **dict.fromkeys(("done", "functions", "shown", "traceback"), list),
     **dict.fromkeys(("callback", "number"), int),
-    "megabytes": float,
 }
 """The types of the parts of a reply, by their names; all others are texts."""
 
-LONGEST = MOST_INPUT + MOST_JSON
+MAX_MESSAGE = MAX_INPUT + MAX_JSON
 """Limit for a message that is read, bytes: changed arguments come back, images perhaps as float64."""
 
 
@@ -52,7 +51,7 @@ class NotPlainError(TypeError):
     """A value that can't be sent."""
 
 
-def encode(value: Any, callbacks: list[Callable] | None = None, most: int = MOST_BYTES) -> bytes:
+def encode(value: Any, callbacks: list[Callable] | None = None, max_bytes: int = MAX_BYTES) -> bytes:
     """Turn a value into bytes.
 
     Parameters
@@ -62,8 +61,8 @@ def encode(value: Any, callbacks: list[Callable] | None = None, most: int = MOST
         into an array (a tensor, a table, a fraction); one of `RECORDS`.
     callbacks : list of callable, optional
         Collects the functions within `value`; the other side gets their numbers. Without it no function can pass.
-    most : int
-        Bytes that all arrays together may have.
+    max_bytes : int
+        Limit for all arrays together.
 
     Raises
     ------
@@ -73,13 +72,13 @@ def encode(value: Any, callbacks: list[Callable] | None = None, most: int = MOST
     arrays: list[NDArray] = []
     tree = _tree(value, arrays, callbacks)
     head = json.dumps({"value": tree, "arrays": [[array.dtype.str, array.shape] for array in arrays]})
-    if len(head) > MOST_JSON or sum(array.nbytes for array in arrays) > most:
+    if len(head) > MAX_JSON or sum(array.nbytes for array in arrays) > max_bytes:
         raise NotPlainError("more than can be sent: is it as long as it should be, and an array rather than a list?")
     return b"".join([head.encode(), b"\n", *(array.tobytes() for array in arrays)])
 
 
 def decode(data: bytes, callback: Callable[[int], Callable] | None = None) -> Any:
-    """Turn bytes back into the value that `encode` was given; an array is a plain one, with memory of its own.
+    """Turn bytes back into the value that `encode` was given; an array is a plain one with new memory.
 
     Parameters
     ----------
@@ -95,7 +94,7 @@ def decode(data: bytes, callback: Callable[[int], Callable] | None = None) -> An
     """
     head, _, rest = data.partition(b"\n")
     try:
-        if len(head) > MOST_JSON:
+        if len(head) > MAX_JSON:
             raise ValueError(f"{len(head)} bytes of JSON")
         message = json.loads(head)
         return _value(message["value"], _arrays(message["arrays"], rest), callback)
@@ -137,8 +136,8 @@ def _tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | None) -
     for kind in (int, float, str):
         if isinstance(value, kind) and not isinstance(value, np.generic):
             return kind(value)
-    if isinstance(value, set | frozenset | dict) and len(value) > MOST_KEYS:
-        raise NotPlainError(f"a {type(value).__name__} of {len(value)} entries, more than {MOST_KEYS}")
+    if isinstance(value, set | frozenset | dict) and len(value) > MAX_KEYS:
+        raise NotPlainError(f"a {type(value).__name__} of {len(value)} entries, more than {MAX_KEYS}")
     for kind in (tuple, set, frozenset):
         if isinstance(value, kind):
             return {kind.__name__: trees(value)}
@@ -206,7 +205,7 @@ def _value(tree: Any, arrays: dict[int, NDArray], callback: Callable[[int], Call
     if kind == "record":
         return _record(content, _value(tree["fields"], arrays, callback))
     inner = _value(content, arrays, callback)
-    if kind in ("set", "frozenset", "dict") and len(inner) > MOST_KEYS:
+    if kind in ("set", "frozenset", "dict") and len(inner) > MAX_KEYS:
         raise ValueError(f"a {kind} of {len(inner)} entries")
     makers = {"tuple": tuple, "set": set, "frozenset": frozenset, "dict": dict, "scalar": lambda array: array[()]}
     return np.array(inner, dtype=object) if kind == "objects" else makers[kind](inner)
@@ -284,7 +283,7 @@ class Wire:
         """Return the next message; None if the other side has hung up, or sends something that isn't a message."""
         head = self.incoming.read(8)
         length = int.from_bytes(head, "big")
-        if len(head) < 8 or length > LONGEST:
+        if len(head) < 8 or length > MAX_MESSAGE:
             return None
         message = self.incoming.read(length)
         return message if len(message) == length else None

@@ -8,9 +8,7 @@ import linecache
 import os
 import sys
 import traceback
-import tracemalloc
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +17,18 @@ from IPython.utils.capture import RichOutput, capture_output
 from traitlets.config import Config
 
 from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_this_process
-from semgrid_edu.workshop.course.sandbox.values import MOST_INPUT, NotPlainError, Wire, decode, encode
+from semgrid_edu.workshop.course.sandbox.values import MAX_INPUT, NotPlainError, Wire, decode, encode
 
-MOST_TEXT = 20_000
+MAX_TEXT = 20_000
 """How many characters of a text are kept."""
 
 FORBIDDEN = "not allowed where answers are graded: pools of processes, the network, files outside the notebook's folder"
 """Added to the message of a PermissionError."""
 
-MOST_OUTPUTS = 1000
+MAX_OUTPUTS = 1000
 """How many of the things that a cell displays are kept."""
 
-MOST_SHOWN = 5_000_000
+MAX_SHOWN = 5_000_000
 """How many characters of what a cell displays are kept, pictures included."""
 
 
@@ -78,7 +76,7 @@ class Worker:
                 message["sent"] = data
             try:
                 # Functions among changed arguments go back by their numbers.
-                reply = encode(getattr(self, message.pop("do"))(**message), [], MOST_INPUT)
+                reply = encode(getattr(self, message.pop("do"))(**message), [], MAX_INPUT)
             except NotPlainError as error:
                 reply = encode({"error": _report(error)})
             self.wire.send(reply)
@@ -137,7 +135,7 @@ class Worker:
         functions = [name for name, value in known.items() if callable(value)]
         return {"functions": functions, "values": {n: v for n, v in known.items() if n not in functions and _passes(v)}}
 
-    def call(self, name: str, arguments: tuple, named: dict, measured: bool, sent: bytes) -> dict:
+    def call(self, name: str, arguments: tuple, named: dict, sent: bytes) -> dict:
         """Call a function; report its result or error, what it printed, and what it changed in its arguments.
 
         Parameters
@@ -146,23 +144,19 @@ class Worker:
             The function.
         arguments, named : tuple, dict
             What it is called with.
-        measured : bool
-            Whether its memory is measured.
         sent : bytes
             The message in which the arguments came.
         """
         reply: dict[str, Any] = {}
         with capture_output(display=False) as captured:
             try:
-                with _traced(measured) as megabytes:
-                    reply["result"] = self.shell.user_ns[name](*arguments, **named)
-                    reply |= {"megabytes": megabytes()} if measured else {}
+                reply["result"] = self.shell.user_ns[name](*arguments, **named)
                 encode(reply["result"])
             except BaseException as error:
                 reply = {"error": _report(error)}
         before = decode(sent, self._callback)
         given, now = (before["arguments"], before["named"]), _what_passes((arguments, named))
-        if encode(given, [], MOST_INPUT) != encode(now, [], MOST_INPUT):
+        if encode(given, [], MAX_INPUT) != encode(now, [], MAX_INPUT):
             reply["changed"] = now
         return reply | {"streams": _streams(captured)}
 
@@ -190,24 +184,13 @@ def _passes(value: Any, *options: Any) -> bool:
 
 def _what_passes(value: Any) -> Any:
     """Return a value with NaN for each part that can't be sent: NaN equals nothing, so a test sees the change."""
-    if _passes(value, [], MOST_INPUT):
+    if _passes(value, [], MAX_INPUT):
         return value
     if isinstance(value, dict):
         return dict(_what_passes(pair) for pair in value.items())
     if isinstance(value, list | tuple):
         return (list if isinstance(value, list) else tuple)(map(_what_passes, value))
     return float("nan")
-
-
-@contextmanager
-def _traced(measured: bool) -> Iterator[Callable[[], float]]:
-    """Measure memory if `measured`; yield a function that returns the most that was held so far, megabytes."""
-    if measured:
-        tracemalloc.start()
-    try:
-        yield lambda: tracemalloc.get_traced_memory()[1] / 1e6
-    finally:
-        tracemalloc.stop()
 
 
 def _streams(captured: Any) -> dict[str, str]:
@@ -217,16 +200,16 @@ def _streams(captured: Any) -> dict[str, str]:
 
 def _text(text: str) -> str:
     """Return the beginning of a text, with question marks for characters that can't be encoded."""
-    return text[:MOST_TEXT].encode("utf-8", "replace").decode()
+    return text[:MAX_TEXT].encode("utf-8", "replace").decode()
 
 
 def _shown(outputs: list[RichOutput]) -> list[dict[str, str]]:
     """Return the displayed texts and pictures, until there are too many."""
     kept, size = [], 0
-    for output in outputs[:MOST_OUTPUTS]:
+    for output in outputs[:MAX_OUTPUTS]:
         data = {kind: data for kind, data in output.data.items() if isinstance(data, str)}
         size += sum(map(len, data.values()))
-        if size > MOST_SHOWN:
+        if size > MAX_SHOWN:
             break
         kept.append(data)
     return kept
@@ -237,9 +220,9 @@ def _report(error: BaseException) -> dict[str, Any]:
     kinds = [kind.__name__ for kind in type(error).__mro__ if kind.__module__ == "builtins"]
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename.startswith("<ipython")]
     line = linecache.getline(frames[-1].filename, frames[-1].lineno).strip() if frames else ""
-    says = f"{error}: {FORBIDDEN}" if isinstance(error, PermissionError) else str(error)
-    said = {"kind": type(error).__name__, "standard": kinds[0], "says": _text(says), "line": _text(line)[:200]}
-    return said | {"number": frames[-1].lineno if frames else 0}
+    message = f"{error}: {FORBIDDEN}" if isinstance(error, PermissionError) else str(error)
+    report = {"kind": type(error).__name__, "standard": kinds[0], "message": _text(message), "line": _text(line)[:200]}
+    return report | {"number": frames[-1].lineno if frames else 0}
 
 
 def _main() -> None:

@@ -6,15 +6,17 @@ import stat
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
-MOST_FILES = 20_000
+MAX_FILES = 20_000
 """How many files and folders a process may have."""
 
-SAMPLED, LONGEST_SAMPLED = 0.01, 600.0
+SAMPLE_INTERVAL, MAX_SAMPLING = 0.01, 600.0
 """Seconds between two measurements of the memory of child processes, and for how long they are repeated."""
+
+MEGABYTE = 1_000_000
 
 
 def namespace_of(pid: int) -> str:
@@ -62,7 +64,7 @@ def processes_in(namespace: str) -> list[Path]:
 
 
 def has_ended(process: Path) -> bool:
-    """Return whether a process has ended with all its threads, so that at most a zombie is left.
+    """Return whether a process has ended with all its threads; a zombie has.
 
     Parameters
     ----------
@@ -146,29 +148,28 @@ def deleted_bytes(processes: list[Path], each: int) -> int:
     return sum(sizes.values())
 
 
-def takes_too_much(folder: Path, most: int) -> bool:
-    """Return whether the files in a folder take more bytes, are too many, or can't be listed.
+def exceeds_disk_limits(folder: Path, max_bytes: int) -> bool:
+    """Return whether the files in a folder are too large together, too many, or can't be listed.
 
     Parameters
     ----------
     folder : Path
         The folder.
-    most : int
-        Bytes of all files together.
+    max_bytes : int
+        Limit for all files together.
     """
     size, count, waiting = 0, 0, [str(folder)]
     while waiting:
         try:
             with os.scandir(waiting.pop()) as entries:
                 for entry in entries:
-                    with suppress(
-                        FileNotFoundError
-                    ):  # one that has just been deleted must not hide the others beside it
+                    # A file that has just been deleted must not hide the others beside it.
+                    with suppress(FileNotFoundError):
                         found = entry.stat(follow_symlinks=False)
                         size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
                         if stat.S_ISDIR(found.st_mode):
                             waiting.append(entry.path)
-                    if size > most or count > MOST_FILES:
+                    if size > max_bytes or count > MAX_FILES:
                         return True
         except (FileNotFoundError, NotADirectoryError):
             continue
@@ -192,29 +193,53 @@ def delete_folder(folder: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-class Sampled:
-    """Measures a number again and again, until it is asked how far it has grown.
+class PeakMemory:
+    """The growth of a process's memory to its peak, measured from outside while a `with` block runs.
+
+    Mapped files and the memory of descendants count. Only Linux can measure this; elsewhere the growth is 0.
 
     Parameters
     ----------
-    look : callable
-        () -> float.
-    first : float
-        The number before the first measurement.
+    pid : int
+        The process.
     """
 
-    def __init__(self, look: Callable[[], float], first: float) -> None:
-        self.look, self.first, self.most, self.ended = look, first, first, threading.Event()
-        self.thread = threading.Thread(target=self._sample, daemon=True)
-        self.thread.start()
+    def __init__(self, pid: int) -> None:
+        self.pid, self.ended = pid, threading.Event()
+        self.thread = threading.Thread(target=self._sample_family, daemon=True)
+        try:
+            Path(f"/proc/{pid}/clear_refs").write_text("5")  # resets the peak
+            self.held: int | None = memory_of(pid)["VmRSS"]
+        except (OSError, KeyError):
+            self.held = None
 
-    def _sample(self) -> None:
-        until = time.monotonic() + LONGEST_SAMPLED
-        while not self.ended.wait(SAMPLED) and time.monotonic() < until:
-            self.most = max(self.most, self.look())
+    def __enter__(self) -> "PeakMemory":
+        """Begin."""
+        self.first = self.largest = memory_held([Path(f"/proc/{self.pid}")])
+        if self.held is not None:
+            self.thread.start()
+        return self
 
-    def growth(self) -> float:
-        """Stop, and return by how much the largest number exceeds the first."""
+    def __exit__(self, *error: object) -> None:
+        """End."""
+        self.ended.set()
+
+    def megabytes(self) -> float:
+        """Return by how much the memory has grown at most."""
+        if self.held is None:
+            return 0.0
         self.ended.set()
         self.thread.join()
-        return max(self.most, self.look()) - self.first
+        alone = (memory_of(self.pid)["VmHWM"] - self.held) / 1000
+        return max(alone, (max(self.largest, self._family()) - self.first) / MEGABYTE)
+
+    def _sample_family(self) -> None:
+        """Measure again and again, because a child's memory has no peak that outlives it."""
+        until = time.monotonic() + MAX_SAMPLING
+        while not self.ended.wait(SAMPLE_INTERVAL) and time.monotonic() < until:
+            self.largest = max(self.largest, self._family())
+
+    def _family(self) -> int:
+        """Return the bytes that the process and its descendants hold together, 0 without descendants."""
+        below = processes_below(self.pid)
+        return memory_held([Path(f"/proc/{self.pid}"), *below]) if below else 0
