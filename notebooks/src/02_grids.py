@@ -16,7 +16,7 @@
 # **Prerequisites.** Lecture [01](01_bayes.ipynb) (update, witnesses, forks). Colliders and d-separation are explained
 # in [graphical models](deeper/graphical_models.ipynb). Logarithms.
 #
-# **Time.** 70 minutes, of which the computer needs less than one.
+# **Time.** 71 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.2, step 2, the sensor model; it builds on Moravec and Elfes (1985) and Elfes (1989).
 

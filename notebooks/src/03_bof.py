@@ -521,8 +521,7 @@ def watch(boxes_at, spec, params, scans=21, field=180):
 states = watch(world, spec, BofParams(coarse))
 
 # %% [markdown]
-# The whole filter is the two lines in the middle of `watch`. (The compiled `scan_evidence` of `semgrid_edu.fast` gives the same
-# evidence as lecture 02's, in a fraction of the time.)
+# The whole filter is the two lines in the middle of `watch`. (`fast.scan_evidence` is lecture 02's, compiled.)
 #
 # **Predict before you run.** In lecture 02 the log-odds grid left a smear behind a moving thing. Will BOF? What does it
 # believe of a cell that a box, moving for sure, has just left, *before* it looks?
@@ -607,8 +606,7 @@ street, drive = GridSpec.compact(), sample_drive()
 
 def follow(drive, world):
     """Return what BOF believes after each frame of a drive."""
-    lattice, world = VelocityLattice(max_speed=16, spacing=2), replace(world, sensor=SensorModel())
-    bof = Bof(street, BofParams(lattice, world))
+    bof = Bof(street, BofParams(VelocityLattice(16, spacing=2), replace(world, sensor=SensorModel())))
     beliefs, before = [], drive[0]
     for frame in drive:
         motion = PlanarMotion.from_poses(before.T_world_from_lidar, frame.T_world_from_lidar)

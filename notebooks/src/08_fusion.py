@@ -139,9 +139,8 @@ def shares_right():
     """Return labels of pixels and of cells, (1, h, w) and (1, H, W), and the share of each that is right, per cent."""
     with torch.inference_mode():
         pixels, cells = scores_of(learner, batch.frames.image).argmax(dim=1), grid_logits(learner, batch).argmax(dim=1)
-    right = [
-        100 * (a == b)[b != IGNORE].float().mean().item() for a, b in ((pixels, lesson.labels), (cells, lesson.truth))
-    ]
+    pairs = (pixels, lesson.labels), (cells, lesson.truth)
+    right = [100 * (a == b)[b != IGNORE].float().mean().item() for a, b in pairs]
     return pixels.numpy(), cells.numpy(), right
 
 
@@ -1021,7 +1020,6 @@ _ = interact(show, pitch=FloatSlider(value=1.0, min=-3, max=3, step=0.25, descri
 NAMES = {"segnet": "SegNet", "fcn": "FCN", "deeplab": "DeepLab v2"}
 angles, some = (-2, -1, 0, 1, 2), slice(None, None, 2)  # five of the ten frames
 looks = {name: scores_of(load_net(sample_weights(name), drive.camera), image[some]) for name in NAMES}
-usual = {name: accuracies(map_with(name, s, drive.camera, some), truth[some])[0] for name, s in looks.items()}
 
 
 def share_right(name, **angle):
@@ -1030,7 +1028,7 @@ def share_right(name, **angle):
 
 
 curves = {
-    (name, axis): [share_right(name, **{axis: angle}) if angle else usual[name] for angle in angles]
+    (name, axis): [share_right(name, **{axis: angle}) for angle in angles]
     for name in NAMES
     for axis in ("pitch", "yaw")
 }
