@@ -1044,6 +1044,7 @@ axes[0].legend(fontsize="small", loc="lower left")
 plt.show()
 
 # %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
+usual = {name: curves[name, "pitch"][angles.index(0)] for name in NAMES}
 print(f"{'semantic cells right, %':<26}" + "".join(f"{angle:>7}" for angle in angles), "degrees")
 for (name, axis), curve in curves.items():
     print(f"{NAMES[name] + ', ' + axis:<26}" + "".join(f"{value:7.0f}" for value in curve))
