@@ -281,6 +281,8 @@ def _in_columns(points: NDArray, n_columns: int) -> NDArray:
 
 def _on_ground(points: NDArray, height: float) -> float:
     """Return the fraction of returns (N, 3+) in range and near the ground, `height` metres below the LIDAR."""
+    if not len(points):
+        return 0.0
     distance = np.hypot(points[:, 0], points[:, 1])
     near = np.abs(points[:, 2] + height) < LEVEL[0] + LEVEL[1] * distance
     return float(np.mean(near & (distance < LIDAR_RANGE)))

@@ -10,7 +10,7 @@ from tiny_drive import DATE, write_tiny_dataset
 from semgrid_edu.datasets import KittiRawDrive, training_cache
 from semgrid_edu.datasets.ground_truth import TruthPolicy, lidar_truth
 from semgrid_edu.datasets.label_policies import LidarTruth
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.fast import TrainingSet, track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.workshop.flaws import NO_FLAWS, TruthFlaws
@@ -67,6 +67,14 @@ def test_seed_policy_and_flaws_decide_it(root):
     for path in root.glob("cache/train-labels-*"):
         path.unlink()
     np.testing.assert_array_equal(training(root, flawed).arrays["truth"], one)
+
+
+def test_a_damaged_file_is_named(root):
+    training(root, EXACT, "test")
+    (path,) = root.glob("cache/test-labels-*.npz")
+    path.write_bytes(path.read_bytes()[:-5])
+    with pytest.raises(DataError, match=r"labels-.*: .*delete the file to compute them again"):
+        training(root, EXACT, "test")
 
 
 def test_a_negative_seed_is_refused():

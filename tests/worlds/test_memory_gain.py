@@ -70,7 +70,7 @@ def test_counts_are_those_by_hand():
     p = np.array([[0.8, 0.5, 0.1], [0.2, 0.5, 0.9]])
     counted = count_cells(p, np.array([0, 1, 0], np.uint8))
     np.testing.assert_array_equal(counted.confusion, [[1, 1], [1, 0]])
-    unknown = np.eye(14)[[12, 0]].T + 0.1 * np.eye(14)[[3, 5]].T  # its most probable class is unknown, road
+    unknown = 0.9 * np.eye(14)[[12, 0]].T + 0.1 * np.eye(14)[[3, 5]].T  # its most probable class is unknown, road
     assert count_cells(unknown, np.array([3, 0], np.uint8)).forbidden[[3, 0], [3, 0]].tolist() == [1, 1]
     assert counted.brier == pytest.approx(2 * (0.2**2 + 0.5**2 + 0.9**2))
     cells, confidence, right = counted.by_confidence.sum(axis=1)
