@@ -112,7 +112,7 @@ class Frame:
     vehicle_returns: NDArray[np.bool_] | None = None
 
     def need_image(self) -> NDArray[np.uint8]:
-        """Return the image, (h, w, 3) uint8, RGB; raise an error when there is none, or it isn't its camera's."""
+        """Return the image, (h, w, 3) uint8, RGB; raise an error if there is none or its size isn't the camera's."""
         if self.image is None:
             raise ArgumentError("frame", "a frame with a camera image", "a frame without one")
         expected = (*self.camera.size, 3)

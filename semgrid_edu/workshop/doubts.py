@@ -17,6 +17,7 @@ from semgrid_edu.datasets.pandaset import PandasetScene
 from semgrid_edu.datasets.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
+from semgrid_edu.occupancy.sensor import edge_of_splits
 from semgrid_edu.workshop.pose_doubts import packet_doubts, path_doubts
 
 SHORT_SCAN = 0.6
@@ -262,9 +263,10 @@ def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
         hint = question
     elif on_ground < FEWEST_ON_GROUND:
         hint = f"half of them lie below z = {np.median(points[:, 2]):.3g} m"
-    if not points[:, 3].any():
-        found = "0 everywhere: beams that the vehicle's own edge splits can't be told from obstacles"
-        yield "returns of different reflectance", found
+    if not edge_of_splits(points, edge=1.0):  # the filter's own rule
+        dark = np.mean(points[:, 3] == 0)
+        found = f"0 for {dark:.0%} of them: beams that the vehicle's own edge splits can't be told from obstacles"
+        yield "returns with a reflectance", found
     in_image = project(transform_points(frame.camera.T_camera_from_lidar, points[:, :3]), frame.camera)[1]
     if hint:
         yield f"ground about {height:.3g} m below the LIDAR", f"{on_ground:.0%} of the returns near there: {hint}"

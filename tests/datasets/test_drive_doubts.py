@@ -209,7 +209,7 @@ DOUBTFUL = {
     ),
     "axes of graphics": (scans(lambda p: p[:, [1, 2, 0, 3]] * (-1, 1, -1, 1)), "does y point up"),
     "upside down": (scans(lambda p: p * (1, -1, -1, 1)), "does z point down"),
-    "no reflectance": (scans(lambda p: p * (1, 1, 1, 0)), "returns of different reflectance, found 0 everywhere"),
+    "no reflectance": (scans(lambda p: p * (1, 1, 1, 0)), "returns with a reflectance, found 0 for 100%"),
     "50 m below ground": (scans(lambda p: p - (0, 0, 50, 0)), "1.73 m below .*, found 0% .* below z = -51.7 m"),
     "all behind": (scans(lambda p: p * (-1, 1, 1, 1)), "returns ahead .*, found 0 of 700"),
     "beside the image": (scans(lambda p: p - (0, 75, 0, 0)), "returns in the image, found 0 of 700"),

@@ -117,6 +117,16 @@ class TestTrackingRun:
         np.testing.assert_array_equal(frame.camera.K, K)
         assert (len(run), frame.camera.size, frame.time) == (2, SIZE, 0.1)
 
+    def test_the_object_benchmarks_names_mean_the_same(self, tmp_path):
+        root = write_run(tmp_path)
+        before = KittiTrackingRun(root, 9)[1]
+        (path,) = root.rglob("calib/0009.txt")
+        text = path.read_text().replace("R_rect ", "R0_rect: ").replace("Tr_velo_cam ", "Tr_velo_to_cam: ")
+        path.write_text(text.replace("Tr_imu_velo ", "Tr_imu_to_velo: "))
+        after = KittiTrackingRun(root, 9)[1]
+        np.testing.assert_array_equal(after.camera.T_camera_from_lidar, before.camera.T_camera_from_lidar)
+        np.testing.assert_array_equal(after.T_world_from_lidar, before.T_world_from_lidar)
+
     def test_the_camera_stands_where_calibration_says(self, tmp_path):
         expected = CAMERA_FROM_LIDAR.copy()
         expected[0, 3] += BASELINE

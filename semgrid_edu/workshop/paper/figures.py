@@ -30,7 +30,9 @@ KEPT = ("frame", "image", "truth", "true", "network", "refined")
 class FigureRun(NetworkRun):
     """Keep images, truth and grids of a few test frames to look at, for Figures 6 and 7 (sections 4.2 and 4.4)."""
 
-    kind, steps, trial_seconds = "figure", len(SHOWN), 1.0
+    kind = "figure"
+    steps = len(SHOWN)
+    trial_seconds = 1.0
 
     def work(self, root: Path, device: str) -> None:
         """Make the grids. Parameters are those of `Run.work`."""

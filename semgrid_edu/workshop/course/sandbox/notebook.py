@@ -209,7 +209,8 @@ def _as_output(error: Exception, file: str) -> NotebookNode:
 
 def _run_seen(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -> dict[str, str]:
     """Run each cell, and the visible part of tests; return what ended the student's process, by grade_id."""
-    room, ended = MAX_OUTPUT_TEXT, {}
+    room = MAX_OUTPUT_TEXT
+    ended = {}
     for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
         cell.execution_count, tests.seen.ended = number, ""
         cell.outputs, room = _shortened(_outputs(cell, trusted, tests), room)

@@ -61,7 +61,8 @@ def files_beside(folder: Path) -> dict[str, NDArray]:
     folder : Path
         The notebook's folder.
     """
-    found, room = {}, MAX_BYTES
+    found = {}
+    room = MAX_BYTES
     for path in sorted(one for one in folder.rglob("*") if one.is_file() and not one.is_symlink()):
         if path.suffix != ".ipynb" and PREPARED not in path.relative_to(folder).parts and path.stat().st_size <= room:
             found[path.relative_to(folder).as_posix()] = np.fromfile(path, np.uint8)
