@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -36,7 +37,7 @@ def lab(browser, tmp_path):
         path = tmp_path / "settings" / "@jupyterlab" / f"{name}.jupyterlab-settings"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(values), encoding="utf-8")
-    (tmp_path / "work").mkdir()
+    shutil.copytree(LECTURE.parent / "worlds", tmp_path / "work" / "worlds")  # which the lecture imports
     nbformat.write(without_results(LECTURE), tmp_path / "work" / LECTURE.name)
     options = ["--no-browser", "--allow-root", "--expose-app-in-browser", "--ServerApp.port=0"]
     options += [f"--ServerApp.root_dir={tmp_path / 'work'}"]
