@@ -20,7 +20,7 @@ from semgrid_edu.memory.state import (
 )
 from semgrid_edu.occupancy import N_STATES, Belief, PlanarMotion, State
 from semgrid_edu.occupancy.cmcdot import motion_since
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, look_up, map_around, scroll
+from semgrid_edu.occupancy.planar_motion import look_up, map_around, scroll
 
 
 def carry_classes(
@@ -204,7 +204,7 @@ class ClassMemory:
     def __init__(self, spec: GridSpec, params: MemoryParams | None = None) -> None:
         self.spec = spec
         self.params = params or MemoryParams()
-        self.map_spec = map_around(spec, MAX_YAW)
+        self.map_spec = map_around(spec, yaw=0)
         self.state: MemoryState | None = None
         self.pose = PlanarMotion()
         self.predicted: MemoryState | None = None
@@ -244,9 +244,10 @@ class ClassMemory:
         """
         look = self.look_at(grid, belief.probability, self.spec, self.params)
         before = self._state_for(len(look.classes))
-        shift, self.pose = scroll(self.pose.then(motion), self.map_spec.cell, MAX_YAW)
+        shift, self.pose = scroll(self.pose.then(motion), self.spec.cell)
+        before = self._shifted(before, shift)
         moving, velocity = self._movers(belief)
-        self.predicted = self.carry(self._shifted(before, shift), moving, velocity, self.spec.cell, dt, self.params)
+        self.predicted = self.carry(before, moving, velocity, self.spec.cell, dt, self.params)
         self.here = self._places(self.map_spec, self.spec, self.pose)
         recalled = self.recall(self.predicted, self.here, belief.probability, look, self.params)
         on_grid = self._places(self.spec, self.map_spec, self.pose.inverse)
@@ -265,10 +266,9 @@ class ClassMemory:
 
     def _shifted(self, state: MemoryState, shift: PlanarMotion) -> MemoryState:
         """Return the memory in the map's new frame; nothing is known of the cells that come in."""
-        if shift == PlanarMotion():
-            return state
+        before, self.map_spec = self.map_spec, map_around(self.spec, self.pose.dyaw)
         planes = state.planes
-        return MemoryState(self.look_up(planes, np.zeros(len(planes), self.dtype), self.map_spec, self.map_spec, shift))
+        return MemoryState(self.look_up(planes, np.zeros(len(planes), self.dtype), before, self.map_spec, shift))
 
     def _movers(self, belief: Belief) -> tuple[NDArray, NDArray]:
         """Return P(DYNAMIC) of the map's cells, and the velocities there along the map's axes."""

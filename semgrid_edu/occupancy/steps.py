@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
@@ -31,7 +31,7 @@ NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
 """The four probabilities of a cell about which nothing is known: all UNKNOWN."""
 
 
-def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterState:
+def move(state: FilterState, spec: GridSpec, motion: PlanarMotion, to: GridSpec | None = None) -> FilterState:
     """Step 1: express the belief in a new frame.
 
     Each new cell takes the belief of the old cell that contains its centre, so a shift by whole cells is exact. Cells
@@ -43,26 +43,34 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
     state : FilterState
         The belief in the old frame, without newborn mass.
     spec : GridSpec
-        The cells, (H, W), the same in both frames.
+        The cells in the old frame, (H, W).
     motion : PlanarMotion
         Pose of the new frame in the old one, metres and radians.
+    to : GridSpec, optional
+        The cells in the new frame, (H', W'); by default those of `spec`.
     """
     check_shape("state", state.newborn, spec.shape)
-    probability = look_up(state.probability, NOTHING_KNOWN, spec, spec, motion)
+    to = to or spec
+    probability = look_up(state.probability, NOTHING_KNOWN, spec, to, motion)
     particles = transform(state.particles, motion)
-    cells = cells_of(particles.position, spec)
-    claimed = weight_in_cells(particles.weight, cells, spec.shape)
+    cells = cells_of(particles.position, to)
+    claimed = weight_in_cells(particles.weight, cells, to.shape)
     dynamic = np.minimum(claimed, 1)
     others = probability[FREE] + probability[STATIC] + probability[UNKNOWN]
     probability = probability * ratio(1 - dynamic, others)
     probability[DYNAMIC] = dynamic
     probability[UNKNOWN] += np.where(others > 0, 0, 1 - dynamic)  # no other state was possible
     weight = particles.weight * at_cells(ratio(dynamic, claimed), cells)
-    return FilterState(probability, replace(particles, weight=weight), state.newborn)
+    return FilterState(probability, replace(particles, weight=weight), np.zeros(to.shape))
 
 
 def predict(
-    state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator, driven: float = 0.0
+    state: FilterState,
+    spec: GridSpec,
+    world: WorldModel,
+    dt: float,
+    rng: np.random.Generator,
+    driven: ArrayLike = (0.0, 0.0),
 ) -> FilterState:
     """Step 2: predict how the belief changes while `dt` seconds pass without a scan.
 
@@ -87,8 +95,8 @@ def predict(
         Rates of change, how things stop, how they accelerate, and which arrivals to doubt beside walls.
     dt, rng : float, numpy.random.Generator
         Time since the previous instant, seconds, not negative; source of the particles' accelerations.
-    driven : float
-        How far the vehicle has driven along the x axis since the previous instant, metres; negative backwards.
+    driven : (2,) float
+        How far the vehicle has driven since the previous instant, along the axes of the map, metres.
     """
     check_shape("state", state.newborn, spec.shape)
     M = transition_matrix(world, dt)
@@ -104,8 +112,8 @@ def predict(
     vacated = weight_in_cells(particles.weight * moved, start, spec.shape)
     blocked = at_cells(mixed[STATIC], end)
     if world.walls is not None:
-        car_speed = driven / dt if dt > 0 else 0.0
-        blocked += world.walls.doubt(particles, end, mixed, mixed[UNKNOWN] + vacated, spec, car_speed)
+        car_velocity = ratio(np.asarray(driven, dtype=float), dt)
+        blocked += world.walls.doubt(particles, end, mixed, mixed[UNKNOWN] + vacated, spec, car_velocity)
 
     # The particles that have moved meet what their new cells hold; each is blocked with some probability.
     stays = weight_in_cells(particles.weight * ~moved, end, spec.shape)

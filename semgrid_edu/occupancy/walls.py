@@ -74,7 +74,7 @@ class Walls:
         least = self.clearing_cells * cell
         return path * np.maximum(1, ratio(np.full_like(length, least), length))
 
-    def keeps_pace(self, velocity: NDArray, car_speed: float, cell: float) -> NDArray[np.bool_]:
+    def keeps_pace(self, velocity: NDArray, car_velocity: NDArray, cell: float) -> NDArray[np.bool_]:
         """Return which things move at the car's own speed, (N,).
 
         Their velocity differs from the car's by at most the car's speed, as that of a standing thing does. And they
@@ -84,17 +84,18 @@ class Walls:
         ----------
         velocity : (N, 2) float
             Velocities along the axes of the map, m/s.
-        car_speed : float
-            Speed of the vehicle along the x axis of the map, m/s, negative backwards.
+        car_velocity : (2,) float
+            Velocity of the vehicle along the axes of the map, m/s.
         cell : float
             Side of a cell, metres.
         """
         time = self.second_look * self.clearing_time
+        car_speed = np.hypot(*car_velocity)
         if car_speed == 0 or time == 0:
             return np.zeros(len(velocity), bool)
-        difference = np.hypot(velocity[:, 0] - car_speed, velocity[:, 1])
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        return (difference <= abs(car_speed)) & (speed >= self.clearing_cells * cell / time)
+        difference = np.hypot(*(velocity - car_velocity).T)  # unlike `norm`, without overflow
+        speed = np.hypot(*velocity.T)
+        return (difference <= car_speed) & (speed >= self.clearing_cells * cell / time)
 
     def doubt(
         self,
@@ -103,7 +104,7 @@ class Walls:
         mixed: NDArray,
         unseen: NDArray,
         spec: GridSpec,
-        car_speed: float,
+        car_velocity: NDArray,
     ) -> NDArray[np.float64]:
         """Return the probability that a particle's arrival in its cell is only a wall that comes into view, (N,).
 
@@ -119,10 +120,10 @@ class Walls:
             Probability that no scan has found the cell free: P(UNKNOWN), and what has only just left the cell.
         spec : GridSpec
             The cells, (H, W).
-        car_speed : float
-            Speed of the vehicle along the x axis of the map, m/s.
+        car_velocity : (2,) float
+            Velocity of the vehicle along the axes of the map, m/s.
         """
-        keeps = self.keeps_pace(particles.velocity, car_speed, spec.cell)
+        keeps = self.keeps_pace(particles.velocity, car_velocity, spec.cell)
         before, shortly_before, ahead = (
             self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
         )

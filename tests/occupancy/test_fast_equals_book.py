@@ -109,7 +109,7 @@ def test_move(state, motion):
     states(),
     st.sampled_from([0.0, 0.04, 0.1, 1.0, 1e6]),
     st.sampled_from([WorldModel(), WorldModel(walls=None, max_acceleration=0.0), WorldModel(stop_speed=3.0), SLOW]),
-    st.sampled_from([0.0, 0.1, 10.0]),
+    st.sampled_from([(0.0, 0.0), (0.1, 0.0), (6.0, -8.0)]),
     SEEDS,
 )
 def test_predict(state, dt, world, driven, seed):
@@ -123,13 +123,13 @@ def test_predict(state, dt, world, driven, seed):
     assert ours.random() == theirs.random()
 
 
-def looks_alike(compiled: Particles, book: Particles, walls: Walls, driven: float, dt: float) -> bool:
+def looks_alike(compiled: Particles, book: Particles, walls: Walls, driven: tuple[float, float], dt: float) -> bool:
     """Say whether rounding leaves each particle's other places in the same cells, and its pace the same."""
-    speed = driven / dt if dt > 0 else 0.0
+    velocity = np.array(driven) / dt if dt > 0 else np.zeros(2)
     halt = walls.second_look * walls.clearing_time
     least = walls.clearing_cells * GRID.cell / halt if halt > 0 else np.inf
-    keeps = fast_particles.keeps_pace.py_func(*compiled.velocity.T, speed, least)
-    alike = np.array_equal(keeps, walls.keeps_pace(book.velocity, speed, GRID.cell))
+    keeps = fast_particles.keeps_pace.py_func(*compiled.velocity.T, *velocity, least)
+    alike = np.array_equal(keeps, walls.keeps_pace(book.velocity, velocity, GRID.cell))
     cells = fast_particles.cells_of(compiled.position, GRID)
     for fraction in (-1, -walls.second_look, 1):
         time = fraction * walls.clearing_time

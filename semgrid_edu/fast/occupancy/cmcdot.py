@@ -18,7 +18,7 @@ from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import cmcdot
 from semgrid_edu.occupancy.evidence import Observation, observe
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, scroll, turn_moments
+from semgrid_edu.occupancy.planar_motion import PlanarMotion, map_around, scroll, turn_moments
 from semgrid_edu.occupancy.state import OUTSIDE, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
@@ -43,7 +43,9 @@ class Cmcdot(cmcdot.Cmcdot):
 
     def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> Belief:
         """Process one scan. Parameters, result and errors are those of `Cmcdot.step`."""
-        shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
+        shift, pose = scroll(self._pose.then(motion), self.spec.cell)
+        map_spec = map_around(self.spec, pose.dyaw)
+        driven = self._pose.rotation @ (motion.dx, motion.dy)
         steps: dict[str, NDArray[np.float32]] = {}
         generator = self._rng.bit_generator.state
         try:
@@ -51,31 +53,34 @@ class Cmcdot(cmcdot.Cmcdot):
             # lock, so a thread is enough to use two cores.
             with ThreadPoolExecutor(1) as thread:
                 sensor = compiled_twin(self.params.sensor)
-                seen = thread.submit(observe, sensor, points_grid, pose, self.map_spec, self.spec)
+                seen = thread.submit(observe, sensor, points_grid, pose, map_spec, self.spec)
                 # One name for all intermediate states, so that the memory of each is freed and reused.
-                state = self._noted(steps, "move", move(self._state, self.map_spec, shift), pose)
-                state = predict(state, self.map_spec, self.params, dt, self._rng, motion.dx)
-                state = self._noted(steps, "predict", state, pose)
+                state = self._noted(steps, "move", move(self._state, self.map_spec, shift, map_spec), map_spec, pose)
+                state = predict(state, map_spec, self.params, dt, self._rng, driven)
+                state = self._noted(steps, "predict", state, map_spec, pose)
                 predicted = state.probability
-                state = update(state, self.map_spec, seen.result().on_map, self.params)
-                state = self._noted(steps, "update", state, pose)
-                state = resample(state, self.map_spec, self.params, self._rng)
-                state = self._noted(steps, "resample", state, pose)
+                state = update(state, map_spec, seen.result().on_map, self.params)
+                state = self._noted(steps, "update", state, map_spec, pose)
+                state = resample(state, map_spec, self.params, self._rng)
+                state = self._noted(steps, "resample", state, map_spec, pose)
         except BaseException:
             # `predict` has drawn already when a sensor or a resampling fails. A drive that goes on should be the same.
             self._rng.bit_generator.state = generator
             raise
         self._state = state
         self._pose = pose
-        cells = cells_of(state.particles.position, self.map_spec)
-        velocity = velocity_moments(state.particles, cells, self.map_spec.shape)
-        belief = local_belief(predicted, velocity, seen.result(), self.map_spec, self.spec, self.params)
+        self.map_spec = map_spec
+        cells = cells_of(state.particles.position, map_spec)
+        velocity = velocity_moments(state.particles, cells, map_spec.shape)
+        belief = local_belief(predicted, velocity, seen.result(), map_spec, self.spec, self.params)
         return replace(belief, steps=steps)
 
-    def _noted(self, steps: dict[str, NDArray], name: str, state: FilterState, pose: PlanarMotion) -> FilterState:
+    def _noted(
+        self, steps: dict[str, NDArray], name: str, state: FilterState, map_spec: GridSpec, pose: PlanarMotion
+    ) -> FilterState:
         """Return the state; when steps are kept, note its probabilities at the centres of the vehicle's cells."""
         if self.keep_steps:
-            steps[name] = look_up(state.probability, NOTHING_KNOWN, self.map_spec, self.spec, pose)
+            steps[name] = look_up(state.probability, NOTHING_KNOWN, map_spec, self.spec, pose)
         return state
 
 
