@@ -116,23 +116,7 @@ def unary_from_probability(probability: ArrayLike) -> NDArray[np.float64]:
     if probability.ndim == 0 or not (probability >= 0).all() or not np.allclose(probability.sum(axis=0), 1, atol=1e-3):
         raise ArgumentError("probability", "distributions along axis 0", f"an array of shape {probability.shape}")
     with np.errstate(divide="ignore"):
-        return unary_from_log_probability(np.log(probability))
-
-
-def unary_from_log_probability(log_probability: NDArray) -> NDArray:
-    """Turn the logarithm of the network's distribution, a log-soft-max, into the unary term of eq. (3).
-
-    Parameters
-    ----------
-    log_probability : (C, ...) float
-        log g, natural logarithms; -inf for an impossible class.
-
-    Returns
-    -------
-    (C, ...) float
-        phi_u = -log g, in the type of the argument.
-    """
-    return -log_probability
+        return -np.log(probability)
 
 
 def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -38,7 +38,9 @@ def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion, to: GridSpec
     return BofState(moved[1], moved[0], moved[2:], velocity, remainder)
 
 
-def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float, driven: ArrayLike = (0.0, 0.0)) -> BofState:
+def bof_predict(
+    state: BofState, spec: GridSpec, params: BofParams, dt: float, driven: ArrayLike = (0.0, 0.0)
+) -> BofState:
     """Predict: every velocity shifts its mass by its own displacement; all else is as in CMCDOT's `predict`.
 
     Some mass changes to neighbouring velocities, slow mass becomes STATIC, and the states mix by the transition matrix.

@@ -1,11 +1,11 @@
 """A frame can be read in an evening: what `run_frame` reaches without `fast` is short (docs/house.md)."""
 
 import ast
-import io
 import sys
-import tokenize
 from functools import cache
 from pathlib import Path
+
+from code_lines import code_lines
 
 import semgrid_edu
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
@@ -23,21 +23,6 @@ CHECKS = ("errors.py", "stages/checks.py", "stages/stepping.py")
 def functions(file: str) -> list[ast.FunctionDef]:
     nodes = ast.walk(ast.parse(Path(file).read_text(encoding="utf-8")))
     return [node for node in nodes if isinstance(node, ast.FunctionDef)]
-
-
-@cache
-def code_lines(file: str) -> set[int]:
-    """The numbers of the lines of a file that hold code: neither comment, docstring nor blank."""
-    form = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
-    source = Path(file).read_text(encoding="utf-8")
-    tokens = [one for one in tokenize.generate_tokens(io.StringIO(source).readline) if one.type not in form]
-    lines = {line for one in tokens for line in range(one.start[0], one.end[0] + 1)}
-    strings = [
-        node
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-    ]
-    return lines - {line for node in strings for line in range(node.lineno, node.end_lineno + 1)}
 
 
 def reached(work) -> set[tuple[str, int, int]]:
