@@ -48,7 +48,7 @@ from semgrid_edu.occupancy import (
     move, predict, resample, scan_evidence, transition_matrix, update,
 )  # fmt: skip
 from semgrid_edu.occupancy.planar_motion import scroll
-from semgrid_edu.occupancy.resampling import systematic_resample
+from semgrid_edu.occupancy.state import systematic_resample
 from semgrid_edu.occupancy.steps import initialise_unknown
 from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_01_lines import state_history

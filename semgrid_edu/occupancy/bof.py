@@ -9,12 +9,11 @@ from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState, origins, whole_cells
 from semgrid_edu.occupancy.cmcdot import local_belief
-from semgrid_edu.occupancy.evidence import Evidence, observe
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_around, scroll, shift
+from semgrid_edu.occupancy.sensor import Evidence, evidence_of, take_scan
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State, ratio, slow_down
-from semgrid_edu.occupancy.steps import mix, strike_out, update
-from semgrid_edu.occupancy.walls import Walls, free_beside_static, strike_out_wakes
-from semgrid_edu.occupancy.world import transition_matrix
+from semgrid_edu.occupancy.steps import mix, strike_out, transition_matrix, update
+from semgrid_edu.occupancy.walls import Walls, free_beside_static, strike_out_wakes, velocity_of
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -75,7 +74,7 @@ def bof_predict(
     stays = occupied.sum(axis=0, dtype=np.float64, where=~moves[:, None, None])
     vacated = going - stays
     mixed, newborn = mix(state.probability, np.zeros(spec.shape), going, M)
-    car_velocity = ratio(np.asarray(driven, dtype=float), dt)
+    car_velocity = velocity_of(driven, dt)
     blocked = _blocked(state.velocity, mixed, mixed[UNKNOWN] + vacated, spec, params.world.walls, car_velocity)
 
     # What arrives in a cell meets what the cell holds.
@@ -121,7 +120,7 @@ def _accelerated(state: BofState, k: int, params: BofParams, dt: float) -> NDArr
 
 
 def _blocked(
-    velocity: NDArray, mixed: NDArray, unseen: NDArray, spec: GridSpec, walls: Walls | None, car_velocity: NDArray
+    velocity: NDArray, mixed: NDArray, unseen: NDArray, spec: GridSpec, walls: Walls, car_velocity: NDArray
 ) -> Callable[[int], NDArray]:
     """Return a function that tells with what probability mass of velocity k can't have arrived in a cell, (H, W).
 
@@ -129,8 +128,6 @@ def _blocked(
     other way shows in each cell the value at the place where its mass is at another time.
     """
     static = mixed[STATIC]
-    if walls is None:
-        return lambda k: static
     keeps = walls.keeps_pace(velocity, car_velocity, spec.cell)
     before = origins(velocity, spec, walls)
     shortly_before = origins(velocity, spec, walls, walls.second_look)
@@ -178,11 +175,10 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
     for k in range(1, len(occupied)):
         occupied[k] = state.occupied[k] * factor + params.lattice.prior[k] * given.newborn
     probability = given.probability
-    if params.world.walls is not None:
-        left = np.zeros(spec.shape)
-        for mass, back in zip(occupied[1:], origins(state.velocity[1:], spec, params.world.walls), strict=True):
-            left += _elsewhere(mass, -back)
-        probability = strike_out_wakes(probability, left, evidence.occupied == evidence.free)
+    left = np.zeros(spec.shape)
+    for mass, back in zip(occupied[1:], origins(state.velocity[1:], spec, params.world.walls), strict=True):
+        left += _elsewhere(mass, -back)
+    probability = strike_out_wakes(probability, left, evidence.occupied == evidence.free)
     occupied[0] = probability[STATIC]
     dtype = occupied.dtype
     free = probability[FREE].astype(dtype)
@@ -258,15 +254,17 @@ class Bof:
         world = self.params.world
         shift, pose = scroll(self._pose.then(motion), self.spec.cell)
         map_spec = map_around(self.spec, pose.dyaw)
-        seen = observe(world.sensor, points_grid, pose, map_spec, self.spec)
+        scan = take_scan(world.sensor, points_grid)
+        on_map = evidence_of(scan, map_spec, pose)
+        in_grid = evidence_of(scan, self.spec, PlanarMotion())
         driven = self._pose.rotation @ (motion.dx, motion.dy)
         moved = bof_move(self._state, self.map_spec, shift, map_spec)
         predicted = bof_predict(moved, map_spec, self.params, dt, driven)
-        self._state = bof_update(predicted, map_spec, seen.on_map, self.params)
+        self._state = bof_update(predicted, map_spec, on_map, self.params)
         self._pose = pose
         self.map_spec = map_spec
         velocity = bof_velocity(self._state)
-        return local_belief(predicted.probability, velocity, seen, map_spec, self.spec, world)
+        return local_belief(predicted.probability, velocity, in_grid, pose, map_spec, self.spec, world)
 
 
 def _elsewhere(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.camera import invert_rigid
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 
@@ -54,9 +53,10 @@ class PlanarMotion:
         for name, T in (("T_world_from_before", T_world_from_before), ("T_world_from_now", T_world_from_now)):
             if np.shape(T) != (4, 4) or not np.isfinite(T).all():
                 raise ArgumentError(name, "a finite 4x4 transform", T)
-        T_before_from_now = invert_rigid(T_world_from_before) @ T_world_from_now
-        dyaw = np.arctan2(T_before_from_now[1, 0], T_before_from_now[0, 0])
-        return cls(float(T_before_from_now[0, 3]), float(T_before_from_now[1, 3]), float(dyaw))
+        axes = T_world_from_before[:3, :3]  # of the previous instant, as columns
+        dx, dy, _ = axes.T @ (T_world_from_now[:3, 3] - T_world_from_before[:3, 3])
+        ahead = axes.T @ T_world_from_now[:3, 0]
+        return cls(float(dx), float(dy), float(np.arctan2(ahead[1], ahead[0])))
 
     @property
     def rotation(self) -> NDArray[np.float64]:

@@ -31,8 +31,7 @@ from semgrid_edu.occupancy import (
     predict,
     update,
 )
-from semgrid_edu.occupancy.resampling import draw_velocities
-from semgrid_edu.occupancy.state import cells_of, weight_in_cells
+from semgrid_edu.occupancy.state import cells_of, draw_velocities, weight_in_cells
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 GRID = GridSpec(0, 3, -1, 1, 0.5)

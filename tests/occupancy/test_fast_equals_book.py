@@ -35,8 +35,7 @@ from semgrid_edu.occupancy import (
 from semgrid_edu.occupancy.cmcdot import velocity_moments
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.occupancy.polar import GroundParams, height_above_ground
-from semgrid_edu.occupancy.resampling import systematic_resample
-from semgrid_edu.occupancy.state import cells_of
+from semgrid_edu.occupancy.state import cells_of, systematic_resample
 
 GRID = GridSpec(0, 6, -2, 2, 1)
 SEEDS = st.integers(0, 10**6)
@@ -173,7 +172,7 @@ def test_systematic_resampling_draws_the_same_indices(weights, count, offset):
     assert np.array_equal(drawn, fast.systematic_resample(weights, count, offset))
 
 
-@pytest.mark.parametrize("of", [occupancy.resampling, fast], ids=["book", "fast"])
+@pytest.mark.parametrize("of", [occupancy.state, fast], ids=["book", "fast"])
 @pytest.mark.parametrize("count", [1, 5, 1000])
 def test_systematic_resampling_never_draws_a_weight_of_zero(of, count):
     """The largest offset below 1, which rounding puts on the very end of all weights."""

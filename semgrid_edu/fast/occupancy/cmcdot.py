@@ -17,8 +17,8 @@ from semgrid_edu.fast.occupancy.steps import move, predict, resample, update
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import cmcdot
-from semgrid_edu.occupancy.evidence import Observation, observe
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, map_around, scroll, turn_moments
+from semgrid_edu.occupancy.sensor import Evidence, Sensor, evidence_of, take_scan
 from semgrid_edu.occupancy.state import OUTSIDE, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
@@ -59,7 +59,7 @@ class Cmcdot(cmcdot.Cmcdot):
                 state = predict(state, map_spec, self.params, dt, self._rng, driven)
                 state = self._noted(steps, "predict", state, map_spec, pose)
                 predicted = state.probability
-                state = update(state, map_spec, seen.result().on_map, self.params)
+                state = update(state, map_spec, seen.result()[0], self.params)
                 state = self._noted(steps, "update", state, map_spec, pose)
                 state = resample(state, map_spec, self.params, self._rng)
                 state = self._noted(steps, "resample", state, map_spec, pose)
@@ -72,7 +72,7 @@ class Cmcdot(cmcdot.Cmcdot):
         self.map_spec = map_spec
         cells = cells_of(state.particles.position, map_spec)
         velocity = velocity_moments(state.particles, cells, map_spec.shape)
-        belief = local_belief(predicted, velocity, seen.result(), map_spec, self.spec, self.params)
+        belief = local_belief(predicted, velocity, seen.result()[1], pose, map_spec, self.spec, self.params)
         return replace(belief, steps=steps)
 
     def _noted(
@@ -82,6 +82,26 @@ class Cmcdot(cmcdot.Cmcdot):
         if self.keep_steps:
             steps[name] = look_up(state.probability, NOTHING_KNOWN, map_spec, self.spec, pose)
         return state
+
+
+def observe(
+    sensor: Sensor, points_grid: NDArray, pose: PlanarMotion, map_spec: GridSpec, spec: GridSpec
+) -> tuple[Evidence, Evidence]:
+    """Return what a scan tells about the cells of the map, and about those around the vehicle.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Turns the scan into evidence.
+    points_grid : (N, 3+) float
+        The scan, as for `Cmcdot.step`.
+    pose : PlanarMotion
+        Pose of the vehicle in the frame of the map, metres and radians.
+    map_spec, spec : GridSpec
+        The cells of the map, and those of the grid around the vehicle.
+    """
+    scan = take_scan(sensor, points_grid)
+    return evidence_of(scan, map_spec, pose), evidence_of(scan, spec, PlanarMotion())
 
 
 class DriveTracker(cmcdot.DriveTracker):
@@ -109,20 +129,21 @@ def track_drive(
 def local_belief(
     predicted: NDArray,
     velocity: tuple[NDArray, NDArray],
-    seen: Observation,
+    in_grid: Evidence,
+    pose: PlanarMotion,
     map_spec: GridSpec,
     spec: GridSpec,
     world: WorldModel,
 ) -> Belief:
     """Look up the map at the vehicle's cells and update them. Parameters are those of `local_belief`."""
-    here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, seen.pose)
+    here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, pose)
     prior = FilterState(here, Particles.none(), np.zeros(spec.shape, np.float32))
-    probability = update(prior, spec, seen.in_grid, world).probability
+    probability = update(prior, spec, in_grid, world).probability
     mean, covariance = velocity
     moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)])
-    moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, seen.pose)
+    moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, pose)
     moments[:, probability[State.DYNAMIC] == 0] = np.nan
-    return Belief(probability, *turn_moments(moments[:2], moments[2:].reshape(2, 2, *spec.shape), seen.pose))
+    return Belief(probability, *turn_moments(moments[:2], moments[2:].reshape(2, 2, *spec.shape), pose))
 
 
 def velocity_moments(

@@ -22,18 +22,20 @@ from semgrid_edu.fast.occupancy.particles import (
     weight_in_cells,
 )
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.resampling import (
+from semgrid_edu.occupancy.sensor import Evidence
+from semgrid_edu.occupancy.state import (
+    FilterState,
+    Particles,
     Resampling,
+    State,
     SystematicResampling,
     draw_indices,
     draw_velocities,
     equal_weights,
 )
-from semgrid_edu.occupancy.state import FilterState, Particles, State, ratio
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
-from semgrid_edu.occupancy.walls import Walls
+from semgrid_edu.occupancy.walls import Walls, velocity_of
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -76,7 +78,7 @@ def predict(
     walls = _walls_of(world)
     origin = cells_at(particles, cells, spec, -walls.clearing_time, walls.clearing_cells)
     doubt = scale_in_cells(particles.weight, origin, mixed[STATIC])
-    car_velocity = ratio(np.asarray(driven, dtype=float), dt)
+    car_velocity = velocity_of(driven, dt)
     doubt = doubt_arrivals(particles, cells, doubt, mixed, spec, walls, car_velocity)
     stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
@@ -235,9 +237,7 @@ def _single_precision(state: FilterState) -> FilterState:
 
 
 def _walls_of(world: WorldModel) -> Walls:
-    """Return the walls whose rules are compiled; without walls, the filter looks neither back nor ahead."""
-    if world.walls is None:
-        return Walls(clearing_time=0)
+    """Return the walls; only the package's own have compiled rules."""
     if type(world.walls) is not Walls:
         found = f"{type(world.walls).__name__}: semgrid_edu.occupancy runs it"
         raise ArgumentError("walls", "Walls() or None, because fast has compiled their rules", found)
