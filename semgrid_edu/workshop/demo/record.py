@@ -239,7 +239,8 @@ class Record:
             belief = result.belief
             view.images[name] = pictures.raster_uri(occupancy_colours(belief.probability))
             view.texts[name] = f"{self._whose(name)}Occupancy grid seen from above: {_states(belief.probability)}."
-            view.arrows[name] = pictures.arrows_path(self.spec, belief.probability, belief.velocity)
+            moments = belief.velocity, belief.velocity_covariance
+            view.arrows[name] = pictures.arrows_path(self.spec, belief.probability, *moments)
 
     def _whose(self, name: str) -> str:
         return f"{self.comparison.file}: " if name.startswith(YOURS) else ""
