@@ -57,8 +57,12 @@ LIKELY = 0.4
 
 It has to put at least 1.5 times as many there."""
 
+SHARP_LEVEL = (0.2, 0.01)
+"""Like `LEVEL`, but for telling mistakes apart: the true ground is sharper than a slice of the walls at that height, and
+nothing is below it."""
+
 ALIKE = 0.97
-"""Two mistakes fit alike if undoing one puts at least this part as many returns on the ground as undoing the other."""
+"""Two mistakes fit alike if undoing one makes the ground at least this part as clear as undoing the other."""
 
 NEAREST = 1.0
 """Returns closer than this don't count, metres: else a scan in kilometres, whose z is moved, would be on the ground."""
@@ -257,14 +261,16 @@ def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
         yield "returns from places around the LIDAR", "only zeros"
         return
     on_ground = _on_ground(points, height)
-    shares = {question: _on_ground(undo(points, height), height) for question, undo in MISTAKES.items()}
-    # Every second point of a scan with three columns fits six columns as well: of questions that fit alike, the first.
-    question = next(question for question, share in shares.items() if share >= ALIKE * max(shares.values()))
-    undone = shares[question]
     hint = ""
-    if undone > LIKELY > on_ground and undone > 1.5 * on_ground:
-        hint = question
-    elif on_ground < FEWEST_ON_GROUND:
+    if on_ground < LIKELY:
+        clear = {question: _ground_clarity(undo(points, height), height) for question, undo in MISTAKES.items()}
+        # Every second point of a scan with three columns fits six columns as well: of questions that fit alike, the first.
+        best = max(*clear.values(), 0.0)
+        question = next((question for question, value in clear.items() if value >= ALIKE * best), "")
+        undone = _on_ground(MISTAKES[question](points, height), height) if question else 0.0
+        if undone > LIKELY and undone > 1.5 * on_ground and best > _ground_clarity(points, height):
+            hint = question
+    if not hint and on_ground < FEWEST_ON_GROUND:
         hint = f"half of them lie below z = {np.median(points[:, 2]):.3g} m"
     if not edge_of_splits(points, edge=1.0):  # the filter's own rule
         dark = np.mean(points[:, 3] == 0)
@@ -286,8 +292,21 @@ def _in_columns(points: NDArray, n_columns: int) -> NDArray:
 
 def _on_ground(points: NDArray, height: float) -> float:
     """Return the fraction of returns (N, 3+) in range and near the ground, `height` metres below the LIDAR."""
+    return _near_and_below(points, height, LEVEL)[0]
+
+
+def _ground_clarity(points: NDArray, height: float) -> float:
+    """Return the fraction of returns on a sharp ground less the fraction below it, where nothing can be."""
+    on_ground, below = _near_and_below(points, height, SHARP_LEVEL)
+    return on_ground - below
+
+
+def _near_and_below(points: NDArray, height: float, level: tuple[float, float]) -> tuple[float, float]:
+    """Return the fractions of returns (N, 3+) in range that are near the ground, and below it."""
     if not len(points):
-        return 0.0
+        return 0.0, 0.0
     distance = np.hypot(points[:, 0], points[:, 1])
-    near = np.abs(points[:, 2] + height) < LEVEL[0] + LEVEL[1] * distance
-    return float(np.mean(near & (distance > NEAREST) & (distance < LIDAR_RANGE)))
+    in_range = (distance > NEAREST) & (distance < LIDAR_RANGE)
+    tolerance = level[0] + level[1] * distance
+    above = points[:, 2] + height
+    return float(np.mean(in_range & (np.abs(above) < tolerance))), float(np.mean(in_range & (above <= -tolerance)))
