@@ -340,7 +340,7 @@ INDEXES = (
     Row("a drive outside of the data set", TRAIN, "dataset.json: expected a frame like", frames(drive="../../x")),
     Row("a drive that isn't there, in an index", TRAIN, "0042_sync: expected a folder", frames(drive="0042")),
     Row("a frame beyond the drive", TRAIN, "the frame 7 that dataset.json lists, found", frames(frame=7)),
-    Row("a frame without labels", TRAIN, "expected image and labels of the frame 0", frames(frame=0)),
+    Row("a frame without labels", TRAIN, "expected labels of the frame 0", frames(frame=0)),
     Row(
         "labels of an unknown set",
         TRAIN,

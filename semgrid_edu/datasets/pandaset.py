@@ -5,6 +5,7 @@
 002/annotations/semseg/00.pkl.gz    002/annotations/cuboids/00.pkl.gz
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
@@ -156,7 +157,7 @@ class PandasetScene(FrameSequence):
         DataError
             When a scan has no labels, or its files are damaged.
         """
-        points, classes = self._cloud(k, before, after)
+        points, classes = self._cloud(k, before, after, partial(self._around, k, spec))
         return birdseye_votes(self._in_grid(points), classes, spec, KITTI_14)
 
     def visible(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.bool_]:
@@ -224,7 +225,15 @@ class PandasetScene(FrameSequence):
         visible = self._visible(points, classes, camera, LABEL_GRID)
         return FrameLabels(KITTI_14, image, depth, birdseye, visible, cells_in_view(camera, LABEL_GRID))
 
-    def _cloud(self, k: int, before: int = 0, after: int = 0) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    def _around(self, k: int, spec: GridSpec, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which points in the world can be in the grid of frame k; most of a window of scans can't."""
+        T_lidar_from_world = invert_rigid(self._T_world_from_lidar(k))
+        x, y = (points @ row[:3] + row[3] for row in T_lidar_from_world[:2])
+        return (x > spec.x_min - 1) & (x < spec.x_max + 1) & (y > spec.y_min - 1) & (y < spec.y_max + 1)
+
+    def _cloud(
+        self, k: int, before: int = 0, after: int = 0, wanted: Callable[[NDArray], NDArray[np.bool_]] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return the returns of a window of scans in the LIDAR frame of frame k, and their classes."""
         check_whole(before=before, after=after)
         number = self.numbers[k]
@@ -233,7 +242,7 @@ class PandasetScene(FrameSequence):
         later = [n for n in scans if n > number]
         others = earlier[max(len(earlier) - before, 0) :] + later[:after]
         now, *rest = (self._labelled_scan(n) for n in (number, *others))
-        points, classes = put_together(now, rest)
+        points, classes = put_together(now, rest, wanted)
         return transform_points(invert_rigid(self._T_world_from_lidar(k)), points), classes
 
     def _in_grid(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
