@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
 
-IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG")
 """How the names of photographs may end."""
 
 T = TypeVar("T")
@@ -97,10 +97,22 @@ def frame_numbers(folder: Path, what: str, suffixes: Sequence[str], digits: int 
     """
     numbers = sorted(numbers_in(folder, suffixes, digits))
     if not numbers:
-        raise DataError(
-            folder, f"{what} such as {0:0{digits}}{suffixes[0]}", "none" if folder.is_dir() else "no folder"
-        )
+        raise DataError(folder, f"{what} such as {0:0{digits}}{suffixes[0]}", what_is_in(folder))
     return tuple(numbers)
+
+
+def what_is_in(folder: Path) -> str:
+    """Return what is in a folder in place of what was expected, for an error.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder, whether it exists or not.
+    """
+    if not folder.is_dir():
+        return "no folder"
+    names = sorted(path.name for path in folder.iterdir())
+    return f"none, but {len(names)} others, such as {names[0]}" if names else "none"
 
 
 def photograph(folder: Path, stem: str, suffixes: Sequence[str] = IMAGE_SUFFIXES) -> Path:

@@ -180,15 +180,31 @@ def read_scan(path: Path) -> NDArray[np.float32]:
         x forward, y left, z up in the LIDAR frame (metres), and reflectance.
     """
     content = read_bytes(path)
+    start = content[:1000]
+    if start.isascii() and start.decode().replace("\n", "").replace("\r", "").replace("\t", "").isprintable():
+        raise DataError(path, "floats in binary", f"text: {start[:60].decode()!r}")
     if len(content) % 16:
-        raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
+        found = f"{len(content)} bytes, {len(content) % 16} too many{_other_format(content)}"
+        raise DataError(path, "points of 4 x 4 bytes", found)
     points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
     impossible = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
     if impossible.any():
         first = impossible.argmax()
         expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
-        raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
+        raise DataError(path, expected, f"{points[first].tolist()} at point {first}{_other_format(content)}")
     return points
+
+
+def _other_format(content: bytes) -> str:
+    """Ask whether a scan that can't be right is in another format, if it would be right in that."""
+    if content.startswith((b"\x93NUMPY", b"# .PCD", b"ply")):
+        return ": is it a file of NumPy, PCD or PLY?"
+    for question, dtype in (("do the floats have 64 bits?", "<f8"), ("are the floats big-endian?", ">f4")):
+        with np.errstate(invalid="ignore"):
+            numbers = np.frombuffer(content[: len(content) // 32 * 32], dtype)
+        if len(numbers) and (np.abs(numbers) <= LIDAR_RANGE).all() and (np.abs(numbers) > 1e-3).mean() > 0.5:
+            return f": {question}"
+    return ""
 
 
 def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int], sparse: bool = False) -> NDArray[np.uint8]:

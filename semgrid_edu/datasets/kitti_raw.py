@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
-from semgrid_edu.datasets.drive_files import IMAGE_SUFFIXES, first_sound, numbers_in, photograph
+from semgrid_edu.datasets.drive_files import IMAGE_SUFFIXES, first_sound, numbers_in, photograph, what_is_in
 from semgrid_edu.datasets.frames import FrameSequence, error_of, read_scan
 from semgrid_edu.datasets.kitti_labels import (
     KINDS,
@@ -110,7 +110,8 @@ class KittiRawDrive(FrameSequence):
         by_sensor = {name: numbers_in(self.folder / name / "data", SUFFIXES, 10) for name in self._sensors}
         recorded = set().union(*(numbers for name, numbers in by_sensor.items() if name != "oxts")) or by_sensor["oxts"]
         if not recorded:
-            raise DataError(self.folder, "frames in velodyne_points/data", "none")
+            scans = self.folder / "velodyne_points" / "data"
+            raise DataError(scans, "frames such as 0000000000.bin", what_is_in(scans))
         self._numbers = range(min(recorded), 1 + max(recorded | by_sensor["oxts"]))
 
     def __len__(self) -> int:

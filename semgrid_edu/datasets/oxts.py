@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from semgrid_edu.camera import invert_rigid, rigid_transform
 from semgrid_edu.datasets.drive_files import lines_of
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage.reading import parse_numbers, read_text
+from semgrid_edu.storage.reading import parse_numbers, read_lines, read_text
 
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{9}")
 
@@ -40,7 +40,7 @@ def read_timestamps(path: Path, n_frames: int, first: int = 0) -> NDArray[np.dat
     (n_frames,) datetime64[ns]
         NaT for an empty line, with which KITTI marks a scan that was never recorded.
     """
-    lines = read_text(path).splitlines()
+    lines = read_lines(path, n_frames)
     times = np.array([_parse(path, number, line) for number, line in enumerate(lines, 1)], dtype="datetime64[ns]")
     chosen = lines_of(path, times, range(first, first + n_frames))
     known = np.flatnonzero(~np.isnat(times))

@@ -29,7 +29,7 @@ from semgrid_edu.storage.reading import read_image
 
 CAMERAS = ("front_camera", "front_left_camera", "front_right_camera", "left_camera", "right_camera", "back_camera")
 
-SUFFIXES = (".jpg", ".jpeg", ".png")
+SUFFIXES = (".jpg", ".jpeg", ".png", ".JPG", ".JPEG", ".PNG")
 """How the names of images may end, the published way first."""
 
 IMAGE_SIZE = (1080, 1920)

@@ -281,7 +281,7 @@ class SemanticKittiSequence(FrameSequence):
         """Seconds since the first scan: one number in each line, each above the one before."""
         path = self.folder / "times.txt"
         times: list[float] = []
-        for number, line in enumerate(read_text(path).splitlines(), 1):
+        for number, line in enumerate(read_text(path).rstrip().splitlines(), 1):
             found = parse_numbers(path, line, f"the time in line {number}")
             if len(found) != 1:
                 raise DataError(path, f"one time in line {number}", repr(line))

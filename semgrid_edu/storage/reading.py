@@ -2,6 +2,7 @@
 
 import io
 import json
+from codecs import BOM_UTF8
 from pathlib import Path
 from typing import Any
 
@@ -42,12 +43,26 @@ def read_text(path: Path) -> str:
     Parameters
     ----------
     path : Path
-        The file to read: ASCII, as all of KITTI's text files are.
+        The file to read: ASCII, as all of KITTI's text files are; a byte order mark before it is ignored.
     """
     try:
-        return read_bytes(path).decode("ascii")
+        return read_bytes(path).removeprefix(BOM_UTF8).decode("ascii")
     except UnicodeDecodeError as error:
         raise DataError(path, "ASCII text", f"byte {error.object[error.start]:#x} at {error.start}") from error
+
+
+def read_lines(path: Path, n_lines: int) -> list[str]:
+    """Return the lines of a file; blank ones after the last are left out.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    n_lines : int
+        How many lines count, blank or not.
+    """
+    lines = read_text(path).splitlines()
+    return lines if any(map(str.strip, lines[n_lines:])) else lines[:n_lines]
 
 
 def read_json(path: str | Path, kind: type = dict) -> Any:
@@ -162,7 +177,7 @@ def read_image(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
     size : (int, int) or None
         Height and width that the image must have, pixels; None if any size will do.
     """
-    return read_jpeg(path, size) if path.suffix in (".jpg", ".jpeg") else read_png(path, "RGB", size)
+    return read_jpeg(path, size) if path.suffix.lower() in (".jpg", ".jpeg") else read_png(path, "RGB", size)
 
 
 def read_jpeg(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:

@@ -63,6 +63,9 @@ ALIKE = 0.97
 NEAREST = 1.0
 """Returns closer than this don't count, metres: else a scan in kilometres, whose z is moved, would be on the ground."""
 
+BRIGHTEST = 1.01
+"""Reflectances above this aren't fractions."""
+
 FEWEST_SEEN = 1e-3
 """The smallest plausible fraction of returns ahead, or in the image: 0.14 to 0.26 in KITTI and in the sample."""
 
@@ -244,7 +247,11 @@ def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
             hint = question
     if not hint and on_ground < FEWEST_ON_GROUND:
         hint = f"half of them lie below z = {np.median(points[:, 2]):.3g} m"
-    if not edge_of_splits(points, edge=1.0):  # the filter's own rule
+    strongest = np.abs(points[:, 3]).max()
+    if not hint and (strongest > BRIGHTEST or points[:, 3].min() < 0):
+        found = f"{points[:, 3].min():.3g} to {points[:, 3].max():.3g}"
+        yield "reflectances from 0 to 1", f"{found}: are they bytes?" if strongest <= 255 else found
+    if frame.vehicle_returns is None and not edge_of_splits(points, edge=1.0):  # the filter's own rule
         dark = np.mean(points[:, 3] == 0)
         found = f"0 for {dark:.0%} of them: beams that the vehicle's own edge splits can't be told from obstacles"
         yield "returns with a reflectance", found

@@ -12,6 +12,9 @@ from semgrid_edu.errors import DataError
 FASTEST = 100.0
 """Metres per second. No car drives faster."""
 
+PERIODS = (0.005, 5.0)
+"""Seconds: the shortest and the longest plausible time from one frame to the next (median)."""
+
 NEIGHBOURS = 2
 """A step is compared with this many steps before it and after it."""
 
@@ -117,6 +120,9 @@ def path_doubts(
     """
     moved, steps = _steps(poses, seconds)
     timed = np.flatnonzero(steps > 0)  # an unknown time is NaN
+    if len(timed) and not PERIODS[0] < (period := float(np.median(steps[timed]))) < PERIODS[1]:
+        expected = f"times in seconds, {PERIODS[0]} to {PERIODS[1]} apart"
+        return [str(DataError(places[0], expected, f"{period:.3g} apart (median): are they in another unit?"))]
     found = []
     for i, k in enumerate(timed):
         around = timed[max(i - NEIGHBOURS, 0) : i + NEIGHBOURS + 1]

@@ -16,6 +16,7 @@ from semgrid_edu.datasets.drive_files import first_sound, sound_frames
 from semgrid_edu.errors import DataError
 from semgrid_edu.workshop.doubts import drive_doubts
 from semgrid_edu.workshop.paper.datasets import KittiTrackingRun, SynthiaSequence
+from semgrid_edu.workshop.pose_doubts import path_doubts
 
 CLIP = 100
 """Where the clips begin."""
@@ -221,3 +222,94 @@ def test_a_packet_is_named_by_its_file(tmp_path):
     write_packet(folder / "oxts" / "data" / "0000000002.txt", np.array([4e6, 0, 0]), (0.0, 0.0, 0.0))
     doubts = drive_doubts(KittiRawDrive(tmp_path, DATE, "0001"))
     assert doubts[0].startswith(str(folder / "oxts" / "data" / "0000000002.txt"))
+
+
+def rewritten(pattern, change):
+    """Change the bytes of all files of a drive whose names fit."""
+
+    def spoil(folder):
+        for path in folder.parent.rglob(pattern):
+            path.write_bytes(change(path.read_bytes()))
+
+    return spoil
+
+
+def floats(change):
+    return rewritten("*.bin", lambda content: change(np.frombuffer(content, "<f4").reshape(-1, 4)).tobytes())
+
+
+HARMLESS = {
+    "Windows line ends": rewritten("*.txt", lambda content: content.replace(b"\n", b"\r\n")),
+    "a byte order mark": rewritten("*.txt", lambda content: b"\xef\xbb\xbf" + content),
+    "a blank line at the end": rewritten("timestamps.txt", lambda content: content + b"\n"),
+    "files of a Mac": lambda folder: (folder / "velodyne_points/data/._0000000001.bin").write_bytes(b"x"),
+    "copies": lambda folder: (folder / "velodyne_points/data/0000000001 (1).bin").write_bytes(b"x"),
+    "capital letters": lambda folder: [p.rename(p.with_suffix(".PNG")) for p in (folder / "image_02").rglob("*.png")],
+}
+
+
+@pytest.mark.parametrize("spoil", HARMLESS.values(), ids=HARMLESS)
+def test_what_does_no_harm_changes_nothing(tmp_path, spoil):
+    folder = write_tiny_drive(tmp_path, labelled=())
+    before = KittiRawDrive(tmp_path, DATE, "0001")[:]
+    spoil(folder)
+    drive = KittiRawDrive(tmp_path, DATE, "0001")
+    assert (drive.problems(), drive_doubts(drive)) == ([], [])
+    for frame, expected in zip(drive, before, strict=True):
+        np.testing.assert_array_equal(frame.points, expected.points)
+        np.testing.assert_array_equal(frame.image, expected.image)
+        np.testing.assert_array_equal(frame.T_world_from_lidar, expected.T_world_from_lidar)
+        assert frame.time == expected.time
+
+
+def test_a_run_and_a_sequence_from_windows(tmp_path, synthia):  # noqa: F811
+    write_run(tmp_path, n_frames=3)
+    before = KittiTrackingRun(tmp_path, 9)[2], SynthiaSequence(synthia, NAME)[2]
+    for path in (*(tmp_path / "training").rglob("*.txt"), *(synthia / NAME).rglob("*.txt")):
+        path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
+    path = tmp_path / "training/oxts/0009.txt"
+    path.write_bytes(path.read_bytes() + b"\r\n")
+    after = KittiTrackingRun(tmp_path, 9)[2], SynthiaSequence(synthia, NAME)[2]
+    for frame, expected in zip(after, before, strict=True):
+        np.testing.assert_array_equal(frame.T_world_from_lidar, expected.T_world_from_lidar)
+
+
+OTHER_FORMATS = {
+    "64 bits": (floats(lambda p: p.astype("<f8")), r"0000.bin: expected finite .* do the floats have 64 bits"),
+    "big-endian": (floats(lambda p: p.astype(">f4")), r"0000.bin: expected finite .* are the floats big-endian"),
+    "NumPy": (rewritten("*.bin", lambda c: b"\x93NUMPY" + c), r"0000.bin: expected points .* a file of NumPy"),
+    "text": (rewritten("*.bin", lambda c: b"1.0 2.0 3.0\n" * 700), r"0000.bin: expected floats in binary, found text: .1.0"),
+    "commas": (rewritten("00*.txt", lambda c: c.replace(b".", b",")), r"0000.txt: expected numbers"),
+    "UTF-16": (rewritten("00*.txt", lambda c: c.decode().encode("utf-16")), r"0000.txt: expected ASCII text"),
+    "names of six digits": (
+        lambda folder: [path.rename(path.with_name(path.name[4:])) for path in folder.rglob("0000*.*")],
+        r"data: expected frames such as 0000000000.bin, found none, but 3 others, such as 000000.bin",
+    ),
+}
+
+
+@pytest.mark.parametrize(("spoil", "says"), OTHER_FORMATS.values(), ids=OTHER_FORMATS)
+def test_another_format_is_named(tmp_path, spoil, says):
+    spoil(write_tiny_drive(tmp_path, labelled=()))
+    with pytest.raises(DataError, match=says):
+        KittiRawDrive(tmp_path, DATE, "0001")[:]
+
+
+@pytest.mark.parametrize(("factor", "says"), [(255, "0 to 1, found .*: are they bytes"), (-1, "from 0 to 1, found -")])
+def test_reflectances_that_are_no_fractions_are_doubted(tmp_path, factor, says):
+    floats(lambda p: (p * (1, 1, 1, factor)).astype("<f4"))(write_tiny_drive(tmp_path, labelled=()))
+    (doubt,) = drive_doubts(KittiRawDrive(tmp_path, DATE, "0001"))
+    assert re.search(says, doubt)
+
+
+@pytest.mark.parametrize("unit", [1e3, 1e9, 1e-3])
+def test_times_in_another_unit_are_doubted(unit):
+    poses = np.tile(np.eye(4), (9, 1, 1))
+    poses[:, 0, 3] = np.arange(9)
+    (doubt,) = path_doubts(poses, unit * np.arange(9) / 10, ["times"] * 9)
+    assert doubt.startswith("times: expected times in seconds")
+    assert path_doubts(poses, np.arange(9) / 10, ["times"] * 9) == []
+
+
+def test_a_depth_camera_needs_no_reflectance(synthia):  # noqa: F811
+    assert not any("reflectance" in doubt for doubt in drive_doubts(SynthiaSequence(synthia, NAME)))

@@ -40,7 +40,7 @@ from semgrid_edu.datasets.oxts import imu_pose, parse_packet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.storage.reading import read_bytes, read_image, read_text
+from semgrid_edu.storage.reading import read_bytes, read_image, read_lines
 
 TRACKING_PERIOD = 0.1
 """Seconds between frames. The benchmark has no timestamps; KITTI's LIDAR spins at 10 Hz."""
@@ -128,7 +128,7 @@ class KittiTrackingRun(FrameSequence):
     @cached_property
     def _packets(self) -> list[NDArray[np.float64]]:
         path = self._oxts_file
-        lines = lines_of(path, read_text(path).splitlines(), self.numbers)
+        lines = lines_of(path, read_lines(path, len(self)), self.numbers)
         return [parse_packet(path, line) for line in lines]
 
     def _pose(self, k: int) -> NDArray[np.float64]:
