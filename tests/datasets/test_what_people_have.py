@@ -278,7 +278,7 @@ OTHER_FORMATS = {
     "64 bits": (floats(lambda p: p.astype("<f8")), r"0000.bin: expected finite .* do the floats have 64 bits"),
     "big-endian": (floats(lambda p: p.astype(">f4")), r"0000.bin: expected finite .* are the floats big-endian"),
     "NumPy": (rewritten("*.bin", lambda c: b"\x93NUMPY" + c), r"0000.bin: expected points .* a file of NumPy"),
-    "text": (rewritten("*.bin", lambda c: b"1.0 2.0 3.0\n" * 700), r"0000.bin: expected floats in binary, found text: .1.0"),
+    "text": (rewritten("*.bin", lambda c: b"1.0 2.0 3.0\n" * 700), r"0000.bin: expected floats in binary, found text"),
     "commas": (rewritten("00*.txt", lambda c: c.replace(b".", b",")), r"0000.txt: expected numbers"),
     "UTF-16": (rewritten("00*.txt", lambda c: c.decode().encode("utf-16")), r"0000.txt: expected ASCII text"),
     "names of six digits": (
