@@ -240,6 +240,12 @@ DRIVES = (
     Row(
         "a scan of a broken number of bytes", DEMO, "0000.bin: expected points of 4 x 4", text(SCAN.format(0), "x" * 17)
     ),
+    Row(
+        "only damaged scans, to be left out",
+        f"{DEMO} --skip-damaged --frames 0:1",
+        "0000.bin: expected points of 4 x 4",
+        text(SCAN.format(0), "\0" * 17),
+    ),
     Row("a scan with NaN", DEMO, "0000.bin: expected finite coordinates", scan(NAN)),
     Row("a return at five kilometres", DEMO, "0000.bin: expected finite coordinates within 250 m", scan(FAR)),
     Row(

@@ -386,6 +386,14 @@ def test_a_missing_scan_is_a_gap(copy, k):
     assert any("pkl.gz: expected a scan, found none" in doubt for doubt in drive_doubts(scene))
 
 
+@pytest.mark.parametrize(("before", "after"), [(0, 0), (1, 0), (2, 2)])
+def test_returns_that_cannot_be_in_the_grid_are_not_missed(scene, before, after, monkeypatch):
+    truths = [scene.truth(k, SPEC, before, after) for k in range(3)]
+    monkeypatch.setattr(scene, "_around", lambda k, spec, points: np.ones(len(points), bool))
+    for k, truth in enumerate(truths):
+        np.testing.assert_array_equal(scene.truth(k, SPEC, before, after), truth)
+
+
 def test_images_may_be_png(copy):
     before = PandasetScene(copy, SCENE)[1].image
     path = copy / SCENE / "camera/front_camera/02.jpg"
