@@ -180,12 +180,12 @@ def read_scan(path: Path) -> NDArray[np.float32]:
         x forward, y left, z up in the LIDAR frame (metres), and reflectance.
     """
     content = read_bytes(path)
-    start = content[:1000]
-    if start.isascii() and start.decode().replace("\n", "").replace("\r", "").replace("\t", "").isprintable():
-        raise DataError(path, "floats in binary", f"text: {start[:60].decode()!r}")
     if len(content) % 16:
         found = f"{len(content)} bytes, {len(content) % 16} too many{_other_format(content)}"
         raise DataError(path, "points of 4 x 4 bytes", found)
+    start = content[:1000]
+    if start.isascii() and "".join(start.decode().split()).isprintable():
+        raise DataError(path, "floats in binary", f"text: {start[:60].decode()!r}")
     points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
     impossible = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
     if impossible.any():
