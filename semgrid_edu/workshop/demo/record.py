@@ -155,6 +155,10 @@ class Record:
             self._past.append((replace(package.frame, image=None, points=package.frame.points[:0]), maps["grid"]))
         self._number += 1
 
+    def leave_out(self) -> None:
+        """Count a frame that can't be read, so that the next one keeps its number."""
+        self._number += 1
+
     def milliseconds(self, prefix: str = "") -> dict[str, float]:
         """Return the median time of each stage; a median, because the first frames also load compiled code.
 
