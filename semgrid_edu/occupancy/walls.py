@@ -8,7 +8,8 @@ moving things have left out of sight. `CmcdotParams(walls=None)` is the paper's 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import maximum_filter
 
 from semgrid_edu.errors import check_fields, not_negative, types_named
 from semgrid_edu.grid import GridSpec
@@ -21,10 +22,10 @@ FREE, STATIC, DYNAMIC, UNKNOWN = State
 class Walls:
     """How far the filters look back and ahead along a path to tell a moving thing from a wall that comes into view.
 
-    *Walls.* A particle is suspect if the cell where it was `clearing_time` ago is STATIC now, and the cell where it
-    will be after `clearing_time` is not known to be free. Then its arrival in an unseen cell may be only the next piece
-    of the wall. A pedestrian who sets off also comes out of a STATIC cell, but walks into free space. And the side of a
-    long vehicle comes out of a cell where the vehicle moves.
+    *Walls.* A particle is suspect if there is something STATIC where it was `clearing_time` ago, in that cell or beside
+    it, and the cell where it will be after `clearing_time` is not known to be free. Then its arrival in an unseen cell
+    may be only the next piece of the wall. A pedestrian who sets off also comes out of a STATIC cell, but walks into
+    free space. And the side of a long vehicle comes out of a cell where the vehicle moves.
 
     *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. A particle at that speed is
     suspect if a cell on its recent path was STATIC, or if the cell ahead borders one. While the car stands, none of
@@ -74,27 +75,28 @@ class Walls:
         least = self.clearing_cells * cell
         return path * np.maximum(1, ratio(np.full_like(length, least), length))
 
-    def keeps_pace(self, velocity: NDArray, car_speed: float, cell: float) -> NDArray[np.bool_]:
+    def keeps_pace(self, velocity: NDArray, car_velocity: NDArray, cell: float) -> NDArray[np.bool_]:
         """Return which things move at the car's own speed, (N,).
 
-        Their velocity differs from the car's by at most the car's speed, as that of a standing thing does. And they
-        are fast enough to have left their cells within `second_look`. Nothing keeps pace with a car that stands.
+        |v - v_car| <= |v_car|: relative to the car they are no faster than a standing thing. And they are fast enough
+        to have left their cells within `second_look`. Nothing keeps pace with a car that stands.
 
         Parameters
         ----------
         velocity : (N, 2) float
             Velocities along the axes of the map, m/s.
-        car_speed : float
-            Speed of the vehicle along the x axis of the map, m/s, negative backwards.
+        car_velocity : (2,) float
+            Velocity of the vehicle along the axes of the map, m/s.
         cell : float
             Side of a cell, metres.
         """
         time = self.second_look * self.clearing_time
+        car_speed = np.hypot(*car_velocity)
         if car_speed == 0 or time == 0:
             return np.zeros(len(velocity), bool)
-        difference = np.hypot(velocity[:, 0] - car_speed, velocity[:, 1])
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        return (difference <= abs(car_speed)) & (speed >= self.clearing_cells * cell / time)
+        difference = np.hypot(*(velocity - car_velocity).T)  # unlike `norm`, without overflow
+        speed = np.hypot(*velocity.T)
+        return (difference <= car_speed) & (speed >= self.clearing_cells * cell / time)
 
     def doubt(
         self,
@@ -103,7 +105,8 @@ class Walls:
         mixed: NDArray,
         unseen: NDArray,
         spec: GridSpec,
-        car_speed: float,
+        driven: ArrayLike,
+        dt: float,
     ) -> NDArray[np.float64]:
         """Return the probability that a particle's arrival in its cell is only a wall that comes into view, (N,).
 
@@ -119,16 +122,19 @@ class Walls:
             Probability that no scan has found the cell free: P(UNKNOWN), and what has only just left the cell.
         spec : GridSpec
             The cells, (H, W).
-        car_speed : float
-            Speed of the vehicle along the x axis of the map, m/s.
+        driven : (2,) float
+            How far the vehicle has driven during the flight, along the axes of the map, metres.
+        dt : float
+            How long the particles have flown, seconds.
         """
-        keeps = self.keeps_pace(particles.velocity, car_speed, spec.cell)
+        keeps = self.keeps_pace(particles.velocity, velocity_of(driven, dt), spec.cell)
         before, shortly_before, ahead = (
             self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
         )
-        out_of_a_wall = at_cells(mixed[STATIC], before)
-        past_a_wall = keeps * at_cells(mixed[STATIC], shortly_before)
-        open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - keeps * at_cells(free_beside_static(mixed), ahead)
+        static = static_nearby(mixed)
+        out_of_a_wall = at_cells(static, before)
+        past_a_wall = keeps * at_cells(static, shortly_before)
+        open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - keeps * at_cells(mixed[FREE] * static, ahead)
         return np.maximum(out_of_a_wall, past_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)
 
     def clear_wakes(
@@ -158,6 +164,19 @@ class Walls:
         return np.where(then == cells, OUTSIDE, then)
 
 
+def velocity_of(driven: ArrayLike, dt: float) -> NDArray[np.float64]:
+    """Return the velocity of a vehicle that has driven so far, (2,) m/s; 0 when no time has passed.
+
+    Parameters
+    ----------
+    driven : (2,) float
+        Displacement, metres.
+    dt : float
+        Time, seconds.
+    """
+    return ratio(np.asarray(driven, dtype=float), dt)
+
+
 def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDArray[np.float64]:
     """Strike out that something stands where a moving thing has just been.
 
@@ -179,17 +198,16 @@ def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDAr
     return np.stack([posterior[FREE] + (s - static), static, posterior[DYNAMIC], posterior[UNKNOWN]])
 
 
-def free_beside_static(mixed: NDArray) -> NDArray[np.floating]:
-    """Return how much of P(FREE) borders a STATIC cell: P(FREE) times the largest P(STATIC) of the four neighbours.
+def static_nearby(mixed: NDArray) -> NDArray[np.floating]:
+    """Return the largest P(STATIC) of each cell and its eight neighbours, (H, W).
 
-    Hedges are ragged and porous, so beams pass through cells of their face. Once the car looks in from another place,
-    these cells are hit. So to something at the car's speed they are not open space.
+    A wall that crosses the grid at an angle is a staircase of cells, so a path along it also leads through the cells
+    beside them. And hedges are ragged and porous, so beams pass through cells of their face, which are hit once the car
+    looks in from another place.
 
     Parameters
     ----------
     mixed : (4, H, W) float
         The four states.
     """
-    static = np.pad(mixed[STATIC], 1)
-    beside = np.max([static[:-2, 1:-1], static[2:, 1:-1], static[1:-1, :-2], static[1:-1, 2:]], axis=0)
-    return mixed[FREE] * beside
+    return maximum_filter(mixed[STATIC], size=3, mode="constant")
