@@ -168,4 +168,4 @@ def test_a_script_without_a_main_guard_is_told_so(tmp_path):
     )
     ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
     assert ended.returncode
-    assert 'below `if __name__ == "__main__":`' in ended.stderr.splitlines()[-1]
+    assert 'outside `if __name__ == "__main__":`' in ended.stderr.splitlines()[-1]
