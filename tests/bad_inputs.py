@@ -605,28 +605,6 @@ DATA = (
         "provenance.json: .*nested too deeply",
         text("SAMPLES/one/provenance.json", DEEP),
     ),
-    Row(
-        "an excerpt over its own data set",
-        "data excerpt TINY --data TINY",
-        "TINY: expected a folder apart from the data set",
-    ),
-    Row(
-        "an excerpt inside its data set",
-        "data excerpt TINY/part --data TINY",
-        "expected a folder apart from the data set",
-    ),
-    Row(
-        "an excerpt over other results",
-        "data excerpt SAMPLES/one --data TINY",
-        "expected an empty folder, or an earlier excerpt",
-    ),
-    Row("an excerpt of too many frames", "data excerpt OUT --data TINY --frames 99", "n_frames: expected 1 to 6"),
-    Row(
-        "a real excerpt of no scene",
-        "data real-excerpt OUT --pandaset TINY --scene 002",
-        "TINY/002: expected a scene, found no scene",
-    ),
-    Row("an excerpt of no frame", "data excerpt OUT --data TINY --frames 0", "Invalid value for '--frames'"),
 )
 
 COURSE = (
@@ -807,7 +785,6 @@ REFUSED_FIRST = (
     Row(
         "ImageNet weights for U-Net", f"{TRAIN} --segmenter unet --imagenet a", "segmenter: expected one with published"
     ),
-    Row("a real excerpt of no frame", "data real-excerpt OUT --pandaset TINY --scene 002 --frames 0", "Invalid value"),
     Row("an index over another", "data index TINY --pandaset NONE", "dataset.json: expected no data set yet"),
     Row("an argument to the list of data", "data list all", "unexpected extra argument"),
 )

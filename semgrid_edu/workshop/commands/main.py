@@ -39,7 +39,9 @@ def _version(asked: bool) -> None:
 @app.callback()
 def main(
     cache: Annotated[Path | None, typer.Option(help="Where preprocessed data are kept.")] = None,
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Say which.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
 ) -> None:
     """Probabilistic bird's-eye semantic perception, taught notebook by notebook.
 
