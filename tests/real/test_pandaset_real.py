@@ -70,7 +70,7 @@ def test_more_scans_label_more_cells_and_no_moving_car_is_smeared(scene):
 
 
 def test_the_filter_does_not_miss_the_returns_that_the_excerpt_leaves_out(scene):
-    frames, spec = [scene._without_labels(k) for k in range(10)], GridSpec.paper()
+    frames, spec = [scene.without_labels(k) for k in range(10)], GridSpec.paper()
     needed = [needed_returns(frame.points_grid) for frame in frames]
     fewer = [
         replace(f, points=f.points[some], vehicle_returns=f.vehicle_returns[some])
