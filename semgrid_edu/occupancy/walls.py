@@ -22,10 +22,12 @@ FREE, STATIC, DYNAMIC, UNKNOWN = State
 class Walls:
     """How far the filters look back and ahead along a path to tell a moving thing from a wall that comes into view.
 
-    *Walls.* A particle is suspect if there is something STATIC where it was `clearing_time` ago, in that cell or beside
-    it, and the cell where it will be after `clearing_time` is not known to be free. Then its arrival in an unseen cell
-    may be only the next piece of the wall. A pedestrian who sets off also comes out of a STATIC cell, but walks into
-    free space. And the side of a long vehicle comes out of a cell where the vehicle moves.
+    *Walls.* A particle is suspect if there is something STATIC where it was `clearing_time` ago, and the cell where it
+    will be after `clearing_time` is not known to be free. Then its arrival in an unseen cell may be only the next piece
+    of the wall. Above `running_speed` the cells beside that place count, too, because a wall that crosses the grid at
+    an angle is a staircase of cells. Slower things may be people, who walk close to walls. A pedestrian who sets off
+    also comes out of a STATIC cell, but walks into free space. And the side of a long vehicle comes out of a cell where
+    the vehicle moves.
 
     *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. A particle at that speed is
     suspect if a cell on its recent path was STATIC, or if the cell ahead borders one. While the car stands, none of
@@ -43,6 +45,9 @@ class Walls:
         Number of cells by which a thing must move before it counts as having left a place. Slow things are followed
         for longer than `clearing_time`, because a thing shows in more cells than it fills: a pedestrian doesn't get
         out of two cells of 0.5 m in half a second.
+    running_speed : float
+        Speed above which a thing comes out of a wall also if it comes out of a cell beside one, m/s: faster than people
+        walk.
     second_look : float
         Fraction of `clearing_time` at which the past position of a particle at the car's speed is checked a second
         time (0.4: two LIDAR revolutions).
@@ -51,11 +56,12 @@ class Walls:
     clearing_time: float = 0.5
     clearing_cells: float = 3.0
     second_look: float = 0.4
+    running_speed: float = 3.0
 
     @types_named
     def __post_init__(self) -> None:
-        """Check that all three are numbers."""
-        names = "clearing_time", "clearing_cells", "second_look"
+        """Check that all are numbers."""
+        names = "clearing_time", "clearing_cells", "second_look", "running_speed"
         check_fields(self, "a finite number, not negative", not_negative, *names)
 
     def displacement(self, velocity: NDArray, cell: float, fraction: float = 1.0) -> NDArray[np.float64]:
@@ -132,8 +138,9 @@ class Walls:
             self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
         )
         static = static_nearby(mixed)
-        out_of_a_wall = at_cells(static, before)
-        past_a_wall = keeps * at_cells(static, shortly_before)
+        runs = np.hypot(*particles.velocity.T) > self.running_speed
+        out_of_a_wall = np.where(runs, at_cells(static, before), at_cells(mixed[STATIC], before))
+        past_a_wall = keeps * np.where(runs, at_cells(static, shortly_before), at_cells(mixed[STATIC], shortly_before))
         open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - keeps * at_cells(mixed[FREE] * static, ahead)
         return np.maximum(out_of_a_wall, past_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)
 

@@ -189,8 +189,9 @@ def doubt_arrivals(
     since = float(walls.second_look * walls.clearing_time)
     least = walls.clearing_cells * spec.cell / since if since > 0 else np.inf
     now = particles.position.ravel(), particles.velocity.ravel(), particles.weight, cells
-    fields = before, ahead, mixed[FREE], mixed[DYNAMIC], static_nearby(mixed[STATIC])
-    return _doubt_arrivals(*now, *fields, *map(float, car_velocity), float(least), since, spec.shape, *spec.corner)
+    fields = before, ahead, mixed[FREE], mixed[DYNAMIC], mixed[STATIC], static_nearby(mixed[STATIC])
+    speeds = *map(float, car_velocity), float(least), float(walls.running_speed)
+    return _doubt_arrivals(*now, *fields, *speeds, since, spec.shape, *spec.corner)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -204,9 +205,11 @@ def _doubt_arrivals(
     free,
     dynamic,
     static,
+    nearby,
     car_x,
     car_y,
     least,
+    running,
     since,
     shape,
     x_max,
@@ -216,19 +219,23 @@ def _doubt_arrivals(
     doubted = np.empty_like(weight)
     free = free.ravel()
     dynamic = dynamic.ravel()
+    nearby = nearby.ravel()
     static = static.ravel()
     for i in range(len(cells)):
         vx = velocity[2 * i]
         vy = velocity[2 * i + 1]
         keeps = keeps_pace(vx, vy, car_x, car_y, least)
-        wall = static[before[i]] if before[i] != OUTSIDE else np.float32(0)
+        runs = vx * vx + vy * vy > running * running
+        wall = np.float32(0)
+        if before[i] != OUTSIDE:
+            wall = nearby[before[i]] if runs else static[before[i]]
         if keeps:
             shortly = cell_of(xy[2 * i] - since * vx, xy[2 * i + 1] - since * vy, shape, x_max, y_max, cell)
             if shortly != OUTSIDE and shortly != cells[i]:
-                wall = max(wall, static[shortly])
+                wall = max(wall, nearby[shortly] if runs else static[shortly])
         room = np.float32(0)
         if ahead[i] != OUTSIDE:
-            beside = static[ahead[i]] if keeps else np.float32(0)
+            beside = nearby[ahead[i]] if keeps else np.float32(0)
             room = (1 - beside) * free[ahead[i]] + dynamic[ahead[i]]
         doubted[i] = weight[i] * wall * (1 - room)
     return doubted
