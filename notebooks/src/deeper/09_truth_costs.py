@@ -16,6 +16,7 @@
 
 # %% jupyter={"source_hidden": true}
 import json
+import sys
 from itertools import product
 from pathlib import Path
 
@@ -26,6 +27,8 @@ from semgrid_edu import plotting
 from semgrid_edu.workshop.scoring.score_with_interval import shown
 from semgrid_edu.workshop.paper.truth_costs import LEARNED_FROM
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
+
+sys.path.append("..")  # for worlds/, in the folder above
 from worlds.lecture_12_pictures import forest_plot
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI

@@ -20,6 +20,7 @@
 
 # %% jupyter={"source_hidden": true}
 import json
+import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -35,9 +36,11 @@ from semgrid_edu.workshop.paper.scales import SCALES, table1_runs
 from semgrid_edu.workshop.paper.score_runs import by_seed
 from semgrid_edu.workshop.scoring.grids import NETWORK
 from semgrid_edu.workshop.paper.ablations import ablated_runs
-from worlds.lecture_12_pictures import confusion_picture, draw_score, legend_entries
 from semgrid_edu.workshop.paper.published import NETWORKS
 from semgrid_edu.workshop.scoring.score_with_interval import compared, on_cells, shown
+
+sys.path.append("..")  # for worlds/, in the folder above
+from worlds.lecture_12_pictures import confusion_picture, draw_score, legend_entries
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 
