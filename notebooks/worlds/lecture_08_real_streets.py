@@ -21,7 +21,8 @@ from semgrid_edu.datasets.training_set import Mixture
 from semgrid_edu.fast import TrainingSet, build_net, load_net
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, with_mean_scores
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, load_imagenet, with_mean_scores
+from semgrid_edu.networks.imagenet import INSTALLED
 from semgrid_edu.storage.files import check_writable, sha256, table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
@@ -55,6 +56,8 @@ class WayToTrain(NamedTuple):
         The way whose image networks, one for each seed, score images together; the fusion network alone learns.
     params : TrainingParams, optional
         How to train it; None to score the initial network.
+    imagenet : bool
+        Whether the image network starts from the installed ImageNet weights.
     with_simulated : bool
         Whether every other training step uses frames of simulated streets.
     """
@@ -63,6 +66,7 @@ class WayToTrain(NamedTuple):
     start: str | None = None
     mean_of: str | None = None
     params: TrainingParams | None = None
+    imagenet: bool = False
     with_simulated: bool = False
 
 
@@ -215,6 +219,8 @@ def _train(way: WayToTrain, starts: list[Path], mixture: Mixture, folder: Path, 
     """Train a network, or go on where an interrupted run was."""
     nets = [load_net(start, mixture.camera) for start in starts]
     net = with_mean_scores(nets or [build_net(way.architecture, mixture.camera, seed)])
+    if way.imagenet:
+        load_imagenet(net.segmenter, INSTALLED)
     params = replace(way.params, batch_size=min(way.params.batch_size, *map(len, mixture.parts)))
     train(net, mixture, folder, params, seed, resume=True, fabric=fabric)
 

