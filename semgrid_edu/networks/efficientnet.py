@@ -55,8 +55,9 @@ class EfficientNet(Segmenter):
 
     The encoder is the one network here that is small enough for a CPU at its published size, so its ImageNet weights
     fit both presets. At each stride a 1x1 convolution brings the encoder's map to the pyramid's width. From the
-    coarsest map down, each is doubled in size, added to the next finer one and smoothed by a 3x3 convolution. The
-    finest map is scored, and its scores are enlarged twofold.
+    coarsest map down, each is smoothed by a 3x3 convolution, doubled in size and added to the next finer one. The sum
+    at stride 2 is scored as it is, because smoothing it would cost as much as the rest of the pyramid twice over; its
+    scores are enlarged twofold.
 
     The other Parameters are those of `Segmenter`.
 
@@ -90,15 +91,15 @@ class EfficientNet(Segmenter):
         """
         self.backbone = LiteEncoder()
         self.lateral = nn.ModuleList(nn.Conv2d(n_in, width, 1) for n_in in self.backbone.widths)
-        self.smooth = nn.ModuleList(conv_bn_relu(width, width) for _ in self.backbone.widths)
+        self.smooth = nn.ModuleList(conv_bn_relu(width, width) for _ in self.backbone.widths[1:])
         self.score = nn.Conv2d(width, n_classes, 1)
 
     def scores(self, x: Tensor) -> Tensor:
         """Return the scores. Parameters and result are those of `Segmenter.scores`."""
         maps = [lateral(found) for lateral, found in zip(self.lateral, self.backbone(x), strict=True)]
-        pyramid = self.smooth[-1](maps[-1])
-        for finer, smooth in zip(reversed(maps[:-1]), reversed(self.smooth[:-1]), strict=True):
-            pyramid = smooth(finer + enlarge(pyramid, 2, finer.shape[2:]))
+        pyramid = maps[-1]
+        for finer, smooth in zip(reversed(maps[:-1]), reversed(self.smooth), strict=True):
+            pyramid = finer + enlarge(smooth(pyramid), 2, finer.shape[2:])
         return enlarge(self.score(pyramid), 2, x.shape[2:])
 
     def imagenet_tensors(self) -> dict[str, Tensor]:
@@ -223,7 +224,9 @@ class ConvBn(nn.Module):
 
     def __init__(self, n_in: int, n_out: int, kernel: int, stride: int = 1, groups: int = 1) -> None:
         super().__init__()
-        self.conv = nn.Conv2d(n_in, n_out, kernel, stride, groups=groups, bias=False)
+        # With stride 1 the zeros are shared evenly, which needs no copy of the map.
+        padding = kernel // 2 if stride == 1 else 0
+        self.conv = nn.Conv2d(n_in, n_out, kernel, stride, padding, groups=groups, bias=False)
         self.norm = nn.BatchNorm2d(n_out, eps=1e-3, momentum=0.01)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -241,9 +244,11 @@ class ConvBn(nn.Module):
         """
         kernel = self.conv.kernel_size[0]
         stride = self.conv.stride[0]
-        rows = same_padding(x.shape[2], kernel, stride)
-        columns = same_padding(x.shape[3], kernel, stride)
-        return self.norm(self.conv(F.pad(x, (*columns, *rows))))
+        if stride > 1:
+            rows = same_padding(x.shape[2], kernel, stride)
+            columns = same_padding(x.shape[3], kernel, stride)
+            x = F.pad(x, (*columns, *rows))
+        return self.norm(self.conv(x))
 
 
 def same_padding(size: int, kernel: int, stride: int) -> tuple[int, int]:
