@@ -56,8 +56,8 @@ class EfficientNet(Segmenter):
     The encoder is the one network here that is small enough for a CPU at its published size, so its ImageNet weights
     fit both presets. At each stride a 1x1 convolution brings the encoder's map to the pyramid's width. From the
     coarsest map down, each is smoothed by a 3x3 convolution, doubled in size and added to the next finer one. The sum
-    at stride 2 is scored as it is, because smoothing it would cost as much as the rest of the pyramid twice over; its
-    scores are enlarged twofold.
+    at stride 2 is only normalised, because smoothing it would cost twice as much as the rest of the pyramid; its scores
+    are enlarged twofold.
 
     The other Parameters are those of `Segmenter`.
 
@@ -80,7 +80,7 @@ class EfficientNet(Segmenter):
     STD = (128 / 255,) * 3
 
     def build(self, n_classes: int, width: int) -> None:
-        """Make the encoder, the pyramid and the final 1x1 convolution.
+        """Make the encoder, the pyramid and the score layer.
 
         The other Parameters are those of `Segmenter.build`.
 
@@ -92,7 +92,7 @@ class EfficientNet(Segmenter):
         self.backbone = LiteEncoder()
         self.lateral = nn.ModuleList(nn.Conv2d(n_in, width, 1) for n_in in self.backbone.widths)
         self.smooth = nn.ModuleList(conv_bn_relu(width, width) for _ in self.backbone.widths[1:])
-        self.score = nn.Conv2d(width, n_classes, 1)
+        self.score = nn.Sequential(nn.BatchNorm2d(width), nn.ReLU(inplace=True), nn.Conv2d(width, n_classes, 1))
 
     def scores(self, x: Tensor) -> Tensor:
         """Return the scores. Parameters and result are those of `Segmenter.scores`."""
