@@ -133,11 +133,9 @@ def compare_real(
         When there is no such scene, it lacks a camera or labels, or a file is damaged.
     """
     fabric = open_fabric(device)
-    drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
     runs = Path(runs) / scene
-    check_writable(runs / "run")
+    views = open_views(root, scene, runs)
     streets = TrainingSet.by_camera(simulated, "train")
-    views = {camera: _frames(drive, runs) for camera, drive in drives.items()}
     found, weights, seeds = {}, {}, range(seed, seed + TABLE["seeds"])
     for split, rounds in splits(views).items():
         table, tests = _joined(_count_states(*one) for one in rounds)[STATE_TABLE], [test for _, test in rounds]
@@ -152,6 +150,21 @@ def compare_real(
     command = "python -m worlds.lecture_08_real_streets PANDASET MINIKITTI RUNS OUT"
     command += f" --scene {scene} --seed {seed} --device {device}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
+
+
+def open_views(root: str | Path, scene: str, runs: Path) -> dict[str, TrainingSet]:
+    """Open the frames of every camera, by its name.
+
+    Parameters
+    ----------
+    root, scene : path-like, str
+        As `PandasetScene` takes them.
+    runs : Path
+        Takes the arrays that are made of the frames.
+    """
+    drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
+    check_writable(runs / "run")
+    return {camera: _frames(drive, runs) for camera, drive in drives.items()}
 
 
 def splits(views: dict[str, TrainingSet]) -> dict[str, list[Round]]:
