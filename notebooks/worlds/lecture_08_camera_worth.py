@@ -232,7 +232,7 @@ def camera_worth(root: str | Path, scene: str, runs: str | Path, way: str, seed:
         scores[split] = {method: _scores(counts, method) for method in counts}
         texts[split] = {method: _as_text(by_camera) for method, by_camera in counts.items()}
     command = f"python -m worlds.lecture_08_camera_worth PANDASET RUNS OUT --scene {scene} --way {way!r} --seed {seed}"
-    return {"scores": scores, "counts": texts, "weights": weights, **made_by(command, "numpy", "torch", "sklearn")}
+    return {"scores": scores, "counts": texts, "weights": weights, **made_by(command, "numpy", "torch", "scikit-learn")}
 
 
 def _heights(drive: PandasetScene, frames: TrainingSet, folder: Path) -> NDArray:
@@ -247,16 +247,10 @@ def _heights(drive: PandasetScene, frames: TrainingSet, folder: Path) -> NDArray
 
 def _cells(parts: list[Part], heights: dict[str, NDArray]) -> Cells:
     """Put the cells of all frames of a part together."""
-    arrays = [
-        [
-            frames.arrays["occupancy"][ks],
-            heights[_camera(frames)][ks],
-            frames.arrays["truth"][ks],
-            frames.arrays["true"][ks],
-        ]
-        for frames, ks in parts
-    ]
-    return Cells(*(np.concatenate(some) for some in zip(*arrays, strict=True)))
+    o, learned, true = (
+        np.concatenate([frames.arrays[name][ks] for frames, ks in parts]) for name in ("occupancy", "truth", "true")
+    )
+    return Cells(o, np.concatenate([heights[_camera(frames)][ks] for frames, ks in parts]), learned, true)
 
 
 def _camera(frames: TrainingSet) -> str:
@@ -336,9 +330,8 @@ def camera_worth_table(result: dict[str, object]) -> str:
 
 
 def _table(split: str, methods: dict[str, dict]) -> str:
-    columns = [
-        f"{name}{suffix}" for suffix in ("", f" above the {RULE}") for name in ("pixel accuracy", "class accuracy")
-    ]
+    metrics = ("pixel accuracy", "class accuracy")
+    columns = [*metrics, *(f"{name} above the {RULE}" for name in metrics)]
     rows = [[split, *columns]]
     rows += [[method, *(shown(scores[column]) for column in columns)] for method, scores in methods.items()]
     return markdown_table(rows)
