@@ -14,7 +14,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.fast import TrainingSet, build_net, load_net
 from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks import Architecture, SemanticGridNet, build_segmenter, load_imagenet
+from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_segmenter, load_imagenet, save_net
 from semgrid_edu.networks.build import with_mean_scores
 from semgrid_edu.networks.imagenet import imagenet_file
 from semgrid_edu.networks.semantic_grid import MOST_SEGMENTERS
@@ -118,6 +118,7 @@ def train_network(
     device: str = "cpu",
     truth: LidarTruth | None = None,
     start: str | Path | Sequence[str | Path] = (),
+    half: bool = False,
 ) -> None:
     """Train a network on the split "train" of data sets; under torchrun, in all of its processes.
 
@@ -147,6 +148,8 @@ def train_network(
         A trained network of the same architecture to start from, in place of `imagenet`. Of several the image networks'
         mean scores are fused, see `with_mean_scores`; they don't learn, so there is no first stage. Without any, the
         weights are fresh.
+    half : bool
+        Whether the trained network's convolutions are written in 16 bits, see `save_net`.
 
     Raises
     ------
@@ -184,6 +187,8 @@ def train_network(
     train(net, dataset, folder, params, seed, resume, fabric)
 
     if fabric.is_global_zero:
+        if half:
+            save_net(net, folder / WEIGHTS, half=True)
         hashes = [sha256(Path(folder) / INDEX_FILE) for folder in folders]
         details = {
             "date": f"{began:%Y-%m-%d}",
@@ -202,6 +207,7 @@ def train_network(
         if truth:
             details["truth"] = asdict(truth)
         command = _command(folders, folder, description, imagenet, starts, seed, params, truth)
+        command += " --half" if half else ""
         write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)
 
 

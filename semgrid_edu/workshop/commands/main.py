@@ -121,6 +121,7 @@ def train(
     tint: Annotated[float, typer.Option(help="How far each colour of an image varies: 0.15 is 15 % either way.")] = 0.0,
     two_stage: Annotated[bool, typer.Option("--two-stage", help="Train the fusion on a fixed image network.")] = False,
     truth: Annotated[str, typer.Option(help="true, lidar, or another way, such as no-cleanup.")] = "true",
+    half: Annotated[bool, typer.Option("--half", help="Write convolutions in 16 bits, in half the space.")] = False,
     resume: Resume = False,
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
@@ -136,7 +137,7 @@ def train(
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
     choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
-    train_network(data, out, segmenter, params, seed, resume, start=start or (), **choices)
+    train_network(data, out, segmenter, params, seed, resume, start=start or (), half=half, **choices)
 
 
 @app.command()
