@@ -3,7 +3,6 @@
 The unit of an interval is a camera: the vehicle moves two metres, so the frames of one camera show the same view.
 """
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +15,6 @@ from semgrid_edu.datasets.pandaset import PandasetScene
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.fast import load_net
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, unit_image
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.files import sha256, write_json
@@ -24,8 +22,8 @@ from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training.loss import median_frequency_weights
 from semgrid_edu.training.params import TrainingParams
 from semgrid_edu.workshop.scoring.grids import crf_refinement, learned_log_g
-from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, on_cells, shown
-from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
+from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, shown
+from worlds.lecture_08_counts import Counts, add_counts, as_text, camera_of, camera_scores
 from worlds.lecture_08_heights import (
     HeightFusion,
     above_ground,
@@ -53,9 +51,6 @@ FUSIONS = {
 
 FORBIDDEN = ", unknown forbidden"
 """Ends the name of a network's map in which each cell has its best semantic class: no scored cell is unknown."""
-
-Counts = dict[str, dict[str, NDArray]]
-"""By method and camera: confusion matrices of the frames, (N, C, C), rows: labelled returns."""
 
 
 class Cells(NamedTuple):
@@ -119,7 +114,7 @@ def with_networks(learned: list[Part], tested: list[Part], cells: tuple[Cells, C
         The folder of the training run.
     """
     learned_cells, tested_cells = cells
-    maps = _network_maps(tested, run / WEIGHTS)
+    maps = network_maps(tested, run / WEIGHTS)
     seen = [_image_scores(parts, run / IMAGE_STAGE) for parts in (learned, tested)]
     features = [_features(some) for some in cells]
     maps[FOREST_WITH_IMAGE] = forest_grids(
@@ -168,8 +163,16 @@ def _image_scores(parts: list[Part], weights: Path) -> ImageScores:
     return ImageScores(torch.cat(planes), np.stack(at_returns))
 
 
-def _network_maps(parts: list[Part], weights: Path) -> dict[str, NDArray]:
-    """Return the maps of a whole network, refined too."""
+def network_maps(parts: list[Part], weights: Path) -> dict[str, NDArray]:
+    """Return the maps of a whole network, refined too.
+
+    Parameters
+    ----------
+    parts : list of Part
+        The frames.
+    weights : Path
+        The network's file.
+    """
     logs, refined = [], []
     for frames, numbers in parts:
         net: SemanticGridNet = load_net(weights, frames.camera)
@@ -216,27 +219,37 @@ def camera_worth(root: str | Path, scene: str, runs: str | Path, way: str, seed:
     """
     runs = Path(runs) / scene
     views = open_views(root, scene, runs)
-    heights = {camera: _heights(PandasetScene(root, scene, camera), one, runs) for camera, one in views.items()}
+    heights = {camera: heights_of(PandasetScene(root, scene, camera), one, runs) for camera, one in views.items()}
     scores, texts, weights = {}, {}, {}
     for split, rounds in splits(views).items():
         counts: Counts = {}
         folders = [runs / f"{split} {number}, {way}, {seed}" for number in range(len(rounds))]
         has_runs = all((folder / WEIGHTS).exists() for folder in folders)
         for folder, (learned, tested) in zip(folders, rounds, strict=True):
-            cells = _cells(learned, heights), _cells(tested, heights)
+            cells = cells_of(learned, heights), cells_of(tested, heights)
             maps = without_networks(*cells)
             if has_runs:
                 maps |= with_networks(learned, tested, cells, folder)
                 weights |= {f"{folder.name}/{file}": sha256(folder / file) for file in (IMAGE_STAGE, WEIGHTS)}
-            _add_counts(counts, tested, maps)
-        scores[split] = {method: _scores(counts, method) for method in counts}
-        texts[split] = {method: _as_text(by_camera) for method, by_camera in counts.items()}
+            add_counts(counts, tested, maps)
+        scores[split] = {method: camera_scores(counts, method, RULE) for method in counts}
+        texts[split] = {method: as_text(by_camera) for method, by_camera in counts.items()}
     command = f"python -m worlds.lecture_08_camera_worth PANDASET RUNS OUT --scene {scene} --way {way!r} --seed {seed}"
     return {"scores": scores, "counts": texts, "weights": weights, **made_by(command, "numpy", "torch", "scikit-learn")}
 
 
-def _heights(drive: PandasetScene, frames: TrainingSet, folder: Path) -> NDArray:
-    """Return the heights of all frames of a camera, which are kept in a file, because scans are slow to read."""
+def heights_of(drive: PandasetScene, frames: TrainingSet, folder: Path) -> NDArray:
+    """Return the heights of all frames of a camera, (N, 2, H, W), from `above_ground`.
+
+    They are kept in a file, because scans are slow to read.
+
+    Parameters
+    ----------
+    drive, frames : PandasetScene, TrainingSet
+        The camera's drive, and its frames from `open_frames`.
+    folder : Path
+        Takes the file.
+    """
     path = folder / f"heights, {drive.view.name}.npy"
     if not path.exists():
         scans = (drive.without_labels(k).points_grid for k in range(len(drive)))
@@ -245,77 +258,20 @@ def _heights(drive: PandasetScene, frames: TrainingSet, folder: Path) -> NDArray
     return np.load(path)
 
 
-def _cells(parts: list[Part], heights: dict[str, NDArray]) -> Cells:
-    """Put the cells of all frames of a part together."""
-    o, learned, true = (
-        np.concatenate([frames.arrays[name][ks] for frames, ks in parts]) for name in ("occupancy", "truth", "true")
-    )
-    return Cells(o, np.concatenate([heights[_camera(frames)][ks] for frames, ks in parts]), learned, true)
-
-
-def _camera(frames: TrainingSet) -> str:
-    """Return the name of the camera, which begins the name of each drive."""
-    return frames.drives[0].partition(",")[0]
-
-
-def _add_counts(counts: Counts, tested: list[Part], maps: dict[str, NDArray]) -> None:
-    """Count every map's errors, camera by camera."""
-    ends = np.cumsum([len(numbers) for _, numbers in tested])[:-1]
-    for method, grids in maps.items():
-        for (frames, numbers), called in zip(tested, np.split(grids, ends), strict=True):
-            pairs = zip(frames.arrays["true"][numbers], called, strict=True)
-            matrices = [confusion_matrix(true, one, len(KITTI_14)) for true, one in pairs]
-            counts.setdefault(method, {})[_camera(frames)] = np.stack(matrices)
-
-
-def _scores(counts: Counts, method: str) -> dict[str, object]:
-    """Return both accuracies with intervals over cameras, also less those of the height rule, and both by camera."""
-    ours, rule = (_by_camera(counts[name]) for name in (method, RULE))
-    found: dict[str, object] = {}
-    for name in ("pixel accuracy", "class accuracy"):
-        metric = METRICS[name]
-        found[name] = _named(drive_interval(ours, metric))
-        found[f"{name} above the {RULE}"] = _named(paired_interval(ours, rule, metric))
-        found[f"{name} by camera"] = {
-            camera: float(metric(matrix)) for camera, matrix in zip(counts[method], ours[0], strict=True)
-        }
-    return found | {"cells": int(ours.sum())}
-
-
-def _by_camera(matrices: dict[str, NDArray]) -> NDArray[np.int64]:
-    """Return the confusion matrices of cells with a semantic class, (1, V, C, C), a camera for each drive."""
-    return on_cells(np.stack([of_frames.sum(axis=0) for of_frames in matrices.values()])[None], "semantic", KITTI_14)
-
-
-def _named(interval: tuple[float, float, float]) -> dict[str, float]:
-    return dict(zip(("low", "mean", "high"), interval, strict=True))
-
-
-def _as_text(by_camera: dict[str, NDArray]) -> dict[str, list[str]]:
-    """Write each frame's matrix as a line: "0>3:12" are twelve cells of class 0 that are called class 3."""
-    return {camera: [" ".join(_entries(matrix)) for matrix in frames] for camera, frames in by_camera.items()}
-
-
-def _entries(matrix: NDArray) -> Iterator[str]:
-    for true, called in zip(*matrix.nonzero(), strict=True):
-        yield f"{true}>{called}:{matrix[true, called]}"
-
-
-def counts_of_text(lines: list[str]) -> NDArray[np.int64]:
-    """Return the confusion matrices of frames, (N, C, C), from their lines in the JSON file.
+def cells_of(parts: list[Part], heights: dict[str, NDArray]) -> Cells:
+    """Put the cells of all frames of a part together.
 
     Parameters
     ----------
-    lines : list of str
-        One for each frame, such as "0>0:512 0>3:12".
+    parts : list of Part
+        The frames.
+    heights : dict of str to (N, 2, H, W) float
+        From `heights_of`, by camera.
     """
-    matrices = np.zeros((len(lines), len(KITTI_14), len(KITTI_14)), np.int64)
-    for matrix, line in zip(matrices, lines, strict=True):
-        for entry in line.split():
-            cell, _, number = entry.partition(":")
-            true, _, called = cell.partition(">")
-            matrix[int(true), int(called)] = int(number)
-    return matrices
+    o, learned, true = (
+        np.concatenate([frames.arrays[name][ks] for frames, ks in parts]) for name in ("occupancy", "truth", "true")
+    )
+    return Cells(o, np.concatenate([heights[camera_of(frames)][ks] for frames, ks in parts]), learned, true)
 
 
 def camera_worth_table(result: dict[str, object]) -> str:

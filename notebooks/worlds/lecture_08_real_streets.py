@@ -164,7 +164,7 @@ def open_views(root: str | Path, scene: str, runs: Path) -> dict[str, TrainingSe
     """
     drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
     check_writable(runs / "run")
-    return {camera: _frames(drive, runs) for camera, drive in drives.items()}
+    return {camera: open_frames(drive, runs) for camera, drive in drives.items()}
 
 
 def splits(views: dict[str, TrainingSet]) -> dict[str, list[Round]]:
@@ -190,8 +190,16 @@ def splits(views: dict[str, TrainingSet]) -> dict[str, list[Round]]:
     return {LEFT_OUT: rounds, LATER: [(first, last)]}
 
 
-def _frames(drive: PandasetScene, folder: Path) -> TrainingSet:
-    """Open all frames of a camera; "true" is what the returns of each scan alone say of the cells in view."""
+def open_frames(drive: PandasetScene, folder: Path) -> TrainingSet:
+    """Open all frames of a camera; "true" is what the returns of each scan alone say of the cells in view.
+
+    Parameters
+    ----------
+    drive : PandasetScene
+        The camera's drive.
+    folder : Path
+        Takes the arrays that are made of the frames.
+    """
     root, scene, camera = drive.folder.parent, drive.folder.name, drive.view.name
     listed = tuple(LabelledFrame((scene, camera), k) for k in range(len(drive)))
     index = DatasetIndex(root, f"pandaset-{scene}", KITTI_14, {camera: listed}, PandasetScene, folder)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from worlds import lecture_08_camera_worth as worth
-from worlds.lecture_08_camera_worth import RULE, Cells, counts_of_text, without_networks
+from worlds.lecture_08_camera_worth import RULE, Cells, without_networks
+from worlds.lecture_08_counts import as_text, camera_scores, counts_of_text
 
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.occupancy import N_STATES, State
@@ -34,7 +35,7 @@ def test_each_baseline_calls_cells_by_what_it_knows():
 def test_counts_come_back_from_their_text():
     counts = np.random.default_rng(0).integers(0, 2, (3, 14, 14))
     counts[1] = 0
-    text = worth._as_text({"front_camera": counts})["front_camera"]
+    text = as_text({"front_camera": counts})["front_camera"]
     assert text[1] == ""
     assert counts_of_text(text).tolist() == counts.tolist()
     assert counts_of_text(["0>3:12"])[0, 0, 3] == 12
@@ -55,7 +56,7 @@ def _counts(rights):
 def test_the_interval_is_over_cameras_and_paired_with_the_height_rule():
     """Three cameras with 8, 5 and 8 of ten right: 0.7 on average, t(2) = 4.30 standard errors of 0.1 either way."""
     counts = {"ours": _counts([8, 5, 8]), RULE: _counts([7, 4, 7])}
-    scores = worth._scores(counts, "ours")
+    scores = camera_scores(counts, "ours", RULE)
     assert scores["cells"] == 30
     assert scores["pixel accuracy"] == pytest.approx({"low": 0.7 - 0.4303, "mean": 0.7, "high": 0.7 + 0.4303}, abs=1e-4)
     assert scores["pixel accuracy by camera"] == {"0": 0.8, "1": 0.5, "2": 0.8}
