@@ -13,18 +13,14 @@ import numpy as np
 
 
 def filters_and_simulator() -> None:
-    """Track two frames of the shipped drive, remember one, and simulate two others."""
+    """Track two frames of the shipped drive, and simulate two others."""
     from semgrid_edu.datasets.samples import sample_drive
-    from semgrid_edu.fast import ClassMemory, track_drive
+    from semgrid_edu.fast import track_drive
     from semgrid_edu.grid import GridSpec
-    from semgrid_edu.labels import KITTI_14
-    from semgrid_edu.occupancy import PlanarMotion
     from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
 
     spec, drive = GridSpec(0, 32, -8, 8, 1.0), sample_drive()
-    *_, belief = track_drive([drive[0], drive[1]], spec)
-    even = np.full((len(KITTI_14), *spec.shape), 1 / len(KITTI_14), np.float32)
-    ClassMemory(spec).advance(even, belief, PlanarMotion(), 0.1)
+    list(track_drive([drive[0], drive[1]], spec))
     with tempfile.TemporaryDirectory() as folder:
         recipe = DatasetRecipe("small", "KITTI-14", (Route("test", 2, every=2),))
         make_from_recipe(recipe, Path(folder), seed=0, workers=1)

@@ -18,9 +18,9 @@ from time import process_time
 import numpy as np
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.fast import ClassMemory, Cmcdot
+from semgrid_edu.fast import Cmcdot
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.memory import MemoryParams
+from semgrid_edu.memory import ClassMemory, MemoryParams
 from semgrid_edu.occupancy import Belief, CmcdotParams, PlanarMotion
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import versions

@@ -30,7 +30,7 @@ _NAMES = {
     "networks": ("Architecture", "SemanticGridNet", "build_net", "build_segmenter", "load_net", "save_net"),
     "crf": (
         *("CrfParams", "energy", "exact_marginals", "free_energy", "mean_field", "mean_field_naive"),
-        *("most_likely", "unary_from_log_probability"),
+        "most_likely",
     ),
     "memory": ("ClassMemory", "MemoryParams", "remember_drive"),
     "graphical": (

@@ -13,15 +13,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from semgrid_edu.crf import CrfParams
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame, resize_image
 from semgrid_edu.memory import MemoryParams, View
-from semgrid_edu.networks import SemanticGridNet, unit_image
+from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import Belief, CmcdotParams
 from semgrid_edu.stages import REMEMBER, STAGES, StageError, Stages
 
@@ -88,9 +86,10 @@ def run_frame(frame: Frame, stages: Stages) -> FrameResult:
     Raises
     ------
     ArgumentError
-        When the frame has no image.
+        When a stage was left out or is a generator, or the frame has no image.
     """
-    image = network_image(frame, stages.image_size).numpy()
+    stages.need_ready()
+    image = network_image(frame, stages.image_size)
     clock = Stopwatch()
 
     # l -> o: a Bayes filter turns the LIDAR scans so far into an occupancy grid (section 3.2).
@@ -176,7 +175,7 @@ def run_pipeline(
         yield run_frame(frame, running)
 
 
-def network_image(frame: Frame, size: tuple[int, int]) -> Tensor:
+def network_image(frame: Frame, size: tuple[int, int]) -> NDArray[np.float32]:
     """Turn a frame's image into what a network takes.
 
     Parameters
@@ -196,7 +195,7 @@ def network_image(frame: Frame, size: tuple[int, int]) -> Tensor:
     ArgumentError
         When the frame has no image.
     """
-    return unit_image(torch.tensor(resize_image(frame.need_image(), size)).permute(2, 0, 1))
+    return resize_image(frame.need_image(), size).transpose(2, 0, 1) / np.float32(255)
 
 
 class Stopwatch:

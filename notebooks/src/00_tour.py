@@ -49,7 +49,8 @@ from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.planes import sample_planes_naive
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, class_legend, colour_patches
-from semgrid_edu.workshop.demo import cell_story, draw_cell_story
+from semgrid_edu.workshop.demo import cell_story
+from worlds.lecture_00_cell_story import draw_cell_story
 from worlds.lecture_00_equations import equation_table
 from worlds.lecture_00_ledger import ledger, ledger_table, stage_table
 from worlds.lecture_00_system import whole_system

@@ -48,7 +48,7 @@ from semgrid_edu.occupancy import (
     move, predict, resample, scan_evidence, transition_matrix, update,
 )  # fmt: skip
 from semgrid_edu.occupancy.planar_motion import scroll
-from semgrid_edu.occupancy.resampling import systematic_resample
+from semgrid_edu.occupancy.state import systematic_resample
 from semgrid_edu.occupancy.steps import initialise_unknown
 from worlds.lecture_00_ledger import ledger, ledger_table
 from worlds.lecture_01_lines import state_history
@@ -258,10 +258,10 @@ def filter_drive(frames, rng):
     state, pose = FilterState.unknown(spec), PlanarMotion()
     for last, now in pairwise([frames[0], *frames]):
         motion = PlanarMotion.from_poses(last.T_world_from_lidar, now.T_world_from_lidar)
-        shift, pose = scroll(pose.then(motion), spec.cell, max_yaw=0.1)
+        shift, pose = scroll(pose.then(motion), spec.cell)
         evidence = scan_evidence(now.points_grid, spec, params.sensor, pose)
         moved = move(state, spec, shift)  # 1
-        predicted = predict(moved, spec, params, now.time - last.time, rng, motion.dx)  # 2
+        predicted = predict(moved, spec, params, now.time - last.time, rng, (motion.dx, 0.0))  # 2
         updated = update(predicted, spec, evidence, params)  # 3
         resampled = resample(updated, spec, params, rng)  # 4
         yield state, moved, predicted, evidence, updated, resampled

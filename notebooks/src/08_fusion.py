@@ -86,7 +86,7 @@ def prepared(drive):
     frames = [drive[k] for k in range(len(drive))]
     beliefs = [belief.probability for belief in track_drive(frames, spec)]
     truth = np.stack([grid_truth(f.labels, o, spec) for f, o in zip(frames, beliefs, strict=True)])
-    images = torch.stack([network_image(frame, size) for frame in frames])
+    images = torch.from_numpy(np.stack([network_image(frame, size) for frame in frames]))
     return frames, images, torch.from_numpy(np.stack(beliefs)), truth
 
 

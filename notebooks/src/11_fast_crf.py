@@ -37,7 +37,7 @@ from scipy.special import softmax
 
 from semgrid_edu import plotting
 from semgrid_edu.crf import CrfParams, PermutohedralLattice, SeparableGaussian, bilateral_kernel, damping, gram_matrix
-from semgrid_edu.crf import enclosing_simplices, mean_field_naive, mean_field_updates, unary_from_log_probability
+from semgrid_edu.crf import enclosing_simplices, mean_field_naive, mean_field_updates
 from semgrid_edu.crf.lattice import elevation, peak
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.datasets.grid_truth import grid_truth
@@ -66,13 +66,13 @@ occupancies = [belief.probability for belief in track_drive(frames, spec)][::2]
 
 def network(frame, o):
     """Return log g, (14, H, W): what the network says of each cell."""
-    image = network_image(frame, net.architecture.image_size).numpy()
+    image = network_image(frame, net.architecture.image_size)
     return stages.fuse(stages.sample(stages.segment(image)), o)
 
 
 said = [network(frame, o) for frame, o in zip(frames[::2], occupancies, strict=True)]
 o, log_g = occupancies[5], said[5]
-unary, params = unary_from_log_probability(log_g), CrfParams.for_cells(spec.cell)
+unary, params = -log_g, CrfParams.for_cells(spec.cell)
 
 # %% [markdown]
 # Lecture 10 refined 2400 cells near the vehicle, and its mean field visited every pair of them. The whole map has more

@@ -944,7 +944,7 @@ def fields(drive, wanted):
     """Return planes (N, C, D, H, W), occupancy (N, 4, H, W) and truth (N, H, W) of some frames of a drive."""
     frames = [drive[k] for k in range(len(drive))]
     grids = [belief.probability for belief in track_drive(frames, spec)]
-    images = torch.stack([network_image(frames[k], described.image_size) for k in wanted])
+    images = torch.from_numpy(np.stack([network_image(frames[k], described.image_size) for k in wanted]))
     truth = torch.tensor(np.stack([grid_truth(frames[k].labels, grids[k], spec) for k in wanted]))
     o = torch.tensor(np.stack([grids[k] for k in wanted]))
     return sampler(image_stage.segmenter(images)), o.float(), truth.long()

@@ -32,11 +32,11 @@ from scipy.ndimage import label
 
 from semgrid_edu import plotting
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
-from semgrid_edu.fast import load_net, remember_drive  # the book's results, sooner
+from semgrid_edu.fast import load_net
 from semgrid_edu.graphical import d_separated, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.memory import MemoryParams, MemoryState, View, carry_classes, learn_classes, look_at
+from semgrid_edu.memory import MemoryParams, MemoryState, View, carry_classes, learn_classes, look_at, remember_drive
 from semgrid_edu.occupancy import PlanarMotion, State
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.pipeline import Stages, run_pipeline

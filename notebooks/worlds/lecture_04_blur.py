@@ -9,7 +9,7 @@ from scipy.ndimage import map_coordinates
 from scipy.special import entr
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, scroll
+from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, scroll
 
 SCHEMES = ("bilinear", "nearest", "scrolling")
 """Ways to move a map by less than a cell, as `measure_blur` explains them."""
@@ -68,7 +68,7 @@ def measure_blur(scheme: str, motions: Sequence[PlanarMotion], drops: int = 20, 
     scheme : str
         One of `SCHEMES`. "bilinear": in each step, every cell takes the mean of the four old cells around its centre,
         weighted by how near they are. "nearest": in each step, every cell takes the value of the old cell that contains
-        its centre. "scrolling": as `Cmcdot` moves its maps, by whole cells, and turned once per `MAX_YAW`.
+        its centre. "scrolling": as `Cmcdot` moves its maps, by whole cells, while the vehicle turns in the map.
     motions : sequence of PlanarMotion
         Motions of the vehicle, T of them; some of the cells at the start must stay in the map at every step.
     drops : int
@@ -93,7 +93,7 @@ def measure_blur(scheme: str, motions: Sequence[PlanarMotion], drops: int = 20, 
     measured = []
     for motion in motions:
         pose = rest.then(motion)
-        moved, rest = scroll(pose, WORLD.cell, MAX_YAW) if scheme == "scrolling" else (pose, PlanarMotion())
+        moved, rest = scroll(pose, WORLD.cell) if scheme == "scrolling" else (pose, PlanarMotion())
         fields = _carry(scheme, fields, moved)
         T_start_from_map = T_start_from_map.then(moved)
         measured.append(_measure(fields, T_start_from_map, start, held))

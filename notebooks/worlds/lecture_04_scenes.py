@@ -15,7 +15,7 @@ from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels, blocks
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.occupancy import PlanarMotion, SensorModel, State
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, look_up, map_around
+from semgrid_edu.occupancy.planar_motion import look_up, map_around
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
 from semgrid_edu.workshop.simulation.street.traffic import MOVING_SPEED
 from semgrid_edu.workshop.simulation.things.materials import Kind, class_of_kind
@@ -203,7 +203,7 @@ class SceneHistory:
 
     def __init__(self, spec: GridSpec) -> None:
         self.spec = spec
-        self._around = map_around(spec, MAX_YAW)  # the surroundings of the grid that the trackers remember
+        self._around = map_around(spec, yaw=0)
         self._poses, self._observed, self._dynamic = [], [], []  # an array per frame
         self._first_hit, self._last_hit = {}, {}  # frames by number of the object
 

@@ -8,9 +8,9 @@ import torch.nn.functional as F
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor, nn
 
-from semgrid_edu.networks.conv_deconv import fresh_weights
 from semgrid_edu.networks.deeplab import interpolate
 from semgrid_edu.networks.fcn import enlarge
+from semgrid_edu.networks.segmenter import fresh_weights
 
 MECHANISMS = ("nearest", "bilinear", "indices", "skips", "strided", "atrous")
 """Ways to see far and still score at full resolution: max-pooling, then enlarging its result in one of two ways,

@@ -10,8 +10,7 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.crf import CrfParams, SeparableGaussian
-from semgrid_edu.crf.mean_field import settled, updates
-from semgrid_edu.crf.params import check_inputs, check_stop
+from semgrid_edu.crf.mean_field import check_inputs, check_stop, settled, updates
 from semgrid_edu.fast.crf import HALF, exponential
 
 RADIUS = 4.0

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import CrfParams, mean_field_naive, unary_from_log_probability
+from semgrid_edu.crf import CrfParams, mean_field_naive
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.fast import mean_field
 from semgrid_edu.grid import GridSpec
@@ -109,9 +109,9 @@ def sample_problem(spec: GridSpec, seed: int = 0) -> CrfProblem:
     stages = Stages.fast(net.eval(), seed=seed)
     *_, belief = stages.track((drive[k] for k in range(FRAME + 1)), spec)
     o = belief.probability
-    image = network_image(drive[FRAME], trained.need_architecture().image_size).numpy()
+    image = network_image(drive[FRAME], trained.need_architecture().image_size)
     log_g = stages.fuse(stages.sample(stages.segment(image)), o)
-    return CrfProblem(unary_from_log_probability(log_g), o, CrfParams.for_cells(spec.cell))
+    return CrfProblem(-log_g, o, CrfParams.for_cells(spec.cell))
 
 
 def crops(problem: CrfProblem) -> list[CrfProblem]:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.special import log_softmax, logsumexp
 
 from semgrid_edu.crf import CrfParams, pair_weights
+from semgrid_edu.crf.mean_field import check_inputs
 from semgrid_edu.crf.naive import kernels
-from semgrid_edu.crf.params import check_inputs
 from semgrid_edu.errors import ArgumentError
 from worlds.lecture_11_accurate import filtered
 

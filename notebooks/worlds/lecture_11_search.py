@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import CrfParams, at_temperature, fit_temperature, unary_from_log_probability
+from semgrid_edu.crf import CrfParams, at_temperature, fit_temperature
 from semgrid_edu.fast import TrainingSet, mean_field
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
@@ -95,9 +95,7 @@ def main(data: Path, weights: Path, trials: int = 120, seed: int = 0) -> None:
     for _ in tqdm(range(trials), unit="trial"):
         points.append(next_point(points, values, seed))
         params = params_at(points[-1], frames.spec.cell)
-        labels = [
-            mean_field(unary_from_log_probability(log_g[:, k]), o[k], params).argmax(0) for k in range(len(frames))
-        ]
+        labels = [mean_field(-log_g[:, k], o[k], params).argmax(0) for k in range(len(frames))]
         confusion = confusion_matrix(truth, np.array(labels), len(log_g))
         values.append(np.array([pixel_accuracy(confusion), class_accuracy(confusion)]))
     print(f"temperature {temperature:.3f}")

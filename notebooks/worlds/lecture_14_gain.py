@@ -21,11 +21,11 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import real_weights, sample_drive, sample_weights
-from semgrid_edu.fast import load_net, remember_drive
+from semgrid_edu.fast import load_net
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE
-from semgrid_edu.memory import MemoryParams, View, smooth_drive
+from semgrid_edu.memory import MemoryParams, View, remember_drive, smooth_drive
 from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.pipeline import Stages, run_pipeline

@@ -10,7 +10,7 @@ from semgrid_edu.crf.naive import (
     mean_field_updates,
     pair_weights,
 )
-from semgrid_edu.crf.params import CrfParams, unary_from_log_probability, unary_from_probability
+from semgrid_edu.crf.params import CrfParams, unary_from_probability
 from semgrid_edu.crf.temperature import (
     Reliability,
     at_temperature,
@@ -43,6 +43,5 @@ __all__ = [
     "most_likely",
     "pair_weights",
     "reliability",
-    "unary_from_log_probability",
     "unary_from_probability",
 ]

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import xlogy
 
+from semgrid_edu.crf.mean_field import check_inputs
 from semgrid_edu.crf.naive import pair_weights
-from semgrid_edu.crf.params import CrfParams, check_inputs
+from semgrid_edu.crf.params import CrfParams
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Factor, GraphicalModel, eliminate, log_total, max_product
 

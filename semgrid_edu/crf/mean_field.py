@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import log_softmax
 
 from semgrid_edu.crf.lattice import bilateral_kernel
-from semgrid_edu.crf.params import NARROWEST, CrfParams, check_inputs, check_stop
-from semgrid_edu.errors import check_whole
+from semgrid_edu.crf.params import NARROWEST, CrfParams
+from semgrid_edu.errors import ArgumentError, check_shape, check_whole
+from semgrid_edu.occupancy import N_STATES
 
 NEVER = 1e30
 """A cost in place of infinity: it avoids inf - inf, which is NaN, and exp(-1e30) is 0."""
@@ -278,3 +279,67 @@ def without_border(maps: NDArray, pad: int) -> NDArray:
     """
     _, height, width = maps.shape
     return maps[:, pad : height - pad, pad : width - pad]
+
+
+def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Check the CRF's inputs, and return both arrays as float32 or float64.
+
+    Parameters
+    ----------
+    unary : (C, H, W) float
+        phi_u of eq. (3), the cost of each class in each cell; infinite for an impossible class.
+    values : (4, H, W) float
+        o, the probability of FREE, STATIC, DYNAMIC and UNKNOWN in each cell.
+
+    Raises
+    ------
+    ArgumentError
+        When the shapes don't fit, a cost is NaN or -inf, a cell has no possible class, states don't sum to 1, or an
+        argument holds anything but real numbers, or masked ones.
+    """
+    unary, values = _floats("unary", unary), _floats("values", values)
+    if unary.ndim != 3 or 0 in unary.shape:
+        raise ArgumentError("unary", "shape (C, H, W), nothing empty", f"shape {unary.shape}")
+    check_shape("values", values, (N_STATES, *unary.shape[1:]))
+    lowest = unary.min()  # NaN where any cost is NaN
+    if np.isnan(lowest) or np.isneginf(lowest):
+        raise ArgumentError("unary", "numbers, or inf for an impossible class", "NaN or -inf")
+    if np.isinf(unary.max()) and np.isinf(unary.min(axis=0)).any():
+        raise ArgumentError("unary", "a possible class in each cell", "a cell where every class is inf")
+    if not (values.min() >= -1e-3 and np.abs(values.sum(axis=0) - 1).max() <= 1e-3):
+        raise ArgumentError("values", "four probabilities that sum to 1 in each cell", "a cell where they don't")
+    return unary, values
+
+
+def _floats(name: str, argument: ArrayLike) -> NDArray[np.floating]:
+    """Return an array of float32 or float64; any other type becomes float64."""
+    if np.ma.is_masked(argument):
+        raise ArgumentError(name, "an array without masked numbers", f"{np.ma.count_masked(argument)} masked")
+    try:
+        array = np.asarray(argument)
+        if array.dtype in (np.float32, np.float64):
+            return array
+        return array.astype(np.float64, casting="unsafe" if array.dtype == object else "same_kind")
+    except (RuntimeError, TypeError, ValueError) as error:  # RuntimeError: a tensor that requires gradients
+        raise ArgumentError(name, "an array of real numbers", error) from error
+
+
+def check_stop(iterations: int, tolerance: float = 0.0) -> None:
+    """Check the stopping rule of mean field.
+
+    Parameters
+    ----------
+    iterations : int
+        How many times mean field updates all cells.
+    tolerance : float
+        The change of probabilities below which it stops.
+
+    Raises
+    ------
+    ArgumentError
+        When either is negative, or the first isn't a whole number.
+    """
+    if not isinstance(iterations, int | np.integer) or iterations < 0:
+        raise ArgumentError("iterations", "a whole number of at least 0", iterations)
+    if not tolerance >= 0:
+        raise ArgumentError("tolerance", "a change of at least 0", tolerance)

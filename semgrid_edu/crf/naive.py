@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.distance import cdist
 from scipy.special import log_softmax
 
-from semgrid_edu.crf.mean_field import above_best, normalise, settled, updates
-from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
+from semgrid_edu.crf.mean_field import above_best, check_inputs, check_stop, normalise, settled, updates
+from semgrid_edu.crf.params import CrfParams
 from semgrid_edu.errors import ArgumentError
 
 MAX_CELLS = 10_000

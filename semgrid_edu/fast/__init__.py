@@ -26,16 +26,13 @@ _WHERE: dict[str, str] = {
     "track_drive": "occupancy.cmcdot",
     "transition_matrix": "occupancy.steps",
     "update": "occupancy.steps",
-    # planes and memory
-    "ClassMemory": "memory",
+    # planes, networks, all stages
     "PlaneSampler": "planes",
     "TrainingSet": "training_set",
     "build_net": "networks",
-    "learn_classes": "memory",
+    "fast_stages": "stages",
     "load_net": "networks",
-    "look_at": "memory",
-    "recall_classes": "memory",
-    "remember_drive": "memory",
+    "with_fast_sampler": "networks",
     # crf
     "PermutohedralLattice": "crf.lattice",
     "SeparableGaussian": "crf.spatial",

@@ -13,6 +13,20 @@ def build_net(architecture: Architecture, camera: Camera, seed: int = 0) -> Sema
     return book.build_net(architecture, camera, seed, PlaneSampler)
 
 
+def with_fast_sampler(net: SemanticGridNet) -> SemanticGridNet:
+    """Return a network with the same layers and the fast sampler.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+        The network.
+    """
+    book = net.sampler
+    if isinstance(book, PlaneSampler):
+        return net
+    return net.with_sampler(PlaneSampler(book.pixels, book.visible, book.image_size))
+
+
 def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:
     """Read a trained network and place its planes. Parameters, result and errors are those of `load_net`."""
     return book.load_net(path, camera, PlaneSampler)

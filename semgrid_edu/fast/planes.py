@@ -68,10 +68,6 @@ class PlaneSampler(nn.Module):
             self._of_batch = self.operator.block_diagonal(n_images)
         return self._of_batch
 
-    def as_kind(self, kind: type[nn.Module]) -> nn.Module:
-        """Return a sampler of the same points by another class. Parameters are those of `PlaneSampler.as_kind`."""
-        return self if type(self) is kind else kind(self.pixels, self.visible, self.image_size)
-
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "PlaneSampler":
         """Move the operator as well: PyTorch's `.to`, `.double` and `.cuda` call this."""
         self._hold(self.operator.map(fn))

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.memory.class_memory import ClassMemory, recall_classes
-from semgrid_edu.memory.state import MemoryParams, MemoryState, View, look_at
+from semgrid_edu.memory.class_memory import ClassMemory, MemoryParams, MemoryState, View, look_at, recall_classes
 
 
 def remember_drive(views: Iterable[View], spec: GridSpec, params: MemoryParams | None = None) -> Iterator[NDArray]:

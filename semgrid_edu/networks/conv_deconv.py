@@ -1,18 +1,18 @@
 """The conv-deconv network: max-pooling down, unpooling by the same indices up (paper, sections 3.1 and 3.4, Fig. 5).
 
-SegNet and the fusion network are both built from it. `fresh_weights` seeds the initial weights of every network in the
-package.
+SegNet is one whose input is an image. The fusion network has one, too.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from itertools import pairwise
+from itertools import chain, pairwise
+from typing import ClassVar
 
 import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.networks.segmenter import Segmenter
+from semgrid_edu.networks.vgg import vgg16_tensors
 
 
 def conv_bn_relu(n_in: int, n_out: int) -> nn.Sequential:
@@ -105,48 +105,52 @@ def _layers(channels: list[int], plain_end: bool = False) -> list[nn.Module]:
     return [*layers[:-1], layers[-1][0]] if plain_end else layers
 
 
-@contextmanager
-def fresh_weights(net: nn.Module, seed: int) -> Iterator[None]:
-    """Make the initial weights of the layers created in the block depend only on the seed.
+class SegNet(Segmenter):
+    """Segment an image by an encoder shaped like VGG16 and a decoder that unpools by the encoder's indices.
 
-    PyTorch's layers draw their initial weights from the CPU's global generator. Inside the block that generator starts
-    from the seed; afterwards its state is restored. Then `initialise` redraws the weights of the convolutions.
+    The encoder halves the maps by max-pooling and remembers where in each 2x2 window the maximum was. The decoder
+    mirrors the encoder: each of its stages puts the values back in these places, then convolves. The last convolution
+    gives the scores. All of this is `ConvDeconv`, here with the three channels of an image as input.
 
-    Parameters
-    ----------
-    net : Module
-        The network whose layers are created in the block.
-    seed : int
-        Seed for the initial weights.
-    """
-    with torch.random.fork_rng(devices=[]):
-        torch.default_generator.manual_seed(seed)
-        yield
-    initialise(net, seed)
-
-
-def initialise(net: nn.Module, seed: int) -> None:
-    """Draw new weights for all convolutions, scaled so that signals keep their size from layer to layer.
-
-    The weights are normal and the biases zero. The variance of convolutions is 2 / fan-in, because the ReLU after them
-    halves the power of its input (He et al., 2015). The variance of up-convolutions is 1 / (number of input channels):
-    no ReLU follows them, and their strides leave no overlap, so each pixel of the result is a sum over the channels of
-    one input pixel. Other layers are unchanged.
+    The other Parameters are those of `Segmenter`.
 
     Parameters
     ----------
-    net : Module
-        The network, changed in place.
-    seed : int
-        Seed for the weights.
+    preset : str
+        "paper" has VGG16's thirteen convolutions on the way down and thirteen on the way up; "compact" is narrower and
+        shallower, for two cores. Both have two convolutions at full resolution: unpooling leaves three pixels in four
+        empty, and a single convolution isn't enough to fill them without speckles.
+
+    References
+    ----------
+    Badrinarayanan, Kendall, Cipolla: SegNet: A Deep Convolutional Encoder-Decoder Architecture for Image
+    Segmentation. PAMI 39(12), 2017.
     """
-    generator = torch.Generator().manual_seed(seed)
-    for module in net.modules():
-        if isinstance(module, nn.Conv2d | nn.Conv3d):
-            nn.init.kaiming_normal_(module.weight, nonlinearity="relu", generator=generator)
-        elif isinstance(module, nn.ConvTranspose2d):
-            nn.init.normal_(module.weight, std=module.in_channels**-0.5, generator=generator)
-        else:
-            continue
-        if module.bias is not None:
-            nn.init.zeros_(module.bias)
+
+    PRESETS: ClassVar = {
+        "compact": {"widths": (16, 32, 48, 64), "depths": (2, 1, 1, 2)},
+        "paper": {"widths": (64, 128, 256, 512, 512), "depths": (2, 2, 3, 3, 3)},
+    }
+    IMAGENET = "vgg16"
+
+    def build(self, n_classes: int, widths: tuple[int, ...], depths: tuple[int, ...]) -> None:
+        """Make the encoder and its mirror image, see `ConvDeconv`.
+
+        The other Parameters are those of `Segmenter.build`.
+
+        Parameters
+        ----------
+        widths : (S,) int
+            Number of channels in each stage.
+        depths : (S,) int
+            Number of convolutions in each stage, on the way down and again on the way up.
+        """
+        self.conv_deconv = ConvDeconv(3, n_classes, widths, depths)
+
+    def scores(self, x: Tensor) -> Tensor:
+        """Return the scores. Parameters and result are those of `Segmenter.scores`."""
+        return self.conv_deconv(x)
+
+    def imagenet_tensors(self) -> dict[str, Tensor]:
+        """Return weights and biases of the encoder's convolutions; VGG16 has no batch normalisation to load."""
+        return vgg16_tensors(layer[0] for layer in chain.from_iterable(self.conv_deconv.encoder))

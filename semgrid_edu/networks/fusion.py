@@ -4,7 +4,8 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor, nn
 
-from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights
+from semgrid_edu.networks.conv_deconv import ConvDeconv
+from semgrid_edu.networks.segmenter import fresh_weights
 from semgrid_edu.occupancy import N_STATES, State
 
 N_REDUCED = 16

@@ -1,11 +1,11 @@
 """Every image network by its name: a new one is added here (paper, section 3.1)."""
 
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.networks.conv_deconv import SegNet
 from semgrid_edu.networks.deeplab import DeepLab
 from semgrid_edu.networks.efficientnet import EfficientNet
 from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.networks.segmenter import Segmenter
-from semgrid_edu.networks.segnet import SegNet
 from semgrid_edu.networks.unet import UNet
 
 SEGMENTERS: dict[str, type[Segmenter]] = {

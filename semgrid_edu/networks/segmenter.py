@@ -1,13 +1,14 @@
 """What all image networks share: bytes -> RGB in 0..1 -> one score per class and pixel (paper, section 3.1)."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, ClassVar
 
 import torch
 from torch import Tensor, nn
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks.conv_deconv import fresh_weights
 
 IMAGENET_MEAN, IMAGENET_STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Mean and standard deviation of red, green and blue over ImageNet's images, 0..1. Weights learnt on ImageNet expect
@@ -129,3 +130,50 @@ class Segmenter(nn.Module, ABC):
     def imagenet_tensors(self) -> dict[str, Tensor]:
         """Return the encoder's tensors (not copies) that published weights replace, by their published names."""
         return {}
+
+
+@contextmanager
+def fresh_weights(net: nn.Module, seed: int) -> Iterator[None]:
+    """Make the initial weights of the layers created in the block depend only on the seed.
+
+    PyTorch's layers draw their initial weights from the CPU's global generator. Inside the block that generator starts
+    from the seed; afterwards its state is restored. Then `initialise` redraws the weights of the convolutions.
+
+    Parameters
+    ----------
+    net : Module
+        The network whose layers are created in the block.
+    seed : int
+        Seed for the initial weights.
+    """
+    with torch.random.fork_rng(devices=[]):
+        torch.default_generator.manual_seed(seed)
+        yield
+    initialise(net, seed)
+
+
+def initialise(net: nn.Module, seed: int) -> None:
+    """Draw new weights for all convolutions, scaled so that signals keep their size from layer to layer.
+
+    The weights are normal and the biases zero. The variance of convolutions is 2 / fan-in, because the ReLU after them
+    halves the power of its input (He et al., 2015). The variance of up-convolutions is 1 / (number of input channels):
+    no ReLU follows them, and their strides leave no overlap, so each pixel of the result is a sum over the channels of
+    one input pixel. Other layers are unchanged.
+
+    Parameters
+    ----------
+    net : Module
+        The network, changed in place.
+    seed : int
+        Seed for the weights.
+    """
+    generator = torch.Generator().manual_seed(seed)
+    for module in net.modules():
+        if isinstance(module, nn.Conv2d | nn.Conv3d):
+            nn.init.kaiming_normal_(module.weight, nonlinearity="relu", generator=generator)
+        elif isinstance(module, nn.ConvTranspose2d):
+            nn.init.normal_(module.weight, std=module.in_channels**-0.5, generator=generator)
+        else:
+            continue
+        if module.bias is not None:
+            nn.init.zeros_(module.bias)

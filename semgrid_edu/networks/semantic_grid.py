@@ -177,14 +177,11 @@ class SemanticGridNet(nn.Module):
         if len(image) != len(occupancy):
             raise ArgumentError("occupancy", f"one for each of the {len(image)} images", len(occupancy))
         sampler = sampler or self.sampler
-        scores = self.image_scores(image, mirrored)
+        scores = self.segment(image, mirrored)
         planes = sampler(scores)
-        # The 1x1 convolution sees one cell at a time, so we mirror after it, when there is less data to move.
-        reduced = _flip(self.fusion.reduce(planes), mirrored)
-        logits = self.fusion.fuse(reduced, _flip(occupancy, mirrored))
-        return NetOutputs(scores, planes, _flip(logits, mirrored))
+        return NetOutputs(scores, planes, self.fuse(planes, occupancy, mirrored))
 
-    def image_scores(self, image: Tensor, mirrored: bool = False) -> Tensor:
+    def segment(self, image: Tensor, mirrored: bool = False) -> Tensor:
         """Return s, the image network's scores. Parameters are those of `SemanticGridNet.stages`.
 
         Returns
@@ -193,6 +190,37 @@ class SemanticGridNet(nn.Module):
             One score per class and pixel, before any soft-max.
         """
         return _flip(self.segmenter(_flip(image, mirrored)), mirrored)
+
+    def fuse(self, planes: Tensor, occupancy: Tensor, mirrored: bool = False) -> Tensor:
+        """Return the logits of the semantic grid from the sampled planes: (p, o) -> g.
+
+        The other Parameters are those of `SemanticGridNet.stages`.
+
+        Parameters
+        ----------
+        planes : (B, C, D, H, W) float
+            p, the scores on the planes.
+
+        Returns
+        -------
+        (B, C, H, W) float
+            g before the soft-max.
+        """
+        # The 1x1 convolution sees one cell at a time, so we mirror after it, when there is less data to move.
+        reduced = _flip(self.fusion.reduce(planes), mirrored)
+        return _flip(self.fusion.fuse(reduced, _flip(occupancy, mirrored)), mirrored)
+
+    def with_sampler(self, sampler: nn.Module) -> "SemanticGridNet":
+        """Return a network of the same layers, which are shared, with another sampler.
+
+        Parameters
+        ----------
+        sampler : PlaneSampler
+            s -> p, with as many planes.
+        """
+        other = SemanticGridNet(self.segmenter, sampler, self.n_classes, architecture=self.architecture)
+        other.fusion = self.fusion
+        return other.train(self.training)
 
     def forward(self, image: Tensor, occupancy: Tensor) -> Tensor:
         """Return the logits of the semantic grid. Parameters and errors are those of `SemanticGridNet.stages`.

@@ -5,14 +5,13 @@ filter, each a pure function on a `FilterState`. `Cmcdot` runs the steps, and `t
 `LogOddsGrid` and `Bof` are the filters that came before it: the binary grid, and the exact filter on a lattice of
 velocities. `semgrid_edu.fast` has compiled twins of what takes long.
 
-In reading order: `planar_motion`, `state`; `evidence`, `polar`, `sensor`; `log_odds`; `walls`, `world`, `resampling`,
-`steps`, `cmcdot`; `bof_state`, `bof`.
+In reading order: `planar_motion`, `state`; `polar`, `sensor`; `log_odds`; `walls`, `world`, `steps`, `cmcdot`;
+`bof_state`, `bof`.
 """
 
 from semgrid_edu.occupancy.bof import Bof, bof_move, bof_predict, bof_update, bof_velocity
 from semgrid_edu.occupancy.bof_state import BofParams, BofState, VelocityLattice
 from semgrid_edu.occupancy.cmcdot import Cmcdot, DriveTracker, track_drive
-from semgrid_edu.occupancy.evidence import Evidence, Measurement, Sensor, scan_evidence
 from semgrid_edu.occupancy.log_odds import (
     LogOddsGrid,
     LogOddsParams,
@@ -22,12 +21,19 @@ from semgrid_edu.occupancy.log_odds import (
     update_log_odds,
 )
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.resampling import Resampling, SystematicResampling
-from semgrid_edu.occupancy.sensor import Scan, SensorModel
-from semgrid_edu.occupancy.state import N_STATES, Belief, FilterState, Particles, State
-from semgrid_edu.occupancy.steps import move, predict, resample, update
+from semgrid_edu.occupancy.sensor import Evidence, Measurement, Scan, Sensor, SensorModel, scan_evidence
+from semgrid_edu.occupancy.state import (
+    N_STATES,
+    Belief,
+    FilterState,
+    Particles,
+    Resampling,
+    State,
+    SystematicResampling,
+)
+from semgrid_edu.occupancy.steps import move, predict, resample, transition_matrix, update
 from semgrid_edu.occupancy.walls import Walls
-from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
+from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
 
 __all__ = [
     "N_STATES",

@@ -3,23 +3,22 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState, origins, whole_cells
 from semgrid_edu.occupancy.cmcdot import local_belief
-from semgrid_edu.occupancy.evidence import Evidence, observe
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll, shift
+from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_around, scroll, shift
+from semgrid_edu.occupancy.sensor import Evidence, evidence_of, take_scan
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State, ratio, slow_down
-from semgrid_edu.occupancy.steps import mix, strike_out, update
-from semgrid_edu.occupancy.walls import Walls, free_beside_static, strike_out_wakes
-from semgrid_edu.occupancy.world import transition_matrix
+from semgrid_edu.occupancy.steps import mix, strike_out, transition_matrix, update
+from semgrid_edu.occupancy.walls import Walls, free_beside_static, strike_out_wakes, velocity_of
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
 
-def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion) -> BofState:
+def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion, to: GridSpec | None = None) -> BofState:
     """Express the belief in a new frame, as `move` does for CMCDOT: what enters the map is UNKNOWN.
 
     Parameters and errors are those of `move`.
@@ -30,17 +29,17 @@ def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion) -> BofState:
         The belief in the new frame, with velocities along the new axes.
     """
     check_shape("state", state.free, spec.shape)
-    if motion == PlanarMotion():
-        return state
     planes = np.concatenate([[state.unknown, state.free], state.occupied])
     entering = np.eye(1, len(planes), dtype=np.float32)[0]
-    moved = look_up(planes, entering, spec, spec, motion)
+    moved = look_up(planes, entering, spec, to or spec, motion)
     velocity = state.velocity @ motion.rotation
     remainder = state.remainder @ motion.rotation
     return BofState(moved[1], moved[0], moved[2:], velocity, remainder)
 
 
-def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float, driven: float = 0.0) -> BofState:
+def bof_predict(
+    state: BofState, spec: GridSpec, params: BofParams, dt: float, driven: ArrayLike = (0.0, 0.0)
+) -> BofState:
     """Predict: every velocity shifts its mass by its own displacement; all else is as in CMCDOT's `predict`.
 
     Some mass changes to neighbouring velocities, slow mass becomes STATIC, and the states mix by the transition matrix.
@@ -58,8 +57,8 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float, d
         The lattice, and how the world changes.
     dt : float
         Time since the previous instant, seconds, not negative.
-    driven : float
-        How far the vehicle has driven along the x axis in this time, metres; negative backwards.
+    driven : (2,) float
+        How far the vehicle has driven in this time, along the axes of the map, metres.
 
     Raises
     ------
@@ -75,8 +74,8 @@ def bof_predict(state: BofState, spec: GridSpec, params: BofParams, dt: float, d
     stays = occupied.sum(axis=0, dtype=np.float64, where=~moves[:, None, None])
     vacated = going - stays
     mixed, newborn = mix(state.probability, np.zeros(spec.shape), going, M)
-    car_speed = driven / dt if dt > 0 else 0.0
-    blocked = _blocked(state.velocity, mixed, mixed[UNKNOWN] + vacated, spec, params.world.walls, car_speed)
+    car_velocity = velocity_of(driven, dt)
+    blocked = _blocked(state.velocity, mixed, mixed[UNKNOWN] + vacated, spec, params.world.walls, car_velocity)
 
     # What arrives in a cell meets what the cell holds.
     believed = {k: 1 - blocked(k) for k in np.flatnonzero(moves)}
@@ -121,7 +120,7 @@ def _accelerated(state: BofState, k: int, params: BofParams, dt: float) -> NDArr
 
 
 def _blocked(
-    velocity: NDArray, mixed: NDArray, unseen: NDArray, spec: GridSpec, walls: Walls | None, car_speed: float
+    velocity: NDArray, mixed: NDArray, unseen: NDArray, spec: GridSpec, walls: Walls, car_velocity: NDArray
 ) -> Callable[[int], NDArray]:
     """Return a function that tells with what probability mass of velocity k can't have arrived in a cell, (H, W).
 
@@ -129,9 +128,7 @@ def _blocked(
     other way shows in each cell the value at the place where its mass is at another time.
     """
     static = mixed[STATIC]
-    if walls is None:
-        return lambda k: static
-    keeps = walls.keeps_pace(velocity, car_speed, spec.cell)
+    keeps = walls.keeps_pace(velocity, car_velocity, spec.cell)
     before = origins(velocity, spec, walls)
     shortly_before = origins(velocity, spec, walls, walls.second_look)
     open_space = mixed[FREE] + mixed[DYNAMIC]
@@ -178,11 +175,10 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
     for k in range(1, len(occupied)):
         occupied[k] = state.occupied[k] * factor + params.lattice.prior[k] * given.newborn
     probability = given.probability
-    if params.world.walls is not None:
-        left = np.zeros(spec.shape)
-        for mass, back in zip(occupied[1:], origins(state.velocity[1:], spec, params.world.walls), strict=True):
-            left += _elsewhere(mass, -back)
-        probability = strike_out_wakes(probability, left, evidence.occupied == evidence.free)
+    left = np.zeros(spec.shape)
+    for mass, back in zip(occupied[1:], origins(state.velocity[1:], spec, params.world.walls), strict=True):
+        left += _elsewhere(mass, -back)
+    probability = strike_out_wakes(probability, left, evidence.occupied == evidence.free)
     occupied[0] = probability[STATIC]
     dtype = occupied.dtype
     free = probability[FREE].astype(dtype)
@@ -246,7 +242,7 @@ class Bof:
     def __init__(self, spec: GridSpec, params: BofParams | None = None) -> None:
         self.spec = spec
         self.params = params or BofParams()
-        self.map_spec = map_around(spec, MAX_YAW)
+        self.map_spec = map_around(spec, yaw=0)
         self._pose = PlanarMotion()
         self._state = BofState.nothing_known(self.map_spec, self.params.lattice)
 
@@ -256,14 +252,19 @@ class Bof:
         Parameters, result and errors are those of `Cmcdot.step`.
         """
         world = self.params.world
-        step, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
-        seen = observe(world.sensor, points_grid, pose, self.map_spec, self.spec)
-        moved = bof_move(self._state, self.map_spec, step)
-        predicted = bof_predict(moved, self.map_spec, self.params, dt, motion.dx)
-        self._state = bof_update(predicted, self.map_spec, seen.on_map, self.params)
+        shift, pose = scroll(self._pose.then(motion), self.spec.cell)
+        map_spec = map_around(self.spec, pose.dyaw)
+        scan = take_scan(world.sensor, points_grid)
+        on_map = evidence_of(scan, map_spec, pose)
+        in_grid = evidence_of(scan, self.spec, PlanarMotion())
+        driven = self._pose.rotation @ (motion.dx, motion.dy)
+        moved = bof_move(self._state, self.map_spec, shift, map_spec)
+        predicted = bof_predict(moved, map_spec, self.params, dt, driven)
+        self._state = bof_update(predicted, map_spec, on_map, self.params)
         self._pose = pose
+        self.map_spec = map_spec
         velocity = bof_velocity(self._state)
-        return local_belief(predicted.probability, velocity, seen, self.map_spec, self.spec, world)
+        return local_belief(predicted.probability, velocity, in_grid, pose, map_spec, self.spec, world)
 
 
 def _elsewhere(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from semgrid_edu.errors import ArgumentError, not_negative
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Observation, observe
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll, turn_moments
+from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_around, scroll, turn_moments
+from semgrid_edu.occupancy.sensor import Evidence, evidence_of, take_scan
 from semgrid_edu.occupancy.state import OUTSIDE, Belief, FilterState, Particles, State, cells_of, transform
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
@@ -19,9 +19,10 @@ from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
 class Cmcdot:
     """The filter: give it scan after scan, and it tells free, static, dynamic and unknown cells apart.
 
-    Inside, it keeps a map that is somewhat larger than the grid, stays aligned with the world, and scrolls under the
-    vehicle by whole cells (`scroll`). For the belief that it hands out, it looks up in the vehicle's own cells what
-    the map predicts, and updates those cells with the scan (`local_belief`). Nothing of that goes back to the map.
+    Inside, it keeps a map that stays aligned with the world: it scrolls under the vehicle by whole cells (`scroll`) and
+    never turns. It has the cells that the turned grid needs (`map_around`). For the belief that the filter hands out,
+    it looks up in the vehicle's own cells what the map predicts, and updates those cells with the scan
+    (`local_belief`). Nothing of that goes back to the map.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ class Cmcdot:
         self.spec = spec
         self.keep_steps = keep_steps
         self.params = params or CmcdotParams()
-        self.map_spec = map_around(spec, MAX_YAW)
+        self.map_spec = map_around(spec, yaw=0)
         self._rng = np.random.default_rng(seed)
         self._pose = PlanarMotion()
         self._state = FilterState.unknown(self.map_spec)
@@ -90,19 +91,24 @@ class Cmcdot:
         """
         if not not_negative(dt):
             raise ArgumentError("dt", "seconds, not negative", dt)
-        shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
-        scan = observe(self.params.sensor, points_grid, pose, self.map_spec, self.spec)
+        shift, pose = scroll(self._pose.then(motion), self.spec.cell)
+        map_spec = map_around(self.spec, pose.dyaw)
+        scan = take_scan(self.params.sensor, points_grid)
+        on_map = evidence_of(scan, map_spec, pose)
+        in_grid = evidence_of(scan, self.spec, PlanarMotion())
+        driven = self._pose.rotation @ (motion.dx, motion.dy)
 
-        moved = move(self._state, self.map_spec, shift)
-        predicted = predict(moved, self.map_spec, self.params, dt, self._rng, motion.dx)
-        updated = update(predicted, self.map_spec, scan.on_map, self.params)
-        resampled = resample(updated, self.map_spec, self.params, self._rng)
+        moved = move(self._state, self.map_spec, shift, map_spec)
+        predicted = predict(moved, map_spec, self.params, dt, self._rng, driven)
+        updated = update(predicted, map_spec, on_map, self.params)
+        resampled = resample(updated, map_spec, self.params, self._rng)
         self._state = resampled
         self._pose = pose
+        self.map_spec = map_spec
 
-        cells = cells_of(resampled.particles.position, self.map_spec)
-        velocity = velocity_moments(resampled.particles, cells, self.map_spec.shape)
-        belief = local_belief(predicted.probability, velocity, scan, self.map_spec, self.spec, self.params)
+        cells = cells_of(resampled.particles.position, map_spec)
+        velocity = velocity_moments(resampled.particles, cells, map_spec.shape)
+        belief = local_belief(predicted.probability, velocity, in_grid, pose, map_spec, self.spec, self.params)
         if self.keep_steps:
             states = {"move": moved, "predict": predicted, "update": updated, "resample": resampled}
             belief = replace(belief, steps={name: self._in_grid(state) for name, state in states.items()})
@@ -117,7 +123,8 @@ class Cmcdot:
 def local_belief(
     predicted: NDArray,
     velocity: tuple[NDArray, NDArray],
-    seen: Observation,
+    in_grid: Evidence,
+    pose: PlanarMotion,
     map_spec: GridSpec,
     spec: GridSpec,
     world: WorldModel,
@@ -134,21 +141,23 @@ def local_belief(
     velocity : (2, H, W) and (2, 2, H, W) float
         Mean and covariance of the velocity on the map, given the scan, along the axes of the map, m/s and m^2/s^2;
         NaN where nothing moves.
-    seen : Observation
-        The scan in the vehicle's cells, and the pose of the vehicle in the map.
+    in_grid : Evidence
+        What the scan tells about the vehicle's cells, (H', W').
+    pose : PlanarMotion
+        Pose of the vehicle in the frame of the map, metres and radians.
     map_spec, spec : GridSpec
         The cells of the map, (H, W), and those of the vehicle, (H', W').
     world : WorldModel
         What `update` assumes.
     """
-    here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, seen.pose)
+    here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, pose)
     prior = FilterState(here, Particles.none(), np.zeros(spec.shape))
-    probability = update(prior, spec, seen.in_grid, world).probability.astype(np.float32)
+    probability = update(prior, spec, in_grid, world).probability.astype(np.float32)
     mean, covariance = velocity
     moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)]).astype(np.float32)
-    moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, seen.pose)
+    moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, pose)
     moments[:, probability[State.DYNAMIC] == 0] = np.nan
-    return Belief(probability, *turn_moments(moments[:2], moments[2:].reshape(2, 2, *spec.shape), seen.pose))
+    return Belief(probability, *turn_moments(moments[:2], moments[2:].reshape(2, 2, *spec.shape), pose))
 
 
 def velocity_moments(

@@ -7,9 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import ArgumentError, not_negative, types_named
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence, Sensor, check_sensor, observe
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, look_up, map_around, scroll
-from semgrid_edu.occupancy.sensor import SensorModel
+from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_around, scroll
+from semgrid_edu.occupancy.sensor import Evidence, Sensor, SensorModel, check_sensor, evidence_of, take_scan
 
 TINY = np.float32(1e-30)
 """Replaces a likelihood of 0, whose logarithm is infinite. The bounds on P(occupied) make the difference vanish."""
@@ -129,7 +128,7 @@ class LogOddsGrid:
     def __init__(self, spec: GridSpec, params: LogOddsParams | None = None) -> None:
         self.spec = spec
         self.params = params or LogOddsParams()
-        self.map_spec = map_around(spec, MAX_YAW)
+        self.map_spec = map_around(spec, yaw=0)
         self._prior = np.array([log_odds(self.params.prior)], np.float32)
         self._pose = PlanarMotion()
         self._log_odds = np.full(self.map_spec.shape, self._prior, np.float32)
@@ -142,13 +141,17 @@ class LogOddsGrid:
         """
         if not not_negative(dt):
             raise ArgumentError("dt", "seconds, not negative", dt)
-        shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
-        seen = observe(self.params.sensor, points_grid, pose, self.map_spec, self.spec)
-        moved = look_up(self._log_odds[None], self._prior, self.map_spec, self.map_spec, shift)[0]
-        before = look_up(moved[None], self._prior, self.map_spec, self.spec, pose)[0]
-        self._log_odds = update_log_odds(moved, seen.on_map, self.params)
+        shift, pose = scroll(self._pose.then(motion), self.spec.cell)
+        map_spec = map_around(self.spec, pose.dyaw)
+        scan = take_scan(self.params.sensor, points_grid)
+        on_map = evidence_of(scan, map_spec, pose)
+        in_grid = evidence_of(scan, self.spec, PlanarMotion())
+        moved = look_up(self._log_odds[None], self._prior, self.map_spec, map_spec, shift)[0]
+        before = look_up(moved[None], self._prior, map_spec, self.spec, pose)[0]
+        self._log_odds = update_log_odds(moved, on_map, self.params)
         self._pose = pose
-        return probability(update_log_odds(before, seen.in_grid, self.params))
+        self.map_spec = map_spec
+        return probability(update_log_odds(before, in_grid, self.params))
 
 
 def smear_area(p_occupied: NDArray, left: NDArray[np.bool_], spec: GridSpec) -> float:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.camera import invert_rigid
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 
@@ -54,9 +53,10 @@ class PlanarMotion:
         for name, T in (("T_world_from_before", T_world_from_before), ("T_world_from_now", T_world_from_now)):
             if np.shape(T) != (4, 4) or not np.isfinite(T).all():
                 raise ArgumentError(name, "a finite 4x4 transform", T)
-        T_before_from_now = invert_rigid(T_world_from_before) @ T_world_from_now
-        dyaw = np.arctan2(T_before_from_now[1, 0], T_before_from_now[0, 0])
-        return cls(float(T_before_from_now[0, 3]), float(T_before_from_now[1, 3]), float(dyaw))
+        axes = T_world_from_before[:3, :3]  # of the previous instant, as columns
+        dx, dy, _ = axes.T @ (T_world_from_now[:3, 3] - T_world_from_before[:3, 3])
+        ahead = axes.T @ T_world_from_now[:3, 0]
+        return cls(float(dx), float(dy), float(np.arctan2(ahead[1], ahead[0])))
 
     @property
     def rotation(self) -> NDArray[np.float64]:
@@ -102,36 +102,43 @@ class PlanarMotion:
         return PlanarMotion(float(dx), float(dy), self.dyaw + motion.dyaw)
 
 
-MAX_YAW = np.radians(2)
-"""Angle between vehicle and map, radians, beyond which the map turns too. A larger angle needs a wider margin."""
-
-
-def map_around(spec: GridSpec, max_yaw: float) -> GridSpec:
-    """Return a map that covers the grid around the vehicle, however the vehicle moves before the map scrolls.
+def map_around(spec: GridSpec, yaw: float) -> GridSpec:
+    """Return the cells of the map that the grid around the vehicle needs, however the vehicle is turned in the map.
 
     Parameters
     ----------
     spec : GridSpec
         The grid around the vehicle.
-    max_yaw : float
-        The largest angle between vehicle and map, radians; the vehicle shifts by at most one cell.
+    yaw : float
+        Heading of the vehicle in the map, radians. The vehicle is at most half a cell from the origin of the map.
 
     Returns
     -------
     GridSpec
-        The map: cells of the same size, with a margin on every side of the grid.
+        The smallest rectangle of the map's cells that contains the turned grid. All such rectangles share their cell
+        borders, so a map changes from one to the other without interpolation.
+
+    Examples
+    --------
+    >>> map_around(GridSpec(0, 10, -2, 2, cell=1), yaw=np.pi / 2)
+    GridSpec(x_min=-3.0, x_max=3.0, y_min=-1.0, y_max=11.0, cell=1)
     """
-    farthest = np.hypot(max(abs(spec.x_min), abs(spec.x_max)), max(abs(spec.y_min), abs(spec.y_max)))
-    margin = (np.ceil(farthest * np.sin(max_yaw) / spec.cell) + 1) * spec.cell
-    return GridSpec(spec.x_min - margin, spec.x_max + margin, spec.y_min - margin, spec.y_max + margin, spec.cell)
+    corners = np.array([(x, y) for x in (spec.x_min, spec.x_max) for y in (spec.y_min, spec.y_max)])
+    turned = PlanarMotion(dyaw=yaw).to_previous(corners)
+    border = np.array([spec.x_max, spec.y_max])  # borders of the map's cells are whole cells away from here
+    rounding = 1e-6  # of a cell
+    lowest = np.floor((turned.min(axis=0) - border) / spec.cell - 0.5 + rounding)
+    highest = np.ceil((turned.max(axis=0) - border) / spec.cell + 0.5 - rounding)
+    x_min, y_min = (border + lowest * spec.cell).tolist()
+    x_max, y_max = (border + highest * spec.cell).tolist()
+    return GridSpec(x_min, x_max, y_min, y_max, spec.cell)
 
 
-def scroll(pose: PlanarMotion, cell: float, max_yaw: float) -> tuple[PlanarMotion, PlanarMotion]:
+def scroll(pose: PlanarMotion, cell: float) -> tuple[PlanarMotion, PlanarMotion]:
     """Decide how the map follows the vehicle.
 
     The map shifts by whole cells, which is exact, and the rest of the vehicle's displacement stays in the pose, so
-    nothing is interpolated. The map turns only when the vehicle has turned by more than `max_yaw`. Then each new cell
-    is looked up once in the old map.
+    nothing is interpolated. The map never turns: the vehicle turns in it.
 
     Parameters
     ----------
@@ -139,8 +146,6 @@ def scroll(pose: PlanarMotion, cell: float, max_yaw: float) -> tuple[PlanarMotio
         Pose of the vehicle in the frame of the map, metres and radians.
     cell : float
         Side of a cell, metres.
-    max_yaw : float
-        The largest angle between vehicle and map, radians.
 
     Returns
     -------
@@ -151,11 +156,9 @@ def scroll(pose: PlanarMotion, cell: float, max_yaw: float) -> tuple[PlanarMotio
 
     Examples
     --------
-    >>> scroll(PlanarMotion(1.25, 0.0, 0.01), cell=0.5, max_yaw=0.03)
-    (PlanarMotion(dx=1.0, dy=0.0, dyaw=0.0), PlanarMotion(dx=0.25, dy=0.0, dyaw=0.01))
+    >>> scroll(PlanarMotion(1.25, 0.0, 0.3), cell=0.5)
+    (PlanarMotion(dx=1.0, dy=0.0, dyaw=0.0), PlanarMotion(dx=0.25, dy=0.0, dyaw=0.3))
     """
-    if abs(pose.dyaw) > max_yaw:
-        return pose, PlanarMotion()
     dx, dy = math.remainder(pose.dx, cell), math.remainder(pose.dy, cell)
     return PlanarMotion(pose.dx - dx, pose.dy - dy), PlanarMotion(dx, dy, pose.dyaw)
 

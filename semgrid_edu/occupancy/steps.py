@@ -3,13 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import expm
 
-from semgrid_edu.errors import check_shape
+from semgrid_edu.errors import ArgumentError, check_shape, not_negative
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up
-from semgrid_edu.occupancy.resampling import draw_again, draw_newborn
+from semgrid_edu.occupancy.sensor import Evidence
 from semgrid_edu.occupancy.state import (
     CERTAIN,
     FilterState,
@@ -17,13 +17,15 @@ from semgrid_edu.occupancy.state import (
     State,
     at_cells,
     cells_of,
+    draw_again,
+    draw_newborn,
     fly,
     ratio,
     slow_down,
     transform,
     weight_in_cells,
 )
-from semgrid_edu.occupancy.world import CmcdotParams, WorldModel, transition_matrix
+from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -31,7 +33,7 @@ NOTHING_KNOWN = np.array([0, 0, 0, 1], dtype=np.float32)
 """The four probabilities of a cell about which nothing is known: all UNKNOWN."""
 
 
-def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterState:
+def move(state: FilterState, spec: GridSpec, motion: PlanarMotion, to: GridSpec | None = None) -> FilterState:
     """Step 1: express the belief in a new frame.
 
     Each new cell takes the belief of the old cell that contains its centre, so a shift by whole cells is exact. Cells
@@ -43,39 +45,40 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterStat
     state : FilterState
         The belief in the old frame, without newborn mass.
     spec : GridSpec
-        The cells, (H, W), the same in both frames.
+        The cells in the old frame, (H, W).
     motion : PlanarMotion
         Pose of the new frame in the old one, metres and radians.
+    to : GridSpec, optional
+        The cells in the new frame, (H', W'); by default those of `spec`.
     """
     check_shape("state", state.newborn, spec.shape)
-    probability = look_up(state.probability, NOTHING_KNOWN, spec, spec, motion)
+    to = to or spec
+    probability = look_up(state.probability, NOTHING_KNOWN, spec, to, motion)
     particles = transform(state.particles, motion)
-    cells = cells_of(particles.position, spec)
-    claimed = weight_in_cells(particles.weight, cells, spec.shape)
+    cells = cells_of(particles.position, to)
+    claimed = weight_in_cells(particles.weight, cells, to.shape)
     dynamic = np.minimum(claimed, 1)
     others = probability[FREE] + probability[STATIC] + probability[UNKNOWN]
     probability = probability * ratio(1 - dynamic, others)
     probability[DYNAMIC] = dynamic
     probability[UNKNOWN] += np.where(others > 0, 0, 1 - dynamic)  # no other state was possible
     weight = particles.weight * at_cells(ratio(dynamic, claimed), cells)
-    return FilterState(probability, replace(particles, weight=weight), state.newborn)
+    return FilterState(probability, replace(particles, weight=weight), np.zeros(to.shape))
 
 
 def predict(
-    state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator, driven: float = 0.0
+    state: FilterState,
+    spec: GridSpec,
+    world: WorldModel,
+    dt: float,
+    rng: np.random.Generator,
+    driven: ArrayLike = (0.0, 0.0),
 ) -> FilterState:
     """Step 2: predict how the belief changes while `dt` seconds pass without a scan.
 
     First each cell mixes by the transition matrix, and particles near zero speed become STATIC. Then the particles fly,
-    and dynamic mass with them. A cell that they leave becomes FREE, because nothing stands where something has moved
-    away. In a cell where mass arrives with probability a, two statements meet: "something arrives", and what the cell
-    itself holds. "It arrives, and the cell is STATIC" can't be true, because two solid things can't share a cell. So
-    this combination is struck out of the joint distribution. With s and d the cell's own static and dynamic probability
-
-        P(DYNAMIC) = [a (1 - s) + (1 - a) d] / (1 - a s),   others = (1 - a) others / (1 - a s)
-
-    So what arrives in free space is DYNAMIC, and a fence that is known to stand stays STATIC although particles cross
-    it. `world.walls` doubts further arrivals, which may be only a wall that comes into view.
+    dynamic mass with them, and meet what their new cells hold (`collide`). `world.walls` doubts further arrivals, which
+    may be only a wall that comes into view.
 
     Parameters
     ----------
@@ -87,36 +90,22 @@ def predict(
         Rates of change, how things stop, how they accelerate, and which arrivals to doubt beside walls.
     dt, rng : float, numpy.random.Generator
         Time since the previous instant, seconds, not negative; source of the particles' accelerations.
-    driven : float
-        How far the vehicle has driven along the x axis since the previous instant, metres; negative backwards.
+    driven : (2,) float
+        How far the vehicle has driven since the previous instant, along the axes of the map, metres.
     """
     check_shape("state", state.newborn, spec.shape)
     M = transition_matrix(world, dt)
-    particles = slow_down(state.particles, world.stop_rate, world.stop_speed, dt)
-    particles = replace(particles, weight=particles.weight * M[DYNAMIC, DYNAMIC])
+    particles = stay_in_motion(state.particles, world, M, dt)
     start = cells_of(particles.position, spec)
     going = weight_in_cells(particles.weight, start, spec.shape)
     mixed, newborn = mix(state.probability, state.newborn, going, M)
 
     particles = fly(particles, world.max_acceleration, dt, rng)
     end = cells_of(particles.position, spec)
-    moved = end != start
-    vacated = weight_in_cells(particles.weight * moved, start, spec.shape)
-    blocked = at_cells(mixed[STATIC], end)
-    if world.walls is not None:
-        car_speed = driven / dt if dt > 0 else 0.0
-        blocked += world.walls.doubt(particles, end, mixed, mixed[UNKNOWN] + vacated, spec, car_speed)
-
-    # The particles that have moved meet what their new cells hold; each is blocked with some probability.
-    stays = weight_in_cells(particles.weight * ~moved, end, spec.shape)
-    arrives = weight_in_cells(particles.weight * moved, end, spec.shape)
-    possible = weight_in_cells(particles.weight * moved * (1 - blocked), end, spec.shape)
-    keep, take = strike_out(arrives, possible)
-    probability = keep * mixed
-    probability[FREE] += keep * vacated  # what flew away leaves free space behind
-    probability[DYNAMIC] = keep * (newborn + stays) + take * possible
-    factor = np.where(moved, at_cells(take, end) * (1 - blocked), at_cells(keep, end))
-    return FilterState(probability, replace(particles, weight=particles.weight * factor), keep * newborn)
+    vacated = weight_in_cells(particles.weight * (end != start), start, spec.shape)
+    doubt = world.walls.doubt(particles, end, mixed, mixed[UNKNOWN] + vacated, spec, driven, dt)
+    blocked = at_cells(mixed[STATIC], end) + doubt
+    return collide(mixed, newborn, particles, start, end, vacated, blocked)
 
 
 def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldModel) -> FilterState:
@@ -144,8 +133,7 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     posterior, factor = bayes(prior.probability, evidence)
     cells = cells_of(prior.particles.position, spec)
     particles = replace(prior.particles, weight=prior.particles.weight * at_cells(factor, cells))
-    if world.walls is not None:
-        posterior = world.walls.clear_wakes(posterior, particles, cells, ~seen, spec)
+    posterior = world.walls.clear_wakes(posterior, particles, cells, ~seen, spec)
     return FilterState(posterior, particles, prior.newborn * factor)
 
 
@@ -209,6 +197,59 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     return FilterState(probability, Particles(position, velocity, weight), np.zeros(spec.shape))
 
 
+LONGEST = 1e6
+"""Seconds after which nothing changes any more: rates of 1/s have long mixed, and `expm` would lose its digits."""
+
+
+def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
+    """Return the transition matrix of a time step, M = exp(R dt).
+
+    Parameters
+    ----------
+    world : WorldModel
+        Its rates are the off-diagonal of R, whose rows sum to zero.
+    dt : float
+        The time step, seconds, not negative.
+
+    Returns
+    -------
+    (4, 4) float64
+        M[i, j] is the probability that a cell in state i is in state j after `dt`; rows sum to 1.
+
+    Examples
+    --------
+    After three seconds without a scan, this is what a free cell has become:
+
+    >>> transition_matrix(WorldModel(), dt=3.0)[0].round(2)
+    array([0.37, 0.03, 0.01, 0.59])
+    """
+    if not not_negative(dt):
+        raise ArgumentError("dt", "seconds, not negative", dt)
+    R = np.array(world.rates, dtype=np.float64)
+    np.fill_diagonal(R, 0)
+    np.fill_diagonal(R, -R.sum(axis=1))
+    M = expm(R * min(dt, LONGEST))
+    return M / M.sum(axis=1, keepdims=True)
+
+
+def stay_in_motion(particles: Particles, world: WorldModel, M: NDArray, dt: float) -> Particles:
+    """Reduce each weight to what is still DYNAMIC after a time step: by the matrix, and because slow things stop.
+
+    Parameters
+    ----------
+    particles : Particles
+        N particles at the start of the time step.
+    world : WorldModel
+        How things stop.
+    M : (4, 4) float
+        The transition matrix of the time step.
+    dt : float
+        The time step, seconds.
+    """
+    moving = slow_down(particles, world.stop_rate, world.stop_speed, dt)
+    return replace(moving, weight=moving.weight * M[DYNAMIC, DYNAMIC])
+
+
 def mix(
     probability: NDArray, newborn: NDArray, going: NDArray, M: NDArray
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -239,6 +280,53 @@ def mix(
     born = np.einsum("i,ihw->hw", M[:, DYNAMIC], without_particles)
     mixed[DYNAMIC] = born + going
     return mixed, born
+
+
+def collide(
+    mixed: NDArray,
+    newborn: NDArray,
+    particles: Particles,
+    start: NDArray,
+    end: NDArray,
+    vacated: NDArray,
+    blocked: NDArray,
+) -> FilterState:
+    """Let particles that have moved meet what their new cells hold.
+
+    A cell that they leave becomes FREE, because nothing stands where something has moved away. In a cell where mass
+    arrives with probability a, two statements meet: "something arrives", and what the cell itself holds. "It arrives,
+    and the cell is STATIC" can't be true, because two solid things can't share a cell. So this combination is struck
+    out of the joint distribution (`strike_out`). With s and d the cell's own static and dynamic probability
+
+        P(DYNAMIC) = [a (1 - s) + (1 - a) d] / (1 - a s),   others = (1 - a) others / (1 - a s)
+
+    So what arrives in free space is DYNAMIC, and a fence that is known to stand stays STATIC although particles cross
+    it. What `Walls.doubt` doubts of an arrival is struck out in the same way.
+
+    Parameters
+    ----------
+    mixed, newborn : (4, H, W), (H, W) float
+        The four states before particles flew, and the part of P(DYNAMIC) that has no particles, from `mix`.
+    particles : Particles
+        N particles after their flight.
+    start, end : (N,) int
+        The cell of each before and after its flight, from `cells_of`.
+    vacated : (H, W) float
+        Sum of the weights that have left each cell.
+    blocked : (N,) float
+        Probability that a particle's arrival in its cell is impossible.
+    """
+    moved = end != start
+    shape = newborn.shape
+    stays = weight_in_cells(particles.weight * ~moved, end, shape)
+    arrives = weight_in_cells(particles.weight * moved, end, shape)
+    possible = weight_in_cells(particles.weight * moved * (1 - blocked), end, shape)
+    keep, take = strike_out(arrives, possible)
+    probability = keep * mixed
+    probability[FREE] += keep * vacated  # what flew away leaves free space behind
+    probability[DYNAMIC] = keep * (newborn + stays) + take * possible
+    factor = np.where(moved, at_cells(take, end) * (1 - blocked), at_cells(keep, end))
+    return FilterState(probability, replace(particles, weight=particles.weight * factor), keep * newborn)
 
 
 def strike_out(arrives: NDArray, possible: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -8,7 +8,7 @@ moving things have left out of sight. `CmcdotParams(walls=None)` is the paper's 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import check_fields, not_negative, types_named
 from semgrid_edu.grid import GridSpec
@@ -74,27 +74,28 @@ class Walls:
         least = self.clearing_cells * cell
         return path * np.maximum(1, ratio(np.full_like(length, least), length))
 
-    def keeps_pace(self, velocity: NDArray, car_speed: float, cell: float) -> NDArray[np.bool_]:
+    def keeps_pace(self, velocity: NDArray, car_velocity: NDArray, cell: float) -> NDArray[np.bool_]:
         """Return which things move at the car's own speed, (N,).
 
-        Their velocity differs from the car's by at most the car's speed, as that of a standing thing does. And they
-        are fast enough to have left their cells within `second_look`. Nothing keeps pace with a car that stands.
+        |v - v_car| <= |v_car|: relative to the car they are no faster than a standing thing. And they are fast enough
+        to have left their cells within `second_look`. Nothing keeps pace with a car that stands.
 
         Parameters
         ----------
         velocity : (N, 2) float
             Velocities along the axes of the map, m/s.
-        car_speed : float
-            Speed of the vehicle along the x axis of the map, m/s, negative backwards.
+        car_velocity : (2,) float
+            Velocity of the vehicle along the axes of the map, m/s.
         cell : float
             Side of a cell, metres.
         """
         time = self.second_look * self.clearing_time
+        car_speed = np.hypot(*car_velocity)
         if car_speed == 0 or time == 0:
             return np.zeros(len(velocity), bool)
-        difference = np.hypot(velocity[:, 0] - car_speed, velocity[:, 1])
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        return (difference <= abs(car_speed)) & (speed >= self.clearing_cells * cell / time)
+        difference = np.hypot(*(velocity - car_velocity).T)  # unlike `norm`, without overflow
+        speed = np.hypot(*velocity.T)
+        return (difference <= car_speed) & (speed >= self.clearing_cells * cell / time)
 
     def doubt(
         self,
@@ -103,7 +104,8 @@ class Walls:
         mixed: NDArray,
         unseen: NDArray,
         spec: GridSpec,
-        car_speed: float,
+        driven: ArrayLike,
+        dt: float,
     ) -> NDArray[np.float64]:
         """Return the probability that a particle's arrival in its cell is only a wall that comes into view, (N,).
 
@@ -119,10 +121,12 @@ class Walls:
             Probability that no scan has found the cell free: P(UNKNOWN), and what has only just left the cell.
         spec : GridSpec
             The cells, (H, W).
-        car_speed : float
-            Speed of the vehicle along the x axis of the map, m/s.
+        driven : (2,) float
+            How far the vehicle has driven during the flight, along the axes of the map, metres.
+        dt : float
+            How long the particles have flown, seconds.
         """
-        keeps = self.keeps_pace(particles.velocity, car_speed, spec.cell)
+        keeps = self.keeps_pace(particles.velocity, velocity_of(driven, dt), spec.cell)
         before, shortly_before, ahead = (
             self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
         )
@@ -156,6 +160,19 @@ class Walls:
         """Return the cell of each particle at another time, (N,); `OUTSIDE` where it is the same cell as now."""
         then = cells_of(particles.position + self.displacement(particles.velocity, spec.cell, fraction), spec)
         return np.where(then == cells, OUTSIDE, then)
+
+
+def velocity_of(driven: ArrayLike, dt: float) -> NDArray[np.float64]:
+    """Return the velocity of a vehicle that has driven so far, (2,) m/s; 0 when no time has passed.
+
+    Parameters
+    ----------
+    driven : (2,) float
+        Displacement, metres.
+    dt : float
+        Time, seconds.
+    """
+    return ratio(np.asarray(driven, dtype=float), dt)
 
 
 def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDArray[np.float64]:

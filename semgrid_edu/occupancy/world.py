@@ -3,14 +3,10 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from semgrid_edu.errors import ArgumentError, check_fields, not_negative, positive_count, types_named
-from semgrid_edu.occupancy.evidence import Sensor, check_sensor
-from semgrid_edu.occupancy.resampling import Resampling, SystematicResampling
-from semgrid_edu.occupancy.sensor import SensorModel
-from semgrid_edu.occupancy.state import check_part
+from semgrid_edu.occupancy.sensor import Sensor, SensorModel, check_sensor
+from semgrid_edu.occupancy.state import Resampling, SystematicResampling, check_part
 from semgrid_edu.occupancy.walls import Walls
 
 Rates = tuple[tuple[float, ...], ...]
@@ -43,7 +39,7 @@ class WorldModel:
         more than half of DYNAMIC's share to STATIC, so that a wall that comes into view isn't taken for a moving thing.
     walls : Walls or None
         What the filters need beyond the paper in real streets, so that walls and hedges that come into view don't seem
-        to move; None for the paper's filter.
+        to move; None for the paper's filter, which is `Walls(clearing_time=0)`.
     sensor : Sensor
         Turns each scan into evidence. By default a `SensorModel`; any object will do whose `scan(points)` returns
         something with `evidence(spec, pose)`.
@@ -76,41 +72,8 @@ class WorldModel:
         if not isinstance(self.walls, Walls | None):
             raise ArgumentError("walls", "Walls() or None", self.walls)
         check_sensor(self.sensor)
-
-
-LONGEST = 1e6
-"""Seconds after which nothing changes any more: rates of 1/s have long mixed, and `expm` would lose its digits."""
-
-
-def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
-    """Return the transition matrix of a time step, M = exp(R dt).
-
-    Parameters
-    ----------
-    world : WorldModel
-        Its rates are the off-diagonal of R, whose rows sum to zero.
-    dt : float
-        The time step, seconds, not negative.
-
-    Returns
-    -------
-    (4, 4) float64
-        M[i, j] is the probability that a cell in state i is in state j after `dt`; rows sum to 1.
-
-    Examples
-    --------
-    After three seconds without a scan, this is what a free cell has become:
-
-    >>> transition_matrix(WorldModel(), dt=3.0)[0].round(2)
-    array([0.37, 0.03, 0.01, 0.59])
-    """
-    if not not_negative(dt):
-        raise ArgumentError("dt", "seconds, not negative", dt)
-    R = np.array(world.rates, dtype=np.float64)
-    np.fill_diagonal(R, 0)
-    np.fill_diagonal(R, -R.sum(axis=1))
-    M = expm(R * min(dt, LONGEST))
-    return M / M.sum(axis=1, keepdims=True)
+        if self.walls is None:
+            object.__setattr__(self, "walls", Walls(clearing_time=0))
 
 
 @dataclass(frozen=True)

@@ -86,16 +86,6 @@ class PlaneSampler(nn.Module):
         ]
         return torch.stack(planes, dim=2).masked_fill(hidden, 0).to(scores.dtype)
 
-    def as_kind(self, kind: type[nn.Module]) -> nn.Module:
-        """Return a sampler of the same points by another class, or this one if it has that class already.
-
-        Parameters
-        ----------
-        kind : type
-            `semgrid_edu.planes.PlaneSampler` or `semgrid_edu.fast.PlaneSampler`.
-        """
-        return self if type(self) is kind else kind(self.pixels, self.visible, self.image_size)
-
 
 def check_scores(scores: Tensor, image_size: tuple[int, int]) -> None:
     """Raise an `ArgumentError` unless these are scores of images of that size.

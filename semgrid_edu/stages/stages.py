@@ -1,14 +1,12 @@
 """The five stages of the system as functions that can be exchanged, and a sixth that the paper leaves out (Fig. 2).
 
-`Stages.of` assembles the book's parts, `Stages.fast` their compiled twins. This is the only module in the book that
-imports `semgrid_edu.fast`.
+`Stages.of` assembles the book's parts, `Stages.fast` their compiled twins.
 """
 
 import copy
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,14 +15,13 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.crf import CrfParams, mean_field, unary_from_log_probability
+from semgrid_edu.crf import CrfParams, mean_field
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.errors import ArgumentError, MissingExtraError
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.memory import ClassMemory, MemoryParams
 from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
 from semgrid_edu.occupancy import CmcdotParams, DriveTracker
-from semgrid_edu.planes import PlaneSampler
 from semgrid_edu.stages.hints import REMEMBER, STAGES, check_usage
 from semgrid_edu.stages.stepping import checked
 
@@ -117,7 +114,6 @@ class Stages:
         seed: int = 0,
         keep_steps: bool = False,
         memory: bool | MemoryParams = False,
-        parts: Any = None,
     ) -> "Stages":
         """Return the package's own stages, in the book's readable version.
 
@@ -135,8 +131,6 @@ class Stages:
             Whether each belief also holds what the filter had after each of its steps (`Belief.steps`).
         memory : bool or MemoryParams
             Whether class beliefs are carried over frames, or the parameters with which they are.
-        parts : module, optional
-            Where `DriveTracker`, `PlaneSampler`, `mean_field` and `ClassMemory` come from; the book if left out.
 
         Raises
         ------
@@ -148,19 +142,23 @@ class Stages:
         >>> own = Stages.of(load_net(sample_weights(), drive.camera))                   # doctest: +SKIP
         >>> dataclasses.replace(own, refine=my_refine)                                  # doctest: +SKIP
         """
-        parts = parts or _BOOK
         architecture = net.need_architecture()
         crf = crf or CrfParams.for_cells(architecture.grid.cell)
 
+        def log_grid(planes: Tensor, occupancy: Tensor) -> Tensor:
+            return net.fuse(planes, occupancy).log_softmax(dim=1)
+
         def refine(log_g: NDArray, o: NDArray) -> NDArray:
-            return parts.mean_field(unary_from_log_probability(log_g), o, crf)
+            return mean_field(-log_g, o, crf)
 
         return cls(
-            track=parts.DriveTracker(architecture.grid, occupancy, seed, keep_steps),
-            **_network_stages(net, net.sampler.as_kind(parts.PlaneSampler)),
+            track=DriveTracker(architecture.grid, occupancy, seed, keep_steps),
+            segment=_on_arrays(net.segment),
+            sample=_on_arrays(net.sampler),
+            fuse=_on_arrays(log_grid),
             refine=refine,
             architecture=architecture,
-            remember=_memory(parts, memory, architecture),
+            remember=_memory(memory, architecture),
         )
 
     @classmethod
@@ -174,7 +172,14 @@ class Stages:
         occupancy, **options
             Those of `Stages.of`.
         """
-        return cls.of(net, occupancy, **options, parts=_fast_parts())
+        from semgrid_edu import fast  # the book's only import of `fast`
+
+        try:
+            return fast.fast_stages(net, occupancy, **options)
+        except MissingExtraError:
+            hint = "numba is missing, so the slower readable stages run: pip install semgrid_edu[fast]"
+            warnings.warn(hint, stacklevel=2)
+            return cls.of(net, occupancy, **options)
 
     def over(self, other: "Stages") -> "Stages":
         """Return these stages, and those of `other` where one was left out.
@@ -219,58 +224,40 @@ class Stages:
             return stages
         return stages.over(cls.fast(load_net(sample_weights(), camera), memory=memory, **options))
 
-    def started(self) -> "Stages":
-        """Return the stages for one drive: with fresh copies of tracker and memory, and with their results checked."""
+    def need_ready(self) -> None:
+        """Raise an `ArgumentError` unless `run_frame` can run these stages: all five, and no generator among them."""
+        self._need_all()
+        for name in ("track", "remember"):
+            stage = getattr(self, name)
+            if stage is not None and not hasattr(stage, "step"):
+                raise ArgumentError(name, "an object with step(frame), see `Stages.started`", type(stage).__name__)
+
+    def _need_all(self) -> None:
+        """Raise an `ArgumentError` if one of the paper's five stages was left out."""
         if missing := set(STAGES) - set(self.given):
             raise ArgumentError("stages", f"all of {', '.join(STAGES)}", f"no {', '.join(sorted(missing))}")
+
+    def started(self) -> "Stages":
+        """Return the stages for one drive: with fresh copies of tracker and memory, and with their results checked."""
+        self._need_all()
         architecture = self.architecture or Architecture()
         own = replace(self, track=copy.deepcopy(self.track), remember=copy.deepcopy(self.remember))
         parts = {name: checked(name, getattr(own, name), architecture) for name in self.given}
         return Stages(architecture=architecture, **parts)
 
 
-_BOOK = SimpleNamespace(
-    DriveTracker=DriveTracker, PlaneSampler=PlaneSampler, mean_field=mean_field, ClassMemory=ClassMemory
-)
-"""The readable parts that `Stages.of` puts together; `semgrid_edu.fast` has the same names."""
-
-
-def _fast_parts() -> Any:
-    """Return `semgrid_edu.fast`, or the book's parts where numba isn't installed."""
-    from semgrid_edu import fast
-
-    try:
-        fast.DriveTracker  # noqa: B018 (loads the compiled filter)
-    except MissingExtraError:
-        warnings.warn(
-            "numba is missing, so the slower readable stages run: pip install semgrid_edu[fast]", stacklevel=3
-        )
-        return _BOOK
-    return fast
-
-
-def _network_stages(net: SemanticGridNet, sampler: PlaneSampler) -> dict[str, Callable]:
-    """Return the stages that the network computes as functions on numpy arrays, without gradients."""
+def _on_arrays(function: Callable) -> Callable:
+    """Return a function of batches as one of numpy arrays, for one frame at a time, without gradients."""
 
     @torch.inference_mode()
-    def segment(image: NDArray) -> NDArray:
-        return net.segmenter(_tensor(image)[None])[0].numpy()
+    def stage(*arrays: NDArray) -> NDArray:
+        batches = [torch.from_numpy(np.asarray(array, dtype=np.float32))[None] for array in arrays]
+        return function(*batches)[0].numpy()
 
-    @torch.inference_mode()
-    def sample(s: NDArray) -> NDArray:
-        return sampler(_tensor(s)[None])[0].numpy()
-
-    @torch.inference_mode()
-    def fuse(p: NDArray, o: NDArray) -> NDArray:
-        planes = _tensor(p)
-        # PyTorch recognises channels-last planes by the stride of the batch axis too, and would copy them without it.
-        planes = planes.as_strided((1, *planes.shape), (planes.numel(), *planes.stride()))
-        return net.fusion(planes, _tensor(o)[None])[0].log_softmax(dim=0).numpy()
-
-    return {"segment": segment, "sample": sample, "fuse": fuse}
+    return stage
 
 
-def _memory(parts: Any, memory: bool | MemoryParams, architecture: Architecture) -> Tracker | None:
+def _memory(memory: bool | MemoryParams, architecture: Architecture) -> Tracker | None:
     """Return the stage `remember`, or None without memory."""
     if memory is False:
         return None
@@ -279,9 +266,4 @@ def _memory(parts: Any, memory: bool | MemoryParams, architecture: Architecture)
     if architecture.label_set != KITTI_14.name:
         found = f"{memory} with {architecture.label_set}"
         raise ArgumentError("memory", f"the classes of {KITTI_14.name}, which have unknown ones", found)
-    return parts.ClassMemory(architecture.grid, None if memory is True else memory)
-
-
-def _tensor(array: NDArray) -> Tensor:
-    """Return a tensor that shares the memory of a float32 array and has its layout."""
-    return torch.from_numpy(np.asarray(array, dtype=np.float32))
+    return ClassMemory(architecture.grid, None if memory is True else memory)

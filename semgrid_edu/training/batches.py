@@ -139,7 +139,7 @@ def image_scores(net: SemanticGridNet, batch: Batch) -> Tensor:
     (B, C, h, w) float32
         s, unmirrored.
     """
-    return net.image_scores(batch.frames.image, batch.mirrored)
+    return net.segment(batch.frames.image, batch.mirrored)
 
 
 def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:

@@ -12,7 +12,6 @@ from semgrid_edu.crf import (
     free_energy,
     mean_field_naive,
     pair_weights,
-    unary_from_log_probability,
     unary_from_probability,
 )
 from semgrid_edu.errors import ArgumentError
@@ -126,7 +125,6 @@ def test_one_update_written_as_eq_4_with_loops():
 
 def test_unary_from_probability_is_minus_log():
     np.testing.assert_allclose(unary_from_probability([[0.5], [0.5], [0.0]]), [[np.log(2)], [np.log(2)], [np.inf]])
-    np.testing.assert_array_equal(unary_from_log_probability(np.array([-0.5, -np.inf])), [0.5, np.inf])
     for wrong in ([0.5, 0.6], [1.5, -0.5], [np.nan, 1.0]):
         with pytest.raises(ArgumentError, match="probability"):
             unary_from_probability(wrong)

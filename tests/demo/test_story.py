@@ -9,6 +9,7 @@ import torch
 from scipy.special import softmax
 from tiny_drive import STEP
 from torch import nn
+from worlds.lecture_00_cell_story import draw_cell_story
 
 from semgrid_edu.crf import CrfParams, damping, gram_matrix, mean_field_naive, pair_weights, unary_from_probability
 from semgrid_edu.datasets.grid_truth import grid_truth
@@ -19,7 +20,7 @@ from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.occupancy import CmcdotParams, SensorModel, scan_evidence, update
 from semgrid_edu.occupancy.state import FilterState, Particles
 from semgrid_edu.planes import plane_pixels
-from semgrid_edu.workshop.demo import cell_story, draw_cell_story
+from semgrid_edu.workshop.demo import cell_story
 from semgrid_edu.workshop.demo.contributions import contributions
 from semgrid_edu.workshop.demo.evidence import VERDICTS, place_history, scan_maps
 from semgrid_edu.workshop.demo.neighbours import neighbour_pull

@@ -1,11 +1,10 @@
-"""The steps of the memory: the book's and the compiled ones are equal, and what must hold however a cell was seen."""
+"""The steps of the memory: what must hold however a cell was seen."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from semgrid_edu import fast
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.memory import (
@@ -18,11 +17,12 @@ from semgrid_edu.memory import (
     recall_classes,
 )
 from semgrid_edu.occupancy import State
+from semgrid_edu.occupancy.state import OUTSIDE
 
 GRID, S = GridSpec(0, 6, -2, 2, 1), 3
 SAME, ONE = np.arange(24, dtype=np.int32).reshape(GRID.shape), np.zeros((1, 1), np.int32)
 """Numbers of cells, in the same grid and in a grid of one cell."""
-TWINS = settings(deadline=None, max_examples=40)
+FEW = settings(deadline=None, max_examples=40)
 SEEDS = st.integers(0, 10**6)
 PARAMS = st.builds(
     MemoryParams,
@@ -43,7 +43,8 @@ def frame(rng: np.random.Generator, level: float = 0.3) -> tuple[np.ndarray, np.
 
 def memories(rng: np.random.Generator, params: MemoryParams) -> MemoryState:
     """Any memory: some cells were never seen, and moving things are anywhere in their cells."""
-    memory = MemoryState(rng.normal(0, 3, (2 * S + 6, *GRID.shape)).astype(np.float32))
+    memory = MemoryState.empty(S, GRID)
+    memory.evidence[:] = rng.normal(0, 3, memory.evidence.shape)
     memory.seen[:] = rng.random(memory.seen.shape) * (rng.random(memory.seen.shape) < 0.7)
     memory.weight[:] = (memory.seen > 0) * rng.uniform(0.1, 1, memory.seen.shape) * params.max_weight
     memory.evidence[:] *= (memory.seen > 0)[:, None]
@@ -51,32 +52,26 @@ def memories(rng: np.random.Generator, params: MemoryParams) -> MemoryState:
     return memory
 
 
-def doubled(memory: MemoryState) -> MemoryState:
-    return MemoryState(memory.planes.astype(np.float64))
-
-
-def assert_same(compiled: MemoryState, book: MemoryState) -> None:
-    for name in ("evidence", "weight", "seen", "offset"):
-        np.testing.assert_allclose(getattr(compiled, name), getattr(book, name), atol=2e-4, err_msg=name)
-
-
-@TWINS
+@FEW
 @given(SEEDS, PARAMS)
-def test_both_recall_and_learn_alike(seed, params):
+def test_what_is_recalled_is_a_distribution_and_what_is_learnt_stays_within_its_limits(seed, params):
     rng = np.random.default_rng(seed)
     memory, (g, o) = memories(rng, params), frame(rng)
-    places = rng.permutation(SAME.ravel() - 3).reshape(SAME.shape).astype(np.int32)
-    look, compiled_look = look_at(g, o, GRID, params), fast.look_at(g, o, GRID, params)
-    for book, compiled in zip(look, compiled_look, strict=True):
-        np.testing.assert_allclose(compiled, book, atol=1e-5)
-    recalled = fast.recall_classes(memory, SAME, o, compiled_look, params)
-    np.testing.assert_allclose(recalled, recall_classes(doubled(memory), SAME, o, look, params), atol=1e-5)
+    places = np.maximum(rng.permutation(SAME.ravel() - 3), OUTSIDE).reshape(SAME.shape)
+    look = look_at(g, o, GRID, params)
+    recalled = recall_classes(memory, SAME, o, look, params)
+    assert recalled.min() >= 0
     np.testing.assert_allclose(recalled.sum(axis=0), 1, atol=1e-5)
-    learnt = fast.learn_classes(memory, places, compiled_look, params)
-    assert_same(learnt, learn_classes(doubled(memory), places, look, params))
+    learnt = learn_classes(memory, places, look, params)
+    assert learnt.weight.max() <= params.max_weight + 1e-9
+    assert (learnt.seen >= memory.seen - 1e-12).all()
+    assert learnt.seen.max() <= 1
+    for name in ("evidence", "weight", "seen", "offset"):  # the frame tells nothing about cells outside its grid
+        before, after = (getattr(one, name)[..., places == OUTSIDE] for one in (memory, learnt))
+        np.testing.assert_array_equal(after, before)
 
 
-@TWINS
+@FEW
 @given(SEEDS, PARAMS)
 def test_a_first_frame_is_kept_as_it_is(seed, params):
     """With nothing remembered, the semantic classes keep their probabilities, and o names the unknown ones."""
@@ -143,7 +138,7 @@ def test_a_remembered_car_counts_only_as_far_as_something_is_there(o, still_ther
     assert recall_classes(memory, ONE, o, blind, params)[1, 0, 0] == pytest.approx(still_there, abs=1e-2)
 
 
-@TWINS
+@FEW
 @given(SEEDS, PARAMS)
 def test_where_the_camera_sees_the_frame_alone_decides_on_what_comes_and_goes(seed, params):
     rng = np.random.default_rng(seed)

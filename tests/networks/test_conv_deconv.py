@@ -3,7 +3,8 @@ import torch
 from torch import nn
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights, initialise
+from semgrid_edu.networks.conv_deconv import ConvDeconv
+from semgrid_edu.networks.segmenter import fresh_weights, initialise
 
 
 def _convolutions(module):

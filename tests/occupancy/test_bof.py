@@ -31,8 +31,7 @@ from semgrid_edu.occupancy import (
     predict,
     update,
 )
-from semgrid_edu.occupancy.resampling import draw_velocities
-from semgrid_edu.occupancy.state import cells_of, weight_in_cells
+from semgrid_edu.occupancy.state import cells_of, draw_velocities, weight_in_cells
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 GRID = GridSpec(0, 3, -1, 1, 0.5)
@@ -99,8 +98,8 @@ def test_prediction_is_that_of_cmcdot_when_its_particles_lie_on_the_lattice(seed
     particles = Particles(position, LATTICE.velocities[1:][velocity].astype(np.float32), state.occupied[1:].ravel())
     twin = FilterState(state.probability, particles, np.zeros(GRID.shape, np.float32))
 
-    twin = predict(twin, GRID, world, EXACT, rng, driven)
-    state = bof_predict(state, GRID, BofParams(LATTICE, world), EXACT, driven)
+    twin = predict(twin, GRID, world, EXACT, rng, (driven, 0.0))
+    state = bof_predict(state, GRID, BofParams(LATTICE, world), EXACT, (driven, 0.0))
     assert np.allclose(state.probability, twin.probability, atol=2e-6)
     for k in range(1, len(LATTICE)):
         of_bin = velocity == k - 1

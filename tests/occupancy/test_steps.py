@@ -25,8 +25,7 @@ from semgrid_edu.occupancy import (
     transition_matrix,
     update,
 )
-from semgrid_edu.occupancy.resampling import systematic_resample
-from semgrid_edu.occupancy.state import cells_of, weight_in_cells
+from semgrid_edu.occupancy.state import cells_of, systematic_resample, weight_in_cells
 
 GRID = GridSpec(0, 6, -2, 2, 1)
 PARAMS = CmcdotParams(n_particles=2000)

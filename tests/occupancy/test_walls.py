@@ -112,7 +112,7 @@ def test_what_comes_past_a_porous_hedge_is_doubted_if_it_keeps_pace_with_the_veh
     """
     state, world = flying(0.0, UNKNOWN), replace(STILL, walls=Walls(clearing_cells=2.0))
     state.probability[:, PASSED, 0] = 0, 1, 0, 0
-    given = predicted(state, ROW, world, 0.1, np.random.default_rng(0), driven)
+    given = predicted(state, ROW, world, 0.1, np.random.default_rng(0), (driven, 0.0))
     np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], 0.0 if driven > 0.5 else 0.5, atol=1e-6)
 
 
@@ -123,7 +123,7 @@ def test_a_place_beside_what_stands_is_no_open_space_to_what_keeps_pace_with_the
     state = flying(1.0, UNKNOWN, FREE)
     state.probability[:, AHEAD - 1, 0] = 0.4, 0.6, 0, 0
     given = predicted(
-        state, ROW, replace(STILL, walls=Walls(clearing_cells=1.0)), 0.1, np.random.default_rng(0), driven
+        state, ROW, replace(STILL, walls=Walls(clearing_cells=1.0)), 0.1, np.random.default_rng(0), (driven, 0.0)
     )
     np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], dynamic, atol=1e-6)
 
@@ -137,7 +137,7 @@ def test_who_steps_out_of_a_hedge_into_the_open_is_believed_although_the_vehicle
     probability[:, 8, 2] = 0, 0.5, 0.5, 0
     walker = Particles(*(np.array(a, np.float32) for a in ([[3.75, 2.55]], [[0.0, -1.5]], [0.5])))
     state = FilterState(probability, walker, np.zeros(street.shape, np.float32))
-    given = predicted(state, street, STILL, 0.1, np.random.default_rng(0), 1.0)
+    given = predicted(state, street, STILL, 0.1, np.random.default_rng(0), (1.0, 0.0))
     np.testing.assert_allclose(given.probability[DYNAMIC, 8, 3], 0.5, atol=1e-6)
 
 
@@ -150,7 +150,7 @@ def test_a_car_that_drives_along_a_parked_row_is_believed_although_the_vehicle_d
     state = replace(flying(0.0, FREE), probability=probability, newborn=np.zeros((16, 2), np.float32))
     state.particles.position[:, 1] = 1.5
     street, world = GridSpec(0, 16, 0, 2, 1), replace(STILL, walls=Walls(clearing_cells=1.0))
-    given = predicted(state, street, world, 0.1, np.random.default_rng(0), 1.0)
+    given = predicted(state, street, world, 0.1, np.random.default_rng(0), (1.0, 0.0))
     np.testing.assert_allclose(given.probability[:, TARGET, 0], [0.5, 0, 0.5, 0], atol=1e-6)
 
 

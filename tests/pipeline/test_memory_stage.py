@@ -8,8 +8,7 @@ from tiny_drive import DATE, write_tiny_drive
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.fast import remember_drive
-from semgrid_edu.memory import MemoryParams, View
+from semgrid_edu.memory import MemoryParams, View, remember_drive
 from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.pipeline import StageError, Stages, run_pipeline
@@ -42,7 +41,7 @@ def test_memory_changes_nothing_else_and_is_what_remember_drive_does(drive, net,
         assert without.remembered is None
         assert set(result.seconds) - set(without.seconds) == {"remember"}
         np.testing.assert_array_equal(result.refined, without.refined)
-        np.testing.assert_array_equal(result.remembered, remembered)
+        np.testing.assert_array_equal(result.remembered, remembered.astype(np.float32))
         np.testing.assert_allclose(result.remembered.sum(axis=0), 1, atol=1e-4)
 
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 from tiny_drive import DATE, write_tiny_drive
 
-from semgrid_edu.crf import CrfParams, unary_from_log_probability
+from semgrid_edu.crf import CrfParams
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import real_weights, sample_weights
 from semgrid_edu.errors import ArgumentError
@@ -63,11 +63,12 @@ def test_occupancy_is_that_of_track_drive(drive, net, results):
 
 def test_the_semantic_grids_are_those_of_network_and_crf_bit_for_bit(net, results):
     for result in results:
-        image, occupancy = network_image(result.frame, (96, 320)), torch.from_numpy(result.belief.probability)
+        image = torch.from_numpy(network_image(result.frame, (96, 320)))
+        occupancy = torch.from_numpy(result.belief.probability)
         with torch.inference_mode():
             scores = net.segmenter(image[None])[0].numpy()
             log_g = net(image[None], occupancy[None])[0].log_softmax(dim=0).numpy()
-        refined = mean_field(unary_from_log_probability(log_g), result.belief.probability, CrfParams.for_cells(0.5))
+        refined = mean_field(-log_g, result.belief.probability, CrfParams.for_cells(0.5))
         np.testing.assert_array_equal(result.scores, scores)
         np.testing.assert_array_equal(result.grid, np.exp(log_g))
         np.testing.assert_array_equal(result.refined, refined)
@@ -130,6 +131,18 @@ def test_stages_of_networks_with_other_image_networks_can_be_mixed(drive, net, r
 def test_a_set_that_lacks_stages_does_not_start(net):
     with pytest.raises(ArgumentError, match=r"^stages: expected all of track, .*, found no fuse"):
         replace(Stages.fast(net), fuse=None).started()
+
+
+def test_run_frame_names_what_its_stages_lack(drive, net):
+    def track(frames, spec):
+        yield from track_drive(frames, spec)
+
+    with pytest.raises(
+        ArgumentError, match=r"^stages: expected all of track, .*, found no fuse, sample, segment, track"
+    ):
+        run_frame(drive[0], Stages(refine=lambda log_g, o: np.exp(log_g)))
+    with pytest.raises(ArgumentError, match=r"^track: expected an object with step\(frame\), .* found function"):
+        run_frame(drive[0], replace(Stages.of(net), track=track))
 
 
 @pytest.mark.parametrize("stages", [lambda log_g, o: np.exp(log_g), {"refine": None}, Stages, None])

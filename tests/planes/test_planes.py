@@ -137,7 +137,7 @@ def test_both_samplers_compute_equation_2(seed, h, w, n_classes, batch):
     scores = rng.normal(size=(batch, n_classes, h, w)).astype(np.float32)
     naive = np.stack([sample_planes_naive(image, pixels, visible) for image in scores])
     book = planes.PlaneSampler(pixels, visible, (h, w))
-    for sampler in (book, book.as_kind(fast.PlaneSampler)):
+    for sampler in (book, fast.PlaneSampler(pixels, visible, (h, w))):
         found = sampler(torch.from_numpy(scores)).numpy()
         assert found.dtype == np.float32
         np.testing.assert_allclose(found, naive, atol=2e-6)
@@ -268,16 +268,6 @@ def test_a_sampler_holds_no_weights_and_follows_its_module_to_another_device(sam
     torch.nn.Sequential(sampler).to("meta")
     for n_images in (1, 2):
         assert sampler(torch.zeros(n_images, 1, 4, 5, device="meta")).shape == (n_images, 1, 2, 3, 4)
-
-
-def test_a_sampler_becomes_one_of_the_other_class_and_back():
-    book = planes.PlaneSampler(*random_points(np.random.default_rng(4), (4, 5)), (4, 5))
-    quick = book.as_kind(fast.PlaneSampler)
-    assert type(quick) is fast.PlaneSampler
-    assert quick.as_kind(fast.PlaneSampler) is quick
-    back = quick.as_kind(planes.PlaneSampler)
-    assert type(back) is planes.PlaneSampler
-    np.testing.assert_array_equal(back.pixels, book.pixels)
 
 
 @BOTH

@@ -11,8 +11,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles
 from semgrid_edu.occupancy import update as package_update
 from semgrid_edu.occupancy.cmcdot import velocity_moments
-from semgrid_edu.occupancy.resampling import systematic_resample
-from semgrid_edu.occupancy.state import cells_of, weight_in_cells
+from semgrid_edu.occupancy.state import cells_of, systematic_resample, weight_in_cells
 from semgrid_edu.workshop.course.answers import answer_array, answer_arrays
 from semgrid_instructor import close, generator, hidden, keeping
 

@@ -569,7 +569,7 @@ print(*(f"{state.name} {p:.2f}" for state, p in zip(State, hidden, strict=True))
 
 # %%
 others = {"beside us": (10, 0), "overtakes": (15, 0), "comes towards us": (-10, 0), "crosses": (0, 1.4)}
-with_us = AFTER.walls.keeps_pace(np.array(list(others.values())), car_speed=10.0, cell=spec.cell)
+with_us = AFTER.walls.keeps_pace(np.array(list(others.values())), car_velocity=np.array([10.0, 0.0]), cell=spec.cell)
 assert [name for name, keeps in zip(others, with_us, strict=True) if keeps] == ["beside us", "overtakes"]
 
 # %% [markdown]

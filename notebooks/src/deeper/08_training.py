@@ -53,7 +53,7 @@ drive, spec, heights, few = sample_drive(), GridSpec.compact(), plane_heights(),
 frames = [drive[k] for k in range(len(drive))]
 beliefs = [belief.probability for belief in track_drive(frames, spec)]
 truth = np.stack([grid_truth(f.labels, o, spec) for f, o in zip(frames, beliefs, strict=True)])[::2]
-image = torch.stack([network_image(frame, Architecture.image_size) for frame in frames[::2]])
+image = torch.from_numpy(np.stack([network_image(frame, Architecture.image_size) for frame in frames[::2]]))
 o, frames, shown = torch.from_numpy(np.stack(beliefs[::2])), frames[::2], 5
 ROAD, SIDEWALK, CAR, BICYCLE, BUILDING = map(KITTI_14.index, ("road", "sidewalk", "car", "bicycle", "building"))
 

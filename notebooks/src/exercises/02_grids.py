@@ -27,7 +27,7 @@ from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import PlanarMotion, SensorModel, scan_evidence
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, look_up, map_around, scroll
+from semgrid_edu.occupancy.planar_motion import look_up, map_around, scroll
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 # Names that begin with _ belong to the tests.
@@ -530,13 +530,14 @@ _test()
 # %% nbgrader={"grade": false, "grade_id": "stage", "locked": true, "schema_version": 3, "solution": false, "task": false}
 def _track(frames, spec, tau=0.5):
     """Yield your grid's belief (4, H, W) for each frame: called `track`, this is a stage of the pipeline."""
-    area, pose, before = map_around(spec, MAX_YAW), PlanarMotion(), None
+    area, pose, before = map_around(spec, yaw=0), PlanarMotion(), None
     L, nothing = np.zeros(area.shape), np.zeros(1, np.float32)
     for frame in frames:
         before = before or frame
         motion = PlanarMotion.from_poses(before.T_world_from_lidar, frame.T_world_from_lidar)
-        shift, pose = scroll(pose.then(motion), spec.cell, MAX_YAW)  # by whole cells; the rest stays in the pose
-        L = look_up(np.float32(L)[None], nothing, area, area, shift)[0]
+        shift, pose = scroll(pose.then(motion), spec.cell)  # by whole cells; the rest stays in the pose
+        last, area = area, map_around(spec, pose.dyaw)
+        L = look_up(np.float32(L)[None], nothing, last, area, shift)[0]
         scan = scan_evidence(frame.points_grid, area, SensorModel(), pose)
         L = np.array(update(L, scan.occupied, scan.free, frame.time - before.time, tau, -1.99, 3.48), float)
         yield np.array(as_belief(look_up(np.float32(L)[None], nothing, area, spec, pose)[0]), float)

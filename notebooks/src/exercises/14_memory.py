@@ -25,8 +25,8 @@ from dataclasses import replace as _replace
 import numpy as np
 
 from semgrid_edu.workshop.course.answers import answer_array
-from semgrid_edu.fast import remember_drive as _remember_drive
 from semgrid_edu.memory import View
+from semgrid_edu.memory import remember_drive as _remember_drive
 from semgrid_edu.occupancy import Belief, PlanarMotion  # for task 5
 from semgrid_edu.occupancy.planar_motion import look_up  # for task 5
 from semgrid_edu.stages.stepping import CheckedMemory

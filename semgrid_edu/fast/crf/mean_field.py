@@ -5,8 +5,8 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.crf.lattice import bilateral_features
-from semgrid_edu.crf.mean_field import NEVER, damping, with_border, without_border
-from semgrid_edu.crf.params import CrfParams, check_inputs, check_stop
+from semgrid_edu.crf.mean_field import NEVER, check_inputs, check_stop, damping, with_border, without_border
+from semgrid_edu.crf.params import CrfParams
 from semgrid_edu.fast.crf import FAST, exponential
 from semgrid_edu.fast.crf.lattice import PermutohedralLattice
 from semgrid_edu.fast.crf.spatial import SeparableGaussian

@@ -17,8 +17,8 @@ from semgrid_edu.fast.occupancy.steps import move, predict, resample, update
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import cmcdot
-from semgrid_edu.occupancy.evidence import Observation, observe
-from semgrid_edu.occupancy.planar_motion import MAX_YAW, PlanarMotion, scroll, turn_moments
+from semgrid_edu.occupancy.planar_motion import PlanarMotion, map_around, scroll, turn_moments
+from semgrid_edu.occupancy.sensor import Evidence, Sensor, evidence_of, take_scan
 from semgrid_edu.occupancy.state import OUTSIDE, Belief, FilterState, Particles, State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
@@ -43,7 +43,9 @@ class Cmcdot(cmcdot.Cmcdot):
 
     def step(self, points_grid: NDArray, motion: PlanarMotion, dt: float) -> Belief:
         """Process one scan. Parameters, result and errors are those of `Cmcdot.step`."""
-        shift, pose = scroll(self._pose.then(motion), self.map_spec.cell, MAX_YAW)
+        shift, pose = scroll(self._pose.then(motion), self.spec.cell)
+        map_spec = map_around(self.spec, pose.dyaw)
+        driven = self._pose.rotation @ (motion.dx, motion.dy)
         steps: dict[str, NDArray[np.float32]] = {}
         generator = self._rng.bit_generator.state
         try:
@@ -51,32 +53,55 @@ class Cmcdot(cmcdot.Cmcdot):
             # lock, so a thread is enough to use two cores.
             with ThreadPoolExecutor(1) as thread:
                 sensor = compiled_twin(self.params.sensor)
-                seen = thread.submit(observe, sensor, points_grid, pose, self.map_spec, self.spec)
+                seen = thread.submit(observe, sensor, points_grid, pose, map_spec, self.spec)
                 # One name for all intermediate states, so that the memory of each is freed and reused.
-                state = self._noted(steps, "move", move(self._state, self.map_spec, shift), pose)
-                state = predict(state, self.map_spec, self.params, dt, self._rng, motion.dx)
-                state = self._noted(steps, "predict", state, pose)
+                state = self._noted(steps, "move", move(self._state, self.map_spec, shift, map_spec), map_spec, pose)
+                state = predict(state, map_spec, self.params, dt, self._rng, driven)
+                state = self._noted(steps, "predict", state, map_spec, pose)
                 predicted = state.probability
-                state = update(state, self.map_spec, seen.result().on_map, self.params)
-                state = self._noted(steps, "update", state, pose)
-                state = resample(state, self.map_spec, self.params, self._rng)
-                state = self._noted(steps, "resample", state, pose)
+                state = update(state, map_spec, seen.result()[0], self.params)
+                state = self._noted(steps, "update", state, map_spec, pose)
+                state = resample(state, map_spec, self.params, self._rng)
+                state = self._noted(steps, "resample", state, map_spec, pose)
         except BaseException:
             # `predict` has drawn already when a sensor or a resampling fails. A drive that goes on should be the same.
             self._rng.bit_generator.state = generator
             raise
         self._state = state
         self._pose = pose
-        cells = cells_of(state.particles.position, self.map_spec)
-        velocity = velocity_moments(state.particles, cells, self.map_spec.shape)
-        belief = local_belief(predicted, velocity, seen.result(), self.map_spec, self.spec, self.params)
+        self.map_spec = map_spec
+        cells = cells_of(state.particles.position, map_spec)
+        velocity = velocity_moments(state.particles, cells, map_spec.shape)
+        belief = local_belief(predicted, velocity, seen.result()[1], pose, map_spec, self.spec, self.params)
         return replace(belief, steps=steps)
 
-    def _noted(self, steps: dict[str, NDArray], name: str, state: FilterState, pose: PlanarMotion) -> FilterState:
+    def _noted(
+        self, steps: dict[str, NDArray], name: str, state: FilterState, map_spec: GridSpec, pose: PlanarMotion
+    ) -> FilterState:
         """Return the state; when steps are kept, note its probabilities at the centres of the vehicle's cells."""
         if self.keep_steps:
-            steps[name] = look_up(state.probability, NOTHING_KNOWN, self.map_spec, self.spec, pose)
+            steps[name] = look_up(state.probability, NOTHING_KNOWN, map_spec, self.spec, pose)
         return state
+
+
+def observe(
+    sensor: Sensor, points_grid: NDArray, pose: PlanarMotion, map_spec: GridSpec, spec: GridSpec
+) -> tuple[Evidence, Evidence]:
+    """Return what a scan tells about the cells of the map, and about those around the vehicle.
+
+    Parameters
+    ----------
+    sensor : Sensor
+        Turns the scan into evidence.
+    points_grid : (N, 3+) float
+        The scan, as for `Cmcdot.step`.
+    pose : PlanarMotion
+        Pose of the vehicle in the frame of the map, metres and radians.
+    map_spec, spec : GridSpec
+        The cells of the map, and those of the grid around the vehicle.
+    """
+    scan = take_scan(sensor, points_grid)
+    return evidence_of(scan, map_spec, pose), evidence_of(scan, spec, PlanarMotion())
 
 
 class DriveTracker(cmcdot.DriveTracker):
@@ -104,20 +129,21 @@ def track_drive(
 def local_belief(
     predicted: NDArray,
     velocity: tuple[NDArray, NDArray],
-    seen: Observation,
+    in_grid: Evidence,
+    pose: PlanarMotion,
     map_spec: GridSpec,
     spec: GridSpec,
     world: WorldModel,
 ) -> Belief:
     """Look up the map at the vehicle's cells and update them. Parameters are those of `local_belief`."""
-    here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, seen.pose)
+    here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, pose)
     prior = FilterState(here, Particles.none(), np.zeros(spec.shape, np.float32))
-    probability = update(prior, spec, seen.in_grid, world).probability
+    probability = update(prior, spec, in_grid, world).probability
     mean, covariance = velocity
     moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)])
-    moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, seen.pose)
+    moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, pose)
     moments[:, probability[State.DYNAMIC] == 0] = np.nan
-    return Belief(probability, *turn_moments(moments[:2], moments[2:].reshape(2, 2, *spec.shape), seen.pose))
+    return Belief(probability, *turn_moments(moments[:2], moments[2:].reshape(2, 2, *spec.shape), pose))
 
 
 def velocity_moments(

@@ -4,8 +4,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from semgrid_edu.occupancy.evidence import check_points
 from semgrid_edu.occupancy.polar import GroundParams
+from semgrid_edu.occupancy.sensor import check_points
 
 ROUGH = 3e-5
 """Error bound of `rough_azimuth`, radians; the error is less than half of it (Abramowitz and Stegun, 4.4.47)."""

@@ -141,21 +141,22 @@ def _cells_at(xy, velocity, cells, time, least, shape, x_max, y_max, cell):
 
 
 @njit(cache=True, nogil=True)
-def keeps_pace(vx, vy, car_speed, least):
+def keeps_pace(vx, vy, car_x, car_y, least):
     """Return whether a particle moves at the vehicle's speed: its velocity differs by at most that speed.
 
     Parameters
     ----------
     vx, vy : float
         Velocity along the axes of the map, m/s. A static thing, seen from the vehicle, differs by exactly its speed.
-    car_speed : float
-        Speed of the vehicle along the x axis of the map, m/s, negative backwards. Nothing keeps pace when it is 0.
+    car_x, car_y : float
+        Velocity of the vehicle along the axes of the map, m/s. Nothing keeps pace when it is 0.
     least : float
         The least speed at which something leaves its cells soon enough, m/s. Slower things don't keep pace.
     """
-    slip_squared = (vx - car_speed) ** 2 + vy**2
+    slip_squared = (vx - car_x) ** 2 + (vy - car_y) ** 2
     speed_squared = vx**2 + vy**2
-    return (slip_squared <= car_speed**2) & (speed_squared >= least**2) & (car_speed != 0)
+    car_squared = car_x**2 + car_y**2
+    return (slip_squared <= car_squared) & (speed_squared >= least**2) & (car_squared != 0)
 
 
 def doubt_arrivals(
@@ -165,7 +166,7 @@ def doubt_arrivals(
     mixed: NDArray,
     spec: GridSpec,
     walls: Walls,
-    car_speed: float,
+    car_velocity: NDArray,
 ) -> NDArray[np.float32]:
     """Return the part of each weight that comes out of a wall and moves along it, (N,).
 
@@ -183,20 +184,20 @@ def doubt_arrivals(
         The cells, (H, W).
     walls : Walls
         How far the filter looks ahead and back.
-    car_speed : float
-        Speed of the vehicle along the x axis of the map, m/s.
+    car_velocity : (2,) float
+        Velocity of the vehicle along the axes of the map, m/s.
     """
     ahead = cells_at(particles, cells, spec, walls.clearing_time, walls.clearing_cells)
     since = float(walls.second_look * walls.clearing_time)
     least = walls.clearing_cells * spec.cell / since if since > 0 else np.inf
     now = particles.position.ravel(), particles.velocity.ravel(), particles.weight, cells
     fields = doubt, ahead, mixed[STATIC], open_space(mixed)
-    return _doubt_arrivals(*now, *fields, float(car_speed), float(least), since, spec.shape, *spec.corner)
+    return _doubt_arrivals(*now, *fields, *map(float, car_velocity), float(least), since, spec.shape, *spec.corner)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _doubt_arrivals(
-    xy, velocity, weight, cells, doubt, ahead, static, room, car_speed, least, since, shape, x_max, y_max, cell
+    xy, velocity, weight, cells, doubt, ahead, static, room, car_x, car_y, least, since, shape, x_max, y_max, cell
 ):
     doubted = np.empty_like(doubt)
     standing = static.ravel()
@@ -205,7 +206,7 @@ def _doubt_arrivals(
         vx = velocity[2 * i]
         vy = velocity[2 * i + 1]
         solid = doubt[i]
-        keeps = keeps_pace(vx, vy, car_speed, least)
+        keeps = keeps_pace(vx, vy, car_x, car_y, least)
         if keeps:
             before = cell_of(xy[2 * i] - since * vx, xy[2 * i + 1] - since * vy, shape, x_max, y_max, cell)
             if before != OUTSIDE and before != cells[i]:

@@ -10,16 +10,15 @@ from numpy.typing import NDArray
 from semgrid_edu.fast.occupancy.cells import cell_of
 from semgrid_edu.fast.occupancy.ground import beams_of, heights_of
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import evidence, sensor
-from semgrid_edu.occupancy.evidence import Evidence, Sensor
+from semgrid_edu.occupancy import sensor as book
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.polar import fill_gaps, visible_range
-from semgrid_edu.occupancy.sensor import edge_of_splits, likelihoods
+from semgrid_edu.occupancy.sensor import Evidence, Sensor, edge_of_splits, likelihoods
 from semgrid_edu.occupancy.state import OUTSIDE
 
 
 @dataclass(frozen=True)
-class SensorModel(sensor.SensorModel):
+class SensorModel(book.SensorModel):
     """The book's sensor, compiled. Parameters are those of `SensorModel`."""
 
     def scan(self, points: NDArray) -> "Scan":
@@ -30,7 +29,7 @@ class SensorModel(sensor.SensorModel):
 
 
 @dataclass(frozen=True, eq=False)
-class Scan(sensor.Scan):
+class Scan(book.Scan):
     """The book's scan, compiled. Parameters are those of `Scan`."""
 
     def evidence(self, spec: GridSpec, pose: PlanarMotion) -> Evidence:
@@ -51,7 +50,7 @@ def compiled_twin(model: Sensor) -> Sensor:
     model : Sensor
         The sensor. A subclass of the book's that overrides how scans are processed counts as another sensor.
     """
-    if type(model) is not sensor.SensorModel:
+    if type(model) is not book.SensorModel:
         return model
     return SensorModel(**{field.name: getattr(model, field.name) for field in fields(model)})
 
@@ -61,10 +60,10 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: Sensor, pose: PlanarM
 
     Parameters, result and errors are those of `scan_evidence`.
     """
-    return evidence.scan_evidence(points, spec, compiled_twin(sensor), pose)
+    return book.scan_evidence(points, spec, compiled_twin(sensor), pose)
 
 
-def prepare_scan(points: NDArray, sensor: sensor.SensorModel) -> NDArray:
+def prepare_scan(points: NDArray, sensor: book.SensorModel) -> NDArray:
     """Prepare a scan for evidence. Parameters and result are those of `prepare_scan`; the type is that of `points`."""
     edge = edge_of_splits(points, sensor.edge)
     points = without_own_returns(points, sensor.vehicle, edge, sensor.obstacle_min)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.errors import ArgumentError, check_shape, not_negative
 from semgrid_edu.fast.occupancy.cells import look_up
@@ -22,37 +22,45 @@ from semgrid_edu.fast.occupancy.particles import (
     weight_in_cells,
 )
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.evidence import Evidence
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
-from semgrid_edu.occupancy.resampling import (
+from semgrid_edu.occupancy.sensor import Evidence
+from semgrid_edu.occupancy.state import (
+    FilterState,
+    Particles,
     Resampling,
+    State,
     SystematicResampling,
     draw_indices,
     draw_velocities,
     equal_weights,
 )
-from semgrid_edu.occupancy.state import FilterState, Particles, State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
-from semgrid_edu.occupancy.walls import Walls
+from semgrid_edu.occupancy.walls import Walls, velocity_of
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
 
-def move(state: FilterState, spec: GridSpec, motion: PlanarMotion) -> FilterState:
+def move(state: FilterState, spec: GridSpec, motion: PlanarMotion, to: GridSpec | None = None) -> FilterState:
     """Step 1: express the belief in a new frame. Parameters are those of `move`."""
     state = _single_precision(state)
     check_shape("state", state.newborn, spec.shape)
-    probability = look_up(state.probability, NOTHING_KNOWN, spec, spec, motion)
+    to = to or spec
+    probability = look_up(state.probability, NOTHING_KNOWN, spec, to, motion)
     particles = transform(state.particles, motion)
-    cells = cells_of(particles.position, spec)
-    probability, factor = renormalise(probability, weight_in_cells(particles.weight, cells, spec.shape))
+    cells = cells_of(particles.position, to)
+    probability, factor = renormalise(probability, weight_in_cells(particles.weight, cells, to.shape))
     weight = scale_in_cells(particles.weight, cells, factor)
-    return FilterState(probability, replace(particles, weight=weight), state.newborn)
+    return FilterState(probability, replace(particles, weight=weight), np.zeros(to.shape, np.float32))
 
 
 def predict(
-    state: FilterState, spec: GridSpec, world: WorldModel, dt: float, rng: np.random.Generator, driven: float = 0.0
+    state: FilterState,
+    spec: GridSpec,
+    world: WorldModel,
+    dt: float,
+    rng: np.random.Generator,
+    driven: ArrayLike = (0.0, 0.0),
 ) -> FilterState:
     """Step 2: predict. Parameters are those of `predict`."""
     state = _single_precision(state)
@@ -70,8 +78,8 @@ def predict(
     walls = _walls_of(world)
     origin = cells_at(particles, cells, spec, -walls.clearing_time, walls.clearing_cells)
     doubt = scale_in_cells(particles.weight, origin, mixed[STATIC])
-    car_speed = driven / dt if dt > 0 else 0.0
-    doubt = doubt_arrivals(particles, cells, doubt, mixed, spec, walls, car_speed)
+    car_velocity = velocity_of(driven, dt)
+    doubt = doubt_arrivals(particles, cells, doubt, mixed, spec, walls, car_velocity)
     stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
     probability, newborn, factor, less = collide(mixed, newborn, going, stays, arrives, doubtful)
@@ -229,9 +237,7 @@ def _single_precision(state: FilterState) -> FilterState:
 
 
 def _walls_of(world: WorldModel) -> Walls:
-    """Return the walls whose rules are compiled; without walls, the filter looks neither back nor ahead."""
-    if world.walls is None:
-        return Walls(clearing_time=0)
+    """Return the walls; only the package's own have compiled rules."""
     if type(world.walls) is not Walls:
         found = f"{type(world.walls).__name__}: semgrid_edu.occupancy runs it"
         raise ArgumentError("walls", "Walls() or None, because fast has compiled their rules", found)

@@ -12,18 +12,17 @@ import torch
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from semgrid_edu import fast
 from semgrid_edu.crf import CrfParams, unary_from_probability
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.fast import mean_field
+from semgrid_edu.fast import mean_field, with_fast_sampler
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, LABEL_SETS
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.pipeline import FrameResult
-from semgrid_edu.planes import PlaneSampler, plane_pixels
+from semgrid_edu.planes import plane_pixels
 from semgrid_edu.workshop.demo.contributions import Contributions, contributions, fusion_inputs
 from semgrid_edu.workshop.demo.evidence import (
     VERDICTS,
@@ -100,7 +99,7 @@ def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[
     Parameters
     ----------
     result : FrameResult
-        The frame's result from the package's stages with their defaults, such as `Stages.of(net, keep_steps=True)`.
+        The frame's result from the package's stages with their defaults, such as `Stages.fast(net, keep_steps=True)`.
     net : SemanticGridNet
         The network that made the result, in evaluation mode.
     past : sequence of (Frame, (H, W) int)
@@ -116,14 +115,11 @@ def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[
     o = result.belief.probability
     if net.training:
         raise ArgumentError("net", "a network in evaluation mode, see `net.eval()`", "one in training mode")
-    for sampler in (fast.PlaneSampler, PlaneSampler):  # `run_pipeline` takes the first, `Stages.of` the second
-        net = _sampling_by(sampler, net)
-        with torch.no_grad():
-            logits = net.fusion(*fusion_inputs(net, result.scores, o))[0]
-        apart = np.abs(softmax(logits.numpy(), axis=0) - result.grid).max()
-        if apart <= TOLERANCE:
-            break
-    else:
+    net = with_fast_sampler(net)
+    with torch.no_grad():
+        logits = net.fusion(*fusion_inputs(net, result.scores, o))[0]
+    apart = np.abs(softmax(logits.numpy(), axis=0) - result.grid).max()
+    if apart > TOLERANCE:
         raise ArgumentError("net", "the network that made the result", f"one whose probabilities are {apart:.3f} apart")
     parts = contributions(net, result.scores, o)
     labels = result.frame.labels
@@ -157,18 +153,6 @@ def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[
         fault=faults(label, refined, truth, otherwise),
         sight=sight,
     )
-
-
-def _sampling_by(sampler: type, net: SemanticGridNet) -> SemanticGridNet:
-    """Return a network with the same layers that samples the planes by another class; this one if it does so already.
-
-    The two samplers differ in the last digits, by which a max-pooling may choose another of two nearly equal numbers.
-    """
-    if type(net.sampler) is sampler:
-        return net
-    other = SemanticGridNet(net.segmenter, net.sampler.as_kind(sampler), net.n_classes, architecture=net.architecture)
-    other.fusion = net.fusion
-    return other.eval()
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,7 +238,7 @@ def cell_story(
 
     Examples
     --------
-    >>> results = list(run_pipeline(drive[:10], Stages.of(net, keep_steps=True)))           # doctest: +SKIP
+    >>> results = list(run_pipeline(drive[:10], Stages.fast(net, keep_steps=True)))         # doctest: +SKIP
     >>> story = cell_story(results[-1], (101, 31), net, past=results[:-1])                  # doctest: +SKIP
     """
     architecture = net.need_architecture()

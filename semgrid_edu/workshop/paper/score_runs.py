@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.crf import CrfParams, at_temperature, unary_from_log_probability
+from semgrid_edu.crf import CrfParams, at_temperature
 from semgrid_edu.crf.temperature import Reliability
 from semgrid_edu.datasets.index import load_index
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive
@@ -207,7 +207,7 @@ class ScoreRun(CountingRun, NetworkRun):
 
 def _refined(temperature: float, params: CrfParams, log_g: NDArray, o: NDArray) -> NDArray:
     """Refine a grid by the CRF, after its log-probabilities were divided by a temperature."""
-    return mean_field(unary_from_log_probability(at_temperature(log_g, temperature)), o, params)
+    return mean_field(-at_temperature(log_g, temperature), o, params)
 
 
 @dataclass(frozen=True)

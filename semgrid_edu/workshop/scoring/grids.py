@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.crf import CrfParams, unary_from_log_probability
+from semgrid_edu.crf import CrfParams
 from semgrid_edu.datasets.ground_truth import carry_labels, close_gaps
 from semgrid_edu.datasets.training_set import Sample, TrainingSet
 from semgrid_edu.errors import ArgumentError
@@ -101,7 +101,7 @@ def crf_refinement(cell: float) -> Refine:
     params = CrfParams.for_cells(cell)
 
     def refine(log_g: NDArray, o: NDArray) -> NDArray[np.float32]:
-        return mean_field(unary_from_log_probability(log_g), o, params)
+        return mean_field(-log_g, o, params)
 
     return refine
 
