@@ -156,7 +156,7 @@ def _image_scores(parts: list[Part], weights: Path) -> ImageScores:
     for frames, numbers in parts:
         net = load_net(weights, frames.camera)
         for k in numbers:
-            scores = net.image_scores(unit_image(frames[k].image)[None])
+            scores = net.segment(unit_image(frames[k].image)[None])
             planes.append(net.sampler(scores).half())
             probability = scores[0].softmax(dim=0).numpy()
             at_returns.append(scores_of_returns(probability, *frames.returns(k), frames.spec))

@@ -15,7 +15,8 @@ from torch import Tensor, nn
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.networks import FusionNet
-from semgrid_edu.networks.conv_deconv import ConvDeconv, fresh_weights
+from semgrid_edu.networks.conv_deconv import ConvDeconv
+from semgrid_edu.networks.segmenter import fresh_weights
 from semgrid_edu.occupancy import N_STATES
 
 NEIGHBOURS = 9
@@ -155,7 +156,7 @@ class HeightFusion(FusionNet):
         super().__init__(n_scores, n_planes, n_classes, seed=seed)
         self.uses_image = uses_image
         n_reduced = self.reduce[0].out_channels
-        with fresh_weights(self.reduce, seed):
+        with fresh_weights(self, seed):
             self.conv_deconv = ConvDeconv(
                 n_reduced + N_STATES + n_beside, n_classes, self.WIDTHS, self.DEPTHS, skips=True
             )
