@@ -56,7 +56,7 @@ def count(spec: GridSpec, number: int, edge: float) -> tuple[float, int, int, in
     arrows = called = cells = 0
     for scene in known_scenes(drive, spec, f"{number}, edge {edge}"):
         belief = tracker.step(with_split_beams(scene.frame.points_grid, rng, sensor.vehicle), scene.motion, PERIOD)
-        start, velocity = velocity_arrows(spec, belief.probability, belief.velocity)
+        start, velocity = velocity_arrows(spec, belief.probability, belief.velocity, belief.velocity_covariance)
         beside = (start[:, 0] <= 40) & (start[:, 1] <= sensor.vehicle[2]) & (start[:, 1] >= -15)
         arrows += bool((beside & (np.hypot(*velocity.T) >= FAST)).any())
         if scene.frame.time >= 1:

@@ -162,7 +162,7 @@ def types_named(check: Callable[[object], None]) -> Callable[[object], None]:
             for field in fields(thing):
                 if field.type in (int, float) and not isinstance(value := getattr(thing, field.name), Real):
                     raise ArgumentError(field.name, "a number", repr(value)) from error
-            raise ArgumentError(type(thing).__name__, "values of the types that it describes", error) from error
+            raise ArgumentError(type(thing).__name__, "the types that its docstring gives", error) from error
 
     return checked
 

@@ -589,7 +589,9 @@ assert class_accuracy(drive_confusion("refined")) < class_accuracy(drive_confusi
 def draw(result, axes):
     """Draw one instant: occupancy with velocities, and the refined map."""
     plotting.occupancy(spec, result.belief.probability, ax=axes[0], legend=False)
-    plotting.velocity(spec, result.belief.probability, result.belief.velocity, ax=axes[0])
+    plotting.velocity(
+        spec, result.belief.probability, result.belief.velocity, axes[0], result.belief.velocity_covariance
+    )
     plotting.grid_labels(spec, result.refined.argmax(axis=0), KITTI_14, ax=axes[1], legend=False)
     axes[0].set_title(f"{result.frame.time:.1f} s: states")
     axes[1].set_title("refined classes")

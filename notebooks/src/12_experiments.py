@@ -47,7 +47,7 @@ from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.fast import build_net, load_net, track_drive
 from semgrid_edu.workshop.scoring.score_with_interval import compared, shown, shown_seeds
 from semgrid_edu.workshop.paper.published import NETWORKS
-from semgrid_edu.workshop.paper.pictures import accuracy_picture, draw_score, forest_plot
+from worlds.lecture_12_pictures import accuracy_picture, draw_score, forest_plot
 from semgrid_edu.workshop.paper.variants import Variant
 from semgrid_edu.workshop.paper.claims import stated
 from semgrid_edu.workshop.paper.verdicts import holm, verdict

@@ -1,6 +1,6 @@
 """Merge labelled scans of several instants: returns of moving objects move with their cuboids, so they don't smear."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -98,8 +98,27 @@ class LabelledScan:
         """The number of the cuboid of each movable return, in their order; -1 if none holds it."""
         return self.cuboids.holding(self.points[self.movable], self.lidars[self.movable])
 
+    @cached_property
+    def resting(self) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+        """Points and classes of the returns that are where they were at any other instant, too."""
+        kept = np.ones(len(self.points), bool)
+        boxes = np.append(self.cuboids.moving, True)  # the last one is for movable returns in no box
+        kept[np.flatnonzero(self.movable)[boxes[self.holder]]] = False
+        return self.points[kept], self.classes[kept]
 
-def put_together(now: LabelledScan, others: Sequence[LabelledScan]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    @cached_property
+    def carried(self) -> dict[int, tuple[NDArray[np.float64], NDArray[np.uint8]]]:
+        """Points and classes of the returns in each moving cuboid that holds any, by its number."""
+        movable = np.flatnonzero(self.movable)
+        by_holder = movable[np.argsort(self.holder, kind="stable")]
+        ends = np.searchsorted(np.sort(self.holder), np.arange(len(self.cuboids.names) + 1))
+        groups = {b: by_holder[ends[b] : ends[b + 1]] for b in np.flatnonzero(self.cuboids.moving)}
+        return {b: (self.points[held], self.classes[held]) for b, held in groups.items() if len(held)}
+
+
+def put_together(
+    now: LabelledScan, others: Sequence[LabelledScan], wanted: Callable[[NDArray], NDArray[np.bool_]] | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
     """Merge the returns of several scans at one instant.
 
     Returns from a moving object are moved to its cuboid at that instant. If it has no cuboid then, its returns in the
@@ -112,6 +131,9 @@ def put_together(now: LabelledScan, others: Sequence[LabelledScan]) -> tuple[NDA
         The scan of that instant; its returns come first.
     others : sequence of LabelledScan
         Scans of other instants.
+    wanted : callable, optional
+        Tells for points (N, 3) in the world which are wanted, (N,) bool; by default all. Points of moving objects in
+        other scans are returned in any case.
 
     Returns
     -------
@@ -121,25 +143,30 @@ def put_together(now: LabelledScan, others: Sequence[LabelledScan]) -> tuple[NDA
         Class of each; 255 where unlabelled.
     """
     places = now.cuboids.poses()
-    parts = [_carried(now, places, own=True), *(_carried(scan, places, own=False) for scan in others)]
+    parts = []
+    for points, classes in (_of_now(now, places), *(scan.resting for scan in others)):
+        seen = slice(None) if wanted is None else wanted(points)
+        parts.append((points[seen], classes[seen]))
+    parts += [part for scan in others for part in _moved(scan, places).values()]
     points, classes = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return points, classes
 
 
-def _carried(
-    scan: LabelledScan, places: dict[str, NDArray[np.float64]], own: bool
-) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
-    """Return the returns of a scan, with moving objects at their poses in `places`."""
-    points = scan.points.copy()
-    kept = np.ones(len(scan.points), bool)
-    boxes = scan.cuboids
-    movable = np.flatnonzero(scan.movable)
-    kept[movable[scan.holder < 0]] = own
-    for b in np.flatnonzero(boxes.moving):
-        held = movable[scan.holder == b]
-        if boxes.names[b] in places:
-            T_now_from_then = places[boxes.names[b]] @ invert_rigid(boxes.T_world_from_box[b])
-            points[held] = transform_points(T_now_from_then, points[held])
-        else:
-            kept[held] = False
-    return points[kept], scan.classes[kept]
+def _of_now(now: LabelledScan, places: dict[str, NDArray]) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    """Return all returns of the scan of that instant; of the two cuboids that two LIDARs see, the first one counts."""
+    points = now.points.copy()
+    movable = np.flatnonzero(now.movable)
+    for b, (moved, _) in _moved(now, places).items():
+        points[movable[now.holder == b]] = moved
+    return points, now.classes
+
+
+def _moved(scan: LabelledScan, places: dict[str, NDArray]) -> dict[int, tuple[NDArray[np.float64], NDArray[np.uint8]]]:
+    """Return the returns in each moving cuboid that has a pose in `places`, moved there."""
+    there = {}
+    for b, (points, classes) in scan.carried.items():
+        name = scan.cuboids.names[b]
+        if name in places:
+            T_now_from_then = places[name] @ invert_rigid(scan.cuboids.T_world_from_box[b])
+            there[b] = transform_points(T_now_from_then, points), classes
+    return there

@@ -1,7 +1,6 @@
 """What all readers of drives share: labelled drives, frames read on demand, KITTI's scans (section 4)."""
 
 import operator
-import re
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from semgrid_edu.camera import Camera
+from semgrid_edu.datasets.drive_files import DriveFiles
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
@@ -82,7 +82,7 @@ class LabelledDrive(Protocol):
         """Return the files of the drive: when one of them changes, its cached arrays are stale."""
 
 
-class FrameSequence(Sequence[Frame]):
+class FrameSequence(DriveFiles, Sequence[Frame]):
     """The frames of a drive, each read and checked on access.
 
     `drive[k]` is frame k, `drive[-1]` the last one, `drive[2:5]` a list of three. A reader derives from this class and
@@ -181,35 +181,30 @@ def read_scan(path: Path) -> NDArray[np.float32]:
     """
     content = read_bytes(path)
     if len(content) % 16:
-        raise DataError(path, "points of 4 x 4 bytes", f"{len(content)} bytes, {len(content) % 16} too many")
+        found = f"{len(content)} bytes, {len(content) % 16} too many{_other_format(content)}"
+        raise DataError(path, "points of 4 x 4 bytes", found)
+    start = content[:1000]
+    if start.isascii() and "".join(start.decode().split()).isprintable():
+        raise DataError(path, "floats in binary", f"text: {start[:60].decode()!r}")
     points = np.frombuffer(content, dtype="<f4").reshape(-1, 4).astype(np.float32)
     impossible = ~(np.abs(points[:, :3]) <= LIDAR_RANGE).all(axis=1) | ~np.isfinite(points[:, 3])
     if impossible.any():
         first = impossible.argmax()
         expected = f"finite coordinates within {LIDAR_RANGE:g} m and a finite reflectance"
-        raise DataError(path, expected, f"{points[first].tolist()} at point {first}")
+        raise DataError(path, expected, f"{points[first].tolist()} at point {first}{_other_format(content)}")
     return points
 
 
-def frame_numbers(folder: Path, what: str, suffix: str, digits: int = 6) -> tuple[int, ...]:
-    """Return the numbers of files with names such as 000000.png, in ascending order.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder with one file per frame; files of some frames may be missing.
-    what : str
-        What the files contain, such as "images", for the error.
-    suffix : str
-        The end of their names, such as ".png".
-    digits : int
-        Number of digits in a name.
-    """
-    form = re.compile(rf"(\d{{{digits}}}){re.escape(suffix)}")
-    numbers = sorted(int(match[1]) for path in folder.glob(f"*{suffix}") if (match := form.fullmatch(path.name)))
-    if not numbers:
-        raise DataError(folder, f"{what} such as {0:0{digits}}{suffix}", "none" if folder.is_dir() else "no folder")
-    return tuple(numbers)
+def _other_format(content: bytes) -> str:
+    """Ask whether a scan that can't be right is in another format, if it would be right in that."""
+    if content.startswith((b"\x93NUMPY", b"# .PCD", b"ply")):
+        return ": is it a file of NumPy, PCD or PLY?"
+    for question, dtype in (("do the floats have 64 bits?", "<f8"), ("are the floats big-endian?", ">f4")):
+        with np.errstate(invalid="ignore"):
+            numbers = np.frombuffer(content[: len(content) // 32 * 32], dtype)
+        if len(numbers) and (np.abs(numbers) <= LIDAR_RANGE).all() and (np.abs(numbers) > 1e-3).mean() > 0.5:
+            return f": {question}"
+    return ""
 
 
 def resize_labels(labels: NDArray[np.uint8], size: tuple[int, int], sparse: bool = False) -> NDArray[np.uint8]:

@@ -1,7 +1,7 @@
 """One drive in KITTI's raw layout, real or simulated, frame by frame (section 4; Geiger et al., IJRR 2013)."""
 
-import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
+from semgrid_edu.datasets.drive_files import IMAGE_SUFFIXES, first_sound, numbers_in, photograph, what_is_in
 from semgrid_edu.datasets.frames import FrameSequence, error_of, read_scan
 from semgrid_edu.datasets.kitti_labels import (
     KINDS,
@@ -26,7 +27,7 @@ from semgrid_edu.datasets.project_lidar import cells_in_view
 from semgrid_edu.errors import ArgumentError, DataError, check_text
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import LabelSet
-from semgrid_edu.storage.reading import read_png
+from semgrid_edu.storage.reading import read_image
 
 VIEWS = ("image_02", "image_03")
 """The folders of the colour cameras."""
@@ -34,7 +35,8 @@ VIEWS = ("image_02", "image_03")
 SAME_INSTANT = np.timedelta64(500, "ms")
 """How much the sensors' times of one frame may differ; at 10 Hz they should differ by less than 0.1 s."""
 
-_FRAME_FILE = re.compile(r"(\d{10})\.(bin|png|txt)")
+SUFFIXES = (".bin", ".txt", *IMAGE_SUFFIXES)
+"""How the names of a frame's files end."""
 
 
 def drive_folder(root: str | Path, date: str, drive: str) -> Path:
@@ -62,7 +64,8 @@ class KittiRawDrive(FrameSequence):
 
     `drive[k]` is frame k as KITTI numbers it, `drive[-1]` the last one, `drive[2:5]` a list of three. Some of KITTI's
     drives have gaps, such as 0009, which lacks the scans 177 to 180. A frame in a gap keeps its number, time and image,
-    but has no points, so the filter only predicts. `gaps` lists these frames.
+    but has no points, so the filter only predicts. `gaps` lists these frames. The files of a clip cut from a drive may
+    begin at any number; `drive[0]` is then the first frame of the clip, and `numbers` names the files.
 
     Parameters
     ----------
@@ -104,13 +107,16 @@ class KittiRawDrive(FrameSequence):
         self._sensors = ["velodyne_points", "oxts"]
         if images and (self.folder / view).exists():
             self._sensors.append(view)
-        self._length = 1 + max((_last_frame(self.folder / sensor / "data") for sensor in self._sensors), default=-1)
-        if self._length == 0:
-            raise DataError(self.folder, "frames in velodyne_points/data", "none")
+        by_sensor = {name: numbers_in(self.folder / name / "data", SUFFIXES, 10) for name in self._sensors}
+        recorded = set().union(*(numbers for name, numbers in by_sensor.items() if name != "oxts")) or by_sensor["oxts"]
+        if not recorded:
+            scans = self.folder / "velodyne_points" / "data"
+            raise DataError(scans, "frames such as 0000000000.bin", what_is_in(scans))
+        self._numbers = range(min(recorded), 1 + max(recorded | by_sensor["oxts"]))
 
     def __len__(self) -> int:
         """Return the number of frames, including frames whose scans were never recorded."""
-        return self._length
+        return len(self._numbers)
 
     @property
     def label_set(self) -> LabelSet:
@@ -131,12 +137,30 @@ class KittiRawDrive(FrameSequence):
             labels=self._labels(k),
         )
 
-    @cached_property
-    def gaps(self) -> tuple[int, ...]:
-        """Numbers of the frames without a scan between frames with one."""
-        scans = [k for k in range(len(self)) if self.file("velodyne_points", k, ".bin").exists()]
-        between = range(scans[0], scans[-1]) if scans else range(0)
-        return tuple(sorted(set(between) - set(scans)))
+    def scan_file(self, k: int) -> Path:
+        """Return the file of a frame's scan. Parameters are those of `DriveFiles.scan_file`."""
+        return self.file("velodyne_points", k, ".bin")
+
+    def image_file(self, k: int) -> Path | None:
+        """Return the file of a frame's image, if images are read. Parameters are those of `DriveFiles.scan_file`."""
+        if self.view not in self._sensors:
+            return None
+        return photograph(self.folder / self.view / "data", f"{self.numbers[k]:010d}")
+
+    def packets(self) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
+        """Return the packets that can be read, by file, and their times; NaN if the times can't be read."""
+        packets = {}
+        readable = []
+        for k in range(len(self)):
+            path = self.file("oxts", k, ".txt")
+            with suppress(DataError):
+                packets[str(path)] = read_packet(path)
+                readable.append(k)
+        seconds = np.full(len(self), np.nan)
+        with suppress(DataError):
+            times = self._read_times(self.folder / "oxts" / "timestamps.txt")
+            seconds = (times - times[0]) / np.timedelta64(1, "s")  # an unknown time (NaT) becomes NaN
+        return packets, seconds[readable]
 
     @cached_property
     def camera(self) -> Camera:
@@ -149,16 +173,16 @@ class KittiRawDrive(FrameSequence):
         yield partial(read_rigid, self.date_folder / "calib_velo_to_cam.txt")
         yield partial(read_rigid, self.date_folder / "calib_imu_to_velo.txt")
         for path in self._timestamp_files():
-            yield partial(read_timestamps, path, len(self))
+            yield partial(self._read_times, path)
         size = None if error_of(lambda: self.camera) else self.camera.size
         for k in range(len(self)):
             yield partial(self._points, k)
             yield partial(read_packet, self.file("oxts", k, ".txt"))
             yield partial(self._time, k)
             if self.view in self._sensors:
-                yield partial(read_png, self.file(self.view, k, ".png"), "RGB", size)
+                yield partial(read_image, self.image_file(k), size)
             labels = self.folder / "labels"
-            name = f"{k:010d}.png"
+            name = f"{self.numbers[k]:010d}.png"
             for kind in KINDS if is_labelled(labels, name) else ():
                 yield partial(read_label, labels, kind, name, size)
 
@@ -170,11 +194,11 @@ class KittiRawDrive(FrameSequence):
         sensor : str
             Folder of the sensor: "velodyne_points", "oxts", "image_02" or "image_03".
         k : int
-            Number of the frame.
+            The frame, counted from 0.
         suffix : str
             ".bin", ".txt" or ".png".
         """
-        return self.folder / sensor / "data" / f"{k:010d}{suffix}"
+        return self.folder / sensor / "data" / f"{self.numbers[k]:010d}{suffix}"
 
     def _timestamp_files(self) -> list[Path]:
         """Return timestamps.txt of every sensor, and the LIDAR's times of start and end where they are given."""
@@ -185,7 +209,10 @@ class KittiRawDrive(FrameSequence):
     @cached_property
     def _times(self) -> dict[str, NDArray[np.datetime64]]:
         """Time of each frame, (frames,) datetime64[ns] by sensor."""
-        return {sensor: read_timestamps(self.folder / sensor / "timestamps.txt", len(self)) for sensor in self._sensors}
+        return {sensor: self._read_times(self.folder / sensor / "timestamps.txt") for sensor in self._sensors}
+
+    def _read_times(self, path: Path) -> NDArray[np.datetime64]:
+        return read_timestamps(path, len(self), self.numbers[0])
 
     def _time(self, k: int) -> float:
         """Return the seconds since the first scan, after checking that the sensors' times agree."""
@@ -207,13 +234,12 @@ class KittiRawDrive(FrameSequence):
     def _points(self, k: int) -> NDArray[np.float32]:
         if k in self.gaps:
             return np.zeros((0, 4), np.float32)
-        return read_scan(self.file("velodyne_points", k, ".bin"))
+        return read_scan(self.scan_file(k))
 
     def _image(self, k: int) -> NDArray[np.uint8] | None:
         """Read the image, (h, w, 3); None when the drive has no folder of this camera."""
-        if self.view not in self._sensors:
-            return None
-        return read_png(self.file(self.view, k, ".png"), "RGB", self.camera.size)
+        path = self.image_file(k)
+        return None if path is None else read_image(path, self.camera.size)
 
     @cached_property
     def _T_lidar_from_imu(self) -> NDArray[np.float64]:
@@ -221,7 +247,7 @@ class KittiRawDrive(FrameSequence):
 
     @cached_property
     def _first_packet(self) -> NDArray[np.float64]:
-        return read_packet(self.file("oxts", 0, ".txt"))
+        return first_sound(lambda k: read_packet(self.file("oxts", k, ".txt")), range(len(self)))
 
     def _pose(self, k: int) -> NDArray[np.float64]:
         """Return T_world_from_lidar; the world is the frame of the IMU at the drive's first packet."""
@@ -231,7 +257,7 @@ class KittiRawDrive(FrameSequence):
     def _labels(self, k: int) -> FrameLabels | None:
         if self.view != VIEWS[0]:
             return None
-        labels = read_labels(self.folder / "labels", f"{k:010d}.png", self.camera.size)
+        labels = read_labels(self.folder / "labels", f"{self.numbers[k]:010d}.png", self.camera.size)
         return replace(labels, undecided=self._in_view) if labels and have_gaps(self.folder / "labels") else labels
 
     @cached_property
@@ -258,9 +284,3 @@ def _instead(root: Path, parent: Path, what: str, pattern: str) -> str:
     layout = what_is(root)
     names = f"only the {what} {', '.join(there)}" if there else f"no {what}"
     return names + (f"; {root} looks like {layout}" if layout else "")
-
-
-def _last_frame(folder: Path) -> int:
-    """Return the highest frame number among the files of a folder, -1 if there are none."""
-    names = (path.name for path in folder.iterdir()) if folder.is_dir() else ()
-    return max((int(match[1]) for match in map(_FRAME_FILE.fullmatch, names) if match), default=-1)

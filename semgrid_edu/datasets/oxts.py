@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import invert_rigid, rigid_transform
+from semgrid_edu.datasets.drive_files import lines_of
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage.reading import parse_numbers, read_text
+from semgrid_edu.storage.reading import parse_numbers, read_lines, read_text
 
 _STAMP = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{9}")
 
@@ -22,7 +23,7 @@ PACKET_FIELDS = 30
 """Number of values in a packet; a drive's dataformat.txt names them."""
 
 
-def read_timestamps(path: Path, n_frames: int) -> NDArray[np.datetime64]:
+def read_timestamps(path: Path, n_frames: int, first: int = 0) -> NDArray[np.datetime64]:
     """Read the times at which a sensor took each frame.
 
     Parameters
@@ -31,22 +32,23 @@ def read_timestamps(path: Path, n_frames: int) -> NDArray[np.datetime64]:
         timestamps.txt of the sensor.
     n_frames : int
         Number of frames, and therefore of lines.
+    first : int
+        The number of the first frame: the file of a clip may be that of the drive from which it was cut.
 
     Returns
     -------
     (n_frames,) datetime64[ns]
         NaT for an empty line, with which KITTI marks a scan that was never recorded.
     """
-    lines = read_text(path).splitlines()
+    lines = read_lines(path, n_frames)
     times = np.array([_parse(path, number, line) for number, line in enumerate(lines, 1)], dtype="datetime64[ns]")
-    if len(times) != n_frames:
-        raise DataError(path, f"{n_frames} lines, one per frame", f"{len(times)}")
+    chosen = lines_of(path, times, range(first, first + n_frames))
     known = np.flatnonzero(~np.isnat(times))
     backwards = np.flatnonzero(np.diff(times[known]) <= np.timedelta64(0))
     if backwards.size:
         line = known[backwards[0] + 1]
         raise DataError(path, "increasing times", f"{lines[line]!r} in line {line + 1}, not after the one before")
-    return times
+    return chosen
 
 
 def _parse(path: Path, number: int, line: str) -> np.datetime64:

@@ -5,6 +5,7 @@
 002/annotations/semseg/00.pkl.gz    002/annotations/cuboids/00.pkl.gz
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
@@ -17,24 +18,25 @@ from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_tran
 from semgrid_edu.datasets import pandaset_files as files
 from semgrid_edu.datasets.calibration import camera_from
 from semgrid_edu.datasets.cuboids import LabelledScan, put_together
-from semgrid_edu.datasets.frames import FrameSequence, frame_numbers
+from semgrid_edu.datasets.drive_files import first_sound, frame_numbers, photograph
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.project_lidar import birdseye_votes, cells_in_view, paint_image, unhidden
 from semgrid_edu.errors import ArgumentError, DataError, check_text, check_whole
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.storage.reading import read_jpeg
+from semgrid_edu.storage.reading import read_image
 
 CAMERAS = ("front_camera", "front_left_camera", "front_right_camera", "left_camera", "right_camera", "back_camera")
+
+SUFFIXES = (".jpg", ".jpeg", ".png", ".JPG", ".JPEG", ".PNG")
+"""How the names of images may end, the published way first."""
 
 IMAGE_SIZE = (1080, 1920)
 """Height and width of PandaSet's images, pixels."""
 
 ROWS = slice(216, 796)
 """The image rows to keep. They have KITTI's aspect ratio; the sky above and the vehicle's bonnet below are cropped."""
-
-LIDAR_HEIGHT = 2.13
-"""Height of the Pandar64 above the ground if no labels show the ground, metres; measured on scene 002."""
 
 _WINDOW = 20
 """Number of scans kept in memory, 7 MB each: a frame's scan, and nine before and after it."""
@@ -43,7 +45,7 @@ _WINDOW = 20
 class PandasetScene(FrameSequence):
     """The frames of a scene as one of its cameras sees them, each read and checked on access.
 
-    There is a frame for each image of the camera on disk; `numbers` has their numbers in the published scene. Frames
+    There is a frame for each image of the camera on disk; `numbers` has their published numbers. Frames
     have KITTI's form: the x axis points where the camera looks, along the ground, and the LIDAR is the Pandar64 at the
     instant of the image, when it faces the same way. Only its returns are in `Frame.points`; the labels use both
     LIDARs. The vehicle sways, so each frame has its own camera. The world is PandaSet's.
@@ -61,11 +63,6 @@ class PandasetScene(FrameSequence):
     camera : str
         One of `CAMERAS`.
 
-    Attributes
-    ----------
-    numbers : tuple of int
-        The published number of each frame.
-
     Raises
     ------
     ArgumentError
@@ -81,6 +78,7 @@ class PandasetScene(FrameSequence):
     """
 
     label_set = KITTI_14
+    poses_file = "lidar/poses.json"
     credit = files.CREDIT
 
     def __init__(self, root: str | Path, scene: str, camera: str = CAMERAS[0]) -> None:
@@ -94,7 +92,7 @@ class PandasetScene(FrameSequence):
             raise DataError(self.folder, "a scene", f"only {', '.join(there)}" if there else "no scene beside it")
         self.name = f"{scene} {camera}"
         self._opened = (root, scene, camera)
-        self.numbers = frame_numbers(self.view, "images", ".jpg", digits=2)
+        self._numbers = frame_numbers(self.view, "images", SUFFIXES, digits=2)
         self._scan = lru_cache(_WINDOW)(partial(files.read_pandaset_scan, self.folder))
 
     def __len__(self) -> int:
@@ -105,11 +103,13 @@ class PandasetScene(FrameSequence):
         """Pickle only the arguments: another process opens the scene and reads the scans itself."""
         return type(self), self._opened
 
-    @cached_property
-    def gaps(self) -> tuple[int, ...]:
-        """Published numbers of missing images; the others have a constant spacing."""
-        spacing = min(np.diff(self.numbers), default=1)
-        return tuple(sorted(set(range(self.numbers[0], self.numbers[-1], spacing)) - set(self.numbers)))
+    def scan_file(self, k: int) -> Path:
+        """Return the file of a frame's scan. Parameters are those of `DriveFiles.scan_file`."""
+        return self.folder / "lidar" / f"{self.numbers[k]:02d}.pkl.gz"
+
+    def image_file(self, k: int) -> Path:
+        """Return the file of a frame's image. Parameters are those of `DriveFiles.scan_file`."""
+        return photograph(self.view, f"{self.numbers[k]:02d}", SUFFIXES)
 
     @cached_property
     def camera(self) -> Camera:
@@ -118,16 +118,10 @@ class PandasetScene(FrameSequence):
 
     @cached_property
     def lidar_height(self) -> float:
-        """Height of the LIDAR above the road within 12 m, metres, at the first frame."""
-        number = self.numbers[0]
-        if self._scan(number).labelled is None:
-            return LIDAR_HEIGHT
-        labelled = self._labelled_scan(number)
-        points = labelled.points
-        classes = labelled.classes
-        eye = self._T_world_from_lidar(0)[:3, 3]
-        near = (classes == KITTI_14.index("road")) & (np.hypot(*(points[:, :2] - eye[:2]).T) < 12)
-        return float(eye[2] - np.median(points[near, 2])) if near.any() else LIDAR_HEIGHT
+        """Height of the LIDAR above the road within 12 m, metres, at the first frame whose scan can be read."""
+        with_scan = [k for k in range(len(self)) if k not in self.gaps]
+        k, labelled = first_sound(lambda k: (k, self._scan(self.numbers[k]).labelled), with_scan)
+        return files.above_the_road(labelled, self._T_world_from_lidar(k)[:3, 3])
 
     def truth(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.uint8]:
         """Return the class of each cell with a labelled return, seen by the camera or not.
@@ -156,7 +150,7 @@ class PandasetScene(FrameSequence):
         DataError
             When a scan has no labels, or its files are damaged.
         """
-        points, classes = self._cloud(k, before, after)
+        points, classes = self._cloud(k, before, after, partial(self._around, k, spec))
         return birdseye_votes(self._in_grid(points), classes, spec, KITTI_14)
 
     def visible(self, k: int, spec: GridSpec, before: int = 9, after: int = 9) -> NDArray[np.bool_]:
@@ -204,19 +198,22 @@ class PandasetScene(FrameSequence):
 
     def without_labels(self, k: int) -> Frame:
         """Read a frame without its labels. Parameters are those of `FrameSequence.without_labels`."""
-        scan = self._scan(self.numbers[k])
         camera = self._camera(k)
         T_world_from_lidar = self._T_world_from_lidar(k)
+        scan = self._scan_of(k)
         turning = scan.lidars == files.TURNING
         points = transform_points(invert_rigid(T_world_from_lidar), scan.points[turning])
         points = np.column_stack([points, scan.reflectance[turning]]).astype(np.float32)
-        image = read_jpeg(self.view / f"{self.numbers[k]:02d}.jpg", IMAGE_SIZE)[ROWS]
+        image = read_image(self.image_file(k), IMAGE_SIZE)[ROWS]
         start, now = self._camera_times[[self.numbers[0], self.numbers[k]]]
         on_vehicle = files.on_the_roof(scan.points[turning], self._poses[self.numbers[k]])
         return Frame(image, points, camera, T_world_from_lidar, float(now - start), vehicle_returns=on_vehicle)
 
+    def _scan_of(self, k: int) -> files.PandasetScan:
+        return files.NO_SCAN if k in self.gaps else self._scan(self.numbers[k])
+
     def _labels(self, k: int, camera: Camera) -> FrameLabels | None:
-        if self._scan(self.numbers[k]).labelled is None:
+        if self._scan_of(k).labelled is None:
             return None
         points, classes = self._cloud(k)
         image, depth = paint_image(points, classes, _standing(classes), camera)
@@ -224,16 +221,24 @@ class PandasetScene(FrameSequence):
         visible = self._visible(points, classes, camera, LABEL_GRID)
         return FrameLabels(KITTI_14, image, depth, birdseye, visible, cells_in_view(camera, LABEL_GRID))
 
-    def _cloud(self, k: int, before: int = 0, after: int = 0) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
+    def _around(self, k: int, spec: GridSpec, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Return which points in the world can be in the grid of frame k; most of a window of scans can't."""
+        T_lidar_from_world = invert_rigid(self._T_world_from_lidar(k))
+        x, y = (points @ row[:3] + row[3] for row in T_lidar_from_world[:2])
+        return (x > spec.x_min - 1) & (x < spec.x_max + 1) & (y > spec.y_min - 1) & (y < spec.y_max + 1)
+
+    def _cloud(
+        self, k: int, before: int = 0, after: int = 0, wanted: Callable[[NDArray], NDArray[np.bool_]] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return the returns of a window of scans in the LIDAR frame of frame k, and their classes."""
         check_whole(before=before, after=after)
         number = self.numbers[k]
-        scans = frame_numbers(self.folder / "lidar", "scans", ".pkl.gz", digits=2)
+        scans = frame_numbers(self.folder / "lidar", "scans", [".pkl.gz"], digits=2)
         earlier = [n for n in scans if n < number]
         later = [n for n in scans if n > number]
         others = earlier[max(len(earlier) - before, 0) :] + later[:after]
         now, *rest = (self._labelled_scan(n) for n in (number, *others))
-        points, classes = put_together(now, rest)
+        points, classes = put_together(now, rest, wanted)
         return transform_points(invert_rigid(self._T_world_from_lidar(k)), points), classes
 
     def _in_grid(self, points: NDArray[np.float64]) -> NDArray[np.float64]:

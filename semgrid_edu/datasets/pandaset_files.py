@@ -92,6 +92,31 @@ class PandasetScan(NamedTuple):
     labelled: LabelledScan | None
 
 
+NO_SCAN = PandasetScan(np.zeros((0, 3)), np.zeros(0, np.float32), np.zeros(0, np.int64), None)
+"""In place of a scan that is missing."""
+
+
+LIDAR_HEIGHT = 2.13
+"""Height of the Pandar64 above the ground if no labels show the ground, metres; measured on scene 002."""
+
+
+def above_the_road(labelled: LabelledScan | None, eye: NDArray[np.float64]) -> float:
+    """Return how high the Pandar64 is above the road within 12 m, metres; `LIDAR_HEIGHT` if no label tells.
+
+    Parameters
+    ----------
+    labelled : LabelledScan or None
+        A scan, if it has labels.
+    eye : (3,) float64
+        Where the LIDAR is, world.
+    """
+    if labelled is None:
+        return LIDAR_HEIGHT
+    points = labelled.points
+    near = (labelled.classes == KITTI_14.index("road")) & (np.hypot(*(points[:, :2] - eye[:2]).T) < 12)
+    return float(eye[2] - np.median(points[near, 2])) if near.any() else LIDAR_HEIGHT
+
+
 def semseg_folder(scene: Path) -> Path:
     """Return the folder with the classes of a scene's returns; scenes without labels don't have it.
 

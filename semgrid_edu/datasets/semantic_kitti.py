@@ -18,13 +18,21 @@ from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_f
 from semgrid_edu.datasets.benchmark_calibration import BenchmarkCalibration, parse_pose, read_benchmark_calibration
 from semgrid_edu.datasets.calibration import camera_from
 from semgrid_edu.datasets.class_tables import ClassTable
-from semgrid_edu.datasets.frames import FrameSequence, frame_numbers, nothing_known, read_scan
+from semgrid_edu.datasets.drive_files import (
+    IMAGE_SUFFIXES,
+    first_sound,
+    frame_numbers,
+    lines_of,
+    numbers_in,
+    photograph,
+)
+from semgrid_edu.datasets.frames import FrameSequence, nothing_known, read_scan
 from semgrid_edu.datasets.project_lidar import birdseye_votes, seen_returns
 from semgrid_edu.errors import DataError, check_text
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.storage.reading import parse_numbers, read_bytes, read_png, read_text
+from semgrid_edu.storage.reading import parse_numbers, read_bytes, read_image, read_text
 
 IMAGE_SIZES = {"00": (376, 1241), "01": (376, 1241), "02": (376, 1241), "03": (375, 1242)} | {
     f"{sequence:02d}": (370, 1226) for sequence in range(4, 11)
@@ -111,16 +119,27 @@ class SemanticKittiSequence(FrameSequence):
     """
 
     label_set = KITTI_14
+    poses_file = "poses.txt"
 
     def __init__(self, root: str | Path, sequence: str) -> None:
         check_text(sequence=(sequence, "00"))
         self.folder = Path(root) / "sequences" / sequence
         self.name = sequence
-        self._length = 1 + max(frame_numbers(self.folder / "velodyne", "scans", ".bin"))
+        scans = frame_numbers(self.folder / "velodyne", "scans", [".bin"])
+        recorded = numbers_in(self.folder / "image_2", IMAGE_SUFFIXES).union(scans)
+        self._numbers = range(min(recorded), max(recorded) + 1)
 
     def __len__(self) -> int:
-        """Return the number of frames."""
-        return self._length
+        """Return the number of frames, including those without a scan."""
+        return len(self._numbers)
+
+    def scan_file(self, k: int) -> Path:
+        """Return the file of a frame's scan. Parameters are those of `DriveFiles.scan_file`."""
+        return self.folder / "velodyne" / f"{self.numbers[k]:06d}.bin"
+
+    def image_file(self, k: int) -> Path | None:
+        """Return the file of a frame's image, if there are images. Parameters are those of `DriveFiles.scan_file`."""
+        return photograph(self.folder / "image_2", f"{self.numbers[k]:06d}") if self._has_images else None
 
     def scan(self, k: int) -> NDArray[np.float32]:
         """Read the returns of one scan.
@@ -135,7 +154,7 @@ class SemanticKittiSequence(FrameSequence):
         (N, 4) float32
             LIDAR frame, metres, and reflectance.
         """
-        return read_scan(self._scan_file(k))
+        return np.zeros((0, 4), np.float32) if k in self.gaps else read_scan(self.scan_file(k))
 
     def classes(self, k: int) -> NDArray[np.uint8]:
         """Read the class of each return of one scan. Parameters are those of `SemanticKittiSequence.scan`.
@@ -145,7 +164,7 @@ class SemanticKittiSequence(FrameSequence):
         (N,) uint8
             Classes of KITTI-14; 255 where unlabelled.
         """
-        return SEMANTIC_KITTI_CLASSES.classes(self._label_file(k), self._numbers(k))
+        return SEMANTIC_KITTI_CLASSES.classes(self._label_file(k), self._point_labels(k))
 
     def moving(self, k: int) -> NDArray[np.bool_]:
         """Read which returns of one scan come from moving objects.
@@ -156,7 +175,7 @@ class SemanticKittiSequence(FrameSequence):
         -------
         (N,) bool
         """
-        return self._numbers(k) >= FIRST_MOVING
+        return self._point_labels(k) >= FIRST_MOVING
 
     def truth(self, k: int, spec: GridSpec, before: int = 0, after: int = 0) -> NDArray[np.uint8]:
         """Return the bird's-eye truth of one frame, from its own scan or accumulated over several by their poses.
@@ -179,14 +198,16 @@ class SemanticKittiSequence(FrameSequence):
         (H, W) uint8
             Classes of KITTI-14; 255 in a cell in which there is no labelled return.
         """
-        window = [j for j in range(max(0, k - before), min(len(self), k + after + 1)) if j == k or self._has_scan(j)]
+        window = [
+            j for j in range(max(0, k - before), min(len(self), k + after + 1)) if j == k or self.scan_file(j).exists()
+        ]
         labelled = [self._labelled_points(j, k) for j in window]
         points, classes = (np.concatenate(arrays) for arrays in zip(*labelled, strict=True))
         return birdseye_votes(points, classes, spec, KITTI_14)
 
     def path(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the poses of the LIDAR, (N, 4, 4) T_world_from_lidar in metres, and their times, (N,) seconds."""
-        return np.array(self._poses[: len(self)]), np.array(self._times[: len(self)])
+        return np.array(self._poses), np.array(self._times)
 
     def _labelled_points(self, j: int, k: int) -> tuple[NDArray[np.float64], NDArray[np.uint8]]:
         """Return scan j in the grid frame of frame k, and its classes, without things that moved in between."""
@@ -204,7 +225,7 @@ class SemanticKittiSequence(FrameSequence):
 
     def without_labels(self, k: int) -> Frame:
         """Read a frame without its labels. Parameters are those of `FrameSequence.without_labels`."""
-        image = read_png(self._image_file(k), "RGB", self.camera.size) if self._has_images else None
+        image = read_image(self.image_file(k), self.camera.size) if self._has_images else None
         return Frame(image, self.scan(k), self.camera, self._poses[k], self._times[k])
 
     def _labels(self, k: int, frame: Frame) -> FrameLabels | None:
@@ -216,24 +237,17 @@ class SemanticKittiSequence(FrameSequence):
         visible.flat[cells] = True
         return replace(nothing_known(KITTI_14, self.camera.size), birdseye=self.truth(k, LABEL_GRID), visible=visible)
 
-    def _scan_file(self, k: int) -> Path:
-        return self.folder / "velodyne" / f"{k:06d}.bin"
-
-    def _has_scan(self, k: int) -> bool:
-        return self._scan_file(k).exists()
-
     def _label_file(self, k: int) -> Path:
-        return self.folder / "labels" / f"{k:06d}.label"
+        return self.folder / "labels" / f"{self.numbers[k]:06d}.label"
 
-    def _numbers(self, k: int) -> NDArray[np.int64]:
+    def _point_labels(self, k: int) -> NDArray[np.int64]:
+        if k in self.gaps:
+            return np.zeros(0, np.int64)
         return read_point_labels(self._label_file(k), len(self.scan(k)))
 
     @property
     def _has_images(self) -> bool:
         return (self.folder / "image_2").exists()
-
-    def _image_file(self, k: int) -> Path:
-        return self.folder / "image_2" / f"{k:06d}.png"
 
     @cached_property
     def _calibration(self) -> BenchmarkCalibration:
@@ -241,13 +255,15 @@ class SemanticKittiSequence(FrameSequence):
 
     @cached_property
     def camera(self) -> Camera:
-        """The calibration of image_2, the same for all frames; its size from the first image or `IMAGE_SIZES`."""
+        """The calibration of image_2, the same for all frames; its size from an image or `IMAGE_SIZES`."""
         if self._has_images:
-            height, width = read_png(self._image_file(0), "RGB", None).shape[:2]
+            height, width = first_sound(lambda k: read_image(self.image_file(k), None), range(len(self))).shape[:2]
         elif self.folder.name in IMAGE_SIZES:
             height, width = IMAGE_SIZES[self.folder.name]
         else:
-            raise DataError(self._image_file(0), "an image, to know the camera's size", "no folder image_2")
+            raise DataError(
+                self.folder / "image_2" / "000000.png", "an image, to know the camera's size", "no folder image_2"
+            )
         K, T_camera_from_lidar, *_ = self._calibration
         return camera_from(self.folder / "calib.txt", K, T_camera_from_lidar, (height, width))
 
@@ -256,7 +272,8 @@ class SemanticKittiSequence(FrameSequence):
         """T_world_from_lidar of each frame; the world is the LIDAR at the first one."""
         path = self.folder / "poses.txt"
         T_camera0_from_lidar = self._calibration.T_camera0_from_lidar
-        poses = [parse_pose(path, line, f"line {n}") for n, line in enumerate(self._lines(path), 1)]
+        lines = [(line, f"line {n}") for n, line in enumerate(read_text(path).splitlines(), 1)]
+        poses = [parse_pose(path, *line) for line in lines_of(path, lines, self.numbers, or_more=True)]
         return [invert_rigid(T_camera0_from_lidar) @ T @ T_camera0_from_lidar for T in poses]
 
     @cached_property
@@ -264,18 +281,12 @@ class SemanticKittiSequence(FrameSequence):
         """Seconds since the first scan: one number in each line, each above the one before."""
         path = self.folder / "times.txt"
         times: list[float] = []
-        for number, line in enumerate(self._lines(path), 1):
+        for number, line in enumerate(read_text(path).rstrip().splitlines(), 1):
             found = parse_numbers(path, line, f"the time in line {number}")
             if len(found) != 1:
                 raise DataError(path, f"one time in line {number}", repr(line))
             if times and found[0] <= times[-1]:
                 raise DataError(path, "increasing times", f"{line!r} in line {number}, not after the one before")
             times.append(float(found[0]))
+        times = lines_of(path, times, self.numbers, or_more=True)
         return [time - times[0] for time in times]
-
-    def _lines(self, path: Path) -> list[str]:
-        """Return the lines of a file with one line per frame; the last frames may be missing on this disk."""
-        lines = read_text(path).splitlines()
-        if len(lines) < len(self):
-            raise DataError(path, f"at least {len(self)} lines, one per frame", f"{len(lines)}")
-        return lines

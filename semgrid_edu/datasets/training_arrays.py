@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.frames import LabelledDrive
 from semgrid_edu.datasets.grid_truth import truth_to_learn
@@ -62,7 +63,9 @@ def drive_arrays(drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRec
         For each labelled frame "image" (3, h, w) uint8, "labels" (h, w) uint8, "occupancy" (4, H, W) float32, "truth"
         (H, W) uint8, and "return_pixels" and "return_cells" from `seen_returns`.
     """
-    frames, scans = tee(drive[k] for k in range(max(labelled) + 1))
+    read = getattr(drive, "without_labels", drive.__getitem__)  # `image_labels` and `truth` make the labels
+    numbers = tqdm(range(max(labelled) + 1), desc=drive.name, unit="frame", leave=False)
+    frames, scans = tee(read(k) for k in numbers)
     beliefs = recipe.track(scans, recipe.spec, recipe.params, SEED)
     arrays = {
         k: _frame_arrays(drive, k, frame, belief.probability, recipe)
@@ -76,9 +79,8 @@ def _frame_arrays(
     drive: LabelledDrive, k: int, frame: Frame, occupancy: NDArray, recipe: ArrayRecipe
 ) -> dict[str, NDArray]:
     """Make the arrays of one frame."""
-    if frame.labels is None or frame.image is None:
-        missing = "image" if frame.image is None else "labels"
-        raise DataError(drive.name, f"image and labels of the frame {k}, which is listed as labelled", f"no {missing}")
+    if frame.image is None:
+        raise DataError(drive.name, f"an image of the frame {k}, which is listed as labelled", "none")
     pixels, cells = seen_returns(frame, recipe.spec, recipe.image_size)
     return {
         "image": resize_image(frame.image, recipe.image_size).transpose(2, 0, 1),

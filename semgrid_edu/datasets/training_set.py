@@ -242,7 +242,7 @@ def _shared_camera(drives: Sequence[tuple[LabelledDrive, list[int]]]) -> Camera:
 
 
 def read_excerpt(folder: str | Path) -> list[Sample]:
-    """Read the frames that `semgrid-edu data excerpt` kept.
+    """Read the frames that `data_samples/make_frames.py` kept.
 
     Parameters
     ----------

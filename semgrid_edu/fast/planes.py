@@ -6,7 +6,6 @@ matrix that maps pixels to points, and its transpose maps gradients back.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import prod
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +22,6 @@ from semgrid_edu.planes.sampler import check_scores
 class PlaneSampler(nn.Module):
     """Resample scores on the planes. Parameters and errors are those of `PlaneSampler` in `semgrid_edu.planes`.
 
-    The module also keeps the operator of its last batch, because all batches of a training run have the same size.
-
     Examples
     --------
     >>> sampler = PlaneSampler(np.full((1, 1, 1, 2), 0.5), np.ones((1, 1, 1), bool), image_size=(2, 2))
@@ -37,11 +34,7 @@ class PlaneSampler(nn.Module):
         self.pixels = np.asarray(pixels, dtype=np.float64)
         self.visible = np.asarray(visible)
         self.image_size = tuple(image_size)
-        self._hold(PlaneOperator.build(self.pixels, self.visible, self.image_size))
-
-    def _hold(self, operator: "PlaneOperator") -> None:
-        """Use this operator from now on, and forget the last batch's operator."""
-        self.operator = self._of_batch = operator
+        self.operator = PlaneOperator.build(self.pixels, self.visible, self.image_size)
 
     @property
     def planes_shape(self) -> tuple[int, int, int]:
@@ -58,19 +51,11 @@ class PlaneSampler(nn.Module):
             convolution that follows reads them in this order.
         """
         check_scores(scores, self.image_size)
-        return self._operator_for(len(scores))(scores)
-
-    def _operator_for(self, n_images: int) -> "PlaneOperator":
-        """Return the operator for this many images at once: the last batch's operator, if it was as large."""
-        if n_images == 1:
-            return self.operator
-        if self._of_batch.n_images != n_images:
-            self._of_batch = self.operator.block_diagonal(n_images)
-        return self._of_batch
+        return self.operator(scores)
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "PlaneSampler":
         """Move the operator as well: PyTorch's `.to`, `.double` and `.cuda` call this."""
-        self._hold(self.operator.map(fn))
+        self.operator = self.operator.map(fn)
         return super()._apply(fn, recurse)
 
 
@@ -89,15 +74,12 @@ class PlaneOperator:
         Height h and width w of the scores, pixels.
     planes_shape : (int, int, int)
         D planes of H x W points.
-    n_images : int
-        How many images the matrices take at once, B: see `block_diagonal`.
     """
 
     matrix: "SparseMatrix"
     transpose: "SparseMatrix"
     image_size: tuple[int, int]
     planes_shape: tuple[int, int, int]
-    n_images: int = 1
 
     @classmethod
     def build(cls, pixels: NDArray, visible: NDArray, image_size: tuple[int, int]) -> "PlaneOperator":
@@ -106,21 +88,6 @@ class PlaneOperator:
         matrix = bilinear_matrix(np.moveaxis(pixels, 0, 2), np.moveaxis(visible, 0, 2), image_size)
         transpose = SparseMatrix.from_scipy(matrix.T.tocsr())
         return cls(SparseMatrix.from_scipy(matrix), transpose, tuple(image_size), visible.shape)
-
-    def block_diagonal(self, n_images: int) -> "PlaneOperator":
-        """Return the operator for several images at once: its matrices repeat this one's along their diagonals.
-
-        One product then gives the planes of all images next to each other in memory, so that they needn't be copied
-        into a batch.
-
-        Parameters
-        ----------
-        n_images : int
-            B, the number of images. The new operator needs B times the memory of this one.
-        """
-        matrix = self.matrix.block_diagonal(n_images, prod(self.image_size))
-        transpose = self.transpose.block_diagonal(n_images, prod(self.planes_shape))
-        return replace(self, matrix=matrix, transpose=transpose, n_images=n_images)
 
     def map(self, change: Callable[[Tensor], Tensor]) -> "PlaneOperator":
         """Return an operator with changed tensors, such as copies of them on a GPU.
@@ -134,10 +101,12 @@ class PlaneOperator:
         return replace(self, matrix=matrix, transpose=transpose)
 
     def __call__(self, scores: Tensor) -> Tensor:
-        """Return the planes of each image, (B, C, h, w) -> (B, C, D, H, W), differentiable; B is `n_images`."""
-        planes = SparseProduct.apply(scores.permute(0, 2, 3, 1).flatten(0, 2), self.matrix, self.transpose)
+        """Return the planes of each image, (B, C, h, w) -> (B, C, D, H, W), differentiable."""
+        images = scores.permute(0, 2, 3, 1).flatten(1, 2)
+        products = [SparseProduct.apply(image, self.matrix, self.transpose) for image in images]
+        planes = torch.stack(products) if len(products) > 1 else products[0][None]  # without a copy
         n_planes, *shape = self.planes_shape
-        return planes.unflatten(0, (self.n_images, *shape, n_planes)).permute(0, 4, 3, 1, 2)
+        return planes.unflatten(1, (*shape, n_planes)).permute(0, 4, 3, 1, 2)
 
     def __deepcopy__(self, memo: dict) -> "PlaneOperator":
         """Return the operator itself: it never changes, so copies of a network share it."""
@@ -230,25 +199,6 @@ class SparseMatrix(NamedTuple):
         weights = self.weights.to(rows.dtype)
         return F.embedding_bag(
             self.indices, rows, self.offsets, mode="sum", per_sample_weights=weights, include_last_offset=True
-        )
-
-    def block_diagonal(self, n_blocks: int, n_columns: int) -> "SparseMatrix":
-        """Return the matrix that multiplies several dense matrices at once, one stacked below the other.
-
-        Parameters
-        ----------
-        n_blocks : int
-            How often this matrix is repeated along the diagonal: once per image.
-        n_columns : int
-            The number of columns of this matrix. Its entries don't determine it, because its last columns may be empty.
-        """
-        block = torch.arange(n_blocks, dtype=self.offsets.dtype, device=self.offsets.device)[:, None]
-        n_weights = self.offsets[-1:]
-        starts = (self.offsets[:-1] + block * n_weights).flatten()
-        return SparseMatrix(
-            indices=(self.indices + block * n_columns).flatten(),
-            offsets=torch.cat([starts, n_blocks * n_weights]),
-            weights=self.weights.repeat(n_blocks),
         )
 
 

@@ -13,7 +13,7 @@ from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_aroun
 from semgrid_edu.occupancy.sensor import Evidence, evidence_of, take_scan
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State, ratio, slow_down
 from semgrid_edu.occupancy.steps import mix, strike_out, transition_matrix, update
-from semgrid_edu.occupancy.walls import Walls, free_beside_static, strike_out_wakes, velocity_of
+from semgrid_edu.occupancy.walls import Walls, static_nearby, strike_out_wakes, velocity_of
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -127,19 +127,19 @@ def _blocked(
     It can't if the cell is STATIC. What `walls` doubts is that of `Walls.doubt`, for whole planes: a plane shifted the
     other way shows in each cell the value at the place where its mass is at another time.
     """
-    static = mixed[STATIC]
+    static = static_nearby(mixed)
     keeps = walls.keeps_pace(velocity, car_velocity, spec.cell)
     before = origins(velocity, spec, walls)
     shortly_before = origins(velocity, spec, walls, walls.second_look)
     open_space = mixed[FREE] + mixed[DYNAMIC]
-    open_to_pace = open_space - free_beside_static(mixed)
+    open_to_pace = open_space - mixed[FREE] * static
 
     def blocked(k: int) -> NDArray[np.floating]:
         from_wall = _elsewhere(static, before[k])
         if keeps[k]:
             from_wall = np.maximum(from_wall, _elsewhere(static, shortly_before[k]))
         open_ahead = _elsewhere(open_to_pace if keeps[k] else open_space, -before[k])
-        return static + from_wall * (1 - open_ahead) * unseen
+        return mixed[STATIC] + from_wall * (1 - open_ahead) * unseen
 
     return blocked
 

@@ -213,8 +213,6 @@ class DriveTracker:
         Whether each belief also contains the state of the filter's map after each step (`Belief.steps`).
     """
 
-    filter_class = Cmcdot
-
     def __init__(
         self,
         spec: GridSpec,
@@ -222,7 +220,7 @@ class DriveTracker:
         seed: int | np.random.Generator = 0,
         keep_steps: bool = False,
     ) -> None:
-        self.filter = self.filter_class(spec, params, seed, keep_steps)
+        self.filter = Cmcdot(spec, params, seed, keep_steps)
         self._before: Frame | None = None
 
     def step(self, frame: Frame) -> Belief:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import maximum_filter
 
 from semgrid_edu.errors import check_fields, not_negative, types_named
 from semgrid_edu.grid import GridSpec
@@ -21,10 +22,10 @@ FREE, STATIC, DYNAMIC, UNKNOWN = State
 class Walls:
     """How far the filters look back and ahead along a path to tell a moving thing from a wall that comes into view.
 
-    *Walls.* A particle is suspect if the cell where it was `clearing_time` ago is STATIC now, and the cell where it
-    will be after `clearing_time` is not known to be free. Then its arrival in an unseen cell may be only the next piece
-    of the wall. A pedestrian who sets off also comes out of a STATIC cell, but walks into free space. And the side of a
-    long vehicle comes out of a cell where the vehicle moves.
+    *Walls.* A particle is suspect if there is something STATIC where it was `clearing_time` ago, in that cell or beside
+    it, and the cell where it will be after `clearing_time` is not known to be free. Then its arrival in an unseen cell
+    may be only the next piece of the wall. A pedestrian who sets off also comes out of a STATIC cell, but walks into
+    free space. And the side of a long vehicle comes out of a cell where the vehicle moves.
 
     *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. A particle at that speed is
     suspect if a cell on its recent path was STATIC, or if the cell ahead borders one. While the car stands, none of
@@ -130,9 +131,10 @@ class Walls:
         before, shortly_before, ahead = (
             self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
         )
-        out_of_a_wall = at_cells(mixed[STATIC], before)
-        past_a_wall = keeps * at_cells(mixed[STATIC], shortly_before)
-        open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - keeps * at_cells(free_beside_static(mixed), ahead)
+        static = static_nearby(mixed)
+        out_of_a_wall = at_cells(static, before)
+        past_a_wall = keeps * at_cells(static, shortly_before)
+        open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - keeps * at_cells(mixed[FREE] * static, ahead)
         return np.maximum(out_of_a_wall, past_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)
 
     def clear_wakes(
@@ -196,17 +198,16 @@ def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDAr
     return np.stack([posterior[FREE] + (s - static), static, posterior[DYNAMIC], posterior[UNKNOWN]])
 
 
-def free_beside_static(mixed: NDArray) -> NDArray[np.floating]:
-    """Return how much of P(FREE) borders a STATIC cell: P(FREE) times the largest P(STATIC) of the four neighbours.
+def static_nearby(mixed: NDArray) -> NDArray[np.floating]:
+    """Return the largest P(STATIC) of each cell and its eight neighbours, (H, W).
 
-    Hedges are ragged and porous, so beams pass through cells of their face. Once the car looks in from another place,
-    these cells are hit. So to something at the car's speed they are not open space.
+    A wall that crosses the grid at an angle is a staircase of cells, so a path along it also leads through the cells
+    beside them. And hedges are ragged and porous, so beams pass through cells of their face, which are hit once the car
+    looks in from another place.
 
     Parameters
     ----------
     mixed : (4, H, W) float
         The four states.
     """
-    static = np.pad(mixed[STATIC], 1)
-    beside = np.max([static[:-2, 1:-1], static[2:, 1:-1], static[1:-1, :-2], static[1:-1, 2:]], axis=0)
-    return mixed[FREE] * beside
+    return maximum_filter(mixed[STATIC], size=3, mode="constant")

@@ -20,6 +20,13 @@ ARROW_SECONDS = 0.5
 ARROW_SPACING = 2.0
 """Each square with this side length, metres, gets one arrow, so that arrows don't hide a car."""
 
+ARROW_SPREAD = 2.5
+"""Largest standard deviation of the velocity in a square that gets an arrow, m/s.
+
+That of a thing which has been followed for half a second is 1 to 2.4 m/s, that of one which has just appeared 3 m/s and
+more: nobody knows yet where it goes, or whether it moves at all.
+"""
+
 
 def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, legend: bool = True) -> Axes:
     """Draw an occupancy grid; each cell mixes the state colours, weighted by probability.
@@ -44,7 +51,9 @@ def occupancy(spec: GridSpec, probability: NDArray, ax: Axes | None = None, lege
     return colour_legend(ax, STATE_NAMES, STATE_COLOURS) if legend else ax
 
 
-def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) -> Axes:
+def velocity(
+    spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes, covariance: NDArray | None = None
+) -> Axes:
     """Add the arrows of `velocity_arrows` to an occupancy grid; their length is the distance covered in half a second.
 
     A note below the map explains this length.
@@ -59,8 +68,10 @@ def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) 
         Velocity over ground, along x and y of the grid frame, m/s; NaN where nothing moves.
     ax : Axes
         Axes with the drawn grid.
+    covariance : (2, 2, H, W) float, optional
+        Covariance of the velocity, `Belief.velocity_covariance`, m^2/s^2.
     """
-    start, speed = velocity_arrows(spec, probability, velocity)
+    start, speed = velocity_arrows(spec, probability, velocity, covariance)
     (x, y), (vx, vy) = start.T, speed.T * ARROW_SECONDS
     ax.quiver(y, x, vy, vx, angles="xy", scale_units="xy", scale=1.0, color="#6a1b9a", width=0.007, zorder=3)
     ax.set_xlabel(f"{ax.get_xlabel()}\narrows: distance covered in {ARROW_SECONDS} s")
@@ -68,9 +79,12 @@ def velocity(spec: GridSpec, probability: NDArray, velocity: NDArray, ax: Axes) 
 
 
 def velocity_arrows(
-    spec: GridSpec, probability: NDArray, velocity: NDArray
+    spec: GridSpec, probability: NDArray, velocity: NDArray, covariance: NDArray | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Average the velocities of cells that are probably DYNAMIC over squares of side `ARROW_SPACING`.
+
+    A square gets an arrow where its velocity is known: the cells agree, and each has been followed for some scans. Both
+    show in the standard deviation of the velocity over the whole square, which is at most `ARROW_SPREAD`.
 
     Parameters
     ----------
@@ -80,6 +94,8 @@ def velocity_arrows(
         Probabilities of FREE, STATIC, DYNAMIC and UNKNOWN.
     velocity : (2, H, W) float
         Velocity over ground, along x and y of the grid frame, m/s; NaN where nothing moves.
+    covariance : (2, 2, H, W) float, optional
+        Covariance of the velocity in each cell, m^2/s^2; when left out, the velocities are taken as exact.
 
     Returns
     -------
@@ -91,10 +107,18 @@ def velocity_arrows(
     moving = np.isfinite(velocity).all(axis=0) & (probability[State.DYNAMIC] > 0.5)
     xy = spec.centers()[moving]
     _, square = np.unique(np.floor(xy / ARROW_SPACING), axis=0, return_inverse=True)
+    square = square.ravel()
     count = np.maximum(np.bincount(square), 1)
-    start = [np.bincount(square, weights=column) / count for column in xy.T]
-    speed = [np.bincount(square, weights=component) / count for component in velocity[:, moving]]
-    return np.stack(start, axis=-1), np.stack(speed, axis=-1)
+
+    def averages(values: NDArray) -> NDArray[np.float64]:
+        return np.stack([np.bincount(square, weights=column) / count for column in values], axis=-1)
+
+    start = averages(xy.T)
+    speed = averages(velocity[:, moving])
+    between = averages((velocity[:, moving] - speed[square].T) ** 2).sum(axis=-1)
+    within = 0.0 if covariance is None else averages(covariance[[0, 1], [0, 1]][:, moving]).sum(axis=-1)
+    known = between + within <= ARROW_SPREAD**2
+    return start[known], speed[known]
 
 
 def grid_labels(

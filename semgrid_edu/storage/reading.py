@@ -2,6 +2,7 @@
 
 import io
 import json
+from codecs import BOM_UTF8
 from pathlib import Path
 from typing import Any
 
@@ -42,12 +43,26 @@ def read_text(path: Path) -> str:
     Parameters
     ----------
     path : Path
-        The file to read: ASCII, as all of KITTI's text files are.
+        The file to read: ASCII, as all of KITTI's text files are; a byte order mark before it is ignored.
     """
     try:
-        return read_bytes(path).decode("ascii")
+        return read_bytes(path).removeprefix(BOM_UTF8).decode("ascii")
     except UnicodeDecodeError as error:
         raise DataError(path, "ASCII text", f"byte {error.object[error.start]:#x} at {error.start}") from error
+
+
+def read_lines(path: Path, n_lines: int) -> list[str]:
+    """Return the lines of a file; blank ones after the last are left out.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    n_lines : int
+        How many lines count, blank or not.
+    """
+    lines = read_text(path).splitlines()
+    return lines if any(map(str.strip, lines[n_lines:])) else lines[:n_lines]
 
 
 def read_json(path: str | Path, kind: type = dict) -> Any:
@@ -152,15 +167,28 @@ def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     return pixels
 
 
-def read_jpeg(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
+def read_image(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
+    """Return the pixels of a photograph, (h, w, 3), RGB: a PNG, or a JPEG if its name ends in .jpg or .jpeg.
+
+    Parameters
+    ----------
+    path : Path
+        The file to read.
+    size : (int, int) or None
+        Height and width that the image must have, pixels; None if any size will do.
+    """
+    return read_jpeg(path, size) if path.suffix.lower() in (".jpg", ".jpeg") else read_png(path, "RGB", size)
+
+
+def read_jpeg(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
     """Return the pixels of a JPEG, (h, w, 3), RGB.
 
     Parameters
     ----------
     path : Path
         The file to read.
-    size : (int, int)
-        Height and width that the image must have, pixels.
+    size : (int, int) or None
+        Height and width that the image must have, pixels; None if any size will do.
 
     Raises
     ------
@@ -169,11 +197,14 @@ def read_jpeg(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
     """
     content = read_bytes(path)
     try:
-        pixels = np.asarray(Image.open(io.BytesIO(content), formats=["JPEG"]).convert("RGB"))
+        image = Image.open(io.BytesIO(content), formats=["JPEG"])
+        pixels = np.array(image)
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise DataError(path, "a sound JPEG image", f"{str(error).partition(' <')[0]!r}") from error
-    if pixels.shape[:2] != size:
-        raise DataError(path, f"{size[0]} x {size[1]} pixels", f"{pixels.shape[0]} x {pixels.shape[1]}")
+    height, width = pixels.shape[:2]
+    if image.mode != "RGB" or (height, width) != (size or (height, width)):
+        expected = f"RGB of {size[0]} x {size[1]} pixels" if size else "RGB"
+        raise DataError(path, expected, f"{image.mode} of {height} x {width} pixels")
     return pixels
 
 

@@ -11,10 +11,6 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets.frames import LIDAR_RANGE, FrameSequence
-from semgrid_edu.datasets.kitti_raw import KittiRawDrive
-from semgrid_edu.datasets.oxts import read_packet, read_timestamps
-from semgrid_edu.datasets.pandaset import PandasetScene
-from semgrid_edu.datasets.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
 from semgrid_edu.occupancy.sensor import edge_of_splits
@@ -57,11 +53,18 @@ LIKELY = 0.4
 
 It has to put at least 1.5 times as many there."""
 
+SHARP_LEVEL = (0.2, 0.01)
+"""Like `LEVEL`, but for telling mistakes apart: the true ground is sharper than a slice of the walls at that height,
+and nothing is below it."""
+
 ALIKE = 0.97
-"""Two mistakes fit alike if undoing one puts at least this part as many returns on the ground as undoing the other."""
+"""Two mistakes fit alike if undoing one makes the ground at least this part as clear as undoing the other."""
 
 NEAREST = 1.0
 """Returns closer than this don't count, metres: else a scan in kilometres, whose z is moved, would be on the ground."""
+
+BRIGHTEST = 1.01
+"""Reflectances above this aren't fractions."""
 
 FEWEST_SEEN = 1e-3
 """The smallest plausible fraction of returns ahead, or in the image: 0.14 to 0.26 in KITTI and in the sample."""
@@ -81,59 +84,35 @@ def drive_doubts(drive: FrameSequence) -> list[str]:
     Returns
     -------
     list of str
-        One line for each doubt, which names the file or folder. For KITTI raw drives: missing and short scans, files
-        that repeat the one before. For PandaSet: missing and repeated files. For these two and SemanticKITTI: poses
-        that no car can have (`pose_doubts`). For every drive: the doubts of `frame_doubts`.
+        One line for each doubt, which names the file or folder: missing and short scans, files that repeat the one
+        before, poses that no car can have (`pose_doubts`), and the doubts of `frame_doubts`.
     """
-    in_files = []
-    if isinstance(drive, KittiRawDrive):
-        in_files = _kitti_doubts(drive)
-    elif isinstance(drive, PandasetScene):
-        in_files = [*_pandaset_doubts(drive), *_path_doubts(drive, "lidar/poses.json")]
-    elif isinstance(drive, SemanticKittiSequence):
-        in_files = _path_doubts(drive, "poses.txt")
-    return [*in_files, *frame_doubts(drive, drive.folder, drive.without_labels)]
+    files = getattr(drive, "drive", drive)  # a `ZhangDrive` adds labels to the files of another drive
+    return [*_file_doubts(files), *_pose_doubts(files), *frame_doubts(drive, drive.folder, drive.without_labels)]
 
 
-def _kitti_doubts(drive: KittiRawDrive) -> list[str]:
-    scans = [drive.file("velodyne_points", k, ".bin") for k in range(len(drive))]
-    images = [drive.file(drive.view, k, ".png") for k in range(len(drive))]
-    gaps = [str(DataError(scans[k], "a scan", "none: the filter predicts over the gap")) for k in drive.gaps]
-    return [*gaps, *repeats(scans, "scans"), *repeats(images, "images"), *short_scans(scans), *_packet_doubts(drive)]
+def _file_doubts(drive: FrameSequence) -> list[str]:
+    scans = [file for k in range(len(drive)) if (file := drive.scan_file(k))]
+    images = [file for k in range(len(drive)) if (file := drive.image_file(k))]
+    gaps = [DataError(drive.scan_file(k), "a scan", "none: the filter predicts over the gap") for k in drive.gaps]
+    spacing = min(np.diff(drive.numbers), default=1)
+    expected = f"an image, since there is one every {spacing} frames"
+    for number in sorted(set(range(drive.numbers[0], drive.numbers[-1], spacing)) - set(drive.numbers)):
+        gaps.append(DataError(drive.image_file(0).with_stem(f"{number:02d}"), expected, "none"))
+    short = short_scans(scan for scan in scans if scan.suffix == ".bin")
+    return [*map(str, gaps), *repeats(scans, "scans"), *repeats(images, "images"), *short]
 
 
-def _packet_doubts(drive: KittiRawDrive) -> list[str]:
-    """Check the poses whose packets and times can be read; what can't be read is an error, not a doubt."""
-    packets = {}
-    readable = []
-    for k in range(len(drive)):
-        with suppress(DataError):
-            path = drive.file("oxts", k, ".txt")
-            packets[path] = read_packet(path)
-            readable.append(k)
-    try:
-        times = read_timestamps(drive.folder / "oxts" / "timestamps.txt", len(drive))
-    except DataError:
-        return []
-    seconds = (times - times[0]) / np.timedelta64(1, "s")  # an unknown time (NaT) becomes NaN
-    return packet_doubts(packets, seconds[readable])
-
-
-def _path_doubts(drive: PandasetScene | SemanticKittiSequence, file: str) -> list[str]:
+def _pose_doubts(drive: FrameSequence) -> list[str]:
     """Check the poses of a drive; what can't be read is an error, not a doubt."""
     try:
+        packets, seconds = drive.packets()
+        if packets:
+            return packet_doubts(packets, seconds)
         poses, seconds = drive.path()
     except DataError:
         return []
-    return path_doubts(poses, seconds, [f"{drive.folder / file}, pose {k}" for k in range(len(poses))])
-
-
-def _pandaset_doubts(scene: PandasetScene) -> list[str]:
-    scans = [scene.folder / "lidar" / f"{number:02d}.pkl.gz" for number in scene.numbers]
-    images = [scene.view / f"{number:02d}.jpg" for number in scene.numbers]
-    expected = f"an image, since there is one every {min(np.diff(scene.numbers), default=1)} frames"
-    gaps = [str(DataError(scene.view / f"{number:02d}.jpg", expected, "none")) for number in scene.gaps]
-    return [*gaps, *repeats(scans, "scans"), *repeats(images, "images")]
+    return path_doubts(poses, seconds, [drive.pose_name(k) for k in range(len(poses))])
 
 
 def short_scans(paths: Iterable[Path]) -> list[str]:
@@ -257,16 +236,22 @@ def _scan_doubts(frame: Frame) -> Iterator[tuple[str, str]]:
         yield "returns from places around the LIDAR", "only zeros"
         return
     on_ground = _on_ground(points, height)
-    shares = {question: _on_ground(undo(points, height), height) for question, undo in MISTAKES.items()}
-    # Every second point of a scan with three columns fits six columns as well: of questions that fit alike, the first.
-    question = next(question for question, share in shares.items() if share >= ALIKE * max(shares.values()))
-    undone = shares[question]
     hint = ""
-    if undone > LIKELY > on_ground and undone > 1.5 * on_ground:
-        hint = question
-    elif on_ground < FEWEST_ON_GROUND:
+    if on_ground < LIKELY:
+        clear = {question: _ground_clarity(undo(points, height), height) for question, undo in MISTAKES.items()}
+        # Of questions that fit alike, the first: every second point of a scan with three columns fits six, too.
+        best = max(*clear.values(), 0.0)
+        question = next((question for question, value in clear.items() if value >= ALIKE * best), "")
+        undone = _on_ground(MISTAKES[question](points, height), height) if question else 0.0
+        if undone > LIKELY and undone > 1.5 * on_ground and best > _ground_clarity(points, height):
+            hint = question
+    if not hint and on_ground < FEWEST_ON_GROUND:
         hint = f"half of them lie below z = {np.median(points[:, 2]):.3g} m"
-    if not edge_of_splits(points, edge=1.0):  # the filter's own rule
+    strongest = np.abs(points[:, 3]).max()
+    if not hint and (strongest > BRIGHTEST or points[:, 3].min() < 0):
+        found = f"{points[:, 3].min():.3g} to {points[:, 3].max():.3g}"
+        yield "reflectances from 0 to 1", f"{found}: are they bytes?" if strongest <= 255 else found
+    if frame.vehicle_returns is None and not edge_of_splits(points, edge=1.0):  # the filter's own rule
         dark = np.mean(points[:, 3] == 0)
         found = f"0 for {dark:.0%} of them: beams that the vehicle's own edge splits can't be told from obstacles"
         yield "returns with a reflectance", found
@@ -286,8 +271,21 @@ def _in_columns(points: NDArray, n_columns: int) -> NDArray:
 
 def _on_ground(points: NDArray, height: float) -> float:
     """Return the fraction of returns (N, 3+) in range and near the ground, `height` metres below the LIDAR."""
+    return _near_and_below(points, height, LEVEL)[0]
+
+
+def _ground_clarity(points: NDArray, height: float) -> float:
+    """Return the fraction of returns on a sharp ground less the fraction below it, where nothing can be."""
+    on_ground, below = _near_and_below(points, height, SHARP_LEVEL)
+    return on_ground - below
+
+
+def _near_and_below(points: NDArray, height: float, level: tuple[float, float]) -> tuple[float, float]:
+    """Return the fractions of returns (N, 3+) in range that are near the ground, and below it."""
     if not len(points):
-        return 0.0
+        return 0.0, 0.0
     distance = np.hypot(points[:, 0], points[:, 1])
-    near = np.abs(points[:, 2] + height) < LEVEL[0] + LEVEL[1] * distance
-    return float(np.mean(near & (distance > NEAREST) & (distance < LIDAR_RANGE)))
+    in_range = (distance > NEAREST) & (distance < LIDAR_RANGE)
+    tolerance = level[0] + level[1] * distance
+    above = points[:, 2] + height
+    return float(np.mean(in_range & (np.abs(above) < tolerance))), float(np.mean(in_range & (above <= -tolerance)))

@@ -53,10 +53,10 @@ class TruthFlaws:
     skewed: bool = False
 
     def __post_init__(self) -> None:
-        """Check that sizes are finite and not negative, and that the probability is at most 1."""
-        expected = "a finite number from 0 up, a probability up to 1"
-        check_fields(self, expected, not_negative, "rotation", "translation", "outline", "small", "missed")
-        check_fields(self, expected, lambda probability: probability <= 1, "missed")
+        """Check that sizes are finite and not negative, and that the probability is one."""
+        check_fields(self, "degrees, 0 or more", not_negative, "rotation")
+        check_fields(self, "a finite number, 0 or more", not_negative, "translation", "outline", "small")
+        check_fields(self, "a probability, 0 to 1", lambda p: 0 <= p <= 1, "missed")
 
     def apply(self, frames: Sequence[Frame], seed: int, number: int) -> list[Frame]:
         """Return the frames of a drive with these errors. Parameters are those of `flawed_drive`."""

@@ -1,7 +1,6 @@
 """Poses that no car can have: jumps, turns in no time, a heading that isn't the way it moves, a GPS without a fix."""
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,9 @@ from semgrid_edu.errors import DataError
 
 FASTEST = 100.0
 """Metres per second. No car drives faster."""
+
+PERIODS = (0.005, 5.0)
+"""Seconds: the shortest and the longest plausible time from one frame to the next (median)."""
 
 NEIGHBOURS = 2
 """A step is compared with this many steps before it and after it."""
@@ -62,13 +64,13 @@ PACKET_MISTAKES: dict[str, Callable[[NDArray], NDArray]] = {
 The question is asked if undoing one makes the vehicle move the way it looks."""
 
 
-def packet_doubts(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str]:
+def packet_doubts(packets: Mapping[object, NDArray], seconds: NDArray) -> list[str]:
     """Name the packets that no car can have sent.
 
     Parameters
     ----------
-    packets : mapping of Path to (30,) float
-        The packets of a drive, in order, from `read_packet`.
+    packets : mapping of object to (30,) float
+        The packets of a drive, in order, from `read_packet`, by what to call each in a line, such as its file.
     seconds : (N,) float
         Time of each packet; steps that aren't positive or not known are skipped.
 
@@ -91,7 +93,7 @@ def packet_doubts(packets: Mapping[Path, NDArray], seconds: NDArray) -> list[str
         ratio = float(np.median(np.linalg.norm(moved[known, :2], axis=1) / steps[known] / measured[1:][known]))
         if not 1 / SPEED_RATIO < ratio < SPEED_RATIO:
             expected = "positions that move as fast as the packets' velocities"
-            found.append(str(DataError(paths[0].parent, expected, f"{ratio:.2g} times as fast (median)")))
+            found.append(str(DataError(paths[0], expected, f"{ratio:.2g} times as fast (median)")))
     return found
 
 
@@ -118,6 +120,9 @@ def path_doubts(
     """
     moved, steps = _steps(poses, seconds)
     timed = np.flatnonzero(steps > 0)  # an unknown time is NaN
+    if len(timed) and not PERIODS[0] < (period := float(np.median(steps[timed]))) < PERIODS[1]:
+        expected = f"times in seconds, {PERIODS[0]} to {PERIODS[1]} apart"
+        return [str(DataError(places[0], expected, f"{period:.3g} apart (median): are they in another unit?"))]
     found = []
     for i, k in enumerate(timed):
         around = timed[max(i - NEIGHBOURS, 0) : i + NEIGHBOURS + 1]
@@ -194,7 +199,7 @@ def _with_yaw(packets: NDArray, yaw: NDArray) -> NDArray:
     return changed
 
 
-def _without_fix(packets: NDArray, paths: Sequence[Path]) -> list[str]:
+def _without_fix(packets: NDArray, paths: Sequence[object]) -> list[str]:
     """Name the first packet whose GPS has no fix. A drive that never says how it got its positions isn't doubted."""
     mode = packets[:, POSITION_MODE]
     lost = np.flatnonzero(mode <= 2)

@@ -50,7 +50,9 @@ def worker_pool(workers: int) -> Iterator[Executor]:
             raise
 
 
-DIED = 'a worker died: does your script start them below `if __name__ == "__main__":`? Else memory may have run out'
+DIED = (
+    'a worker process died. Either memory ran out, or your script starts workers outside `if __name__ == "__main__":`'
+)
 """The message when a worker dies: each worker imports the script that started it."""
 
 

@@ -14,7 +14,7 @@ from tiny_drive import DATE, SIZE, K, write_packet, write_tiny_dataset, write_ti
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.oxts import EARTH_RADIUS, read_packet
-from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.workshop import demo
@@ -270,6 +270,25 @@ def test_returns_in_millimetres_that_no_reader_refused():
     frame = sample_drive()[0]
     (doubt,) = frame_doubts([replace(frame, points=1000 * frame.points)])
     assert "are they in millimetres" in doubt
+
+
+LAYOUTS = {
+    "is z the height above the ground": lambda p: p + np.array([0, 0, 1.73, 0]),
+    "does z point down": lambda p: p * (1, 1, -1, 1),
+    "are they in kilometres": lambda p: p * (1e-3, 1e-3, 1e-3, 1),
+    "does x point up": lambda p: p[:, [2, 0, 1, 3]],
+    "were five columns read": lambda p: np.c_[p, np.zeros(len(p))].ravel()[: 5 * len(p) // 4 * 4].reshape(-1, 4),
+}
+
+
+@pytest.mark.parametrize("drive", [sample_drive, real_drive])
+@pytest.mark.parametrize(("question", "spoil"), LAYOUTS.items(), ids=LAYOUTS)
+def test_the_right_mistake_is_named_between_walls_too(question, spoil, drive):
+    """On the real street more returns are on walls, 1.73 m above the ground, than on the ground itself."""
+    frame = drive()[0]
+    points = spoil(frame.points).astype(np.float32)
+    (doubt,) = [doubt for doubt in frame_doubts([replace(frame, points=points)]) if "ground about" in doubt]
+    assert question in doubt
 
 
 def test_a_scan_without_its_ground_is_not_taken_for_kilometres():

@@ -94,11 +94,20 @@ class TestGap:
         assert unknown[1] < unknown[2] < unknown[3] > unknown[4]
 
     @pytest.mark.parametrize("k", [0, 5])
-    def test_a_scan_missing_at_an_end_is_an_error(self, tmp_path, k):
-        folder = write_tiny_drive(tmp_path, n_frames=6)
+    def test_a_scan_missing_at_an_end_is_a_gap_too(self, tmp_path, k):
+        folder = write_tiny_drive(tmp_path, n_frames=6, labelled=())
         (folder / "velodyne_points" / "data" / f"{k:010d}.bin").unlink()
-        with pytest.raises(DataError, match=f"{k}.bin"):
-            KittiRawDrive(tmp_path, DATE, "0001")[k]
+        drive = KittiRawDrive(tmp_path, DATE, "0001")
+        assert (drive.gaps, len(drive), drive[k].points.shape, drive[k].time) == ((k,), 6, (0, 4), 0.1 * k)
+        assert any(f"{k}.bin: expected a scan, found none" in doubt for doubt in drive_doubts(drive))
+
+    def test_a_link_to_nothing_is_an_error(self, tmp_path):
+        folder = write_tiny_drive(tmp_path, n_frames=3, labelled=())
+        path = folder / "velodyne_points" / "data" / "0000000001.bin"
+        path.unlink()
+        path.symlink_to(tmp_path / "nowhere.bin")
+        with pytest.raises(DataError, match=r"0001.bin: expected a file, found nothing there"):
+            KittiRawDrive(tmp_path, DATE, "0001")[1]
 
 
 class TestRightCamera:

@@ -8,6 +8,7 @@ import shutil
 import numpy as np
 import pytest
 from pandas import DataFrame
+from PIL import Image
 from scipy.spatial.transform import Rotation
 from tiny_pandaset import (
     CAR_SIZE,
@@ -308,7 +309,6 @@ def relabelled(folder):
 
 
 BAD = {
-    "a missing scan": (gone("lidar/02.pkl.gz"), r"lidar/02\.pkl\.gz: expected a file"),
     "missing poses": (gone("lidar/poses.json"), r"lidar/poses\.json: expected a file"),
     "missing poses of the camera": (
         gone("camera/front_camera/poses.json"),
@@ -368,14 +368,49 @@ def test_bad_inputs_are_named(copy, kind):
     assert scene.problems()
 
 
-def test_a_missing_image_is_a_gap(copy):
+@pytest.mark.parametrize("k", [0, 1, 2])
+def test_a_missing_scan_is_a_gap(copy, k):
+    """The frame keeps its image, time and pose; the height above the road comes from the first scan that is there."""
+    whole = PandasetScene(copy, SCENE)
+    frame = whole[k]
+    (copy / SCENE / f"lidar/{NUMBERS[k]:02d}.pkl.gz").unlink()
+    scene = PandasetScene(copy, SCENE)
+    assert (scene.gaps, scene.problems(), len(scene)) == ((k,), [], 3)
+    gap = scene[k]
+    assert (gap.points.shape, gap.vehicle_returns.shape, gap.labels, gap.time) == ((0, 4), (0,), None, frame.time)
+    assert gap.camera.lidar_height == pytest.approx(frame.camera.lidar_height)
+    np.testing.assert_array_equal(gap.image, frame.image)
+    np.testing.assert_array_equal(gap.T_world_from_lidar, frame.T_world_from_lidar)
+    other = (k + 1) % 3
+    np.testing.assert_array_equal(scene[other].points, whole[other].points)
+    assert any("pkl.gz: expected a scan, found none" in doubt for doubt in drive_doubts(scene))
+
+
+@pytest.mark.parametrize(("before", "after"), [(0, 0), (1, 0), (2, 2)])
+def test_returns_that_cannot_be_in_the_grid_are_not_missed(scene, before, after, monkeypatch):
+    truths = [scene.truth(k, SPEC, before, after) for k in range(3)]
+    monkeypatch.setattr(scene, "_around", lambda k, spec, points: np.ones(len(points), bool))
+    for k, truth in enumerate(truths):
+        np.testing.assert_array_equal(scene.truth(k, SPEC, before, after), truth)
+
+
+def test_images_may_be_png(copy):
+    before = PandasetScene(copy, SCENE)[1].image
+    path = copy / SCENE / "camera/front_camera/02.jpg"
+    Image.open(path).save(path.with_suffix(".png"))
+    path.unlink()
+    np.testing.assert_array_equal(PandasetScene(copy, SCENE)[1].image, before)
+
+
+def test_a_missing_image_is_doubtful(copy):
     (copy / SCENE / "camera/front_camera/06.jpg").write_bytes(
         (copy / SCENE / "camera/front_camera/04.jpg").read_bytes() + b"\0"  # another file
     )
     (copy / SCENE / "camera/front_camera/02.jpg").unlink()
     scene = PandasetScene(copy, SCENE)
-    assert (scene.numbers, scene.gaps) == ((0, 4, 6), (2,))
-    (line,) = drive_doubts(scene)
+    (copy / SCENE / "lidar/06.pkl.gz").write_bytes((copy / SCENE / "lidar/04.pkl.gz").read_bytes()[:-1])
+    assert (scene.numbers, scene.gaps) == ((0, 4, 6), ())
+    (line,) = (line for line in drive_doubts(scene) if "02.jpg" in line)
     assert "02.jpg: expected an image" in line
 
 

@@ -48,7 +48,7 @@ def test_licence_and_terms_lie_beside_it(drive):
         assert term in text
     assert "PandaSet by Hesai and Scale AI, CC BY 4.0" in drive.credit
     command = json.loads((FOLDER / "provenance.json").read_text())["command"]
-    assert command == "semgrid-edu data real-excerpt real --pandaset PANDASET --scene 002 --frames 10"
+    assert command == "python data_samples/make_real.py PANDASET 002 10 real"
 
 
 def test_its_index_lists_every_frame(drive):

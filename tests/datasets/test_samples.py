@@ -6,6 +6,7 @@ import pytest
 import torch
 from tiny_drive import write_tiny_dataset
 
+from data_samples.make_frames import write_excerpt
 from semgrid_edu.datasets import training_cache
 from semgrid_edu.datasets.samples import (
     sample_drive,
@@ -20,7 +21,6 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.fast import TrainingSet
 from semgrid_edu.networks import load_net
 from semgrid_edu.storage.files import write_bytes
-from semgrid_edu.workshop.commands.excerpt import write_excerpt
 
 
 @pytest.fixture(scope="module")

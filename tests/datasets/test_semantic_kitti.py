@@ -11,6 +11,7 @@ from semgrid_edu.datasets.semantic_kitti import SEMANTIC_KITTI_CLASSES
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.workshop.doubts import drive_doubts
 
 SPEC = GridSpec(x_min=0, x_max=20, y_min=-5, y_max=5, cell=0.5)
 GROUND = -1.73
@@ -238,7 +239,37 @@ class TestDamage:
             SemanticKittiSequence(root, "00")[0]
 
     def test_problems_names_each_once(self, root, folder):
-        (folder / "velodyne" / "000001.bin").unlink()
+        (folder / "velodyne" / "000001.bin").write_bytes(b"cut")
         (folder / "labels" / "000002.label").write_bytes(b"")
         problems = SemanticKittiSequence(root, "00").problems()
         assert [problem.split(": ")[0][-12:] for problem in problems] == ["e/000001.bin", "000002.label"]
+
+    def test_a_missing_scan_is_a_gap(self, root, folder):
+        (folder / "velodyne" / "000001.bin").unlink()
+        sequence = SemanticKittiSequence(root, "00")
+        assert (sequence.gaps, sequence.problems(), len(sequence[1].points)) == ((1,), [], 0)
+        assert (sequence[1].labels.birdseye == IGNORE).all()
+        np.testing.assert_allclose(sequence[1].T_world_from_lidar[0, 3], STEP)
+        assert any("000001.bin: expected a scan, found none" in doubt for doubt in drive_doubts(sequence))
+
+    @pytest.mark.parametrize("cut", ["times and poses of the clip", "those of the whole drive"])
+    def test_a_clip_may_begin_at_any_frame(self, root, folder, cut):
+        (folder / "image_2").mkdir()
+        for k in range(3):
+            Image.fromarray(np.full((*SIZE, 3), (k, 2, 3), np.uint8)).save(
+                folder / "image_2" / f"{k:06d}.jpg", quality=100
+            )
+        whole = SemanticKittiSequence(root, "00")
+        frame = whole[2]
+        for name in ("velodyne/000000.bin", "labels/000000.label", "image_2/000000.jpg"):
+            (folder / name).unlink()
+        if cut == "times and poses of the clip":
+            for name in ("times.txt", "poses.txt"):
+                (folder / name).write_text("".join((folder / name).read_text().splitlines(keepends=True)[1:]))
+        clip = SemanticKittiSequence(root, "00")
+        assert (len(clip), *clip.numbers, clip.problems()) == (2, 1, 2, [])
+        np.testing.assert_array_equal(clip[1].points, frame.points)
+        np.testing.assert_array_equal(clip[1].labels.birdseye, frame.labels.birdseye)
+        np.testing.assert_allclose(clip[1].T_world_from_lidar, frame.T_world_from_lidar)
+        assert (clip[0].time, clip[1].time) == (0.0, pytest.approx(0.103736))
+        assert abs(int(clip[1].image[0, 0, 0]) - 2) <= 2

@@ -368,6 +368,19 @@ class TestMistakes:
         assert "could not be read to its end" in html
         assert "0000000002.bin" in html
 
+    def test_damaged_frames_are_left_out_on_request(self, weights, tmp_path):
+        folder = write_tiny_drive(tmp_path, n_frames=5)
+        (folder / "velodyne_points" / "data" / "0000000000.bin").write_bytes(b"\0")
+        (folder / "image_02" / "data" / "0000000003.png").write_bytes(b"no image")
+        told = []
+        out = tmp_path / "out"
+        html = write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, out, skipped=told.append).read_text("utf-8")
+        shown = [frame["clock"] for frame in json.loads(Page(html).text["frames"])]
+        assert shown == ["frame 1, 0.1 s", "frame 2, 0.2 s", "frame 4, 0.4 s"]
+        assert [line.partition(": ")[0] for line in told] == ["frame 0", "frame 3"]
+        assert "<b>Damaged frames were left out: 2.</b>" in html
+        assert "0000000003.png: expected a sound PNG image" in html
+
     def test_a_gap_is_marked(self, weights, tmp_path):
         folder = write_tiny_drive(tmp_path)
         (folder / "velodyne_points" / "data" / "0000000001.bin").unlink()

@@ -5,11 +5,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from tiny_notes import Note
+from worlds.lecture_12_pictures import accuracy_picture, confusion_picture
 
 import semgrid_edu
 from semgrid_edu.labels import SYNTHIA_10
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS, Experiment
-from semgrid_edu.workshop.paper.pictures import accuracy_picture, confusion_picture
 from semgrid_edu.workshop.paper.published import TABLE_1_SCORES
 from semgrid_edu.workshop.paper.reproduce import result_markdown, write_result
 from semgrid_edu.workshop.paper.scales import SCALES

@@ -25,6 +25,8 @@ from semgrid_edu.workshop.paper.run import estimate, left_to_do, with_needs
 from semgrid_edu.workshop.paper.scales import SCALES, scale_named
 from semgrid_edu.workshop.paper.variants import Variant
 from semgrid_edu.workshop.simulation.datasets import DatasetRecipe, Route, make_from_recipe
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
+from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.workplace import Workplace, workplace
 
 A = Note("a")
@@ -242,7 +244,8 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(cluster, trained, tm
 
 
 def test_a_cluster_makes_the_same_data(cluster, tmp_path):
-    recipe = DatasetRecipe("two", "KITTI-14", (Route("drive", 1),) * 2)
+    quiet = Wishes(density=0.2, layout="straight", styles=("park", "park"))
+    recipe = DatasetRecipe("two", "KITTI-14", (Route("drive", 1, 1, quiet),) * 2, rig=Rig())
     alone = make_from_recipe(recipe, tmp_path / "alone", seed=3, workers=1)
     together = make_from_recipe(recipe, tmp_path / "together", 3, 2, cluster.scheduler_address)
     assert results(together) == results(alone)

@@ -149,7 +149,10 @@ class Checks:
         assert {task: message for task, (score, points, message) in scores.items() if score < points} == {}
 
     def test_catalogue_is_complete(self, source):
-        """Each task of code has another right way, a mistake for its visible tests and one for its hidden ones."""
+        """Each task of code has another right way, a mistake for its visible tests and one for its hidden ones.
+
+        Endless loops are in exercise 00 alone: how they end is the session's affair, not the exercise's.
+        """
         for task, names in tasks(source).items():
             entries = [entry for entry in self.entries if entry.task == task]
             if names == (task,):
@@ -159,7 +162,6 @@ class Checks:
             assert 1 <= len(entries) - len(hidden) <= 2, f"{task}: one or two other right ways"
             assert {False, True} == {*hidden}, f"{task}: a mistake that visible tests find, and one for hidden ones"
             assert len(hidden) <= 4, f"{task}: at most four mistakes"
-        assert any("before timeout" in entry.says for entry in self.entries), "an endless loop"
 
 
 for exercise in exercises():

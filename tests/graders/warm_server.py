@@ -16,7 +16,8 @@ from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.values import Wire
 from semgrid_edu.workshop.course.sandbox.worker import Shell, Worker
 
-LIBRARIES = ("matplotlib.pyplot", "scipy.stats", "semgrid_edu.crf", "semgrid_edu.networks", "semgrid_edu.pipeline")
+LIBRARIES = ("matplotlib.pyplot", "mpmath", "scipy.stats", "sympy", "filterpy.discrete_bayes")
+LIBRARIES += ("semgrid_edu.crf", "semgrid_edu.networks", "semgrid_edu.pipeline")
 
 
 def hatch(nursery):

@@ -5,9 +5,9 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import torch
-from scipy.sparse import block_diag, random_array
+from scipy.sparse import random_array
 
-from semgrid_edu.fast.planes import PlaneOperator, PlaneSampler, SparseMatrix, SparseProduct, bilinear_matrix
+from semgrid_edu.fast.planes import PlaneSampler, SparseMatrix, SparseProduct, bilinear_matrix
 
 SIZE, SHAPE = (30, 40), (5, 20, 10)
 
@@ -84,14 +84,6 @@ def test_a_copy_of_another_type_leaves_the_original_alone(sampler, scores):
     assert torch.equal(sampler(scores), before)
 
 
-def test_batches_of_one_size_build_their_operator_once(sampler, monkeypatch):
-    built, original = [], PlaneOperator.block_diagonal
-    monkeypatch.setattr(PlaneOperator, "block_diagonal", lambda operator, n: built.append(n) or original(operator, n))
-    for n_images in (3, 3, 1, 3, 2, 2):
-        sampler(torch.zeros(n_images, 2, *SIZE))
-    assert built == [3, 2]
-
-
 def _random_matrix():
     return random_array((30, 20), density=0.1, format="csr", dtype=np.float32, rng=np.random.default_rng(0))
 
@@ -112,13 +104,6 @@ def test_products_are_those_of_scipy():
     assert (np.diff(matrix.indptr) == 0).any()  # some rows are empty
     x = torch.randn(20, 3, generator=torch.Generator().manual_seed(0))
     torch.testing.assert_close(SparseMatrix.from_scipy(matrix).multiply(x), torch.from_numpy(matrix @ x.numpy()))
-
-
-def test_blocks_along_a_diagonal_are_those_of_scipy():
-    matrix = _random_matrix()
-    x = torch.randn(60, 3, generator=torch.Generator().manual_seed(0))
-    product = SparseMatrix.from_scipy(matrix).block_diagonal(3, n_columns=20).multiply(x)
-    torch.testing.assert_close(product, torch.from_numpy(block_diag([matrix] * 3) @ x.numpy()))
 
 
 def test_the_gradient_of_a_product_is_that_by_the_transpose():

@@ -152,6 +152,17 @@ def test_cells_of_a_square_share_an_arrow_and_only_probably_dynamic_ones_count()
     np.testing.assert_allclose(speed, [[3, 0]])
 
 
+@pytest.mark.parametrize(("speeds", "deviation", "arrows"), [((2, 5), 2.0, 1), ((2, 8), 0.0, 0), ((4, 4), 2.6, 0)])
+def test_an_arrow_needs_a_velocity_that_is_known(speeds, deviation, arrows):
+    """Variance within the cells plus variance between them: 4 + 1.5^2, 3^2 and 2.6^2, against 2.5^2."""
+    spec = GridSpec(x_min=0, x_max=2, y_min=0, y_max=2, cell=1)
+    probability, velocity, covariance = np.zeros((4, 2, 2)), np.full((2, 2, 2), np.nan), np.zeros((2, 2, 2, 2))
+    probability[2, 0] = 0.9
+    velocity[:, 0] = speeds, (0, 0)
+    covariance[0, 0, 0] = deviation**2
+    assert len(plotting.velocity_arrows(spec, probability, velocity, covariance)[0]) == arrows
+
+
 def test_a_still_grid_has_no_arrows():
     start, speed = plotting.velocity_arrows(SPEC, np.full((4, 4, 2), 0.25), np.full((2, 4, 2), np.nan))
     assert start.shape == speed.shape == (0, 2)

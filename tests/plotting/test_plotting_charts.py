@@ -1,11 +1,11 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from worlds.lecture_12_pictures import forest_plot
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.plotting import training_curves
 from semgrid_edu.training.log import TrainingLog
-from semgrid_edu.workshop.paper.pictures import forest_plot
 
 
 def _log(image=200, grid=100):

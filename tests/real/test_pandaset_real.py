@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from data_samples.make_real import needed_returns
 from semgrid_edu.datasets import PandasetScene
 from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.workshop.simulation.real_excerpt import needed_returns
 
 pytestmark = pytest.mark.real
 

@@ -21,7 +21,7 @@ MOST = {"paper": 0.01, "compact": 0.015}
 """The largest share of the standing hit cells that may be called DYNAMIC."""
 WORST, FEW = 0.06, 60
 """The largest share in a frame that has at least this number of them."""
-FAST, MOST_ARROWS = 6.0, 0.1
+FAST, MOST_ARROWS = 6.0, 0.05
 """Speed of an arrow, m/s, that is as fast as the vehicle; and the largest share of frames that may show one."""
 ONE_SECOND, FOUND, SETTLED = 10, 8, 15
 """Frames: from when on standing cells count; after how long in view a car is DYNAMIC, and its speed is right."""
@@ -52,7 +52,7 @@ def phantoms(spec: GridSpec, frame, belief) -> tuple[int, int]:
 
 def has_fast_arrow(spec: GridSpec, belief) -> bool:
     """Say whether an arrow faster than `FAST` is drawn from 15 m to 5.2 m to the right, up to 40 m ahead."""
-    start, velocity = velocity_arrows(spec, belief.probability, belief.velocity)
+    start, velocity = velocity_arrows(spec, belief.probability, belief.velocity, belief.velocity_covariance)
     beside = (start[:, 0] <= 40) & (start[:, 1] >= -15) & (start[:, 1] <= -5.2)
     return bool((beside & (np.hypot(*velocity.T) >= FAST)).any())
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from tiny_pandaset import NUMBERS, SCENE, STEP, write_tiny_pandaset
 
+from data_samples.make_real import needed_returns, write_real_excerpt
 from semgrid_edu.camera import invert_rigid
 from semgrid_edu.datasets import KittiRawDrive, PandasetScene
 from semgrid_edu.datasets.samples import sample_drive
@@ -16,7 +17,6 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
-from semgrid_edu.workshop.simulation.real_excerpt import needed_returns, write_real_excerpt
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E, Rig
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 

@@ -18,11 +18,13 @@ from semgrid_edu.storage.files import sha256, sole_writer
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.workshop.simulation import datasets, writer
 from semgrid_edu.workshop.simulation.datasets import RECIPES, DatasetRecipe, Route, make_dataset, make_from_recipe
+from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.street.plan import Wishes
 from semgrid_edu.workshop.simulation.writer import DATE
 
 QUIET = Wishes(density=0.2, layout="straight", styles=("park", "park"))
-TINY = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, 2, QUIET), Route("test", 1, 1, QUIET)))
+TINY = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, 2, QUIET), Route("test", 1, 1, QUIET)), rig=Rig())
+LONG = DatasetRecipe("long", "KITTI-14", (Route("train", 50, 50, QUIET),) * 2, rig=Rig())
 DENSE = DatasetRecipe("dense", "SYNTHIA-10", (Route("train", 1, 1, QUIET),), dense=True)
 
 
@@ -101,14 +103,19 @@ def test_the_drive_of_the_faster_worker_stays_and_the_other_one_is_removed(alone
 
 
 def test_workers_end_when_their_parent_is_killed(tmp_path):
-    code = (
-        "from semgrid_edu.workshop.simulation.datasets import make_dataset\n"
-        "if __name__ == '__main__':\n    make_dataset('minikitti', {!r})"
-    )
+    code = """
+import sys
+from pathlib import Path
+from test_simulated_datasets import LONG, make_from_recipe
+if __name__ == "__main__":
+    make_from_recipe(LONG, Path(sys.argv[1]), seed=3, workers=2)
+"""
     script = tmp_path / "run.py"
-    script.write_text(code.format(str(tmp_path)))
-    process = subprocess.Popen([sys.executable, script], stderr=subprocess.DEVNULL, start_new_session=True)
-    day = tmp_path / "minikitti" / DATE
+    script.write_text(code)
+    command, paths = [sys.executable, script, tmp_path], os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    variables = os.environ | {"PYTHONPATH": paths}
+    process = subprocess.Popen(command, env=variables, stderr=subprocess.DEVNULL, start_new_session=True)
+    day = tmp_path / "long" / DATE
     while not list(day.glob(".*.partial/image_02/data/*.png")):
         assert process.poll() is None
         time.sleep(0.05)

@@ -114,7 +114,7 @@ def true_state(scene):
 def show(ax, belief, title, legend=False):
     """Draw a belief with its velocities, and the letters of the phantoms."""
     plotting.occupancy(spec, belief.probability, ax=ax, legend=legend)
-    plotting.velocity(spec, belief.probability, belief.velocity, ax=ax)
+    plotting.velocity(spec, belief.probability, belief.velocity, ax, belief.velocity_covariance)
     ax.set(xlim=(11, -15), ylim=(2, 42), title=title)
     letters(ax)
 
@@ -749,7 +749,7 @@ worst = int(np.argmax([phantoms(*pair).sum() for pair in zip(mesh, mesh_after, s
 fig, ax = plt.subplots(figsize=(5.4, 5), layout="compressed")
 last = mesh_after[worst]
 plotting.occupancy(spec, last.probability, ax=ax)
-plotting.velocity(spec, last.probability, last.velocity, ax=ax)
+plotting.velocity(spec, last.probability, last.velocity, ax, last.velocity_covariance)
 x, y = min(map(tuple, spec.centers()[phantoms(mesh[worst], last)]))  # the nearest
 ax.annotate("C", (y, x), (y + 7, x + 5), fontsize=12, arrowprops={"arrowstyle": "->", "lw": 1.5})
 ax.set(xlim=(11, -15), ylim=(0, 40), title=f"mesh and hedge, default filter, {worst / 10:.1f} s")

@@ -26,7 +26,7 @@ from semgrid_edu import plotting
 from semgrid_edu.workshop.scoring.score_with_interval import shown
 from semgrid_edu.workshop.paper.truth_costs import LEARNED_FROM
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
-from semgrid_edu.workshop.paper.pictures import forest_plot
+from worlds.lecture_12_pictures import forest_plot
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 result = json.loads(Path("../../docs/results/reduced/truth-costs.json").read_text(encoding="utf-8"))

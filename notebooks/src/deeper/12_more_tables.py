@@ -35,7 +35,7 @@ from semgrid_edu.workshop.paper.scales import SCALES, table1_runs
 from semgrid_edu.workshop.paper.score_runs import by_seed
 from semgrid_edu.workshop.scoring.grids import NETWORK
 from semgrid_edu.workshop.paper.ablations import ablated_runs
-from semgrid_edu.workshop.paper.pictures import confusion_picture, draw_score, legend_entries
+from worlds.lecture_12_pictures import confusion_picture, draw_score, legend_entries
 from semgrid_edu.workshop.paper.published import NETWORKS
 from semgrid_edu.workshop.scoring.score_with_interval import compared, on_cells, shown
 

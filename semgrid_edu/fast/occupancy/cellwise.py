@@ -87,37 +87,26 @@ def mix(probability, newborn, going, M):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def open_space(mixed):
-    """Return how much of each cell is open space: for most particles, and for those that keep pace with the vehicle.
-
-    Static things are ragged and often porous, so beams pass through some cells of their surface. These cells are hit
-    later, when the vehicle sees them from another place.
+def static_nearby(static):
+    """Return the largest P(STATIC) of each cell and its eight neighbours, (H, W).
 
     Parameters
     ----------
-    mixed : (4, H, W) float32
-        The four states before particles flew, from `mix`.
-
-    Returns
-    -------
-    (2, H, W) float32
-        P(FREE) + P(DYNAMIC); and the same with P(FREE) times (1 - the largest P(STATIC) of the four neighbours).
+    static : (H, W) float32
+        P(STATIC) of each cell.
     """
-    height, width = mixed.shape[1:]
-    room = np.empty((2, height, width), np.float32)
+    height, width = static.shape
+    across = static.copy()
     for r in range(height):
+        for c in range(1, width):
+            across[r, c] = max(across[r, c], static[r, c - 1])
+            across[r, c - 1] = max(across[r, c - 1], static[r, c])
+    nearby = across.copy()
+    for r in range(1, height):
         for c in range(width):
-            free = mixed[FREE, r, c]
-            dynamic = mixed[DYNAMIC, r, c]
-            beside = np.float32(0)
-            if free > 0:
-                beside = max(beside, mixed[STATIC, r - 1, c] if r > 0 else beside)
-                beside = max(beside, mixed[STATIC, r + 1, c] if r + 1 < height else beside)
-                beside = max(beside, mixed[STATIC, r, c - 1] if c > 0 else beside)
-                beside = max(beside, mixed[STATIC, r, c + 1] if c + 1 < width else beside)
-            room[0, r, c] = free + dynamic
-            room[1, r, c] = (1 - beside) * free + dynamic
-    return room
+            nearby[r, c] = max(nearby[r, c], across[r - 1, c])
+            nearby[r - 1, c] = max(nearby[r - 1, c], across[r, c])
+    return nearby
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -107,7 +107,15 @@ def observe(
 class DriveTracker(cmcdot.DriveTracker):
     """The book's tracker with the compiled filter. Parameters are those of `DriveTracker`."""
 
-    filter_class = Cmcdot
+    def __init__(
+        self,
+        spec: GridSpec,
+        params: CmcdotParams | None = None,
+        seed: int | np.random.Generator = 0,
+        keep_steps: bool = False,
+    ) -> None:
+        super().__init__(spec)
+        self.filter = Cmcdot(spec, params, seed, keep_steps)
 
 
 def track_drive(

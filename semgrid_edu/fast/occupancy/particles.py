@@ -11,7 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.fast.occupancy.cells import cell_of
-from semgrid_edu.fast.occupancy.cellwise import STATIC, open_space
+from semgrid_edu.fast.occupancy.cellwise import DYNAMIC, FREE, STATIC, static_nearby
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import OUTSIDE, Particles
@@ -162,7 +162,6 @@ def keeps_pace(vx, vy, car_x, car_y, least):
 def doubt_arrivals(
     particles: Particles,
     cells: NDArray,
-    doubt: NDArray,
     mixed: NDArray,
     spec: GridSpec,
     walls: Walls,
@@ -176,8 +175,6 @@ def doubt_arrivals(
         N particles after their flight.
     cells : (N,) int32
         The cell that each is in now, from `cells_of`.
-    doubt : (N,) float32
-        The part of each weight that comes out of a wall, judged by its origin alone.
     mixed : (4, H, W) float32
         The four states before particles flew.
     spec : GridSpec
@@ -187,31 +184,53 @@ def doubt_arrivals(
     car_velocity : (2,) float
         Velocity of the vehicle along the axes of the map, m/s.
     """
+    before = cells_at(particles, cells, spec, -walls.clearing_time, walls.clearing_cells)
     ahead = cells_at(particles, cells, spec, walls.clearing_time, walls.clearing_cells)
     since = float(walls.second_look * walls.clearing_time)
     least = walls.clearing_cells * spec.cell / since if since > 0 else np.inf
     now = particles.position.ravel(), particles.velocity.ravel(), particles.weight, cells
-    fields = doubt, ahead, mixed[STATIC], open_space(mixed)
+    fields = before, ahead, mixed[FREE], mixed[DYNAMIC], static_nearby(mixed[STATIC])
     return _doubt_arrivals(*now, *fields, *map(float, car_velocity), float(least), since, spec.shape, *spec.corner)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _doubt_arrivals(
-    xy, velocity, weight, cells, doubt, ahead, static, room, car_x, car_y, least, since, shape, x_max, y_max, cell
+    xy,
+    velocity,
+    weight,
+    cells,
+    before,
+    ahead,
+    free,
+    dynamic,
+    static,
+    car_x,
+    car_y,
+    least,
+    since,
+    shape,
+    x_max,
+    y_max,
+    cell,
 ):
-    doubted = np.empty_like(doubt)
-    standing = static.ravel()
-    rooms = room.reshape(2, -1)
+    doubted = np.empty_like(weight)
+    free = free.ravel()
+    dynamic = dynamic.ravel()
+    static = static.ravel()
     for i in range(len(cells)):
         vx = velocity[2 * i]
         vy = velocity[2 * i + 1]
-        solid = doubt[i]
         keeps = keeps_pace(vx, vy, car_x, car_y, least)
+        wall = static[before[i]] if before[i] != OUTSIDE else np.float32(0)
         if keeps:
-            before = cell_of(xy[2 * i] - since * vx, xy[2 * i + 1] - since * vy, shape, x_max, y_max, cell)
-            if before != OUTSIDE and before != cells[i]:
-                solid = max(solid, weight[i] * standing[before])
-        doubted[i] = solid - solid * rooms[int(keeps), ahead[i]] if ahead[i] != OUTSIDE else solid
+            shortly = cell_of(xy[2 * i] - since * vx, xy[2 * i + 1] - since * vy, shape, x_max, y_max, cell)
+            if shortly != OUTSIDE and shortly != cells[i]:
+                wall = max(wall, static[shortly])
+        room = np.float32(0)
+        if ahead[i] != OUTSIDE:
+            beside = static[ahead[i]] if keeps else np.float32(0)
+            room = (1 - beside) * free[ahead[i]] + dynamic[ahead[i]]
+        doubted[i] = weight[i] * wall * (1 - room)
     return doubted
 
 

@@ -76,10 +76,7 @@ def predict(
     cells = cells_of(particles.position, spec)
     came = by_origin(before, cells, going.size)
     walls = _walls_of(world)
-    origin = cells_at(particles, cells, spec, -walls.clearing_time, walls.clearing_cells)
-    doubt = scale_in_cells(particles.weight, origin, mixed[STATIC])
-    car_velocity = velocity_of(driven, dt)
-    doubt = doubt_arrivals(particles, cells, doubt, mixed, spec, walls, car_velocity)
+    doubt = doubt_arrivals(particles, cells, mixed, spec, walls, velocity_of(driven, dt))
     stays, arrives = weight_in_cells(particles.weight, came, (2, *spec.shape))
     doubtful = weight_in_cells(doubt, came, (2, *spec.shape))[1]
     probability, newborn, factor, less = collide(mixed, newborn, going, stays, arrives, doubtful)

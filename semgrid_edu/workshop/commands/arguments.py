@@ -47,10 +47,9 @@ class Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
-            helps = [self.command.help, *(f"{one.opts} {vars(one).get('help')}" for one in self.command.params)]
-            how = "goes on" if "the same command" in " ".join(map(str, helps)).lower() else "begins again"
-            how = "goes on with --resume" if "--resume" in str(helps) else how
-            sys.exit(f"semgrid-edu: interrupted; the same command {how}")
+            options = [option for one in self.command.params for option in one.opts]
+            how = " with --resume" if "--resume" in options else ""
+            sys.exit(f"semgrid-edu: interrupted; run the same command again{how}")
 
 
 def check_arguments(arguments: Sequence[str]) -> None:

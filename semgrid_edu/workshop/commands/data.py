@@ -88,31 +88,6 @@ def verify(
     report(samples_problems(folder), "every sample is as it was made")
 
 
-@data.command()
-def excerpt(
-    folder: Annotated[Path, typer.Argument(help="The folder that takes the frames and their provenance.")],
-    data: Annotated[Path, typer.Option(help="A data set with train frames, such as data/minikitti.")],
-    frames: Annotated[int, typer.Option(min=1, help="Number of frames.")] = 6,
-) -> None:
-    """Keep a few labelled frames of a data set, in the form that a network takes."""
-    from semgrid_edu.workshop.commands.excerpt import write_excerpt
-
-    write_excerpt(data, frames, folder)
-
-
-@data.command()
-def real_excerpt(
-    folder: Annotated[Path, typer.Argument(help="A new folder, which takes the drive, its licence and provenance.")],
-    pandaset: Annotated[Path, typer.Option(help="The folder that holds PandaSet's scenes.")],
-    scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")],
-    frames: Annotated[int, typer.Option(min=1, help="Number of frames, from the first one.")] = 10,
-) -> None:
-    """Keep a few frames of a labelled scene of PandaSet, reduced in size, in KITTI's raw layout."""
-    from semgrid_edu.workshop.simulation.real_excerpt import write_real_excerpt
-
-    typer.echo(f"the drive is in {write_real_excerpt(pandaset, scene, frames, folder)}")
-
-
 def report(problems: list[str], success: str) -> None:
     """Print one problem per line and exit with 1, or print a message if there is none.
 

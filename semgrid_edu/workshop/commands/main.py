@@ -39,7 +39,9 @@ def _version(asked: bool) -> None:
 @app.callback()
 def main(
     cache: Annotated[Path | None, typer.Option(help="Where preprocessed data are kept.")] = None,
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Say which.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
 ) -> None:
     """Probabilistic bird's-eye semantic perception, taught notebook by notebook.
 
@@ -66,6 +68,9 @@ def demo(
     memory: Annotated[
         bool, typer.Option("--memory", help="Remember classes over frames, and show that map too.")
     ] = False,
+    skip_damaged: Annotated[
+        bool, typer.Option("--skip-damaged", help="Leave out frames with a damaged file, and say which.")
+    ] = False,
     out: Annotated[Path, typer.Option(help="The folder for the page.")] = Path("out/demo"),
     force: Force = False,
     show: Annotated[bool, typer.Option("--open", help="Show the page in a browser.")] = False,
@@ -83,10 +88,13 @@ def demo(
     kitti_named = {"--kitti": kitti, "--date": date, "--drive": drive}
     chosen = chosen_drive(kitti_named, {"--pandaset": pandaset, "--scene": scene}, camera)
     tell([*(drive_doubts(chosen) if chosen else ()), *(weights_doubts(weights) if weights else ())])
+    options = {"stages": stages, "frames": frames, "force": force, "memory": memory}
+    if skip_damaged:
+        options["skipped"] = lambda line: typer.echo(f"semgrid-edu: left out: {line}", err=True)
     if chosen is None:
-        page = write_both_streets(out, weights, stages=stages, frames=frames, force=force, memory=memory)
+        page = write_both_streets(out, weights, **options)
     else:
-        page = write_demo(chosen, weights or real_weights(), out, stages, frames, force=force, memory=memory)
+        page = write_demo(chosen, weights or real_weights(), out, **options)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
     if show:
         typer.launch(page.resolve().as_uri())

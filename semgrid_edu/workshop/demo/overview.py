@@ -108,7 +108,7 @@ def _draw_panel(ax: Axes, panel: GridPicture, record: Record) -> None:
     spec, belief = record.spec, panel.result.belief
     if panel.labels is None:
         plotting.occupancy(spec, belief.probability, ax, legend=False)
-        plotting.velocity(spec, belief.probability, belief.velocity, ax)
+        plotting.velocity(spec, belief.probability, belief.velocity, ax, belief.velocity_covariance)
     else:
         plotting.grid_labels(spec, panel.labels, record.label_set, ax, legend=False)
     ax.set_title(panel.title)

@@ -1,7 +1,7 @@
 """The demo's page: one HTML file that holds its figures, style, script and data."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
@@ -33,6 +33,10 @@ GAPS = " White cells are left out: they are in view, but nobody labelled what is
 """Added to the caption of the truth if its labels have gaps."""
 
 
+MOST_LEFT_OUT = 20
+"""How many damaged frames the page names."""
+
+
 class Panel(NamedTuple):
     """A bird's-eye panel.
 
@@ -60,6 +64,7 @@ def page_html(
     story: dict[str, object],
     choice: str = "",
     broken: str = "",
+    left_out: Sequence[str] = (),
     expected: str = "",
     credit: str = "",
     switch: str = "",
@@ -82,6 +87,8 @@ def page_html(
         Which frames of the drive are shown, from `ChosenFrames.told`.
     broken : str
         What could not be read, so that the page ends there; empty if everything could.
+    left_out : sequence of str
+        A line for each damaged frame that was left out.
     expected : str
         What to expect of the classes, in plain text; its first sentence is set in bold.
     credit : str
@@ -112,7 +119,7 @@ def page_html(
         column=_column_svg(camera),
         story=_json(story),
         lead=_lead(record, title, choice),
-        notice=_broken(broken) + _notice(expected),
+        notice=_broken(broken) + _left_out(left_out) + _notice(expected),
         switch=f'<p class="switch">{switch}</p>' if switch else "",
         credit=escape(f"Data: {credit} ") if credit else "",
         last=len(record.views) - 1,
@@ -179,6 +186,12 @@ def _broken(error: str) -> str:
     """Return the notice that the drive could not be read to its end."""
     notice = '<p class="notice"><b>The drive could not be read to its end.</b> The page shows what came before: {}</p>'
     return notice.format(escape(error)) if error else ""
+
+
+def _left_out(lines: Sequence[str]) -> str:
+    """Return the notice that says which frames could not be read."""
+    notice = '<p class="notice"><b>Damaged frames were left out: {}.</b> {}</p>'
+    return notice.format(len(lines), "<br>".join(map(escape, lines[:MOST_LEFT_OUT]))) if lines else ""
 
 
 def _notice(expected: str) -> str:

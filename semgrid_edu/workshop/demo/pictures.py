@@ -161,7 +161,7 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, 
     )
 
 
-def arrows_path(spec: GridSpec, probability: NDArray, velocity: NDArray) -> str:
+def arrows_path(spec: GridSpec, probability: NDArray, velocity: NDArray, covariance: NDArray | None = None) -> str:
     """Return the velocities of a belief as an SVG path of arrows, in the panel's metres.
 
     Parameters
@@ -172,13 +172,15 @@ def arrows_path(spec: GridSpec, probability: NDArray, velocity: NDArray) -> str:
         Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
     velocity : (2, H, W) float
         Velocity over ground along the grid's x and y axes, m/s; NaN where nothing moves.
+    covariance : (2, 2, H, W) float, optional
+        Covariance of the velocity, m^2/s^2.
 
     Returns
     -------
     str
         The attribute `d` of a path.
     """
-    start, speed = velocity_arrows(spec, probability, velocity)
+    start, speed = velocity_arrows(spec, probability, velocity, covariance)
     way = speed * ARROW_SECONDS
     end = start + way
     length = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)

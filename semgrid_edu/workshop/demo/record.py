@@ -155,6 +155,10 @@ class Record:
             self._past.append((replace(package.frame, image=None, points=package.frame.points[:0]), maps["grid"]))
         self._number += 1
 
+    def leave_out(self) -> None:
+        """Count a frame that can't be read, so that the next one keeps its number."""
+        self._number += 1
+
     def milliseconds(self, prefix: str = "") -> dict[str, float]:
         """Return the median time of each stage; a median, because the first frames also load compiled code.
 
@@ -239,7 +243,8 @@ class Record:
             belief = result.belief
             view.images[name] = pictures.raster_uri(occupancy_colours(belief.probability))
             view.texts[name] = f"{self._whose(name)}Occupancy grid seen from above: {_states(belief.probability)}."
-            view.arrows[name] = pictures.arrows_path(self.spec, belief.probability, belief.velocity)
+            moments = belief.velocity, belief.velocity_covariance
+            view.arrows[name] = pictures.arrows_path(self.spec, belief.probability, *moments)
 
     def _whose(self, name: str) -> str:
         return f"{self.comparison.file}: " if name.startswith(YOURS) else ""

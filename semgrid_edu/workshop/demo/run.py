@@ -1,7 +1,7 @@
 """The demo: run every stage over every frame of a drive, then write the page and its picture."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from importlib.util import find_spec
 from itertools import tee
@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from tqdm.auto import tqdm
 
+from semgrid_edu.datasets.drive_files import first_sound, sound_frames
 from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
 from semgrid_edu.errors import ArgumentError, DataError
@@ -119,6 +120,7 @@ def write_demo(
     switch: str = "",
     force: bool | None = None,
     memory: bool = False,
+    skipped: Callable[[str], None] | None = None,
 ) -> Path:
     """Run every stage over a drive and write a page that shows it.
 
@@ -142,6 +144,8 @@ def write_demo(
     memory : bool
         Whether classes are remembered over frames, and that map is shown too. A `remember` among the stages shows it in
         any case.
+    skipped : callable, optional
+        Is called with a line for each damaged frame, which is left out. By default a damaged frame ends the drive.
 
     Returns
     -------
@@ -162,7 +166,8 @@ def write_demo(
     net = load_net(weights, drive.camera)
     known = _said_by_card(weights)
     page, picture = _check_page(out, force)
-    if drive[chosen.run[0]].image is None:
+    first = first_sound(drive.__getitem__, chosen.run if skipped else chosen.run[:1])
+    if first.image is None:
         raise DataError(drive.folder, f"images of {getattr(drive, 'view', 'its camera')}", "none")
     mine = load_stages(stages) if stages is not None else Stages()
     memory = memory or mine.remember is not None
@@ -174,13 +179,22 @@ def write_demo(
     spec = net.architecture.grid
     stories = _stories_every(len(chosen.shown), spec)
     record = Record(spec, LABEL_SETS[net.architecture.label_set], chosen.shown, comparison, net, stories, memory)
-    results = run_side_by_side((drive[k] for k in chosen.run), *runs)
+    left_out: list[str] = []
+
+    def leave_out(k: int, error: DataError) -> None:
+        left_out.append(f"frame {k}: {error}")
+        skipped(left_out[-1])
+        record.leave_out()
+
+    frames_read = sound_frames(drive, chosen.run, leave_out if skipped else None)
+    results = run_side_by_side(frames_read, *runs)
     with compile_bar():
         broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
     words = {"expected": known or ("" if record.labelled else POOR), "credit": drive.credit}
     save_overview(record, picture, " ".join(filter(None, words.values())))
     story = story_data(net, drive.camera, record.layout) | {"start": record.start}
     words |= {"choice": chosen.told(len(drive)), "broken": str(broken or ""), "switch": switch}
+    words["left_out"] = left_out
     html = page_html(record, drive.folder.name, drive.camera, net.architecture.image_size, story, **words)
     write_text(page, html)
     if broken:
@@ -202,7 +216,7 @@ def write_both_streets(out: str | Path, weights: str | Path | None = None, **opt
     weights : path-like, optional
         The network for both; when left out, each street has one that has learned from such streets.
     **options
-        `stages`, `frames`, `force` and `memory` of `write_demo`.
+        `stages`, `frames`, `force`, `memory` and `skipped` of `write_demo`.
 
     Returns
     -------

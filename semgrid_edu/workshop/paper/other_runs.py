@@ -32,15 +32,29 @@ from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval
 OVERTURNED = "overturned cars"
 """The method: the network's grid, counted in the cells of overturned cars alone."""
 
-UPRIGHT, UPRIGHT_RANGE = "upright cars", (10.0, 22.0)
-"""The same for upright cars on the same frames, at the distances of the overturned ones, metres."""
+UPRIGHT = "upright cars"
+"""The same for upright cars on the same frames."""
 
-TIMES, ROUNDS, FRAMES_EACH, TRAINING_ROUNDS = "times.json", 12, 3, 6
-"""The file with the times, how often two networks take turns, for how many frames each time, and how often in training.
-"""
+UPRIGHT_RANGE = (10.0, 22.0)
+"""At which distances upright cars count, metres: those of the overturned ones."""
 
-FRAME, STEP = "seconds per frame", "seconds per training step"
-"""What that file holds."""
+TIMES = "times.json"
+"""The file with the times."""
+
+FRAME = "seconds per frame"
+"""Its key for the times of whole frames."""
+
+STEP = "seconds per training step"
+"""Its key for the times of training steps."""
+
+ROUNDS = 12
+"""How often two networks take turns on frames."""
+
+FRAMES_EACH = 3
+"""How many frames a network gets at each turn."""
+
+TRAINING_ROUNDS = 6
+"""How often two networks take turns in training."""
 
 
 @dataclass(frozen=True)

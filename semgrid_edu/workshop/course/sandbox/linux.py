@@ -37,7 +37,8 @@ PROCESSORS = table_beside(__file__)
 """By processor: the code of its native calls ("audit"), and the calls that seccomp denies or ignores, by name."""
 
 NEWER = 467
-"""Calls from this number on fail as if the system didn't know them: x86_64 has all calls a second time from 2^30."""
+"""System calls with this number or a higher one fail with ENOSYS. x86_64 repeats all calls from 2^30 on, so a filter
+by number alone could be bypassed."""
 
 LOAD, EQUAL, AT_LEAST, ANY_BIT, RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
 """The five instructions of the filter: load a word, compare it in three ways, and end."""

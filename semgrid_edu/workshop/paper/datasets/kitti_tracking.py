@@ -27,12 +27,20 @@ from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.benchmark_calibration import BenchmarkCalibration, read_benchmark_calibration
 from semgrid_edu.datasets.calibration import camera_from
 from semgrid_edu.datasets.class_tables import ClassTable
-from semgrid_edu.datasets.frames import FrameSequence, frame_numbers, nothing_known, read_scan
+from semgrid_edu.datasets.drive_files import (
+    IMAGE_SUFFIXES,
+    first_sound,
+    frame_numbers,
+    lines_of,
+    numbers_in,
+    photograph,
+)
+from semgrid_edu.datasets.frames import FrameSequence, nothing_known, read_scan
 from semgrid_edu.datasets.oxts import imu_pose, parse_packet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.storage.reading import read_bytes, read_png, read_text
+from semgrid_edu.storage.reading import read_bytes, read_image, read_lines
 
 TRACKING_PERIOD = 0.1
 """Seconds between frames. The benchmark has no timestamps; KITTI's LIDAR spins at 10 Hz."""
@@ -41,7 +49,8 @@ TRACKING_PERIOD = 0.1
 class KittiTrackingRun(FrameSequence):
     """The frames of a run, read and checked on access.
 
-    A few scans of the benchmark were never recorded. These frames raise a missing-file error; the others can be read.
+    A few scans of the benchmark were never recorded: these frames (`gaps`) have no points, so the filter only predicts.
+    A clip cut from a run may begin at any number; `run[0]` is its first frame.
 
     Parameters
     ----------
@@ -59,16 +68,35 @@ class KittiTrackingRun(FrameSequence):
     def __init__(self, root: str | Path, run: int) -> None:
         self.folder = Path(root) / "training"
         self.name = f"{run:04d}"
-        self._length = 1 + max(frame_numbers(self.folder / "image_02" / self.name, "images", ".png"))
+        images = frame_numbers(self.folder / "image_02" / self.name, "images", IMAGE_SUFFIXES)
+        recorded = numbers_in(self.folder / "velodyne" / self.name, [".bin"]).union(images)
+        self._numbers = range(min(recorded), max(recorded) + 1)
 
     def __len__(self) -> int:
         """Return the number of frames, including those whose scans were never recorded."""
-        return self._length
+        return len(self._numbers)
+
+    def scan_file(self, k: int) -> Path:
+        """Return the file of a frame's scan. Parameters are those of `DriveFiles.scan_file`."""
+        return self.folder / "velodyne" / self.name / f"{self.numbers[k]:06d}.bin"
+
+    def image_file(self, k: int) -> Path:
+        """Return the file of a frame's image. Parameters are those of `DriveFiles.scan_file`."""
+        return photograph(self.folder / "image_02" / self.name, f"{self.numbers[k]:06d}")
+
+    def packets(self) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.float64]]:
+        """Return the packets, by line, and their times."""
+        packets = self._packets
+        return {self.pose_name(k): packet for k, packet in enumerate(packets)}, np.arange(len(self)) * TRACKING_PERIOD
+
+    def pose_name(self, k: int) -> str:
+        """Return where a packet is. Parameters are those of `DriveFiles.scan_file`."""
+        return f"{self._oxts_file}, frame {self.numbers[k]}"
 
     def _frame(self, k: int) -> Frame:
         return Frame(
-            image=read_png(self._image_file(k), "RGB", self.camera.size),
-            points=read_scan(self.folder / "velodyne" / self.name / f"{k:06d}.bin"),
+            image=read_image(self.image_file(k), self.camera.size),
+            points=np.zeros((0, 4), np.float32) if k in self.gaps else read_scan(self.scan_file(k)),
             camera=self.camera,
             T_world_from_lidar=self._pose(k),
             time=k * TRACKING_PERIOD,
@@ -76,8 +104,9 @@ class KittiTrackingRun(FrameSequence):
 
     @cached_property
     def camera(self) -> Camera:
-        """The calibration of image_02, the same for all frames, at the size of the first image."""
-        height, width = read_png(self._image_file(0), "RGB", None).shape[:2]
+        """The calibration of image_02, the same for all frames, at the size of the first image that can be read."""
+        image = first_sound(lambda k: read_image(self.image_file(k), None), range(len(self)))
+        height, width = image.shape[:2]
         K, T_camera_from_lidar, *_ = self._calibration
         return camera_from(self._calibration_file, K, T_camera_from_lidar, (height, width))
 
@@ -92,15 +121,14 @@ class KittiTrackingRun(FrameSequence):
             raise DataError(self._calibration_file, "the key Tr_imu_velo", "a calibration of the odometry benchmark")
         return calibration
 
-    def _image_file(self, k: int) -> Path:
-        return self.folder / "image_02" / self.name / f"{k:06d}.png"
+    @property
+    def _oxts_file(self) -> Path:
+        return self.folder / "oxts" / f"{self.name}.txt"
 
     @cached_property
     def _packets(self) -> list[NDArray[np.float64]]:
-        path = self.folder / "oxts" / f"{self.name}.txt"
-        lines = read_text(path).splitlines()
-        if len(lines) != len(self):
-            raise DataError(path, f"{len(self)} lines, one per frame", f"{len(lines)}")
+        path = self._oxts_file
+        lines = lines_of(path, read_lines(path, len(self)), self.numbers)
         return [parse_packet(path, line) for line in lines]
 
     def _pose(self, k: int) -> NDArray[np.float64]:
@@ -255,4 +283,4 @@ class ZhangDrive(FrameSequence):
 
     def _frame(self, k: int) -> Frame:
         frame = self.drive[k]
-        return replace(frame, labels=self.labels.read(self.run, k, frame.camera.size))
+        return replace(frame, labels=self.labels.read(self.run, self.drive.numbers[k], frame.camera.size))

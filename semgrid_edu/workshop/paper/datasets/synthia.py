@@ -25,12 +25,13 @@ from numpy.typing import NDArray
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
 from semgrid_edu.datasets.calibration import camera_from, check_rotation
 from semgrid_edu.datasets.class_tables import ClassTable
-from semgrid_edu.datasets.frames import FrameSequence, error_of, frame_numbers
+from semgrid_edu.datasets.drive_files import IMAGE_SUFFIXES, frame_numbers, photograph
+from semgrid_edu.datasets.frames import FrameSequence, error_of
 from semgrid_edu.datasets.project_lidar import birdseye_votes, depth_scan, points_from_depth
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
 from semgrid_edu.labels import IGNORE, SYNTHIA_10
-from semgrid_edu.storage.reading import parse_numbers, read_png, read_text
+from semgrid_edu.storage.reading import parse_numbers, read_image, read_png, read_text
 
 SYNTHIA_CLASSES = ClassTable(
     SYNTHIA_10,
@@ -73,6 +74,9 @@ FORWARD_SHARE = 0.9
 
 _CAMERA_FROM_LIDAR = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """From axes forward, left, up to camera axes."""
+
+_UP_FROM_SYNTHIA = rigid_transform(np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]), np.zeros(3))
+"""From SYNTHIA's world, whose y axis points up, to one whose z axis does."""
 
 
 def read_synthia_labels(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
@@ -180,11 +184,25 @@ class SynthiaSequence(FrameSequence):
     def __init__(self, root: str | Path, sequence: str) -> None:
         self.folder = Path(root) / sequence
         self.name = sequence
-        self._length = 1 + max(frame_numbers(self.folder / "RGB" / VIEW, "images", ".png"))
+        images = frame_numbers(self.folder / "RGB" / VIEW, "images", IMAGE_SUFFIXES)
+        self._numbers = range(images[0], images[-1] + 1)
 
     def __len__(self) -> int:
         """Return the number of frames."""
-        return self._length
+        return len(self._numbers)
+
+    def image_file(self, k: int) -> Path:
+        """Return the file of a frame's image. Parameters are those of `DriveFiles.scan_file`."""
+        return photograph(self.folder / "RGB" / VIEW, f"{self.numbers[k]:06d}")
+
+    def path(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the poses of the camera, (N, 4, 4) T_world_from_lidar in metres, z up, and their times, (N,)."""
+        up = _UP_FROM_SYNTHIA
+        return np.array([up @ self._pose(k) for k in range(len(self))]), np.arange(len(self)) * SYNTHIA_PERIOD
+
+    def pose_name(self, k: int) -> str:
+        """Return where a pose is. Parameters are those of `DriveFiles.scan_file`."""
+        return str(self._file("CameraParams", k, ".txt"))
 
     def problems(self) -> list[str]:
         """Read every frame, and check that the camera moves forward, as on a driving car.
@@ -211,7 +229,7 @@ class SynthiaSequence(FrameSequence):
         depth = read_synthia_depth(self._file("Depth", k), size)
         points = depth_scan(depth, self.camera)
         return Frame(
-            image=read_png(self._file("RGB", k), "RGB", size),
+            image=read_image(self.image_file(k), size),
             points=points,
             camera=self.camera,
             T_world_from_lidar=invert_rigid(self._pose(0)) @ self._pose(k),
@@ -223,7 +241,7 @@ class SynthiaSequence(FrameSequence):
     @cached_property
     def camera(self) -> Camera:
         """The calibration, the same for all frames, at the size of the first image."""
-        height, width = read_png(self._file("RGB", 0), "RGB", None).shape[:2]
+        height, width = read_image(self.image_file(0), None).shape[:2]
         path = self.folder / "CameraParams" / "intrinsics.txt"
         K = read_synthia_intrinsics(path)
         T_camera_from_lidar = rigid_transform(_CAMERA_FROM_LIDAR, np.zeros(3))
@@ -258,4 +276,4 @@ class SynthiaSequence(FrameSequence):
         return read_synthia_pose(self._file("CameraParams", k, ".txt")) @ self.camera.T_camera_from_lidar
 
     def _file(self, kind: str, k: int, suffix: str = ".png") -> Path:
-        return self.folder / kind / VIEW / f"{k:06d}{suffix}"
+        return self.folder / kind / VIEW / f"{self.numbers[k]:06d}{suffix}"

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.workshop.simulation.things import shapes
 from semgrid_edu.workshop.simulation.things.materials import PALETTES, Kind, Material
-from semgrid_edu.workshop.simulation.things.shapes import UP, Shape, merge, quads
+from semgrid_edu.workshop.simulation.things.shapes import UP, Shape, cross, merge, quads
 
 _DEEP = -2.5
 """Walls go this deep into the ground, metres, so that no gap opens on a slope."""
@@ -61,7 +61,7 @@ def _walls(house: House) -> list[tuple[NDArray, NDArray, float]]:
 
 def _panel(corner, right, up, out: float, colour, material=Material.MATTE) -> Shape:
     """Place rectangles on a wall, `out` metres in front of it."""
-    normal = np.cross(right, up)
+    normal = cross(right, up)
     normal /= np.linalg.norm(normal)
     return quads(corner + out * normal, right, up, colour, material, Kind.BUILDING)
 
@@ -94,7 +94,7 @@ def _front_door(origin, along, length: float, rng: np.random.Generator) -> list[
     """Place a door with its frame, a window and a small canopy near the middle of the front."""
     at = origin + (length * rng.uniform(0.3, 0.6)) * along
     colour = _pick("doors", rng)
-    out = np.cross(along, UP)
+    out = cross(along, UP)
     return [
         _panel(at - 0.12 * along, 1.34 * along, 2.5 * UP, 0.06, (0.6, 0.58, 0.54)),
         _panel(at, 1.1 * along, 2.35 * UP, 0.08, colour, Material.WOOD),

@@ -1,5 +1,9 @@
-"""A few frames of a PandaSet scene in KITTI's raw layout, small enough to ship with the package."""
+"""How `real/` was made: `python data_samples/make_real.py PANDASET SCENE N_FRAMES FOLDER`.
 
+A few frames of a PandaSet scene in KITTI's raw layout, small enough to ship with the package.
+"""
+
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -174,6 +178,10 @@ def _write(excerpt: _FixedRig, scene: str, n_frames: int, folder: Path) -> Path:
     text = Template(Path(__file__).with_name("attribution.md").read_text(encoding="utf-8"))
     numbers = ", ".join(f"{number:02d}" for number in excerpt.numbers[:n_frames])
     write_text(folder / "README.md", text.substitute(scene=scene, numbers=numbers, width=IMAGE_SIZE[1], scans=SCANS))
-    command = f"semgrid-edu data real-excerpt {folder.name} --pandaset PANDASET --scene {scene} --frames {n_frames}"
+    command = f"python data_samples/make_real.py PANDASET {scene} {n_frames} {folder.name}"
     write_provenance(folder, command, 0, ("numpy", "scipy", "numba", "pillow"))
     return written
+
+
+if __name__ == "__main__":
+    print(write_real_excerpt(sys.argv[1], sys.argv[2], int(sys.argv[3]), sys.argv[4]))
