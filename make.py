@@ -65,8 +65,7 @@ def test() -> None:
     # take minutes come first, so that no process ends long before the others. Graders are one class an exercise.
     pool = ("-n", "3", "--dist", "loadscope", "--no-loadscope-reorder", "-p", "no:cacheprovider")
     nbval = ("--nbval", "--nbval-current-env", "--nbval-cell-timeout=300")
-    files = (*notebooks, "tests", "semgrid_edu")
-    _pytest(*pool, *nbval, "--doctest-modules", "--ignore=tests/browser", *files)
+    _pytest(*pool, *nbval, "--ignore=tests/browser", *notebooks, "tests")
 
 
 def quick() -> None:

@@ -609,11 +609,12 @@ DATA = (
 
 COURSE = (
     Row("an unknown lecture to build", "course notebooks 99_none", "99_none"),
+    Row("an unknown lecture to measure", "course minutes 99_none", "99_none"),
     Row("a course over other files", "course build SAMPLES", "SAMPLES: expected an empty folder"),
     Row("a class without a course", "course grade TINY", "TINY: expected a course"),
     Row("a class with fewer than no workers", "course grade TINY --workers 0", "Invalid value for '--workers'"),
     Row("a course over a file", "course build architecture.json", "architecture.json: expected a folder, found a file"),
-    Row("an argument too many", "data verify SAMPLES TINY", "unexpected extra argument"),
+    Row("an argument too many", "course check all", "unexpected extra argument"),
     Row(
         "a class and an unknown exercise",
         "course grade CLASS 99_none",

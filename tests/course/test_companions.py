@@ -1,10 +1,11 @@
 """Companion notebooks and exercises without a number go the same ways as those of the lectures."""
 
 import nbformat
-import notebook_checks as checks
 import pytest
 from tiny_course import EXERCISE, tiny_notebooks
 
+from semgrid_edu.workshop.course import checks
+from semgrid_edu.workshop.course.nbgrader.build import build_exercise, exercise_sources
 from semgrid_edu.workshop.course.notebooks.build import (
     build_lecture,
     built_path,
@@ -79,3 +80,15 @@ def test_each_flaw_of_a_companion_is_found(folder):
         "cell '## When this breaks' links to 00_tiny.ipynb, which does not exist",
         "no lecture links to it; write ](deeper/messages.ipynb) where it helps",
     ]
+
+
+def test_the_course_check_sees_companions_and_their_exercises(folder, monkeypatch):
+    monkeypatch.setattr(checks, "LECTURE_PARTS", {})
+    for source in exercise_sources(folder):
+        build_exercise(source)
+    assert checks.course_problems(folder) == [
+        "00_tiny.ipynb: cell '[More](deeper/messages.ipynb)' links to deeper/messages.ipynb, which does not exist",
+        "deeper/messages.ipynb: not built; run `semgrid-edu course notebooks`",
+    ]
+    monkeypatch.setattr(checks, "MAX_BYTES_TOGETHER", 1000)
+    assert "all notebooks together" in checks.course_problems(folder)[-1]

@@ -19,7 +19,7 @@ def test_unknown_lecture_is_refused():
 
 def test_missing_tools_are_named(monkeypatch):
     monkeypatch.setattr(course_commands, "find_spec", lambda name: None)
-    result = CliRunner().invoke(cli.app, ["course", "notebooks"])
+    result = CliRunner().invoke(cli.app, ["course", "check"])
     assert "jupytext and nbgrader" in str(result.exception)
 
 

@@ -10,13 +10,13 @@ from nbgrader.apps.dbapp import DbApp
 from nbgrader.apps.nbgraderapp import NbGraderApp
 from nbgrader.utils import is_grade, is_solution, parse_utc
 from nbgrader_scores import tasks
-from notebook_minutes import reading_time
 from packaging.requirements import Requirement
 from typer.main import get_command
 
 from semgrid_edu.workshop.commands import main as cli
 from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, built_path, lecture_sources, read_percent
+from semgrid_edu.workshop.course.notebooks.minutes import reading_time
 
 CLONE = NOTEBOOKS.parent
 GUIDE = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")

@@ -4,8 +4,8 @@ import sys
 
 import numpy as np
 import pytest
-from notebook_checks import instructor_problems
 
+from semgrid_edu.workshop.course.checks import instructor_problems
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 from semgrid_edu.workshop.course.sandbox.session import AnswerTimeoutError
 

@@ -5,15 +5,16 @@ import io
 
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
-from notebook_minutes import (
+from PIL import Image
+
+from semgrid_edu.workshop.course.notebooks.minutes import (
     ReadingTime,
     minutes_table,
     reading_time,
     section_times,
     stated_minutes,
 )
-from notebook_minutes import time_of_text as time_of
-from PIL import Image
+from semgrid_edu.workshop.course.notebooks.minutes import time_of_text as time_of
 
 
 def png(size=(4, 3), **options):

@@ -4,13 +4,13 @@ import asyncio
 import time
 
 import nbformat
-import notebook_checks as checks
 import pytest
 import zmq
 import zmq.asyncio
 from jupyter_client.session import Session
 
 from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.workshop.course import checks
 from semgrid_edu.workshop.course.notebooks.build import (
     WakefulChannel,
     build_lecture,

@@ -5,7 +5,11 @@ import io
 
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
-from notebook_rules import (
+from PIL import Image
+
+from semgrid_edu.plotting import Animation
+from semgrid_edu.workshop.course.notebooks.build import read_percent
+from semgrid_edu.workshop.course.notebooks.rules import (
     LECTURE_RULES,
     answers_in_sight,
     coarse_figures,
@@ -15,10 +19,6 @@ from notebook_rules import (
     too_long,
     unfit_animations,
 )
-from PIL import Image
-
-from semgrid_edu.plotting import Animation
-from semgrid_edu.workshop.course.notebooks.build import read_percent
 
 QUESTION = "**Predict before you run.** How many?\n\n<details><summary>Answer</summary>Two.</details>"
 FIGURE = "fig, ax = plt.subplots()\nax.plot([1, 2])\nplt.show()"

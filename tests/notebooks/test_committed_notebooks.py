@@ -1,13 +1,13 @@
 """The committed lectures and exercises are what their sources say, have run, and are fit to be shown."""
 
 import pytest
-from notebook_checks import (
+
+from semgrid_edu.workshop.course.checks import (
     MAX_BYTES_TOGETHER,
     companion_problems,
     exercise_problems,
     lecture_problems,
 )
-
 from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, built_path, companion_sources, lecture_sources
 

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from semgrid_edu.workshop.commands.data import report
+
 course = typer.Typer(no_args_is_help=True, help="Build the notebooks and the exercises, and grade them.")
 
 
@@ -31,6 +33,23 @@ def notebooks(
     for source in lectures.named(sources, names):
         build = build_exercise if source in exercise_sources() else lectures.build_lecture
         typer.echo(f"{lectures.notebook_name(source)}: {build(source)}")
+
+
+@course.command()
+def minutes(names: Annotated[list[str] | None, typer.Argument(help="Such as 00_tour; all by default.")] = None) -> None:
+    """Show how many minutes each notebook takes a student, and what takes them; one notebook section by section."""
+    from semgrid_edu.workshop.course.notebooks.build import companion_sources, lecture_sources, named
+    from semgrid_edu.workshop.course.notebooks.minutes import minutes_table
+
+    typer.echo(minutes_table(named([*lecture_sources(), *companion_sources()], names)))
+
+
+@course.command()
+def check() -> None:
+    """Check that every notebook agrees with its source, has run, and is fit to be shown."""
+    from semgrid_edu.workshop.course.checks import course_problems
+
+    report(course_problems(), "every notebook agrees with its source")
 
 
 @course.command()

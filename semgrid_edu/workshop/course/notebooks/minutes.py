@@ -1,21 +1,13 @@
 """How long a student needs for a notebook, computed from its contents, so that its header can be honest."""
 
 import re
-import sys
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
 import nbformat
 from nbformat import NotebookNode
 
-from semgrid_edu.workshop.course.notebooks.build import (
-    built_path,
-    companion_sources,
-    lecture_sources,
-    named,
-    notebook_name,
-    read_percent,
-)
+from semgrid_edu.workshop.course.notebooks.build import built_path, notebook_name, read_percent
 from semgrid_edu.workshop.course.notebooks.figures import figures
 
 PREDICTION = "**Predict before you run.**"
@@ -205,7 +197,3 @@ def _built(source: Path) -> NotebookNode:
     """Return the executed notebook of a source; the source itself while there is none."""
     path = built_path(source)
     return nbformat.read(path, as_version=4) if path.is_file() else read_percent(source)
-
-
-if __name__ == "__main__":
-    print(minutes_table(named([*lecture_sources(), *companion_sources()], sys.argv[1:] or None)))

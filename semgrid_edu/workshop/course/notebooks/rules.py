@@ -5,10 +5,10 @@ import re
 from collections.abc import Callable, Iterator
 
 from nbformat import NotebookNode
-from notebook_minutes import PREDICTION, reading_time, stated_minutes
 
 from semgrid_edu.plotting import FIGURE_DPI, MAX_ANIMATION_BYTES
 from semgrid_edu.workshop.course.notebooks.figures import PNG, alternative_text, figures, moves, png_bytes, resolution
+from semgrid_edu.workshop.course.notebooks.minutes import PREDICTION, reading_time, stated_minutes
 
 MAX_MINUTES = 75
 """The longest that a lecture's main path may take."""
@@ -29,7 +29,7 @@ def dishonest_minutes(notebook: NotebookNode) -> Iterator[str]:
     """
     needed, stated = round(reading_time(notebook).minutes), stated_minutes(notebook)
     if stated is not None and stated < needed:
-        yield f"states {stated} minutes and takes {needed}; `python tests/notebook_minutes.py NAME` shows where they go"
+        yield f"states {stated} minutes and takes {needed}; `semgrid-edu course minutes NAME` shows where they go"
 
 
 def too_long(notebook: NotebookNode) -> Iterator[str]:

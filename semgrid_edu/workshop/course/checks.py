@@ -10,15 +10,18 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 from nbgrader.utils import is_grade
-from notebook_rules import COMPANION_RULES, LECTURE_RULES
 
 from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.course.nbgrader.build import student_version
+from semgrid_edu.workshop.course.nbgrader.build import exercise_sources, student_version
 from semgrid_edu.workshop.course.notebooks.build import (
+    NOTEBOOKS,
     built_path,
+    companion_sources,
+    lecture_sources,
     notebook_name,
     read_percent,
 )
+from semgrid_edu.workshop.course.notebooks.rules import COMPANION_RULES, LECTURE_RULES
 
 MAX_LINES = 25
 """Largest number of lines of a code cell, so that a student can take it in at a glance."""
@@ -108,6 +111,29 @@ def instructor_problems(folder: Path) -> list[str]:
         for rule, remedy in rules.items()
         if rule.search(line)
     ]
+
+
+def course_problems(folder: Path = NOTEBOOKS) -> list[str]:
+    """List everything that is wrong with the lectures, companions, exercises and hidden tests in a folder of notebooks.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of notebooks, with their sources in `src`.
+
+    Raises
+    ------
+    DataError
+        When the folder holds no lectures.
+    """
+    problems = [problem for source in lecture_sources(folder) for problem in lecture_problems(source)]
+    problems += [problem for source in companion_sources(folder) for problem in companion_problems(source)]
+    problems += [problem for source in exercise_sources(folder) for problem in exercise_problems(source)]
+    problems += instructor_problems(folder / "instructor" / "semgrid_instructor")
+    together = sum(path.stat().st_size for path in folder.rglob("*.ipynb"))
+    if together > MAX_BYTES_TOGETHER:
+        problems.append(f"all notebooks together: {together / 1e6:.1f} MB, more than {MAX_BYTES_TOGETHER / 1e6:.0f} MB")
+    return problems
 
 
 def text_problems(notebook: NotebookNode, folder: Path) -> Iterator[str]:
