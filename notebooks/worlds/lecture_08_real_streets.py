@@ -21,7 +21,8 @@ from semgrid_edu.datasets.training_set import Mixture
 from semgrid_edu.fast import TrainingSet, build_net, load_net
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
-from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, with_mean_scores
+from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, Architecture, load_imagenet, with_mean_scores
+from semgrid_edu.networks.imagenet import INSTALLED
 from semgrid_edu.storage.files import check_writable, sha256, table_beside, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
@@ -55,6 +56,8 @@ class WayToTrain(NamedTuple):
         The way whose image networks, one for each seed, score images together; the fusion network alone learns.
     params : TrainingParams, optional
         How to train it; None to score the initial network.
+    imagenet : bool
+        Whether the image network starts from the installed ImageNet weights.
     with_simulated : bool
         Whether every other training step uses frames of simulated streets.
     """
@@ -63,6 +66,7 @@ class WayToTrain(NamedTuple):
     start: str | None = None
     mean_of: str | None = None
     params: TrainingParams | None = None
+    imagenet: bool = False
     with_simulated: bool = False
 
 
@@ -129,11 +133,9 @@ def compare_real(
         When there is no such scene, it lacks a camera or labels, or a file is damaged.
     """
     fabric = open_fabric(device)
-    drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
     runs = Path(runs) / scene
-    check_writable(runs / "run")
+    views = open_views(root, scene, runs)
     streets = TrainingSet.by_camera(simulated, "train")
-    views = {camera: _frames(drive, runs) for camera, drive in drives.items()}
     found, weights, seeds = {}, {}, range(seed, seed + TABLE["seeds"])
     for split, rounds in splits(views).items():
         table, tests = _joined(_count_states(*one) for one in rounds)[STATE_TABLE], [test for _, test in rounds]
@@ -148,6 +150,21 @@ def compare_real(
     command = "python -m worlds.lecture_08_real_streets PANDASET MINIKITTI RUNS OUT"
     command += f" --scene {scene} --seed {seed} --device {device}"
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
+
+
+def open_views(root: str | Path, scene: str, runs: Path) -> dict[str, TrainingSet]:
+    """Open the frames of every camera, by its name.
+
+    Parameters
+    ----------
+    root, scene : path-like, str
+        As `PandasetScene` takes them.
+    runs : Path
+        Takes the arrays that are made of the frames.
+    """
+    drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
+    check_writable(runs / "run")
+    return {camera: open_frames(drive, runs) for camera, drive in drives.items()}
 
 
 def splits(views: dict[str, TrainingSet]) -> dict[str, list[Round]]:
@@ -173,8 +190,16 @@ def splits(views: dict[str, TrainingSet]) -> dict[str, list[Round]]:
     return {LEFT_OUT: rounds, LATER: [(first, last)]}
 
 
-def _frames(drive: PandasetScene, folder: Path) -> TrainingSet:
-    """Open all frames of a camera; "true" is what the returns of each scan alone say of the cells in view."""
+def open_frames(drive: PandasetScene, folder: Path) -> TrainingSet:
+    """Open all frames of a camera; "true" is what the returns of each scan alone say of the cells in view.
+
+    Parameters
+    ----------
+    drive : PandasetScene
+        The camera's drive.
+    folder : Path
+        Takes the arrays that are made of the frames.
+    """
     root, scene, camera = drive.folder.parent, drive.folder.name, drive.view.name
     listed = tuple(LabelledFrame((scene, camera), k) for k in range(len(drive)))
     index = DatasetIndex(root, f"pandaset-{scene}", KITTI_14, {camera: listed}, PandasetScene, folder)
@@ -215,6 +240,8 @@ def _train(way: WayToTrain, starts: list[Path], mixture: Mixture, folder: Path, 
     """Train a network, or go on where an interrupted run was."""
     nets = [load_net(start, mixture.camera) for start in starts]
     net = with_mean_scores(nets or [build_net(way.architecture, mixture.camera, seed)])
+    if way.imagenet:
+        load_imagenet(net.segmenter, INSTALLED)
     params = replace(way.params, batch_size=min(way.params.batch_size, *map(len, mixture.parts)))
     train(net, mixture, folder, params, seed, resume=True, fabric=fabric)
 

@@ -3,12 +3,14 @@
 from semgrid_edu.networks.build import build_net, with_mean_scores
 from semgrid_edu.networks.conv_deconv import SegNet
 from semgrid_edu.networks.deeplab import DeepLab
+from semgrid_edu.networks.efficientnet import EfficientNet
 from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.networks.fusion import FusionNet
+from semgrid_edu.networks.imagenet import load_imagenet
 from semgrid_edu.networks.registry import SEGMENTERS, build_segmenter
 from semgrid_edu.networks.segmenter import Segmenter, unit_image
 from semgrid_edu.networks.semantic_grid import Architecture, SemanticGridNet
-from semgrid_edu.networks.weights import IMAGE_STAGE, WEIGHTS, load_imagenet, load_net, save_net
+from semgrid_edu.networks.weights import IMAGE_STAGE, WEIGHTS, load_net, save_net
 
 __all__ = [
     "IMAGE_STAGE",
@@ -16,6 +18,7 @@ __all__ = [
     "WEIGHTS",
     "Architecture",
     "DeepLab",
+    "EfficientNet",
     "Fcn",
     "FusionNet",
     "SegNet",

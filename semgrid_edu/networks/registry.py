@@ -3,6 +3,7 @@
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks.conv_deconv import SegNet
 from semgrid_edu.networks.deeplab import DeepLab
+from semgrid_edu.networks.efficientnet import EfficientNet
 from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.networks.segmenter import Segmenter
 from semgrid_edu.networks.unet import UNet
@@ -12,6 +13,7 @@ SEGMENTERS: dict[str, type[Segmenter]] = {
     "fcn": Fcn,
     "deeplab": DeepLab,
     "unet": UNet,
+    "efficientnet": EfficientNet,
 }
 """Commands, experiments, benchmarks and tests all look here, so a new network needs its module and one line here."""
 

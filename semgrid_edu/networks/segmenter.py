@@ -63,16 +63,19 @@ class Segmenter(nn.Module, ABC):
     """The keyword arguments of `build`, for each preset."""
 
     IMAGENET: ClassVar[str | None] = None
-    """torchvision's name of the published network whose ImageNet weights the encoder can start from; None if there is
-    none."""
+    """Name of the published network whose ImageNet weights the encoder can start from; None if there is none."""
+
+    MEAN: ClassVar[tuple[float, ...]] = IMAGENET_MEAN
+    STD: ClassVar[tuple[float, ...]] = IMAGENET_STD
+    """What the published weights expect the images to be normalised by: mean and deviation of red, green and blue."""
 
     def __init__(self, n_classes: int, preset: str = "compact", seed: int = 0) -> None:
         super().__init__()
         if preset not in self.PRESETS:
             raise ArgumentError("preset", f"one of {', '.join(self.PRESETS)}", repr(preset))
         self.n_classes = n_classes
-        self.register_buffer("mean", torch.tensor(IMAGENET_MEAN).view(3, 1, 1), persistent=False)
-        self.register_buffer("std", torch.tensor(IMAGENET_STD).view(3, 1, 1), persistent=False)
+        self.register_buffer("mean", torch.tensor(self.MEAN).view(3, 1, 1), persistent=False)
+        self.register_buffer("std", torch.tensor(self.STD).view(3, 1, 1), persistent=False)
         with fresh_weights(self, seed):
             self.build(n_classes, **self.PRESETS[preset])
 
@@ -116,7 +119,7 @@ class Segmenter(nn.Module, ABC):
         Parameters
         ----------
         x : (B, 3, h, w) float
-            RGB, normalised to zero mean and unit deviation over ImageNet's images.
+            RGB, normalised by `MEAN` and `STD`.
 
         Returns
         -------
@@ -125,7 +128,7 @@ class Segmenter(nn.Module, ABC):
         """
 
     def imagenet_tensors(self) -> dict[str, Tensor]:
-        """Return the encoder's tensors (not copies) that published weights replace, by their names in torchvision."""
+        """Return the encoder's tensors (not copies) that published weights replace, by their published names."""
         return {}
 
 

@@ -1,4 +1,4 @@
-"""Weights on disk: safetensors files with their architecture, and encoders published for ImageNet (section 4)."""
+"""Weights on disk: safetensors files with their architecture (section 4)."""
 
 import json
 from collections.abc import Iterator
@@ -6,15 +6,12 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
-import torch
 from torch import Tensor, nn
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks.build import build_net
-from semgrid_edu.networks.registry import SEGMENTERS
-from semgrid_edu.networks.segmenter import Segmenter
 from semgrid_edu.networks.semantic_grid import Architecture, SemanticGridNet
 from semgrid_edu.planes import PlaneSampler
 from semgrid_edu.storage.reading import parse_json
@@ -24,7 +21,7 @@ IMAGE_STAGE, WEIGHTS = "image_stage.safetensors", "weights.safetensors"
 """The files that a training run writes to its folder: the network after each of the two stages."""
 
 
-def save_net(net: SemanticGridNet, path: str | Path) -> None:
+def save_net(net: SemanticGridNet, path: str | Path, half: bool = False) -> None:
     """Write a network's weights and its architecture, atomically.
 
     Parameters
@@ -34,6 +31,9 @@ def save_net(net: SemanticGridNet, path: str | Path) -> None:
         to the drive.
     path : path-like
         The safetensors file to write.
+    half : bool
+        Whether convolutions are written in 16 bits, which takes half the space. Biases and batch normalisation stay in
+        32, because running variances span many orders of magnitude. `load_net` gives a network of 32 bits again.
 
     Raises
     ------
@@ -46,6 +46,8 @@ def save_net(net: SemanticGridNet, path: str | Path) -> None:
         if description[name] == getattr(Architecture, name):
             del description[name]
     tensors = {name: tensor.detach().cpu().contiguous() for name, tensor in net.state_dict().items()}
+    if half:
+        tensors = {name: tensor.half() if tensor.ndim > 1 else tensor for name, tensor in tensors.items()}
     write_tensors(path, tensors, {"architecture": json.dumps(description)})
 
 
@@ -160,52 +162,3 @@ def check_tensors(path: str | Path, found: dict[str, Tensor], expected: dict[str
             raise DataError(path, f"finite numbers for {name}", "NaN or infinity")
         if name.endswith("running_var") and found[name].min() < 0:
             raise DataError(path, f"variances of at least 0 for {name}", float(found[name].min()))
-
-
-def load_imagenet(segmenter: Segmenter, path: str | Path) -> None:
-    """Load weights that were learnt on ImageNet into an image network's encoder.
-
-    Parameters
-    ----------
-    segmenter : Segmenter
-        An image network of preset "paper" whose class names a published network in `IMAGENET`. It is changed in place,
-        or not at all if the file doesn't fit.
-    path : path-like
-        A safetensors file with the names and shapes of that network in torchvision: `vgg16` for SegNet and FCN,
-        `resnet101` for DeepLab. Tensors of other layers, such as ImageNet's classifier, are not used.
-
-    Raises
-    ------
-    ArgumentError
-        When the network has no published ImageNet weights.
-    DataError
-        When the file is missing, damaged or not a safetensors file, or a tensor is missing or has another shape.
-
-    Notes
-    -----
-    What is loaded: for SegNet the thirteen convolutions, but no batch normalisation, which VGG16 lacks; for FCN the
-    convolutions, and the two hidden layers of the classifier as conv6 and conv7; for DeepLab all of ResNet-101 before
-    the classifier, with scales, shifts and running statistics of its batch normalisation. Decoders and score layers
-    keep their weights.
-
-    Pickled files (`.pth`) are rejected, because reading one can run arbitrary code. Convert a file from a trusted
-    source once::
-
-        tensors = torch.load("vgg16.pth", map_location="cpu", weights_only=True)
-        safetensors.torch.save_file({name: t.contiguous() for name, t in tensors.items()}, "vgg16.safetensors")
-    """
-    wanted = segmenter.imagenet_tensors() if isinstance(segmenter, Segmenter) else {}
-    if not wanted:
-        published = ", ".join(name for name, network in SEGMENTERS.items() if network.IMAGENET)
-        raise ArgumentError("segmenter", f"one with published ImageNet weights: {published}", type(segmenter).__name__)
-    _, tensors = read_tensors(path)
-    found = {name: tensors[name] for name in wanted if name in tensors}
-    check_tensors(path, found, {name: _as_published(name, tensor) for name, tensor in wanted.items()})
-    with torch.no_grad():
-        for name, tensor in wanted.items():
-            tensor.copy_(found[name].reshape(tensor.shape))
-
-
-def _as_published(name: str, tensor: Tensor) -> Tensor:
-    """Return a tensor in the file's shape, in which fully connected layers have no kernel rows and columns."""
-    return tensor.flatten(1) if name.startswith("classifier") and tensor.ndim == 4 else tensor

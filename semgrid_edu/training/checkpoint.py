@@ -3,8 +3,8 @@
 import json
 from pathlib import Path
 
-from torch import nn
-from torch.optim import SGD
+from torch import Tensor, nn
+from torch.optim import Optimizer
 
 from semgrid_edu.datasets.index import INDEX_FILE
 from semgrid_edu.errors import ArgumentError, DataError
@@ -47,7 +47,7 @@ def check_folder(folder: Path, resume: bool) -> None:
         raise DataError(folder, "a folder without an interrupted run (--resume continues it)", CHECKPOINT)
 
 
-def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimiser: SGD, iteration: int) -> None:
+def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimiser: Optimizer, iteration: int) -> None:
     """Write weights, momenta and the number of the next step to one file, so that they always match.
 
     Parameters
@@ -59,19 +59,19 @@ def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
         What distinguishes this run from others, such as its seed, by name; anything that JSON can hold.
     net : Module
         The network that learns.
-    optimiser : SGD
-        The optimiser of the parameters of `net`, which holds their momenta.
+    optimiser : Optimizer
+        The optimiser of the parameters of `net`, which holds what it remembers of them: momenta, and more.
     iteration : int
         Number of the next step, from 0.
     """
     tensors = {f"net.{name}": tensor for name, tensor in net.state_dict().items()}
     for name, parameter in net.named_parameters():
-        if parameter in optimiser.state:  # only after its first gradient
-            tensors[f"momentum.{name}"] = optimiser.state[parameter]["momentum_buffer"]
+        remembered = optimiser.state.get(parameter, {})  # empty before its first gradient
+        tensors |= {f"{key}.{name}": tensor for key, tensor in remembered.items()}
     write_tensors(path, tensors, {"run": json.dumps(run), "iteration": str(iteration)})
 
 
-def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimiser: SGD) -> int:
+def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimiser: Optimizer) -> int:
     """Restore weights and momenta, and return the number of the next step.
 
     Parameters
@@ -82,7 +82,7 @@ def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
         What distinguishes this run from others; it must be equal in the file.
     net : Module
         The network, whose weights are replaced.
-    optimiser : SGD
+    optimiser : Optimizer
         The optimiser of its parameters, whose momenta are replaced.
 
     Returns
@@ -106,13 +106,19 @@ def load_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimise
     except (KeyError, TypeError, ValueError) as error:
         raise DataError(path, "a checkpoint of a training run", error) from error
     _check_run(path, found, json.loads(json.dumps(run)))
-    momenta = {name: tensors.pop(f"momentum.{name}", None) for name, _ in net.named_parameters()}
-    weights = {name.removeprefix("net."): tensor for name, tensor in tensors.items()}
+    parts: dict[str, dict[str, Tensor]] = {}
+    for name, tensor in tensors.items():
+        part, _, layer = name.partition(".")
+        parts.setdefault(part, {})[layer] = tensor
+    weights = parts.pop("net", {})
     check_tensors(path, weights, net.state_dict())
     net.load_state_dict(weights)
-    for name, parameter in net.named_parameters():
-        if momenta[name] is not None:
-            optimiser.state[parameter]["momentum_buffer"] = momenta[name].to(parameter.device)
+    parameters = dict(net.named_parameters())
+    for part, remembered in parts.items():
+        for name, tensor in remembered.items():
+            parameter = parameters[name]
+            # AdamW counts its steps on the CPU.
+            optimiser.state[parameter][part] = tensor if part == "step" else tensor.to(parameter.device)
     return iteration
 
 

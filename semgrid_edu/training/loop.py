@@ -95,7 +95,7 @@ def train(
         net.to(fabric.device)
         if fabric.world_size > 1 and fabric.device.type == "cuda":
             nn.SyncBatchNorm.convert_sync_batchnorm(net)
-        optimiser = torch.optim.SGD(learnable, lr=params.learning_rate, momentum=params.momentum)
+        optimiser = make_optimiser(net, params)
         start = 0
         if (folder / CHECKPOINT).exists():
             start = load_checkpoint(folder / CHECKPOINT, run, net, optimiser)
@@ -110,7 +110,8 @@ def train(
             if iteration in (start, params.image_iterations):  # a stage begins
                 _begin_stage(net, stage, params.end_to_end, learnable)
                 objective = fabric.setup_module(Objective(net, stage, alpha[stage]))
-            optimiser.param_groups[0]["lr"] = rate
+            for group in optimiser.param_groups:
+                group["lr"] = rate * group["share"]
             batch = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror, params.tint)
             if parts:
                 batch = batch._replace(sampler=samplers[dataset.turn(iteration)[0]])
@@ -129,6 +130,30 @@ def train(
             save_net(net, folder / WEIGHTS)
             (folder / CHECKPOINT).unlink(missing_ok=True)
     net.eval()
+
+
+def make_optimiser(net: SemanticGridNet, params: TrainingParams) -> torch.optim.Optimizer:
+    """Return the optimiser of the trainable weights, in two groups: those that ImageNet taught, and the others.
+
+    Each group's "share" is its fraction of the learning rate.
+
+    Parameters
+    ----------
+    net : SemanticGridNet
+        The network, on its device.
+    params : TrainingParams
+        Which optimiser, and its rates.
+    """
+    # The published tensors share their memory with the parameters.
+    taught = {tensor.data_ptr() for tensor in getattr(net.segmenter, "imagenet_tensors", dict)().values()}
+    learnable = [parameter for parameter in net.parameters() if parameter.requires_grad]
+    groups = [
+        {"params": [weight for weight in learnable if weight.data_ptr() in taught], "share": params.encoder_rate},
+        {"params": [weight for weight in learnable if weight.data_ptr() not in taught], "share": 1.0},
+    ]
+    if params.optimiser == "adamw":
+        return torch.optim.AdamW(groups, lr=params.learning_rate)
+    return torch.optim.SGD(groups, lr=params.learning_rate, momentum=params.momentum)
 
 
 def learn(fabric: "Fabric", objective: nn.Module, optimiser: torch.optim.Optimizer, batch: Batch) -> float:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from semgrid_edu.errors import check_fields, types_named
 
+OPTIMISERS = ("sgd", "adamw")
+
 
 @dataclass(frozen=True)
 class TrainingParams:
@@ -24,6 +26,12 @@ class TrainingParams:
         much larger steps.
     momentum : float
         The fraction of the last step that is added to the next; 0.9 in the paper.
+    optimiser : str
+        "sgd" for gradient descent with momentum, as in the paper; "adamw", which scales the step of each weight by its
+        recent gradients (Loshchilov and Hutter, 2019) and keeps PyTorch's momenta and decay.
+    encoder_rate : float
+        The rate of the weights that ImageNet taught, as a fraction of `learning_rate`: they need smaller steps than
+        fresh weights.
     weight_limit : float
         Largest weight of a class, see `median_frequency_weights`. Without a limit, a cell of signage counts three
         hundred times as much as a cell of unknown-unobserved in minikitti, and a handful of cells decides the loss.
@@ -45,6 +53,8 @@ class TrainingParams:
     batch_size: int = 6
     learning_rate: float = 0.05
     momentum: float = 0.9
+    optimiser: str = "sgd"
+    encoder_rate: float = 1.0
     weight_limit: float = 4.0
     jitter: float = 0.2
     tint: float = 0.0
@@ -57,6 +67,8 @@ class TrainingParams:
         check_fields(self, "0 or more", lambda steps: steps >= 0, "image_iterations", "grid_iterations")
         check_fields(self, "at least one frame", lambda frames: frames >= 1, "batch_size")
         check_fields(self, "a positive number", lambda rate: 0 < rate < math.inf, "learning_rate")
+        check_fields(self, f"one of {', '.join(OPTIMISERS)}", lambda name: name in OPTIMISERS, "optimiser")
+        check_fields(self, "a share from 0 to 1", lambda share: 0 <= share <= 1, "encoder_rate")
         check_fields(self, "a share from 0 to below 1", lambda share: 0 <= share < 1, "momentum")
         check_fields(self, "1 or more", lambda limit: limit >= 1, "weight_limit")
         check_fields(self, "a share of at least 0", lambda share: 0 <= share < math.inf, "jitter", "tint")

@@ -14,8 +14,9 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.fast import TrainingSet, build_net, load_net
 from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.networks import Architecture, SemanticGridNet, build_segmenter, load_imagenet
+from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_segmenter, load_imagenet, save_net
 from semgrid_edu.networks.build import with_mean_scores
+from semgrid_edu.networks.imagenet import imagenet_file
 from semgrid_edu.networks.semantic_grid import MOST_SEGMENTERS
 from semgrid_edu.networks.weights import read_architecture
 from semgrid_edu.storage.files import sha256
@@ -67,7 +68,8 @@ def training_params(
     end_to_end : bool
         Whether the loss on the grid teaches the image network too.
     from_imagenet : bool
-        Whether the image network starts from ImageNet weights. Training end to end then needs no first stage.
+        Whether the image network starts from ImageNet weights. At the published size, training end to end then needs
+        no first stage. The compact network learns by AdamW in both, its encoder at three tenths of the rate.
     tint : float
         How far each colour varies, see `TrainingParams`.
 
@@ -76,9 +78,12 @@ def training_params(
     TrainingParams
         What `train` takes.
     """
+    params = TrainingParams(iterations, iterations, end_to_end=end_to_end, tint=tint)
+    if preset == "compact":
+        from_weights = {"optimiser": "adamw", "learning_rate": 1e-3, "encoder_rate": 0.3}
+        return replace(params, **from_weights) if from_imagenet else params
     image_iterations = 0 if from_imagenet and end_to_end else iterations
-    params = TrainingParams(image_iterations, iterations, end_to_end=end_to_end, tint=tint)
-    return params if preset == "compact" else replace(params, learning_rate=1e-3, weight_limit=math.inf)
+    return replace(params, image_iterations=image_iterations, learning_rate=1e-3, weight_limit=math.inf)
 
 
 def chosen_truth(name: str) -> LidarTruth | None:
@@ -113,6 +118,7 @@ def train_network(
     device: str = "cpu",
     truth: LidarTruth | None = None,
     start: str | Path | Sequence[str | Path] = (),
+    half: bool = False,
 ) -> None:
     """Train a network on the split "train" of data sets; under torchrun, in all of its processes.
 
@@ -133,7 +139,7 @@ def train_network(
     preset : str
         "compact" or "paper", see `architecture`.
     imagenet : path-like, optional
-        ImageNet weights for the image network of preset "paper": see `load_imagenet`.
+        ImageNet weights for the image network, a file or "installed": see `load_imagenet`.
     device : str
         "cpu", "cuda", "cuda:N" or "auto", see `choose_device`.
     truth : LidarTruth, optional
@@ -142,6 +148,8 @@ def train_network(
         A trained network of the same architecture to start from, in place of `imagenet`. Of several the image networks'
         mean scores are fused, see `with_mean_scores`; they don't learn, so there is no first stage. Without any, the
         weights are fresh.
+    half : bool
+        Whether the trained network's convolutions are written in 16 bits, see `save_net`.
 
     Raises
     ------
@@ -179,6 +187,8 @@ def train_network(
     train(net, dataset, folder, params, seed, resume, fabric)
 
     if fabric.is_global_zero:
+        if half:
+            save_net(net, folder / WEIGHTS, half=True)
         hashes = [sha256(Path(folder) / INDEX_FILE) for folder in folders]
         details = {
             "date": f"{began:%Y-%m-%d}",
@@ -191,12 +201,13 @@ def train_network(
             "dataset": hashes[0] if len(hashes) == 1 else hashes,
         }
         if imagenet:
-            details["imagenet"] = sha256(imagenet)
+            details["imagenet"] = sha256(imagenet_file(imagenet))
         if starts:
             details["from"] = [sha256(path) for path in starts]
         if truth:
             details["truth"] = asdict(truth)
         command = _command(folders, folder, description, imagenet, starts, seed, params, truth)
+        command += " --half" if half else ""
         write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)
 
 

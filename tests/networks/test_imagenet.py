@@ -139,6 +139,6 @@ def test_a_network_names_its_published_weights_exactly_when_it_takes_some(name):
 
 
 def test_unet_has_no_imagenet_weights(vgg_file):
-    message = "segmenter: expected one with published ImageNet weights: segnet, fcn, deeplab, found UNet"
+    message = "segmenter: expected one with published ImageNet weights: segnet, fcn, deeplab, efficientnet, found UNet"
     with pytest.raises(ArgumentError, match=message):
         load_imagenet(build_segmenter("unet", 3), vgg_file)

@@ -142,7 +142,7 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options, "--device", "cpu"])
     assert result.exit_code == 0, result.output
     assert given["net"] == experiment.architecture("segnet", "paper")
-    assert given["imagenet"] == (_Net.segmenter, imagenet)
+    assert given["imagenet"] == (_Net.segmenter, str(imagenet))
     net, dataset, folder, params, seed, resume, fabric = given["train"]
     assert dataset.truth == LidarTruth(POLICIES[truth], TruthFlaws())
     assert (net, folder, seed, resume, fabric.device) == (_Net, out, 2, True, torch.device("cpu"))

@@ -1,3 +1,4 @@
+import copy
 import math
 import os
 import resource
@@ -346,17 +347,19 @@ def _same_files(first, second):
         assert (first / name).read_bytes() == (second / name).read_bytes(), name
 
 
-@pytest.mark.parametrize("end_to_end", [True, False])
+@pytest.mark.parametrize(
+    "chosen", [{}, {"end_to_end": False}, {"optimiser": "adamw"}], ids=["end to end", "two stages", "adamw"]
+)
 @pytest.mark.parametrize(
     ("checkpoint_every", "steps_before_the_kill"),
     [(2, 2), (3, 4), (2, 5)],
     ids=["in the first stage", "between the stages", "in the second stage"],
 )
 def test_a_resumed_run_ends_with_the_same_bytes(
-    streets, tmp_path, monkeypatch, checkpoint_every, steps_before_the_kill, end_to_end
+    streets, tmp_path, monkeypatch, checkpoint_every, steps_before_the_kill, chosen
 ):
     monkeypatch.setattr(training, "CHECKPOINT_EVERY", checkpoint_every)
-    whole, broken, params = tmp_path / "whole", tmp_path / "broken", replace(QUICK, end_to_end=end_to_end)
+    whole, broken, params = tmp_path / "whole", tmp_path / "broken", replace(QUICK, **chosen)
     train(build_net(SMALL, CAMERA, seed=1), streets, whole, params, seed=1)
     reads = 3 * len(streets) + params.batch_size * steps_before_the_kill  # check, weights of two stages, steps
     with pytest.raises(_KilledError):
@@ -397,6 +400,17 @@ def test_without_a_first_stage_images_need_no_labels(streets, tmp_path):
     assert with_labels == without
 
 
+@pytest.mark.parametrize("optimiser", ["sgd", "adamw"])
+def test_what_imagenet_taught_takes_smaller_steps(streets, tmp_path, optimiser):
+    """With a rate of 0 the encoder stays, and everything else learns."""
+    start = build_net(replace(SMALL, segmenter="efficientnet"), CAMERA)
+    net = copy.deepcopy(start)
+    train(net, streets, tmp_path, replace(QUICK, optimiser=optimiser, encoder_rate=0.0))
+    before = dict(start.named_parameters())
+    moved = {name for name, weight in net.named_parameters() if not torch.equal(weight, before[name])}
+    assert moved == {name for name in before if "backbone" not in name}
+
+
 def test_another_seed_gives_other_weights(streets, tmp_path):
     for seed in (1, 2):
         train(build_net(SMALL, CAMERA), streets, tmp_path / str(seed), QUICK, seed=seed)
@@ -422,6 +436,8 @@ def test_a_loss_that_is_not_finite_stops_the_run(streets, tmp_path):
         ({"batch_size": 0}, "batch_size: expected at least one frame, found 0"),
         ({"learning_rate": 0.0}, "learning_rate: expected a positive number, found 0.0"),
         ({"learning_rate": math.nan}, "learning_rate: expected a positive number, found nan"),
+        ({"optimiser": "adam"}, "optimiser: expected one of sgd, adamw, found adam"),
+        ({"encoder_rate": 1.5}, "encoder_rate: expected a share from 0 to 1, found 1.5"),
         ({"momentum": 1.0}, "momentum: expected a share from 0 to below 1, found 1.0"),
         ({"weight_limit": 0.5}, "weight_limit: expected 1 or more, found 0.5"),
         ({"jitter": -0.1}, "jitter: expected a share of at least 0, found -0.1"),

