@@ -689,7 +689,7 @@ print("ghosts after 1.9 s [m²]: log-odds {:.0f}, BOF without looking back {:.0f
 
 # %% [markdown]
 # The front of the car is nearly right, its rear slower. Of the ghosts of lecture 02 less than a third is left, and
-# with the look back of [the companion](deeper/04_real_streets.ipynb) about a seventh. Without it, half of them lie in
+# with the look back of [the companion](deeper/04_real_streets.ipynb) about a sixth. Without it, half of them lie in
 # one stretch on the left, 16 to 22 m ahead: the rear of an oncoming car was believed STATIC there, and now hardly a
 # beam reaches this stretch. That is the first dashed edge, one thing in two places.
 #
@@ -865,7 +865,7 @@ plotting.animate_occupancy(
 # %% [markdown]
 # Data: PandaSet by Hesai and Scale AI, CC BY 4.0. Nearly all cells called DYNAMIC lie within a metre of cars, cyclists or
 # pedestrians. In lane E, nearer than 40 m, BOF needs a second to find the cars, and then calls nearly all their occupied cells DYNAMIC. Of the ghosts of
-# the log-odds grid a third is left. More than half of these lie in the lane beside ours, 2 to 4 m to the left, where cars
+# the log-odds grid 38 % is left. More than half of these lie in the lane beside ours, 2 to 4 m to the left, where cars
 # drive away and only few of their cells turn blue. The car **F** ahead of us rolls away, too, and stays dark; lecture 04
 # asks why. And on the sample drive the rear of the overtaking car was slower than its front. This we
 # can explain now.

@@ -131,7 +131,7 @@ assert held["CMCDOT"] < 0.08 < 0.2 < held["log-odds grid"]
 # **A** overtakes us, **B**, first of three, comes towards us, **D** is parked. Look at **C**, the road that B has just left. The
 # log-odds grid still holds it occupied (dark), because it believes that nothing ever changes. After a second the
 # other two have nearly cleared it, and they say what moves where: blue drives our way, yellow comes towards us. After 1.6 s the
-# log-odds grid holds 30 % of the free road in B's lane occupied, CMCDOT 4 %.
+# log-odds grid holds 30 % of the free road in B's lane occupied, CMCDOT 2 %.
 #
 # So CMCDOT does what BOF does. Why want another filter?
 #
@@ -1040,8 +1040,8 @@ as_it_is, without_rules, even_odds, both_off = (shares[-1] for shares in of_f.va
 assert as_it_is < 20 < 30 < min(without_rules, even_odds) < max(without_rules, even_odds) < both_off < 75
 
 # %% [markdown]
-# In the last scan 13 % of F's hit cells are DYNAMIC as the filter is, 47 % without the rules, 40 % with even odds at
-# first sight, and 60 % with both changes. So both are causes, and they don't explain all of it: 40 % aren't DYNAMIC
+# In the last scan 7 % of F's hit cells are DYNAMIC as the filter is, 47 % without the rules, 33 % with even odds at
+# first sight, and 73 % with both changes. So both are causes, and they don't explain all of it: 27 % aren't DYNAMIC
 # even then. A vehicle that starts when the car ahead is DYNAMIC starts late. The rules are there because without them walls that come into view are called DYNAMIC, as
 # the companion [phantoms on real streets](deeper/04_real_streets.ipynb) shows.
 #
