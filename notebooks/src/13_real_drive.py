@@ -691,7 +691,7 @@ def learn_here(weights, steps=30):
 
 
 # %% [markdown]
-# **Predict before you run.** Before it learns, this network has 61 % of the first kind of cells right, 70 % of the
+# **Predict before you run.** Before it learns, this network has 60 % of the first kind of cells right, 69 % of the
 # second and 27 % of the third (the right half is harder: parked cars, hedges, the wall). Write down three numbers for
 # after. 30 steps take about ten seconds.
 #
@@ -723,7 +723,7 @@ if labelled:
         found = 100 * (maps["taught here"].argmax(axis=1) == k)[right & (truths == k)].mean()
         print(f"taught here, right: {found:.0f} % of {KITTI_14.names[k]}")
 if ours:
-    np.testing.assert_allclose([*shares["simulated streets"].values()], [0.61, 0.70, 0.27], atol=0.01)
+    np.testing.assert_allclose([*shares["simulated streets"].values()], [0.605, 0.685, 0.265], atol=0.01)
     assert shares["taught here"]["left, later"] > shares["taught here"]["right"] + 0.2
     assert shares["taught here"]["right"] > shares["simulated streets"]["right"] + 0.1
 
