@@ -94,8 +94,8 @@ assert area[1] > 70 > 2 > area[0]
 #
 # <details><summary>Answer</summary>
 #
-# The beam passed three cells: 0.3 / (0.3 + 0.7) = 0.30. It came back from the fourth: 0.8 / (0.8 + 0.05) = 0.94. The
-# fifth keeps 0.50, because both of its likelihoods are the same.
+# The beam passed three cells: 0.3 / (0.3 + 0.7) = 0.30. It came back from the fourth, which goes to 0.94 in the same
+# way. The fifth stays as it was, because both of its likelihoods are the same.
 #
 # </details>
 #
@@ -135,7 +135,7 @@ ax.annotate("", (0, 3.5), (0, 0), arrowprops={"arrowstyle": "->", "color": "tab:
 for k, one in enumerate(p[::-1, 0]):
     ax.text(0.6, k + 0.5, f"{one:.2f}", va="center", fontsize=10)
 ax.set(title="one beam", xticks=[], ylabel="x, forward [m]")
-draw(spec, scans[0], street_ax, "one scan of the street", legend=True)
+draw(spec, scans[0], street_ax, "one scan of the street")
 street_ax.set(ylim=(0, 50))
 lecture_02_street.note(street_ax, {"S": ((9.5, 20), (13, 27)), "W": ((-7.8, 12.0), (-12.0, 14.5))})
 plt.show()
@@ -147,8 +147,8 @@ plt.show()
 # ## How do two scans add up?
 #
 # One cell, believed occupied with 0.5. A first beam comes back from it, and then a second one. For round numbers, say that a
-# return is four times as likely if the cell is occupied. Count in **odds**, occupied to free. They go from 1 to 4,
-# and then to 16. So P(occupied) is 16/17 = 0.94.
+# return is four times as likely if the cell is occupied. Count in **odds**, occupied to free. They go from 1 to 4 and
+# then to 16, so P(occupied) is 16/17.
 #
 # Odds multiply, so their logarithms add. With $P$ for P(occupied), the **log-odds** $L$ are
 #
@@ -239,8 +239,8 @@ def draw_cell(ax, **dials):
     ax.set(ylim=(0, 1.02), xlabel="time [s]", ylabel="P(occupied)")
 
 
-# %% jupyter={"source_hidden": true} alt="P(occupied) of a cell over four seconds, three panels: with the clamp it falls below one half five passes after the car has left, without it after fifteen, and after eighteen where a beam often passes an occupied cell"
-settings = {"with the clamp": {}, "without the clamp": {"highest": 1 - 1e-9}, "porous world": {"p_pass_occupied": 0.45}}
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="P(occupied) of a cell over four seconds, three panels: with the clamp it falls below one half five passes after the car has left, without its upper limit after fifteen, and after eighteen where a beam often passes an occupied cell"
+settings = {"with the clamp": {}, "no upper limit": {"highest": 1 - 1e-9}, "porous world": {"p_pass_occupied": 0.45}}
 fig, axes = plt.subplots(1, 3, figsize=(10, 2.8), layout="constrained", sharey=True)
 for ax, (name, dials) in zip(axes, settings.items(), strict=True):
     draw_cell(ax, **dials)
@@ -268,8 +268,8 @@ _ = interact(
 )
 
 # %% [markdown]
-# All three cells see the car at its first return. They differ in letting go. Without the clamp the same car needs three
-# times as many passes. In a porous world, where a beam often passes an occupied cell, a pass is worth little, so the
+# All three cells see the car at its first return. They differ in letting go. Without the upper limit the same cell needs
+# three times as many passes. In a porous world, where a beam often passes an occupied cell, a pass is worth little, so the
 # cell waits even longer. (The dials work with a running kernel. What does a very low clamp cost?)
 #
 # So a clamped map changes its mind at the fifth pass. But a pass it must have.
@@ -318,7 +318,7 @@ for k in range(25):
     fades.append(occupancy.update_log_odds(forget(fades[-1], dt=0.1, tau=0.5), scan, params))
 
 
-# %% jupyter={"source_hidden": true} alt="animation of two cars seen from above: without forgetting, the car that drives away drags a short dark tail and the oncoming one a tail that grows without end; with forgetting, the second tail fades to grey"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="animation of two cars seen from above: without forgetting, the car that drives away drags a short dark tail and the oncoming one a tail that grows without end; with forgetting, the second tail fades to grey"
 def two_memories():
     """Draw the grid that never forgets beside the one that does."""
     fig, axes = plt.subplots(1, 2, figsize=(5.8, 5), layout="compressed")
@@ -346,6 +346,7 @@ np.testing.assert_allclose(tails[0], 4, atol=toy.cell / 2)
 assert tails[1] > 19
 
 # %% [markdown]
+# (The tails are striped, because mostly one side of a car sends returns, and the car moves by two cells between scans.)
 # The right map shows a remedy. Before each scan every cell **forgets** a little: its log-odds shrink towards "don't
 # know", with a memory of $\tau$ seconds.
 #
@@ -359,7 +360,7 @@ assert tails[1] > 19
 # Now we can check the street. In each ghost cell, count the passes since its last return. If the explanation is right,
 # no ghost has more than four.
 
-# %% jupyter={"source_hidden": true} alt="the street from above with its ghosts in two colours: hatched dark red without a pass since the last return, orange with one to four passes; lane B is mostly dark red, lanes A and C mostly orange"
+# %% jupyter={"source_hidden": true} alt="the street from above with its ghosts in two colours: dark red without a pass since the last return, orange with one to four passes; lane B is half dark red, lanes A and C are mostly orange"
 ghost = (maps[-1] > 0.5) & (truths[-1] == ROAD)
 passes = lecture_02_street.passes_since_return(scans)
 fig, ax = plt.subplots(figsize=(5.8, 5.2), layout="compressed")
@@ -380,9 +381,9 @@ assert passes[ghost].max() == 4
 assert 0.3 < (passes[ghost] <= 0).mean() < 0.35
 
 # %% [markdown]
-# No ghost has more than four passes, as predicted. In B, half of the ghosts are in a shadow, because the cars there
-# hide the road from us. In A and C most ghosts are visible and wait for their fifth pass. On the whole street
-# two ghost cells in three wait, and one in three is hidden.
+# No ghost has more than four passes, as predicted. In B half of the ghosts are in a shadow: each car hides the road
+# beyond it, where the next car drove. In A and C most ghosts are in view and wait for their fifth pass. On the whole
+# street two ghost cells in three wait, and one in three is hidden.
 #
 # Does forgetting help, and what does it cost? Compare it with two trivial rules: call everything free, and
 # trust only the last scan.
@@ -406,8 +407,8 @@ assert found["memory of 0.5 s"][1] > 0.98 * found["all scans"][1]
 #
 # ## Why do walls get thick?
 #
-# Nothing moves now. A wall is one cell thick. We scan it 20 times, with an error of half a cell (10 cm) in range and
-# pose together. The package's grid then calls 2.5 cells occupied. Why?
+# Nothing moves now. A wall is one cell thick. We scan it 20 times, with an error of half a cell in range and pose
+# together. The package's grid then calls 2.5 cells occupied. Why?
 #
 # **The first suspect: one number per cell.** Take two cells, each occupied with probability 0.2. A sensor reports "at
 # least one of you is occupied". It is never wrong.
@@ -418,17 +419,24 @@ assert found["memory of 0.5 s"][1] > 0.98 * found["all scans"][1]
 #
 # <details><summary>Answer</summary>
 #
-# It starts from independent cells of 5/9. P(not both free) = 1 - (4/9)² = 65/81, so each cell goes to (5/9) / (65/81) =
-# 0.69. It grows surer by hearing the same sentence again.
+# P(both free) is now 0.44 times 0.44, so each cell goes to 0.56 / (1 - 0.44²) = 0.69. The grid grows surer by hearing
+# the same sentence again.
 #
 # </details>
-#
+
+# %% jupyter={"outputs_hidden": true}
+p = 0.2
+for report in (1, 2, 3):
+    p = p / (1 - (1 - p) ** 2)  # two independent cells of p each, and not both free
+    print(f"after report {report}: exact 0.56, cell by cell {p:.2f}")
+
+# %% [markdown]
 # What did the grid forget? After the report the cells are coupled: if you learn that the first is occupied, the second
 # falls back to 0.2, because the first already explains the report. This is **explaining away**, and the report is
 # a **collider** ([graphical models](deeper/graphical_models.ipynb)). A plausible culprit. So switch it off: infer
 # all $2^8$ maps of a row of eight cells together, and then cell by cell with the same beam.
 
-# %%
+# %% tags=["thick-walls"]
 walls = lecture_02_thick_walls.thick_walls()  # 600 random sequences of 20 scans
 thickness = {name: (beliefs > 0.5).sum(axis=1).mean() for name, beliefs in walls.items()}
 print("cells occupied:", ", ".join(f"{name} {thickness[name]:.1f}" for name in ("exact", "cell by cell", "package")))
@@ -443,7 +451,7 @@ assert thickness["cell by cell"] - thickness["exact"] < 0.15 < 1 < thickness["pa
 # free one in 95 %, but the grid calculates with 30 and 70. So it needs more than three passes to outweigh one
 # return, where two would do. Switch off each of them, and look at the same picture:
 
-# %% jupyter={"source_hidden": true} alt="four bar charts of P(occupied) in eight cells after 20 scans of a wall in cell 4; as it is, also the cells before and behind the wall are high, 2.5 cells in all; without the clamp the cells before it drop; with the beam's passes all drop a little; with neither only the cell behind the wall stays high, 1.6 cells"
+# %% jupyter={"source_hidden": true} alt="four bar charts of P(occupied) in eight cells after 20 scans of a wall in cell 4; as it is, also the cells before and behind the wall are high, 2.5 cells in all; without the clamp the cells before it drop; with the beam's passes all drop a little; with neither only the cell behind the wall stays high, 1.5 cells"
 titles = {"package": "as it is", "no clamp": "without the clamp", "beam's passes": "with the beam's passes",
           "neither": "both changes"}  # fmt: skip
 fig, axes = plt.subplots(2, 2, figsize=(7.6, 4.4), layout="constrained", sharex=True, sharey=True)
@@ -461,8 +469,8 @@ print(f"both changes, and an error of a tenth of a cell: {sharp:.1f} cells")
 assert sharp < 1.1
 
 # %% [markdown]
-# Each change makes the wall thinner, and together they remove most of the excess. What is left is the cell behind the
-# wall. Returns that are too long fall into it, and the grid takes each range as exact. With a small error, this
+# Each change makes the wall thinner. Together they remove about two thirds of the excess. What is left is the cell
+# behind the wall. Returns that are too long fall into it, and the grid takes each range as exact. With a small error, this
 # goes too.
 #
 # So walls get thick because the clamp and the weak pass let stray returns win, and because the grid doesn't know that a range has
@@ -479,7 +487,7 @@ plt.show()
 
 # %% [markdown]
 # The pose error $e$ points to both ranges. Even if you know every cell, a first range that is too long makes it likely
-# that the second is too long. The grid has no $e$, so for it the second return is a new witness.
+# that the second is too long. The grid deletes the dashed arrow, so for it the second return is a new witness.
 #
 # **Predict before you run.** A cell has P(occupied) = 0.2, and the pose an error of one cell. A return says "here", and
 # exact inference gives 0.40. A second return of the same scan says "here", too. Is the right answer now near 0.45,
@@ -487,7 +495,7 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# 0.46. The second return rules out that the first was a stray one, but it can't say anything new about the pose.
+# 0.46. The second return makes it less likely that the first was a stray one. It says nothing new about the pose.
 #
 # </details>
 
@@ -503,13 +511,13 @@ np.testing.assert_allclose(small.exact, small.independent, atol=1e-6)
 
 # %% [markdown]
 # That is the price of this lecture. **The second return is worth 0.40 → 0.46, and the grid counts 0.80 → 0.97.**
-# (The grid is too sure from the first return on, because it takes the range as exact. With errors of their own,
-# two returns would deserve 0.57. So sharing the error is one part of the boast, and the exact range the other.)
+# The last column switches the cause off. If each return had an error of its own, the second would be worth three times
+# as much. But the grid would still be too sure, from the first return on. That isn't the shared error. It is an
+# approximation: the grid takes each range as exact.
 #
-# Does this matter on a drive? Of 100 cells that a map calls occupied with 0.97, about 97 should be. A map that keeps
-# such promises is called **calibrated**. On the sample drive, which is simulated, we know what is in each cell. Two
-# returns promise 0.8² / (0.8² + 0.05²) = 0.996. The trivial rule: say the same for each cell with a return, namely
-# how often such cells are occupied.
+# Does this matter on a drive? A map is **calibrated** if it is right as often as it says. On the sample drive, which is
+# simulated, we know what is in each cell. Compare what two returns promise with a trivial rule: give every cell with a
+# return the same number, namely how often such cells are occupied.
 
 # %%
 sample = samples.sample_drive()
@@ -524,8 +532,7 @@ assert there[twice].mean() < 0.95
 
 # %% [markdown]
 # The map promises one error in 250 cells and makes one in 13. The trivial rule, one number for all, is closer to the
-# truth. Which part of that is a shared error, the toy can't say. (Typically the return is a few centimetres beyond the edge of its thing,
-# in the next cell.)
+# truth. How much of this comes from shared errors, the drive can't tell us.
 #
 # Two failures no number repairs. Glass and black paint send nothing back, so a black car is a hole of unknown. And
 # free isn't safe: a cell is free as soon as beams pass it at *one* height, whatever is below them.

@@ -81,7 +81,7 @@ STAGES = (
         lecture_02_beam.beam_over_cells,
         lecture_02_beam.CUT_BEAM,
         "tests/worlds/test_beam.py::test_the_package_makes_walls_thick",
-        "deeper/graphical_models#stages",
+        "02_grids#thick-walls",
     ),
     Stage(
         "pose",
