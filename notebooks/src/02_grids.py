@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Lecture [01](01_bayes.ipynb): Bayes' rule, and when two scans are independent. Logarithms.
 #
-# **Time.** 75 minutes, of which the computer needs less than one.
+# **Time.** 72 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.2, step 2, the sensor model; it builds on Moravec and Elfes (1985) and Elfes (1989).
 
@@ -40,7 +40,7 @@ maps = lecture_02_street.add_up(street, spec, sensor)
 # %% [markdown]
 # ## Why does the map show cars that aren't there?
 #
-# Our vehicle waits in a real street. Ten times in 1.8 seconds its LIDAR measures the distance to whatever is around.
+# Our vehicle waits in a real street. Ten times in two seconds its LIDAR measures the distance to whatever is around.
 # The left map shows what each scan says by itself. The right map is an **occupancy grid**. It adds the scans up. Red
 # marks **ghosts**: cells that the map calls occupied although at that moment they are empty road.
 
@@ -156,7 +156,7 @@ plt.show()
 #    \text{free})}. $$
 #
 # $L = 0$ means "don't know", a positive $L$ means rather occupied. In the table above a return adds log 16 = 2.77 to a
-# cell, and a pass adds log(0.3 / 0.7) = -0.85. **Remember these two numbers**: the rest of the lecture follows from them.
+# cell, and a pass adds log(0.3 / 0.7) = -0.85. **Remember these two numbers**: the rest of the lecture uses them.
 
 
 # %% tags=["log-odds"]
@@ -348,9 +348,7 @@ assert tails[1] > 19
 # %% [markdown]
 # (The tails are striped, because mostly one side of a car sends returns, and the car moves by two cells between scans.)
 # The right map shows a remedy. Before each scan every cell **forgets** a little: its log-odds shrink towards "don't
-# know", with a memory of $\tau$ seconds.
-#
-# $$ L \leftarrow L\, e^{-\Delta t / \tau} $$
+# know", with a memory of $\tau$ seconds: $L \leftarrow L\, e^{-\Delta t / \tau}$.
 #
 # By hand, with $\tau$ = 0.5 s: after one second in the shadow, 3.48 has become 3.48 / $e^2$ = 0.47. One pass would now
 # be enough. So a smear has two causes: cells that wait for their fifth pass, and cells that no beam passes.
