@@ -81,7 +81,7 @@ STAGES = (
         lecture_02_beam.beam_over_cells,
         lecture_02_beam.CUT_BEAM,
         "tests/worlds/test_beam.py::test_the_package_makes_walls_thick",
-        "02_grids#graph",
+        "02_grids#thick-walls",
     ),
     Stage(
         "pose",
@@ -89,7 +89,7 @@ STAGES = (
         lecture_02_thick_walls.scan_with_pose_error,
         lecture_02_thick_walls.CUT_POSE,
         "tests/worlds/test_beam.py::test_a_second_ring_adds_little_when_it_shares_the_pose_error",
-        "02_grids#graph",
+        "02_grids#pose-graph",
     ),
     Stage(
         "bof",

@@ -5,6 +5,7 @@ P(z_t = this scan | state) is the pair of likelihoods that the package computes.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -149,6 +150,11 @@ def one_log_odds_cell(scans: ArrayLike, prior: float = 0.5) -> StageGraph:
         cut=CUT_LOG_ODDS,
         ghosts={"next": (len(names) / 2 - 0.5, 1.3), "front": (-1.4, 0.1)},
     )
+
+
+def only_later(fork: StageGraph) -> StageGraph:
+    """Return the graph of `one_log_odds_cell` with a single dashed edge, from the cell to the cell later."""
+    return replace(fork, cut=CUT_LOG_ODDS[:1], labels={"next": "later"}, ghosts={"next": fork.ghosts["next"]})
 
 
 def package_log_odds_cell(scans: ArrayLike, params: LogOddsParams | None = None) -> NDArray[np.float64]:
