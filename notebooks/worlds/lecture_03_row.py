@@ -106,7 +106,8 @@ class CellsInARow:
         world = WorldModel(
             rates=self.rates,
             first_sight=self.first_sight,
-            walls=Walls(clearing_time=self.clearing_time, clearing_cells=0.0),
+            # In a row of cells there is nothing beside a path but the path itself.
+            walls=Walls(clearing_time=self.clearing_time, clearing_cells=0.0, running_speed=1e6),
             max_acceleration=0.0,
             stop_rate=0.0,
         )

@@ -106,7 +106,7 @@ def test_names_are_followed_to_the_module_that_defines_them(tmp_path):
 def test_the_closure_is_what_makes_arrays_and_no_more():
     found = {path.relative_to(PACKAGE).as_posix() for path in import_closure([ROOT / one for one in ARRAYS])}
     assert {"datasets/training_arrays.py", "datasets/grid_truth.py", f"{READERS}/kitti_raw.py", "grid.py"} < found
-    assert {f"{FILTER}/{name}.py" for name in ("cmcdot", "steps", "sensor", "resampling", "world")} < found
+    assert {f"{FILTER}/{name}.py" for name in ("cmcdot", "steps", "sensor", "state", "world")} < found
     assert not [name for name in found if name.startswith(("networks", "training", "crf", f"{FILTER}/literal"))]
     assert not [name for name in found if name.endswith("__init__.py")]
 

@@ -242,7 +242,7 @@ def test_boxes_are_read_by_frame(tmp_path):
 
 def test_committed_result_says_how_it_was_made_and_holds_what_the_lecture_says():
     result = json.loads(COMMITTED.read_text())
-    assert result["command"].startswith("semgrid-edu reproduce real-drive")
+    assert result["command"].startswith("python -m worlds.lecture_13_real_drive")
     assert {"date", "versions", "seed", "minutes"} <= result.keys()
     sample, *real = result["drives"].values()
     assert [one["frames"] for one in real] == [24, 37]
