@@ -32,9 +32,9 @@ def test_links_lead_to_pages(tmp_path, text, expected):
 
 
 def test_a_linked_file_comes_along(tmp_path):
-    text = "[licence](../LICENSE) and ![a picture](../docs/overview.png)"
+    text = "[licence](../LICENSE) and ![a picture](../docs/street.png)"
     assert relinked(text, CLONE / "notebooks", tmp_path) == text
-    for name in ("LICENSE", "docs/overview.png"):
+    for name in ("LICENSE", "docs/street.png"):
         assert (tmp_path / name).read_bytes() == (CLONE / name).read_bytes()
 
 
