@@ -25,7 +25,7 @@ NOTE = {"ha": "center", "va": "center", "fontsize": 10, "fontweight": "bold", "c
 
 def pixels_of(frame: Frame, points: NDArray) -> NDArray[np.float64]:
     """Return the pixels of N points (x, y, z) of the grid frame, (N, 2): u and v, by eq. (1)."""
-    return project(transform_points(frame.camera.T_camera_from_grid, np.asarray(points)), frame.camera)[0]
+    return project(transform_points(frame.camera.T_camera_from_grid, np.asarray(points, float)), frame.camera)[0]
 
 
 def picture_and_map(
@@ -51,7 +51,12 @@ def picture_and_map(
     axes["legend"].axis("off")
     class_legend(axes["legend"], KITTI_14, labels, loc="upper left", bbox_to_anchor=(0, 1), ncols=3, fontsize=9)
     for letter, (x, y, z) in places.items():
-        axes["map"].text(y, x, letter, **NOTE)
+        aside = {
+            "xytext": (-24 if y < 0 else 24, 14),
+            "textcoords": "offset points",
+            "arrowprops": {"arrowstyle": "->"},
+        }
+        axes["map"].annotate(letter, (y, x), **aside, **NOTE)
         axes["image"].text(*pixels_of(frame, [(x, y, z)])[0], letter, **NOTE)
     return fig
 
@@ -134,9 +139,9 @@ def draw_story(
     _bars(axes["answers"], answers, KITTI_14.rgb)
     axes["answers"].set_title("C  what it is called", fontsize=10)
     for row, p in enumerate(answers.values()):
-        axes["answers"].text(0.02, row, f"{KITTI_14.names[p.argmax()]} {p.max():.2f}", va="center", fontsize=9).set_bbox(
-            {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
-        )
+        axes["answers"].text(
+            0.02, row, f"{KITTI_14.names[p.argmax()]} {p.max():.2f}", va="center", fontsize=9
+        ).set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 1.5})
     best = np.where(np.max(list(answers.values()), axis=0) > 0.1, np.arange(len(KITTI_14)), IGNORE)
     class_legend(axes["answers"], KITTI_14, best, ncols=4, **place)
     return fig
