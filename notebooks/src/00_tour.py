@@ -54,7 +54,7 @@ result = run_frame(frame, stages)
 # %% jupyter={"source_hidden": true} alt="left, a map of the street from above; right, the camera image of the same street; letters A to D mark the same things in both: the car ahead, a parked car, a tree and a car that comes towards us"
 beliefs.append(result.belief)
 spec, occupancy = net.need_architecture().grid, result.belief.probability
-PLACES = {"A": (14, 0, 1), "B": (12, -3, 1), "C": (35, -4.5, 4), "D": (33, 4, 1)}
+PLACES = {"A": (14, 0, 1), "B": (12, -3, 1), "C": (35, -4.5, 4), "D": (48.5, 9.7, 1)}
 fig = lecture_00_tour.picture_and_map(frame, spec, result.refined.argmax(axis=0), PLACES)
 fig.supxlabel(street.credit, fontsize=8)
 plt.show()
@@ -69,7 +69,7 @@ plt.show()
 # ## Stage 1, $l \to o$: where is something?
 #
 # A LIDAR sends out beams of light and measures how far each one gets. So a scan says: nothing on the way, something at
-# the end. But a single beam may be wrong, and things move. **A Bayes filter turns the scans so far into four
+# the end. But a single beam may be wrong, and things move. **A *Bayes filter* turns the scans so far into four
 # probabilities for each cell: FREE, STATIC (something stands there), DYNAMIC (something moves there) and UNKNOWN (no
 # beam was there).**
 #
@@ -264,7 +264,7 @@ plt.show()
 #
 # ## Stage 5, $g \to g$: does a cell fit its neighbours?
 #
-# Each cell has decided by itself, and some look out of place. **A conditional random field (CRF) makes it expensive for
+# Each cell has decided by itself, and some look out of place. **A *conditional random field* (CRF) makes it expensive for
 # neighbours to have different labels, and looks for a cheap map.**
 #
 # *A toy.* Three cells in a row. The outer two are surely road. The middle one is *car* with probability 0.6, *road* with
@@ -499,7 +499,7 @@ assert states[1, 1:].min() > 0.9
 moved = frame.T_world_from_lidar - earlier[0].T_world_from_lidar
 assert abs(moved).max() < 0.25  # less than half a cell, so it is the same place in each scan
 
-# %% [markdown]
+# %% [markdown] tags=["prices"]
 # So the word *car* in one cell needs beams that say where, pixels that say what, and neighbours that agree. The page that `semgrid-edu demo --open` writes tells this story for each cell at a click.
 #
 # To be fast enough, the system simplifies. Five times the course computes the exact answer as well, on a small world,

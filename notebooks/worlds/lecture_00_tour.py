@@ -51,12 +51,8 @@ def picture_and_map(
     axes["legend"].axis("off")
     class_legend(axes["legend"], KITTI_14, labels, loc="upper left", bbox_to_anchor=(0, 1), ncols=3, fontsize=9)
     for letter, (x, y, z) in places.items():
-        aside = {
-            "xytext": (-24 if y < 0 else 24, 14),
-            "textcoords": "offset points",
-            "arrowprops": {"arrowstyle": "->"},
-        }
-        axes["map"].annotate(letter, (y, x), **aside, **NOTE)
+        aside = {"xytext": (22 if y < 0 else -22, 14), "textcoords": "offset points"}
+        axes["map"].annotate(letter, (y, x), arrowprops={"arrowstyle": "->"}, **aside, **NOTE)
         axes["image"].text(*pixels_of(frame, [(x, y, z)])[0], letter, **NOTE)
     return fig
 
