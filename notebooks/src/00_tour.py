@@ -39,11 +39,12 @@ from semgrid_edu.occupancy import State
 from semgrid_edu.pipeline import Stages, network_image, run_frame
 from worlds import lecture_00_tour
 
+plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
+
 # %% [markdown]
 # Here is a real street, and the map that the system makes of it.
 
 # %%
-plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 street = samples.real_drive()  # ten camera images and LIDAR scans in two seconds
 net = load_net(samples.real_weights(), street.camera)
 stages = Stages.fast(net).started()
@@ -71,7 +72,7 @@ plt.show()
 # A LIDAR sends out beams of light and measures how far each one gets. So a scan says: nothing on the way, something at
 # the end. But a single beam may be wrong, and things move. **A *Bayes filter* turns the scans so far into four
 # probabilities for each cell: FREE, STATIC (something stands there), DYNAMIC (something moves there) and UNKNOWN (no
-# beam was there).**
+# beam was there lately).**
 #
 # *A toy.* You believe that a cell is FREE with 0.6, STATIC with 0.3, DYNAMIC with 0.1. Now a beam comes back from it.
 # That happens with probability 0.8 if something is there, whether it stands or moves, and with 0.2 if the cell is free.
@@ -97,14 +98,14 @@ print("FREE, STATIC, DYNAMIC:", (product / product.sum()).round(2))
 # %% jupyter={"source_hidden": true} alt="animation, the occupancy grid seen from above over two seconds: free ground is light and grows ahead, a row of parked cars on the right is dark, cars on the left and ahead are coloured by their velocity and leave dark trails, the rest is grey"
 plotting.animate_occupancy(
     spec,
-    beliefs,
-    [one.time for one in (*earlier, frame)],
+    beliefs[1::2],  # every other scan makes a smaller file
+    [one.time for one in (*earlier, frame)][1::2],
     "free ground grows ahead, parked cars on the right stay dark, moving cars have the colour of their velocity",
 )
 
 # %% [markdown]
-# The parked cars are dark. Cars that move have the colour of their velocity, once the filter has noticed that they move;
-# some leave dark trails on the road. Grey cells are hidden behind something, or no beam came back from there. Lectures
+# The parked cars are dark. Cars that move get the colour of their velocity, once the filter has noticed that they move;
+# some leave dark trails. Grey cells are hidden behind something, or no beam came back from there. Lectures
 # [01](01_bayes.ipynb) to [04](04_cmcdot.ipynb) build this filter, starting with one cell.
 #
 # So the LIDAR says where something is. But no beam comes back with the word *car*.
@@ -149,10 +150,9 @@ plotting.image_labels(small, scores.argmax(axis=0), KITTI_14, ax=ax)
 plt.show()
 
 # %% [markdown]
-# Each pixel has the colour of its highest score. Most of it is right, but look at the sky: it is called building,
-# vegetation or signage. The network has learned from examples that people labelled, and the labels of this street come
-# from LIDAR beams. No beam comes back from the sky. **Where nobody labelled, nobody corrected the network.** Remember
-# this. Lecture [07](07_segmentation.ipynb) builds the network.
+# Each pixel has the colour of its highest score. Most are right, but look at the sky: it is called building, vegetation or
+# signage. The network has learned from examples. The labels of this street belong to LIDAR beams that came back, and no
+# beam comes back from the sky. **Where nothing was labelled, nothing corrected the network.** Remember this. Lecture [07](07_segmentation.ipynb) builds the network.
 #
 # So the camera says what a thing is. But a pixel isn't a place.
 #
@@ -235,7 +235,7 @@ _ = interact(show, height=FloatSlider(value=0, min=0, max=3.8, step=0.2, descrip
 # <details><summary>Answer</summary>
 #
 # *Car* gets 3 - 4 = -1, 3 + 2 = 5 and 3 + 0 = 3, against 0 for *road*. So road, car, car. The filter has moved the car out
-# of the near cell. But in the far cell nothing corrects the image: the map invents half a car.
+# of the near cell. But in the far cell nothing corrects the image: the map may invent a car.
 #
 # </details>
 
@@ -255,9 +255,9 @@ plotting.label_maps(spec, {"semantic grid": grid.argmax(axis=0), "labels, where 
 plt.show()
 
 # %% [markdown]
-# The right map shows what people have labelled: beams that came back, in about twenty scans. In the camera's view a white
-# cell has no label, because no such beam came from it. There the left map guesses, as in the far cell of the toy. Outside the view both maps show only the
-# filter's states, as four classes whose names begin with *unknown*. Lecture [08](08_fusion.ipynb) trains the whole chain,
+# The right map shows labels of beams that came back, in about twenty scans. A white cell in the camera's view has no label,
+# because no such beam came from it. There the left map guesses, as in the far cell of the toy. Outside the view both maps
+# show only the filter's states, as four classes whose names begin with *unknown*. Lecture [08](08_fusion.ipynb) trains the whole chain,
 # and [09](09_truth.ipynb) asks how right labels are.
 #
 # So where a beam was, the filter tells the image which cell it means. Where no beam was, nothing does.
@@ -305,8 +305,8 @@ plt.show()
 # The map looks tidier. Crumbs are gone, but so is most of the sidewalk at the left edge. Lectures [10](10_crf.ipynb) and
 # [11](11_fast_crf.ipynb) are about such bargains.
 #
-# You have now read all of `run_frame`. Without its clock and comments it is this, and each of the five may be replaced by
-# a function of your own:
+# You have now read all of `run_frame`. Without its clock and an optional memory it is this, and you may replace each of
+# the five by a function of your own:
 #
 # ```python
 # belief = stages.track.step(frame)
@@ -330,11 +330,11 @@ plt.show()
 #
 # </details>
 #
-# The first number is the **pixel accuracy**: the share of all cells that are right. The second is the **class accuracy**:
-# for each class take the share of its cells that are found, its *recall*, then the mean over classes. A third one also
-# looks at what a map claims. The *intersection over union* (IoU) of a class is the number of its cells that are right,
-# divided by the cells that are of this class or are called so. **FmIoU** is the mean of these, weighted by how frequent
-# each class is.
+# The first number is the **pixel accuracy**: the share of all cells that are right (the name comes from images). The second
+# is the **class accuracy**: for each class take the share of its cells that are found, its **recall**, then the mean over
+# classes. A third one also looks at what a map claims. The **intersection over union** (IoU) of a class is the number of
+# its cells that are right, divided by the cells that are of this class or are called so. **FmIoU** is the mean of these,
+# weighted by how frequent each class is.
 
 # %% tags=["accuracies", "fmiou"] jupyter={"outputs_hidden": true}
 right, lazy = np.array([ROAD] * 7 + [CAR]), np.full(8, ROAD)
@@ -377,7 +377,7 @@ assert scores_of(after)[1] < scores_of(before)[1] - 10
 #
 # ## Where this breaks: two hundred pedestrians
 #
-# Which class has the best recall? Let us look at the pedestrians.
+# Look at the class that matters most.
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 people = before == PEDESTRIAN
@@ -403,7 +403,7 @@ assert (people & labelled).sum() < 20
 #
 # <details><summary>Answer</summary>
 #
-# Almost all, and all of the ten. The image's pedestrians have no part in it.
+# Almost all, and all of the ten. What looks like a person in the image has no part in it.
 #
 # </details>
 #
@@ -446,7 +446,7 @@ plt.show()
 # %% [markdown]
 # Without a person in the image almost nothing changes. Without UNKNOWN cells the crowd is gone. So these are guesses
 # about places where nobody looked, and a guess in a cell without a label costs nothing in training either. Even the
-# recall of 100 % isn't what it seems, because the ten are found although no pixel looks like them. The network seems to
+# recall of 100 % isn't what it seems, because the ten are found even if no pixel looks like a person. The network seems to
 # know this street by heart.
 #
 # A cure is easy: say nothing where the filter says UNKNOWN. What does the score think of it?
@@ -460,18 +460,18 @@ assert (silent == PEDESTRIAN).sum() < 25
 assert 74 < scores_of(silent)[0] < 77
 
 # %% [markdown]
-# The crowd is gone, and so is a sixth of the pixel accuracy. Labels come from more beams than the filter has had, so
-# some cells that it calls UNKNOWN do have a label. The score rewards a map that guesses. Which of the two maps would you
-# rather drive with?
+# The crowd is gone, and the pixel accuracy falls nearly to that of *always road*. Labels come from more beams than the
+# filter has had, so some cells that it calls UNKNOWN do have a label. The score rewards a map that guesses. With which of
+# the two maps would you rather drive?
 #
 # ## The story of one cell
 #
 # Now you can follow one cell through everything. It is 19 m ahead, in the row of parked cars.
 #
-# First, beams came back from it, scan after scan, so the filter is sure: something stands here (B). But if the planes are
-# empty, the map can say no more than *unknown-static* (C). Second, the camera sees the cell's points: the lower ones on a
-# car, the upper ones on a tree and a house (A). If the filter knows nothing, the map calls the cell *road*. With both, it
-# says *car*, with some doubt left for *vegetation*. Third, the CRF looks at the neighbours and removes this doubt.
+# First, beams came back from it, scan after scan, so the filter is sure: something stands here (B). But without the image
+# the map says only *unknown-static* (C). Second, the camera sees the cell's points: the lower ones on a car, the upper
+# ones on a tree and a house (A). Without the LIDAR the map says *road*. With both it says *car*, with some doubt left for
+# *vegetation*. Third, the CRF looks at the neighbours and removes this doubt.
 
 # %% jupyter={"source_hidden": true} alt="A, the camera image with a column of dots on a parked car; B, bars of the four states after each scan, nearly all static; C, bars of class probabilities: road without the LIDAR, unknown-static without the image, car with both, and more surely car after the CRF"
 CELL = (103, 38)

@@ -147,6 +147,8 @@ def _bars(ax: Axes, rows: Mapping[str, NDArray], colours: Sequence[tuple[int, in
     """Draw rows of probabilities as stacked bars, from top to bottom."""
     left = np.zeros(len(rows))
     for values, colour in zip(np.stack(list(rows.values()), axis=1), colours, strict=True):
+        if values.max() < 0.005:
+            continue  # too thin to be seen
         ax.barh(range(len(rows)), values, left=left, color=np.divide(colour, 255), edgecolor="0.5", linewidth=0.4)
         left = left + values
     ax.set_yticks(range(len(rows)), list(rows), fontsize=9)
