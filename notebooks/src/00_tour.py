@@ -64,8 +64,10 @@ plt.show()
 # The map shows the street from above. We are at the bottom and look up the page. The letters mark the same things in
 # both pictures: a car ahead of us (A), a parked car (B), a tree (C), and a car that comes towards us (D). A cell is
 # half a metre wide. Row 0 of the array is the farthest ahead, column 0 the leftmost; x points forward, y to the left.
+# Outside the camera's view the map says only *unknown*.
 #
-# All of this happened in the line with `run_frame`. The rest of this page opens it, one stage after the other.
+# `track.step` took in nine earlier scans. All the rest happened in the last line, `run_frame`. This page opens it, one
+# stage after the other.
 #
 # ## Stage 1, $l \to o$: where is something?
 #
@@ -114,8 +116,8 @@ plotting.animate_occupancy(
 #
 # The camera can say *car*. **A neural network gives each pixel a score for each of 14 classes: the higher, the more the
 # pixel looks like this class.** Our network is called SegNet. Its main part is the **convolution**: a small table of
-# weights slides over the image, and each output is a weighted sum of the pixels around it. Many such layers, one after
-# the other, see larger and larger parts of the image.
+# weights slides over the image, and each output is a weighted sum of the pixels around it. Many such layers in a
+# row see larger and larger parts of the image.
 #
 # A score isn't a probability. A **soft-max** makes probabilities of scores: take $e$ to the power of each, then divide
 # by the sum.
@@ -257,7 +259,7 @@ plt.show()
 # %% [markdown]
 # The right map shows labels of beams that came back, in about twenty scans. A white cell in the camera's view has no label,
 # because no such beam came from it. There the left map guesses, as in the far cell of the toy. Outside the view both maps
-# show only the filter's states, as four classes whose names begin with *unknown*. Lecture [08](08_fusion.ipynb) trains the whole chain,
+# show only the filter's states, as four *unknown* classes. Lecture [08](08_fusion.ipynb) trains the whole chain,
 # and [09](09_truth.ipynb) asks how right labels are.
 #
 # So where a beam was, the filter tells the image which cell it means. Where no beam was, nothing does.
@@ -395,8 +397,8 @@ assert (people & labelled).sum() < 20
 # accuracy nor recall nor IoU counts them. **A score over labelled cells can't see what a map invents elsewhere.**
 #
 # Why does the map invent people? A first suspect is the image: perhaps the few pixels that look like a person are
-# smeared along their rays, like the cars on the planes. Test it by switching it off. Paint every person out: each pixel
-# that the network calls *pedestrian*, and some around it, gets the scores of its nearest other neighbour.
+# smeared along their rays, like the cars on the planes. Switch that off. Paint every person out: each pixel that the
+# network calls *pedestrian*, and some around it, gets the scores of its nearest other neighbour.
 #
 # **Predict before you run.** Of the two hundred cells, how many are still called pedestrian: almost none, half, or almost
 # all? And of the ten true ones?
@@ -410,7 +412,7 @@ assert (people & labelled).sum() < 20
 # A second suspect is that nobody looked there: most of these cells are UNKNOWN to the filter. Switch this off, too. Leave
 # the image as it is, and tell the fusion that all UNKNOWN cells in view are STATIC, or that they are FREE.
 
-# %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
+# %%
 painted = lecture_00_tour.painted_over(scores, PEDESTRIAN)
 unseen = seen.any(axis=0) & (occupancy.argmax(axis=0) == State.UNKNOWN)
 tests = {"as it is": (planes, occupancy), "people painted out": (stages.sample(painted), occupancy)}
@@ -421,12 +423,11 @@ for state in (State.STATIC, State.FREE):
     tests[f"unseen cells {state.name}"] = planes, told
 
 tests = {name: stages.fuse(*inputs).argmax(axis=0) for name, inputs in tests.items()}
-for name, called in tests.items():
-    print(
-        f"{name:<20} {(called == PEDESTRIAN).sum():3d} called pedestrian, {(called[is_one] == PEDESTRIAN).sum()} right"
-    )
 
-# %% jupyter={"source_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true, "outputs_hidden": true}
+for name, called in tests.items():
+    n, found = (called == PEDESTRIAN).sum(), (called[is_one] == PEDESTRIAN).sum()
+    print(f"{name:<20} {n:3d} called pedestrian, {found} right")
 _, painted_out, *made_seen = tests.values()
 assert (painted_out[is_one] == PEDESTRIAN).all()
 assert (painted_out == PEDESTRIAN).sum() > 195
@@ -466,7 +467,7 @@ assert 74 < scores_of(silent)[0] < 77
 #
 # ## The story of one cell
 #
-# Now you can follow one cell through everything. It is 19 m ahead, in the row of parked cars.
+# Follow one cell through everything. It is 19 m ahead, in the row of parked cars.
 #
 # First, beams came back from it, scan after scan, so the filter is sure: something stands here (B). But without the image
 # the map says only *unknown-static* (C). Second, the camera sees the cell's points: the lower ones on a car, the upper
@@ -508,7 +509,7 @@ assert abs(moved).max() < 0.25  # less than half a cell, so it is the same place
 # - two beams with the same error count as two witnesses (lecture [02](02_grids.ipynb));
 # - two things that may have moved into one cell don't know of each other ([03](03_bof.ipynb));
 # - random particles stand for all places and velocities ([04](04_cmcdot.ipynb));
-# - cells of the CRF agree step by step instead of all together ([10](10_crf.ipynb));
+# - neighbours in the CRF are treated as if they were independent ([10](10_crf.ipynb));
 # - classes are forgotten from one frame to the next ([14](14_memory.ipynb)).
 #
 # ## In five lines
