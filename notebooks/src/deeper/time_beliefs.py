@@ -13,7 +13,7 @@
 # - say what data association is, and why a grid has none.
 #
 # **Prerequisites.** Lectures [01](../01_bayes.ipynb) and [03](../03_bof.ipynb); factors and d-separation, as in
-# [graphical models](graphical_models.ipynb). Lecture [04](../04_cmcdot.ipynb) comes after this page.
+# [graphical models](../01b_graphical_models.ipynb). Lecture [04](../04_cmcdot.ipynb) comes after this page.
 #
 # **Time.** 45 minutes, of which the computer needs a few seconds.
 
