@@ -43,11 +43,9 @@ def any_model(parents):
 # %% [markdown]
 # ## Does one thing tell about another?
 #
-# A beam comes back from somewhere ahead. What does it tell about the cell behind, which it never reached? And what
-# about the same cell a second later?
-#
-# We could answer every such question if we knew how probable each possible map is. But the paper's grid has 55,025
-# cells. If each is free or occupied, there are $2^{55025}$ maps, and nobody can store a number for each.
+# A beam comes back from somewhere ahead. What does it tell about the cell behind, which it never reached? And about the
+# same cell a second later? We could answer all such questions if we knew how probable each map is. But the paper's grid
+# has 55,025 cells. If each is free or occupied, there are $2^{55025}$ maps, and nobody can store a number for each.
 #
 # So each stage of the system stores something smaller, for example one number per cell. It can do so only because it
 # assumes that some things tell nothing about others. In code such assumptions are hard to find. A graph shows them.
@@ -89,8 +87,8 @@ plt.show()
 # | **free** | 0.9 · 0.95 = 0.855 | 0.9 · 0.05 = 0.045 |
 # | **occupied** | 0.1 · 0.2 = 0.02 | 0.1 · 0.8 = 0.08 |
 #
-# How probable is a return? Add its column: 0.045 + 0.08 = 0.125. A return did come. How probable is *occupied* now? Keep
-# this column only, and divide by its sum: 0.08 / 0.125 = 0.64. That is Bayes' rule, and no formula was needed.
+# How probable is a return? Add its column: 0.125. A return did come. How probable is *occupied* now? Keep this column
+# only, and divide by its sum: 0.08 / 0.125 = 0.64. That is Bayes' rule, and no formula was needed.
 #
 # You did three things with the table: you *multiplied*, you *summed out* a variable, and you *sliced* at what is known.
 # With the division at the end, these give every probability in this course. A table of non-negative numbers whose axes
@@ -115,14 +113,14 @@ print("P(z) =", joint.sum("m").table.round(3), "  P(m | return) =", joint.given(
 #
 # <details><summary>Answer</summary>
 #
-# Before the beam: one of the two alone 0.2 · 0.8 = 0.16 each, both 0.04, none 0.64. The return rules out *none*, and
-# 0.36 is left. So $m_2$ has (0.16 + 0.04) / 0.36 = 0.56. If $m_1$ is occupied, only *$m_1$ alone* and *both* are left:
-# 0.04 / (0.16 + 0.04) = 0.2. So it goes down, to where it was before the beam, because $m_1$ already explains the
+# Before the beam: each of the two alone 0.2 · 0.8 = 0.16, both 0.04, none 0.64. The return rules out *none*, and 0.36
+# is left. So $m_2$ has (0.16 + 0.04) / 0.36 = 0.56. If $m_1$ is occupied, only *$m_1$ alone* and *both* are left, and
+# both has 0.04 / 0.20 = 0.2. So it goes down, to where it was before the beam, because $m_1$ already explains the
 # return.
 #
 # </details>
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 cells = [Factor("m1", [0.8, 0.2]), Factor("m2", [0.8, 0.2])]
 returns = Factor(("m1", "m2", "z"), [[[1, 0], [0, 1]], [[0, 1], [0, 1]]])  # no return only if both are free
 one_of_you = GraphicalModel([*cells, returns], parents={"z": ("m1", "m2")})
@@ -307,7 +305,7 @@ np.testing.assert_allclose(after.table, START.table @ M @ M)  # lecture 01's pre
 #
 # </details>
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 street = Factor("street", [0.5, 0.5])  # motorway, market place
 six = [Factor(("street", f"m{k}"), [[0.95, 0.05], [0.7, 0.3]]) for k in range(1, 7)]
 others = [f"m{k}" for k in range(2, 7)]
@@ -340,9 +338,9 @@ assert largest[-1] == 2**14
 # The answer is the same, and the cost isn't. **To sum a variable out is to link all its neighbours**: each cell hints at
 # the street, and so at every other cell.
 #
-# Is there always a good order? In a square of neighbouring cells there isn't (right). A good order needs about sixteen
-# thousand entries for ten by ten cells in place of $2^{100}$ maps, but the table still doubles with about each row
-# of the square. The paper's grid is 355 by 155 cells, and its CRF links even every cell with every other.
+# Is there always a good order? In a square of neighbouring cells there isn't (right). For ten by ten cells a table of
+# sixteen thousand entries is enough, in place of $2^{100}$ maps, but it still grows exponentially with the side. The
+# paper's grid has 155 cells on its shorter side, and its CRF links even every cell with every other.
 #
 # So an answer costs as much as its largest table. On a chain that is little. On a grid it is too much, and **this is
 # why the course needs approximations**.
@@ -350,10 +348,8 @@ assert largest[-1] == 2**14
 # ## How do we get all answers at once?
 #
 # Elimination answers one question. Now we want to know what the cell was *before*, *now* and *after*. Must we start
-# again for each?
-#
-# Our cell is scanned at each time by the beam of the first table: no return, then a return, then again no return. A
-# scan that has happened is a slice of its table, so it is a factor of one variable.
+# again for each? Our cell is scanned each time by the beam of the first table: no return, a return, no return. A scan
+# that has happened is a slice of its table, so it is a factor of one variable.
 
 # %% jupyter={"source_hidden": true} alt="factor graph of the chain before, now, after, with squares for the prior, the matrix M between two times and the scan at each; blue arrows above it run to the right and say forward, orange arrows below run to the left and say backward"
 NOTHING, RETURN = np.array([0.95, 0.2]), np.array([0.05, 0.8])  # P(z | FREE), P(z | OCCUPIED)
@@ -418,34 +414,40 @@ np.testing.assert_allclose(all_answers.messages["now", "f(now, after)"], filtere
 # what has been seen until now?
 #
 # On any graph without loops two sweeps are enough, because each message holds what is on one side of an edge, and the
-# two sides have nothing in common. With a maximum in place of each sum, the messages find the most probable sequence as
-# a whole (the algorithm of **Viterbi**).
+# two sides have nothing in common. With a maximum in place of each sum, messages find the most probable sequence as a
+# whole: the algorithm of **Viterbi**.
 #
 # ## Which graphs does this course use?
 #
 # Three of them, and each has one large question.
 
-# %% tags=["stages"] jupyter={"source_hidden": true} alt="left, a cell at three times in a row of arrows, each with an arrow to its shaded scan, and two more cells faintly boxed as copies; right, four cells at the corners of a square, each pair linked through a black square"
+# %% tags=["stages"] jupyter={"source_hidden": true} alt="left, a cell at three times in a row of arrows, each with an arrow to its shaded scan, all inside a box labelled each cell; right, four cells at the corners of a square, each pair linked through a black square, and one more square at each cell"
 fig, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained", width_ratios=(1.5, 1))
-STEPS = {"m1": ("m0",), "m2": ("m1",), "z0": ("m0",), "z1": ("m1",), "z2": ("m2",)}
-SCANS = ("z0", "z1", "z2")
-draw(any_model(STEPS), axes[0], observed=SCANS, positions=in_rows(["m0", None, "m1", None, "m2"], ["z0", None, "z1", None, "z2"]),
-     plates={"each cell": ("m0", "m1", "m2", *SCANS)})  # fmt: skip
+draw(
+    any_model(CELL_IN_TIME),
+    axes[0],
+    observed=("z1", "z2", "z3"),
+    positions=ROWS,
+    plates={"each cell": ("before", "now", "after", "z1", "z2", "z3")},
+)
 CORNERS = {"x1": (0, 0), "x2": (1.8, 0), "x3": (1.8, -1.8), "x4": (0, -1.8)}
 pairs = [(one, other) for one in CORNERS for other in CORNERS if one < other]
+beside = {f"f({name})": (1.4 * x - 0.36, 1.3 * y + 0.3) for name, (x, y) in CORNERS.items()}
 diagonals = {"f(x1, x3)": (0.6, -0.6), "f(x2, x4)": (1.2, -0.6)}
-draw(GraphicalModel(Factor(pair, AGREE) for pair in pairs), axes[1], positions=CORNERS | diagonals)
+own = [Factor(name, [1, 2]) for name in CORNERS]
+crf = GraphicalModel([*own, *(Factor(pair, AGREE) for pair in pairs)])
+draw(crf, axes[1], positions=CORNERS | diagonals | beside)
 axes[0].set_title("one cell over time", fontsize=10)
 axes[1].set_title("the CRF, on four cells", fontsize=10)
 plt.show()
 
 # %% [markdown]
-# **One cell over time** (lectures 02 to 04). The box is a **plate**: all this is there once for each cell. Between two
-# plates there is no edge, so the filters of a cell ask no neighbour. In lecture 03 things move from cell to cell, and
-# then this promise is broken.
+# **One cell over time** (lectures 02 to 04). The box is a **plate**: all this is there once for each cell. No edge links
+# two plates, so each cell is filtered by itself. In lecture 03 things move from cell to cell, and this promise is
+# broken.
 #
-# **The CRF** (lectures 10 and 11). Every cell is linked with every other, through a table that rewards agreement. There
-# are loops everywhere and no cheap order. Lecture 10 shows what one does then.
+# **The CRF** (lectures 10 and 11). Each cell has a table of its own, what the network says of it, and one with every
+# other cell that rewards agreement. There are loops everywhere and no cheap order. Lecture 10 shows what one does then.
 #
 # **The whole system** (lecture 00). Above is the world, below is what the system computes. The world $w$ goes on from
 # one instant to the next. LIDAR $l$ and image $i$ see it. The occupancy $o$ comes from the scans. The network's scores
@@ -453,7 +455,7 @@ plt.show()
 
 # %% jupyter={"source_hidden": true} alt="two columns, t-1 and t: the world w with an arrow to the next, arrows from w to the shaded readings l and i; l to o, i to s to p, o and p to g; o has an arrow to the next o, and a dashed arrow leads from g to the next g"
 SYSTEM, WHERE, WORDS = {"w1": ("w0",), "o1": ("l1", "o0")}, {}, {}
-COLUMN = {"w": (1, 0), "l": (0, -1), "i": (2, -1), "o": (0, -2.6), "s": (2, -1.9), "p": (2, -2.8), "g": (1, -3.6)}
+COLUMN = {"w": (1, 0), "l": (0, -1), "i": (2, -1), "o": (0, -2.3), "s": (2, -1.75), "p": (2, -2.85), "g": (1, -3.6)}
 for t in (0, 1):
     own = {"l": "w", "i": "w", "s": "i", "p": "s"}
     SYSTEM |= {f"{child}{t}": (f"{parent}{t}",) for child, parent in own.items()} | {f"g{t}": (f"o{t}", f"p{t}")}
@@ -484,8 +486,7 @@ print("the earlier image and the world, given o and p:", why_dependent(system, "
 # blocked. But about the *world* that image still has something to tell, because a path is open. So the system forgets
 # something that is worth knowing. Lecture 14 puts this edge back, and measures what it was worth.
 #
-# So with a graph you can ask three things of each stage: what are its unknowns, what tells about what, and is the
-# answer exact?
+# So ask three things of each stage: what are its unknowns, what tells about what, and is the answer exact?
 #
 # ## Where this breaks: an echo
 #
@@ -503,7 +504,7 @@ print("the earlier image and the world, given o and p:", why_dependent(system, "
 # </details>
 
 
-# %%
+# %% jupyter={"outputs_hidden": true}
 def neighbours(agreement, scan, closed=True):
     """Return three cells that like to agree; the first is scanned. A row, or a triangle if `closed`."""
     pairs = [("m1", "m2"), ("m2", "m3"), ("m1", "m3")][: 3 if closed else 2]
@@ -535,7 +536,7 @@ def echo(scan, ax):
     ax.set_title(f"a scan says {scan:g}", fontsize=10)
 
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, three cells in a triangle of squares with orange arrows running round it; middle and right, P(m1 occupied) against the factor for scans of 0.8 and 0.6: exact and messages in a row are flat, messages in a triangle rise, the steeper the weaker the scan"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, three cells in a triangle of squares with orange arrows running round it; middle and right, P(m1 occupied) against the factor for scans of 0.8 and 0.6: exact and messages in a row are flat, messages in a triangle rise with the factor"
 fig, axes = plt.subplots(1, 3, figsize=(10, 3), layout="constrained", width_ratios=(1, 1.2, 1.2))
 TRIANGLE = {"m1": (0, 0), "m2": (1.9, 0), "m3": (0.95, 1.45)}
 draw(neighbours(3, 0.8), axes[0], positions=TRIANGLE | {"f(m1)": (-0.6, 0)})
@@ -565,13 +566,11 @@ def show(scan):
 _ = interact(show, scan=FloatSlider(value=0.8, min=0.5, max=0.99, step=0.01))
 
 # %% [markdown]
-# The loop is the cause: take one factor of the triangle away, and the messages are exact again (blue). With the loop, a
-# strong agreement passes a loud echo on, and a weak hint of 0.6 is believed much too much. (The dial works with a
-# running kernel. What happens at 0.5?)
+# The loop is the cause: take one factor of the triangle away, and the messages are exact again (blue). With the loop, the
+# stronger the agreement, the louder the echo. (The dial works with a running kernel. Why is there no echo at 0.5?)
 #
-# Two more limits. Everything here has few states; velocities need more, and lectures 03 and 04 say what to do. And no
-# method repairs a wrong graph. If two beams share an error, and the graph has no node for it, even exact inference is
-# too sure. Lecture [02](02_grids.ipynb) shows that on a wall.
+# And no method repairs a wrong graph. If two beams share an error, and the graph has no circle for it, even exact
+# inference is too sure. Lecture [02](02_grids.ipynb) shows that.
 #
 # ## In five lines
 #
@@ -587,9 +586,9 @@ _ = interact(show, scan=FloatSlider(value=0.8, min=0.5, max=0.99, step=0.01))
 #
 # - Bishop, *Pattern Recognition and Machine Learning*, Springer 2006, chapter 8: the same material, for continuous
 #   variables too.
-# - Koller, Friedman, *Probabilistic Graphical Models*, MIT Press 2009, chapters 3, 4, 9 and 10: the reference.
-# - Kschischang, Frey, Loeliger, *Factor graphs and the sum-product algorithm*, IEEE Transactions on Information Theory
-#   47(2), 2001.
+# - Koller, Friedman, *Probabilistic Graphical Models*, MIT Press 2009, the reference.
+# - Kschischang, Frey, Loeliger, *Factor graphs and the sum-product algorithm*, IEEE Transactions on Information
+#   Theory, 2001.
 # - Pearl, *Probabilistic Reasoning in Intelligent Systems*, Morgan Kaufmann 1988: d-separation, by its inventor.
 #
 # [Exercise 01b](exercises/01b_graphical_models.ipynb): tables with named axes, reports that aren't certain, independence
