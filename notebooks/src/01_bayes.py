@@ -16,8 +16,7 @@
 #
 # **Time.** 74 minutes, of which the computer needs a few seconds.
 #
-# **Paper.** Section 3.2, steps 1 to 3, for a single cell: prediction by a transition matrix, update by a sensor
-# model, estimate.
+# **Paper.** Section 3.2, for a single cell: prediction by a transition matrix, update by a sensor model, estimate.
 
 # %% jupyter={"source_hidden": true}
 import matplotlib.pyplot as plt
@@ -101,8 +100,8 @@ plotting.animate(ring_frames(), period=0.7, alt="a belief follows a vehicle roun
 #
 # <details><summary>Answer</summary>
 #
-# Beside a pole 0.1 · 0.8 = 0.08, three times; elsewhere 0.1 · 0.1 = 0.01, seven times. They sum to 0.31. So cell 3 gets
-# 0.08 / 0.31 = 0.26 and cell 5 gets 0.01 / 0.31 = 0.03.
+# Beside a pole 0.1 · 0.8 = 0.08, elsewhere 0.1 · 0.1 = 0.01. Three of the first and seven of the second sum to 0.31. So
+# cell 3 gets 0.08 / 0.31 = 0.26, and cell 5 gets 0.03.
 #
 # </details>
 #
@@ -143,13 +142,13 @@ plt.show()
 # The odometer says: one cell forward. Odometers err too. With probability 0.1 the vehicle hasn't left its cell, with
 # 0.8 it has moved by one, with 0.1 by two.
 #
-# **Predict before you run.** The belief is 0.26 in the cells 2, 3 and 7, and 0.03 elsewhere. What is it in cell 3 after
-# the move? Ask from where one can get there.
+# **Predict before you run.** The belief is the last posterior. What is it in cell 3 after the
+# move? Ask from where one can get there.
 #
 # <details><summary>Answer</summary>
 #
-# From 2 by one: 0.8 · 0.26 = 0.206. From 3, not moved: 0.1 · 0.26 = 0.026. From 1 by two: 0.1 · 0.03 = 0.003. Together
-# 0.24. Nothing needs to be normalised: what leaves one cell arrives in another.
+# From the cell before, by one: 0.8 · 0.26 = 0.21. From cell 3 itself, not moved: 0.1 · 0.26 = 0.03. From two cells
+# before hardly anything. Together 0.24. Nothing needs to be normalised: what leaves one cell arrives in another.
 #
 # </details>
 #
@@ -189,7 +188,7 @@ plt.show()
 
 # %% [markdown]
 # The middle row is the upper one, one cell to the right and blunter. In the lower row cell 3 has 0.55. Neither reading
-# could tell 2, 3 and 7 apart, but their order in time could. And the order of the two steps matters: a reading is about
+# could tell the poles apart, but their order in time could. And the order of the two steps matters: a reading is about
 # where the vehicle is *now*, so predict first.
 #
 # So **prediction carries what was seen there and then to here and now**.
@@ -230,7 +229,7 @@ def entropy(belief):
 
 # %% [markdown]
 # The **entropy** $-\sum_n b(n) \log_2 b(n)$ counts uncertainty in bits: 0 if one cell has everything, 1 for two cells
-# in balance, $\log_2 10 = 3.3$ for ten.
+# in balance, 3.3 for ten.
 #
 # **Predict before you run.** One of the two steps can never lower the entropy on this road. Which one? And is it true
 # that the other can never raise it?
@@ -300,8 +299,8 @@ _ = interact(show, **sliders)
 #
 # <details><summary>Answer</summary>
 #
-# It multiplies by 0.8² = 0.64 there, and by 0.1² = 0.01 elsewhere: 0.064 three times, 0.001 seven times. So the three
-# cells get 0.192 / 0.199 = 0.96. The filter is sure of something that it hasn't seen.
+# It multiplies twice: by 0.64 in all beside a pole, and by 0.01 elsewhere. So the three cells get 0.96. The filter is
+# sure of something that it hasn't seen.
 #
 # </details>
 
@@ -310,8 +309,8 @@ twice = update(P_POLE, one_reading)
 print(f"on the three cells with poles: once {one_reading[POLES].sum():.2f}, counted twice {twice[POLES].sum():.2f}")
 
 # %% [markdown]
-# Multiplication has one more danger. Suppose you are certain that the vehicle is in cell 5: $b(5) = 1$, all others 0.
-# No pole is there, and the sensor says *pole* ten times. You still believe in cell 5, because 0 times anything is 0. Had
+# Multiplication has one more danger. Suppose you are certain that the vehicle is in cell 5, where no pole is. All other
+# cells have 0. The sensor says *pole* ten times. You still believe in cell 5, because zero times anything is zero. Had
 # you given cell 7 one in a thousand, four readings would have turned you round.
 
 # %%
@@ -323,16 +322,16 @@ print(f"after four readings: cell 5 {nearly[5]:.2f}, cell 7 {nearly[7]:.2f}")
 assert nearly[7] > 0.5
 
 # %% [markdown]
-# So **no zeros in a model, and let the prediction leak a little to everywhere**. Computers make zeros of their own: the
-# product of 500 likelihoods of 0.1 is 0 in floating point. Normalise at each step, or add logarithms, as lecture 02 will.
+# So **no zeros in a model, and let the prediction leak a little to everywhere**. Computers make zeros of their own,
+# because the product of very many likelihoods is too small for a floating-point number. Normalise at each step, or add
+# logarithms, as lecture 02 will.
 #
 # In short, readings may be multiplied if each brings its own error, and each counts once.
 #
 # ## What is it now, and what was it then?
 #
-# At step 3 of the trip the filter's best guess was wrong: it said cell 3, and the vehicle was in cell 2. Two steps later
-# it knew better. Can later readings correct an earlier place? Draw what depends on what. An arrow means: depends
-# directly.
+# At step 3 of the trip the filter's best guess was wrong: it was one cell ahead. Can later readings correct that? Draw
+# what depends on what. An arrow means: depends directly.
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a row of four places n0 to n3, an arrow from each to the next; below each place the shaded reading z, with an arrow from the place to it"
 line = bayes_on_a_line()
@@ -348,16 +347,16 @@ assert history[3].argmax() == 3 != places[3] == 2
 # through the present. (Such a model is a **hidden Markov model**.) But what $n_1$ *was* is another question. The
 # reading $z_2$ tells about it, too, against the arrows.
 #
-# How? After the first reading, *pole*, the cells 2, 3 and 7 had 0.26 each. Then came another *pole*.
+# How? Go back to the first two readings. After the first *pole*, each cell with a pole had 0.26. Then came another one.
 #
-# **Predict before you run.** For each of the three cells: if the vehicle was there at the first reading, how probable was
-# the second *pole*? Which cell wins in hindsight?
+# **Predict before you run.** For each of these cells: if the vehicle was there at the first reading, how probable was the
+# second *pole*? Which cell wins in hindsight?
 #
 # <details><summary>Answer</summary>
 #
-# From 2 it stays with 0.1, goes to 3 with 0.8, or to 4 with 0.1: 0.1 · 0.8 + 0.8 · 0.8 + 0.1 · 0.1 = 0.73. From 3, and
-# from 7: 0.1 · 0.8 + 0.8 · 0.1 + 0.1 · 0.1 = 0.17. This is a likelihood like any other, so update with it: cell 2
-# rises to 0.55, and 3 and 7 fall to 0.13.
+# From cell 2 it stays beside a pole, moves to the next pole, or beyond it: 0.1 · 0.8 + 0.8 · 0.8 + 0.1 · 0.1 = 0.73.
+# From the other two only staying keeps it beside a pole: 0.1 · 0.8 + 0.9 · 0.1 = 0.17. This is a likelihood
+# like any other, so update with it: cell 2 rises to 0.55, and the other two fall to 0.13.
 #
 # </details>
 #
@@ -367,7 +366,7 @@ assert history[3].argmax() == 3 != places[3] == 2
 # $$ P(n_t = n \mid \text{all } z) \propto b_t(n)\, \beta_t(n), \qquad
 # \beta_{t-1}(n) = \sum_{d} P(d)\; P(z_t \mid n + d)\; \beta_t(n + d) $$
 
-# %% tags=["smooth"]
+# %% tags=["smooth"] jupyter={"outputs_hidden": true}
 MOVE = np.array([predict(place, MOVED) for place in np.eye(N_CELLS)])  # row i: where a vehicle in cell i will be
 
 
@@ -401,6 +400,7 @@ fig.colorbar(axes[0].images[0], ax=axes, label="probability")
 plt.show()
 
 # %%
+assert smooth(history, says_pole)[3].argmax() == places[3]
 rng, right = np.random.default_rng(0), np.zeros(3)
 for _ in range(400):
     places, heard = trip(30, rng)
@@ -412,10 +412,11 @@ print("400 trips, right: filter {:.0%}, smoother {:.0%}, last reading alone {:.0
 assert right[1] > right[0] + 0.1 > right[2] + 0.3
 
 # %% [markdown]
-# Over 400 trips of 30 steps, the filter names the right cell in 45 % of the steps and the smoother in 59 %. (A trivial
-# rule that looks at the last reading alone is right in 17 %.) But the filter isn't worse. It is exact for its own
-# question, and at the last step both are the same belief. A vehicle that must act now asks the filter. A map that is
-# made after the drive asks the smoother.
+# On this trip the smoother corrects step 3, and nearly all others. Over 400 random trips the filter names the right cell
+# in 45 % of the steps and the smoother in 59 %. (A trivial rule that looks at the last reading alone is right in 17 %.)
+# But the filter isn't worse. It is exact for its own question, and at the last step both are the same belief.
+#
+# So a vehicle that must act now asks the filter, and a map that is made after the drive asks the smoother.
 #
 # ## What if the place is known and the map isn't?
 #
@@ -425,8 +426,8 @@ assert right[1] > right[0] + 0.1 > right[2] + 0.3
 #
 # Update is the same function. And predict? A cell doesn't move, but its *state* changes, because cars come and go. Say
 # that from one scan to the next a free cell becomes occupied with 0.1, and an occupied one free with 0.2. These numbers
-# form a **transition matrix** $M$, from row to column, so each row sums to one. The prediction is $b M$. By
-# hand: FREE 0.6, OCCUPIED 0.4 becomes FREE 0.6 · 0.9 + 0.4 · 0.2 = 0.62.
+# form a **transition matrix** $M$, whose rows say *from* and columns say *to*, so each row sums to one. The prediction is
+# $b M$. By hand, with FREE at 0.6: it becomes 0.6 · 0.9 + 0.4 · 0.2 = 0.62.
 
 # %% jupyter={"source_hidden": true}
 M = np.array([[0.9, 0.1], [0.2, 0.8]])
@@ -491,14 +492,15 @@ plt.show()
 assert abs(ends[0] - ends[1]) < 0.02 < ends[1] - ends[2]
 
 # %% [markdown]
-# With the right matrix both LIDARs forget alike, and both end at $p_\infty$ = 0.25: what is believed of a cell of which
-# nothing is known any more. (With more states the rates $R$ form a matrix, and $M = e^{R \Delta t}$. Lecture 04 has four.)
+# Here $\alpha$ = 0.5 and $\gamma$ = 1.5 a second. With the right matrix both LIDARs forget alike, and both end at
+# $p_\infty$ = 0.25: what is believed of a cell of which nothing is known any more. (With more states the rates $R$ form a
+# matrix, and $M = e^{R \Delta t}$. Lecture 04 has four.)
 #
 # So one cell of a map is filtered like a place on a road. Lecture 02 does it for thousands of cells at once.
 #
 # ## Where this breaks: sure and wrong
 #
-# A filter says how sure it is. Is it right to be? Over 400 trips, take the belief that it gives to its best guess, and
+# A filter says how sure it is. Is it right to be? Over many trips, take the belief that it gives to its best guess, and
 # see how often the vehicle is there. If the two agree, the filter is called **calibrated**. Now break one assumption at
 # a time.
 
@@ -553,7 +555,7 @@ assert all(claim > truth + 0.1 for claim, truth in broken)
 #
 # ## Further reading and exercise
 #
-# - Labbe, *Kalman and Bayesian Filters in Python*, chapter 2: [the discrete Bayes
+# - Labbe, *Kalman and Bayesian Filters in Python*: [the discrete Bayes
 #   filter](https://github.com/rlabbe/Kalman-and-Bayesian-Filters-in-Python), by `filterpy`'s author.
 # - Thrun, Burgard, Fox, *Probabilistic Robotics*, MIT Press 2005: localisation on a map.
 # - Rabiner, *A tutorial on hidden Markov models*, Proceedings of the IEEE, 1989: filter and smoother.

@@ -55,7 +55,7 @@ STAGES = (
         "line",
         "Bayes' rule on a line",
         lecture_01_line.bayes_on_a_line,
-        lecture_01_line.CUT,
+        (),
         "tests/worlds/test_line.py::test_forward_messages_are_lecture_01s_recursion",
         "01_bayes#graph",
     ),
