@@ -25,7 +25,6 @@ from filterpy import discrete_bayes
 from ipywidgets import FloatSlider, interact
 
 from semgrid_edu import plotting
-from semgrid_edu.graphical import d_separated
 from worlds.lecture_01_line import bayes_on_a_line, filtered, smoothed
 from worlds.lecture_01_lines import belief_history, probability_lines
 
@@ -39,7 +38,7 @@ plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 # says *pole* with probability 0.8 beside a pole, and with probability 0.1 elsewhere. The map is known. Where is the
 # vehicle?
 #
-# Here is what a filter believes over 25 readings. Each bar is the probability of a cell; a bar of one half reaches the
+# Here is what a filter believes from reading to reading. Each bar is the probability of a cell; a bar of one half reaches the
 # dotted circle. The orange circle is the vehicle, which the filter can't see.
 
 # %% jupyter={"source_hidden": true}
@@ -48,39 +47,42 @@ N_CELLS = 10
 P_POLE = np.where(np.isin(np.arange(N_CELLS), POLES), 0.8, 0.1)  # P("pole" | cell), for each cell
 TRIP = [0, 1, 2, 2, 3, 4, 5, 5, 6, 7, 8, 9, 0, 1, 2, 3, 5, 6, 7, 8, 9, 0, 1, 2, 3]  # drawn at random, see below
 SAYS_POLE = [2, 3, 4, 9, 15, 18, 23, 24]  # the steps at which the sensor says "pole"
+AROUND = np.array([(np.sin(angle), np.cos(angle)) for angle in 2 * np.pi * np.arange(N_CELLS) / N_CELLS])  # x, y
 
 
-def draw_ring(ax, belief, place, title):
-    """Draw a belief as bars around the ring, the poles as triangles and the vehicle as a circle."""
-    ax.clear()
+def ring():
+    """Draw the road and the poles; return what changes: the bars, the circle of the vehicle and the title."""
+    ax = plt.subplots(figsize=(3.9, 4.1), layout="constrained")[1]
     for radius, style in ((1, "-"), (1.5, ":")):
         ax.add_patch(plt.Circle((0, 0), radius, fill=False, color="0.8", linestyle=style, zorder=0))
-    for n, b in enumerate(belief):
-        x, y = np.sin(2 * np.pi * n / N_CELLS), np.cos(2 * np.pi * n / N_CELLS)
-        ax.plot([x, x * (1 + b)], [y, y * (1 + b)], color="#0072b2", linewidth=14, solid_capstyle="butt")
+    bars = [ax.plot([], [], color="#0072b2", linewidth=14, solid_capstyle="butt")[0] for _ in range(N_CELLS)]
+    for n, (x, y) in enumerate(AROUND):
         ax.text(0.85 * x, 0.85 * y, n, ha="center", va="center", fontsize=9)
-        ax.plot(*((0.65 * x, 0.65 * y, "k^") if n in POLES else ([], [])), markersize=9)
-        ax.plot(*((x, y) if n == place else ([], [])), "o", ms=14, mfc="none", color="#d55e00", mew=3)
+    ax.plot(*(0.65 * AROUND[POLES].T), "k^", markersize=9)
     for letter, at in {"A": (0.38, 0.0), "B": (-0.36, -0.2)}.items():
         ax.text(*at, letter, fontsize=14, fontweight="bold", ha="center", va="center")
+    (vehicle,) = ax.plot([], [], "o", ms=14, mfc="none", color="#d55e00", mew=3)
     ax.set(xlim=(-1.9, 1.9), ylim=(-1.9, 1.9), aspect="equal")
-    ax.set_title(title, fontsize=11)
     ax.set_axis_off()
+    return bars, vehicle, ax.set_title(" ", fontsize=11)
 
 
 # %% jupyter={"source_hidden": true} alt="animation of ten cells in a circle with a bar at each; after two readings of pole in a row the bars gather at A and from then on follow the vehicle round the ring; at step 7 they are one cell ahead"
 def ring_frames():
-    """Draw the ring twice per step: after the prediction, and after the reading."""
-    ax = plt.subplots(figsize=(3.9, 4.1), layout="constrained")[1]
+    """Show the ring twice per step: after the prediction, and after the reading."""
+    bars, vehicle, title = ring()
     belief = np.full(N_CELLS, 1 / N_CELLS)
-    for k, place in enumerate(TRIP):
+    for k, place in enumerate(TRIP[:16]):
+        vehicle.set_data(*AROUND[[place]].T)
         prior = discrete_bayes.predict(belief, offset=1, kernel=[0.1, 0.8, 0.1])
         belief = discrete_bayes.update(P_POLE if k in SAYS_POLE else 1 - P_POLE, prior)
-        draw_ring(ax, prior, place, f"step {k}: predict")
-        yield ax.figure
-        ax.figure.set_layout_engine("none")  # only the first frame is laid out
-        draw_ring(ax, belief, place, f'step {k}: sensor says "{"pole" if k in SAYS_POLE else "nothing"}"')
-        yield ax.figure
+        said = "pole" if k in SAYS_POLE else "nothing"
+        for shown, words in ((prior, "predict"), (belief, f'sensor says "{said}"')):
+            for bar, (x, y), b in zip(bars, AROUND, shown, strict=True):
+                bar.set_data([x, x * (1 + b)], [y, y * (1 + b)])
+            title.set_text(f"step {k}: {words}")
+            yield title.figure
+            title.figure.set_layout_engine("none")  # only the first frame is laid out
 
 
 plotting.animate(ring_frames(), period=0.7, alt="a belief follows a vehicle round a ring road of ten cells")
@@ -142,8 +144,8 @@ plt.show()
 # The odometer says: one cell forward. Odometers err too. With probability 0.1 the vehicle hasn't left its cell, with
 # 0.8 it has moved by one, with 0.1 by two.
 #
-# **Predict before you run.** The belief is the last posterior. What is it in cell 3 after the
-# move? Ask from where one can get there.
+# **Predict before you run.** The belief is the posterior above. What is it in cell 3 after the move? Ask from where one
+# can get there.
 #
 # <details><summary>Answer</summary>
 #
@@ -196,7 +198,7 @@ plt.show()
 # ## How sure is the filter?
 #
 # The rest is repetition. To see it work we need a vehicle that errs as the model says, so `trip` (folded here) draws one
-# at random: that of the animation. The filter gets only the readings.
+# at random: that of the animation. The filter gets the readings alone.
 
 
 # %% jupyter={"source_hidden": true}
@@ -299,8 +301,8 @@ _ = interact(show, **sliders)
 #
 # <details><summary>Answer</summary>
 #
-# It multiplies twice: by 0.64 in all beside a pole, and by 0.01 elsewhere. So the three cells get 0.96. The filter is
-# sure of something that it hasn't seen.
+# It multiplies twice, in all by 0.64 beside a pole and by 0.01 elsewhere: three times 0.064 against seven times 0.001.
+# So the three cells get 0.96. The filter is sure of something that it hasn't seen.
 #
 # </details>
 
@@ -337,15 +339,13 @@ assert nearly[7] > 0.5
 line = bayes_on_a_line()
 line.draw(plt.subplots(figsize=(6.5, 2.2), layout="constrained")[1]).set_title("")
 plt.show()
-assert d_separated(line.model, "n2", "z0", given="n1")
-assert not d_separated(line.model, "n1", "z2")
 assert history[3].argmax() == 3 != places[3] == 2
 
 # %% [markdown]
-# Each place depends on the place before, each reading on its place. Readings are shaded, because we see them. To say
-# what $n_2$ is *now*, the filter needs nothing but its belief about $n_1$: all that the past can tell, it tells
-# through the present. (Such a model is a **hidden Markov model**.) But what $n_1$ *was* is another question. The
-# reading $z_2$ tells about it, too, against the arrows.
+# Each place depends on the place before, each reading on its place. Readings are shaded, because we see them. (Such
+# a model is a **hidden Markov model**.) What is $n_2$ *now*? The filter needs only its belief about $n_1$ and the
+# reading $z_2$, because all that the past can tell, it tells through the place before. But what $n_1$ *was* is another
+# question. The reading $z_2$ tells about it, too, against the arrows.
 #
 # How? Go back to the first two readings. After the first *pole*, each cell with a pole had 0.26. Then came another one.
 #
@@ -507,13 +507,15 @@ assert abs(ends[0] - ends[1]) < 0.02 < ends[1] - ends[2]
 
 # %% jupyter={"source_hidden": true}
 def claims_and_truth(sensor, poles=POLES):
-    """Return the mean belief in the best guess, and how often the vehicle is there, over 400 trips."""
-    rng, claimed, right = np.random.default_rng(0), [], []
-    for _ in range(400):
-        places, heard = trip(30, rng, poles=poles)
-        beliefs = localise(heard, sensor)
+    """Return the mean belief in the best guess, and how often the vehicle is there, over 400 trips at once."""
+    rng = np.random.default_rng(0)
+    places, heard = (np.array(rows) for rows in zip(*[trip(30, rng, poles=poles) for _ in range(400)], strict=True))
+    beliefs, claimed, right = np.tile(nothing_known, (400, 1)), [], []
+    for place, says in zip(places.T, heard.T, strict=True):
+        product = sensor[says.astype(int)] * (beliefs @ MOVE)
+        beliefs = product / product.sum(axis=1, keepdims=True)
         claimed.append(beliefs.max(axis=1))
-        right.append(beliefs.argmax(axis=1) == places)
+        right.append(beliefs.argmax(axis=1) == place)
     return np.mean(claimed), np.mean(right)
 
 
