@@ -543,7 +543,7 @@ assert all(claim > truth + 0.1 for claim, truth in broken)
 
 # %% [markdown]
 # The first pair agrees. In the other three the filter claims far more than it knows, and *nothing in its belief shows
-# it*. Only a comparison with the truth does. Counting twice often comes in disguise: ten returns of one scan from the
+# it*. Comparing with the truth does. Counting twice often comes in disguise: ten returns of one scan from the
 # same bush share an error, and aren't ten witnesses. Lecture 02 meets them on a street.
 #
 # ## In five lines

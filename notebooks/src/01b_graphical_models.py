@@ -71,7 +71,7 @@ plt.show()
 # - **Middle**: two cells on the way of one beam $z$, which comes back or doesn't. It is shaded because we see it. No
 #   edge links the cells: before any beam, one tells nothing about the other.
 # - **Right**: three neighbours that tend to agree, because walls are long. None of them comes first, so there are no
-#   arrows.
+#   arrows. (The middle graph promises the contrary about neighbours. A graph is a model, and one may choose.)
 #
 # So an edge says that two things may depend on each other, and **an edge that isn't there is a promise**. This lecture
 # teaches you to read such promises.
@@ -103,8 +103,8 @@ print("P(z) =", joint.sum("m").table.round(3), "  P(m | return) =", joint.given(
 
 # %% [markdown]
 # For many variables nobody can invent such a table. It is easier to tell a story, one small table after the other.
-# First comes the world: two cells, each occupied with probability 0.2. Then comes the beam: it returns if at least
-# one of them is occupied. Each variable has one table, given the variables that come before it in the story, its
+# First comes the world: two cells, each occupied with probability 0.2. Then comes the beam: it returns if at
+# least one of them is occupied, and this time it never errs. Each variable has one table, given the variables that come before it in the story, its
 # **parents**, and an arrow from each of them. The joint distribution is the product of the tables,
 # $P(m_1)\,P(m_2)\,P(z \mid m_1, m_2)$. Such a model is called **directed**, or a Bayesian network.
 #
@@ -207,7 +207,7 @@ assert d_separated(in_time, "now", ("z1", "z3"), given=blanket)
 # its scan. This set is called the **Markov blanket**: a variable's parents, its children, and its children's other
 # parents, because of explaining away.
 #
-# So what is independent of what, the missing edges tell. Known middles block, known colliders open.
+# So the missing edges tell what is independent of what. Known middles block, and known colliders open.
 #
 # ## What if nothing comes first?
 #
@@ -262,9 +262,9 @@ assert not d_separated(without_arrows, "m1", "m2")
 #
 # ## What does an answer cost?
 #
-# So far we summed over all combinations. Thirty cells have a billion. How can the same sum be cheaper? Take the chain.
-# To get $P(\text{after})$ we sum over *before* and *now*, but one table doesn't contain *before*, and may move out of
-# its sum, as in $ab + ac = a(b + c)$:
+# So far we summed over all combinations. Thirty cells have a billion. How can the same sum be cheaper? Take the chain,
+# with lecture 01's matrix $M$ of a free or occupied cell, and P(*before*) one half. To get $P(\text{after})$ we sum over
+# *before* and *now*. But one table doesn't contain *before*, and may move out of its sum, as in $ab + ac = a(b + c)$:
 #
 # $$ P(\text{after}) = \sum_{\text{now}} P(\text{after} \mid \text{now})
 #    \underbrace{\sum_{\text{before}} P(\text{before})\; P(\text{now} \mid \text{before})}_{\text{a table over now alone}} $$
@@ -338,9 +338,10 @@ assert largest[-1] == 2**14
 # The answer is the same, and the cost isn't. **To sum a variable out is to link all its neighbours**: each cell hints at
 # the street, and so at every other cell.
 #
-# Is there always a good order? In a square of neighbouring cells there isn't (right). For ten by ten cells a table of
-# sixteen thousand entries is enough, in place of $2^{100}$ maps, but it still grows exponentially with the side. The
-# paper's grid has 155 cells on its shorter side, and its CRF links even every cell with every other.
+# Is there always a good order? Not in a square of neighbouring cells (right). Every order meets a table with more axes
+# than the square has cells on a side; this is a theorem. For ten by ten cells sixteen thousand entries are enough, in
+# place of $2^{100}$ maps. But the paper's grid has 155 cells on its shorter side, and its CRF links even every cell with
+# every other.
 #
 # So an answer costs as much as its largest table. On a chain that is little. On a grid it is too much, and **this is
 # why the course needs approximations**.
@@ -348,8 +349,8 @@ assert largest[-1] == 2**14
 # ## How do we get all answers at once?
 #
 # Elimination answers one question. Now we want to know what the cell was *before*, *now* and *after*. Must we start
-# again for each? Our cell is scanned each time by the beam of the first table: no return, a return, no return. A scan
-# that has happened is a slice of its table, so it is a factor of one variable.
+# again for each? Our cell is scanned each time by the noisy beam of the first table: no return, a return, no return. A
+# scan that has happened is a slice of its table, so it is a factor of one variable.
 
 # %% jupyter={"source_hidden": true} alt="factor graph of the chain before, now, after, with squares for the prior, the matrix M between two times and the scan at each; blue arrows above it run to the right and say forward, orange arrows below run to the left and say backward"
 NOTHING, RETURN = np.array([0.95, 0.2]), np.array([0.05, 0.8])  # P(z | FREE), P(z | OCCUPIED)

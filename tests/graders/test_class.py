@@ -42,7 +42,7 @@ def students_of_each_kind():
     half = {task: code for task, code in REFERENCE.items() if task in tasks[::2]}
     found["half"] = handed_in(half), sum(POINTS[task] for task in half)
     found |= {f"wrong-{k}": with_entries([ways[k % len(ways)] for ways in wrongs.values()]) for k in range(2)}
-    found["unlucky-exit"] = handed_in(inside("predict", "exit()")), 12
+    found["unlucky-exit"] = handed_in(inside("predict", "exit()")), 10
     found["hostile-transformer"] = handed_in(sound.EASIER, sound.EASY + sound.ATTACKS["transformer"]), 0
     return found
 

@@ -133,14 +133,14 @@ ENDS = {
 def test_a_task_that_ends_python_costs_its_points_alone(forked, kind):
     settings = GradeSettings(timeout=2 if kind == "swallows" else 5)
     result = graded(forked, kind, handed_in(inside("predict", ENDS[kind])), settings)
-    assert result.score == 12
+    assert result.score == 10
     assert result.note.startswith("Crashed: ")
 
 
 def test_a_cell_that_ends_python_costs_its_points_alone(forked):
     answers = REFERENCE | {"predict": "import os\nos._exit(0)"}
     result = graded(forked, "cell-exit", handed_in(answers))
-    assert result.score == 12
+    assert result.score == 10
     assert "Python itself ended here" in result.note
 
 
@@ -148,7 +148,7 @@ def test_a_deleted_task_costs_its_points_alone(forked):
     notebook = handed_in()
     for name in ("predict", "predict-test", "predict-wall-test"):
         del notebook.cells[cell_of(notebook, name)]
-    assert graded(forked, "deleted", notebook).score == 12
+    assert graded(forked, "deleted", notebook).score == 10
 
 
 def test_who_crashed_gets_feedback_and_the_written_answer_is_read(forked):

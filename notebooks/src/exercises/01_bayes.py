@@ -254,7 +254,6 @@ def _test():
     slips = {
         (0.35, 0.65): "M is transposed: M[i, j] goes from i to j, so a belief stands to its left",
         (0.6, 0.4): "each scan starts from the first belief again: carry on from the last one",
-        (0.66, 0.34): "each scan starts from the first belief again: carry on from the last one",
         (0.2727, 0.7273): "nothing was predicted before the second scan: a silent scan takes time, too",
     }
     _explain(got[1], slips)
