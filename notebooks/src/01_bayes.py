@@ -398,9 +398,10 @@ for ax, name, table in zip(axes, ("filter", "smoother"), (history, smooth(histor
     ax.label_outer()
 fig.colorbar(axes[0].images[0], ax=axes, label="probability")
 plt.show()
+assert smooth(history, says_pole)[3].argmax() == places[3]
+assert [np.sum(table.argmax(axis=1) == places) for table in (history, smooth(history, says_pole))] == [18, 24]
 
 # %%
-assert smooth(history, says_pole)[3].argmax() == places[3]
 rng, right = np.random.default_rng(0), np.zeros(3)
 for _ in range(400):
     places, heard = trip(30, rng)
@@ -482,6 +483,7 @@ ends = []
 for label, rate, matrix, mark, colour in curves:
     p = follow(rate, matrix)
     ends.append(p[int(1.5 * rate) - 1])
+    assert abs(p[-1] - 0.25) < 0.02
     ax.plot((np.arange(len(p)) + 1) / rate, p, mark, color=colour, markersize=5, label=label)
 ax.axvspan(0, 1, color="tab:red", alpha=0.12)
 ax.text(0.5, 0.1, "the car is seen", ha="center", fontsize=9)
