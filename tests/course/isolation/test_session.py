@@ -1,6 +1,8 @@
 """A student's process: calls look as if they were made here, and nothing that it does stops the next call."""
 
 import math
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -54,6 +56,13 @@ def test_only_the_students_own_time_counts(session, hostile_answer):
     session.left_in_all = 0.3
     assert session.run("while True: pass")["error"]["kind"] == "AnswerTimeoutError" or session.left_in_all <= 0
     assert "used up their time" in session.run("x = 1")["error"]["message"], "all cells together have a limit"
+
+
+def test_what_the_grader_does_for_an_answer_comes_to_an_end():
+    """Even where it is one call that Python can't interrupt: the process ends, as `test_pool` knows it."""
+    code = "from semgrid_edu.workshop.course.sandbox import session\nsession.GRADERS_TIME = 0\n"
+    code += "session.Session(None, 0.2)\n10**10**9"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 1
 
 
 def test_a_call_returns_values_and_changes_arguments(answer):

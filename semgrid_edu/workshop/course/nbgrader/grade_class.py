@@ -29,7 +29,7 @@ from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_grader
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.resources import delete_folder
 
-KILLED = "the file can't be graded: twice it ended the process that grades, perhaps for want of memory"
+KILLED = "the file can't be graded: twice it ended the process that grades, perhaps for want of memory or time"
 """The note on a submission that ended the grader twice: among others, and alone."""
 
 UNREADABLE = "unreadable"
