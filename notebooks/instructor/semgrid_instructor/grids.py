@@ -159,6 +159,10 @@ def check_highest_clamp(highest_clamp: Callable) -> None:
         assert 0 < got < 1, "that is no probability to clamp at"
         wrong = "wrong clamp (a tail may be so short that no pass is survived)"
         assert abs(got - expit((survived + 1) * np.log(free / occupied))) < 2e-4, wrong
+        if survived:  # numbers that a computer holds exactly
+            got = answer_number(highest_clamp(survived * 2.0, 8.0, 0.25, occupied, free))
+            longest = "wrong clamp where the tail may be exactly a number of passes long: it may be at most that long"
+            assert abs(got - expit((survived + 1) * np.log(free / occupied))) < 2e-4, longest
 
 
 @hidden
@@ -232,5 +236,6 @@ def check_beam(beam_evidence: Callable) -> None:
 def check_beam_outside(beam_evidence: Callable) -> None:
     """Try returns beyond each border of the grid, far and near: int() cuts -0.6 to 0, a row of the grid."""
     spec = GridSpec(x_min=-10.1, x_max=14.9, y_min=-6.1, y_max=9.9, cell=0.5)
-    for x, y in ((20.3, 1.7), (16.1, -9.3), (-12.4, 3.3), (4.2, 12.9), (3.1, -7.7), (15.2, 1.7), (4.2, 10.2)):
+    ways = ((20.3, 1.7), (16.1, -9.3), (-12.4, 3.3), (4.2, 12.9), (3.1, -7.7), (15.2, 1.7), (4.2, 10.2))
+    for x, y in ways + generator(28).uniform(-0.15, 0.15, (7, 2)):
         _judge_beam_beyond(beam_evidence, spec, x, y)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.workshop.course.answers import answer_array
-from semgrid_instructor import close, generator, hidden, keeping
+from semgrid_instructor import close, generator, hidden, in_any_order, keeping
 
 AXES = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])
 """From the axes of grid and LIDAR to those of the camera."""
@@ -184,7 +184,7 @@ def _faults(rng: np.random.Generator, least: float, noise: float) -> list[tuple[
 @keeping
 def check_fault(find_fault: Callable) -> None:
     """Judge the kind of fault, with pixels that are not quite right."""
-    for given, fault, _ in _faults(generator(58), least=0.4, noise=0.1):
+    for given, fault, _ in in_any_order(_faults(generator(58), least=0.4, noise=0.1)):
         got = answer_array(find_fault(*given)).ravel()
         assert got.shape == (2,), "not two numbers"
         assert got[0] == fault, "the wrong fault (clicks are a tenth of a pixel wrong; a yaw looks nearly like a shift)"
@@ -195,7 +195,7 @@ def check_fault(find_fault: Callable) -> None:
 def check_amount(find_fault: Callable) -> None:
     """Judge the amount of the fault: where clicks are exact, one per cent off is three times what is allowed."""
     for least, noise, allowed in ((0.4, 0.1, 0.05), (1.2, 0, 0.004)):
-        for given, _, amount in _faults(generator(59), least, noise):
+        for given, _, amount in in_any_order(_faults(generator(59), least, noise)):
             got = answer_array(find_fault(*given)).ravel()
             assert got.shape == (2,), "not two numbers"
             assert close(got[1], amount, rtol=0, atol=allowed), "the wrong amount"

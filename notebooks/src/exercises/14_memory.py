@@ -345,7 +345,7 @@ def _right(called, truth, cells):
 # %% nbgrader={"grade": true, "grade_id": "remember-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     given, truth, seen, before = _street()
-    got = answer_array(maps(*given), "maps").astype(int)
+    got = answer_array(maps(*_copy(given)), "maps").astype(int)
     assert got.shape == truth.shape, f"expected one map for each of {len(truth)} frames, {truth.shape}; got {got.shape}"
     one = given[2].argmax(axis=1)
     assert (got != one).any(), "nothing is remembered: every map is that of one frame"
