@@ -231,7 +231,9 @@ def check_swaps(swaps: Callable, convention: Callable) -> None:
         for kind, swapped in in_any_order(product(range(3), (False, True))):
             told = bool(swaps(_black_box(kind, swapped), h, w))
             assert told == swapped, "wrong about a sampler in an image of another size"
-            if swapped and answer_array(convention(_black_box(kind), h, w)).ravel()[0] == kind:  # check_convention judges others
+            if (
+                swapped and answer_array(convention(_black_box(kind), h, w)).ravel()[0] == kind
+            ):  # check_convention judges others
                 found = answer_array(convention(_black_box(kind, True), h, w)).ravel()[0]
                 assert found == kind, "convention is wrong for a sampler that swaps"
 

@@ -107,7 +107,10 @@ def _street(seed: int) -> tuple[NDArray, NDArray, NDArray]:
     rng = generator(seed)
     truth = np.kron(rng.choice([0, 0, 1, 2, 3, 6, 8], (18, 8)), np.ones((8, 8), int))[:142, :62]
     flat = truth < 2
-    o = 0.1 * rng.dirichlet(np.ones(4), truth.shape) + 0.9 * np.eye(4)[np.where(flat, 0, rng.integers(1, 3, truth.shape))]
+    o = (
+        0.1 * rng.dirichlet(np.ones(4), truth.shape)
+        + 0.9 * np.eye(4)[np.where(flat, 0, rng.integers(1, 3, truth.shape))]
+    )
     fails = np.where(flat, rng.integers(1, 3, truth.shape), rng.integers(10, 14, truth.shape))
     said = np.where(rng.random(truth.shape) < 0.4, fails, truth)
     g = 0.4 * np.eye(14)[said] + 0.3 * np.eye(14)[truth] + 0.3 * rng.dirichlet(np.ones(14), truth.shape)

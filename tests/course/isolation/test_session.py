@@ -275,6 +275,13 @@ HIDES = {
     "in a child": "import numpy as np, os, time\ndef f(n):\n    read, write = os.pipe()\n    if os.fork() == 0:\n"
     "        kept = np.ones(n, 'f4'); time.sleep(0.3); os.write(write, str(kept.sum()).encode()); os._exit(0)\n"
     "    os.wait()\n    return float(os.read(read, 99))",
+    "in a file": "import numpy as np\ndef f(n):\n    with open('kept', 'wb') as file:\n        for k in range(8):\n"
+    "            file.write(np.ones(n // 8, 'f4').tobytes())\n    return float(sum(map(np.sum, read(n))))\n"
+    "def read(n):\n    with open('kept', 'rb') as file:\n        while part := file.read(n // 2 + 4):\n"
+    "            yield np.frombuffer(part[: len(part) // 4 * 4], 'f4')",
+    "in a deleted file": "import numpy as np, os, time\ndef f(n):\n    with open('kept', 'wb') as file:\n"
+    "        os.remove('kept')\n        for k in range(8):\n            file.write(np.ones(n // 8, 'f4').tobytes())\n"
+    "        file.flush()\n        time.sleep(0.1)\n    return n",
     "in numbers of Python": "def f(n):\n    return len([1.5] * (n // 2)) * 2",
 }
 

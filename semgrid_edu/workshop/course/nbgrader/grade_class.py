@@ -104,7 +104,12 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
         stack.callback(delete_folder, Path(folder))
         pool = ProcessPoolExecutor(workers, context, _begin, (folder,))
         stack.callback(pool.shutdown, cancel_futures=True)
-        yield pool
+        try:
+            yield pool
+        except BaseException:  # above all Ctrl-C: what is begun isn't waited for, and is graded again
+            for process in list((pool._processes or {}).values()):
+                process.terminate()
+            raise
 
 
 def _begin(folder: str) -> None:
