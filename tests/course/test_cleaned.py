@@ -6,7 +6,9 @@ import zlib
 from base64 import b64encode
 
 import pytest
+from nbgrader.server_extensions.formgrader import handlers
 
+from semgrid_edu.workshop.course.nbgrader.build import course_api
 from semgrid_edu.workshop.course.nbgrader.cleaning import without_scripts
 
 
@@ -65,6 +67,11 @@ def test_what_could_act_in_a_browser_is_gone(html, gone):
 )
 def test_what_markdown_becomes_stays(html):
     assert without_scripts(html) == html
+
+
+def test_a_file_that_was_handed_in_runs_nothing_in_formgrader(course):
+    with course_api(course):
+        assert handlers.SubmissionFilesHandler.content_security_policy.startswith("sandbox; ")
 
 
 SLOW = {"div": "<div>", "p": "<p><b>", "li": "<ul><li>", "closed": "<div></x>", "open": "<a ", "less": "&lt;"}

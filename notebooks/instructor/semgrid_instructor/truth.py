@@ -66,7 +66,7 @@ def check_audit(audit: Callable) -> None:
         votes = np.where(rng.random(shape) < 0.25, rng.integers(0, 10, shape), 255)
         unseen = rng.random(shape) < 0.3
         made = np.where((votes == 255) | (rng.random(shape) < 0.2), rng.integers(0, 14, shape), votes)
-        wanted = [0, 0, 0]
+        wanted, across = [0, 0, 0], 0
         for r, c in np.ndindex(shape):
             if votes[r, c] != 255:
                 wanted[0] += made[r, c] != votes[r, c]
@@ -74,8 +74,12 @@ def check_audit(audit: Callable) -> None:
                 around = votes[max(r - reach, 0) : r + reach + 1, max(c - reach, 0) : c + reach + 1]
                 wanted[1] += unseen[r, c]
                 wanted[2] += made[r, c] not in around
+                round_r, round_c = (np.arange(k - reach, k + reach + 1) for k in (r, c))
+                across += made[r, c] not in votes.take(round_r, 0, mode="wrap").take(round_c, 1, mode="wrap")
         got = answer_array(audit(votes.copy(), unseen.copy(), made.copy(), reach))
         assert got.shape == (3,), "another shape"
+        wraps = "rule 3: a vote at one edge of the map vouches for cells at the other (np.roll wraps round)"
+        assert got[2] == wanted[2] or got[2] != across, wraps
         for rule, (a, b) in enumerate(zip(got, wanted, strict=True)):
             assert a == b, ("rule 1", "rule 2", "rule 3")[rule] + " is broken by another number of cells"
     kept = np.where(votes == 255, 13, votes)

@@ -216,7 +216,7 @@ def delete_folder(folder: Path) -> None:
 class PeakMemory:
     """The growth of a process's memory to its peak, measured from outside while a `with` block runs.
 
-    Written and mapped files and the memory of descendants count. Only Linux can measure this; elsewhere the growth is 0.
+    Written and mapped files count, and the memory of descendants. Only Linux can measure this; elsewhere it is 0.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ class PeakMemory:
             self._sample()
 
     def _sample(self) -> None:
-        """Measure what the process has written, and what it and its descendants hold, unless its own peak says it all."""
+        """Measure files, and what the process and its descendants hold, unless its own peak tells everything."""
         below = processes_below(self.pid)
         family = [Path(f"/proc/{self.pid}"), *below]
         written = disk_use(self.folder, since=self.began) + deleted_bytes(family, 0)
