@@ -239,7 +239,8 @@ def check_swaps(swaps: Callable, convention: Callable) -> None:
 
 
 def _four(u: float, v: float, h: int, w: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Return rows, columns and weights of the four pixels that a point reads."""
+    """Return rows, columns and weights of the four pixels that a point reads; an answer may call this with anything."""
+    assert h * w < 1000, "another image"
     heaviest = np.argsort(-_right(u, v, h, w), axis=None)[:4]
     return heaviest // w, heaviest % w, _right(u, v, h, w).ravel()[heaviest]
 
