@@ -549,7 +549,6 @@ DATA = (
         "OUT/sample: expected a folder that no other process",
         locked("OUT/sample"),
     ),
-    Row("no scheduler there", "data make sample OUT --scheduler nowhere://x", "--scheduler: expected an address"),
     Row(
         "a damaged archive",
         FETCH,

@@ -16,7 +16,7 @@
 # **Prerequisites.** Lecture [00](00_tour.ipynb): the grid, a first look at equation (1). A matrix times a vector; a
 # rotation as a matrix. For the graph: [graphical models](deeper/graphical_models.ipynb).
 #
-# **Time.** 75 minutes; the computer needs less than one.
+# **Time.** 118 minutes; the computer needs less than one.
 #
 # **Paper.** Section 3.3, equation (1).
 

@@ -14,7 +14,7 @@
 # **Prerequisites.** Lecture [05](05_pixels.ipynb): equation (1) gives a pixel (u, v) to each point of each plane.
 # Derivatives and the chain rule; a matrix times a vector.
 #
-# **Time.** 75 minutes; the computer needs less than one.
+# **Time.** 116 minutes; the computer needs less than one.
 #
 # **Paper.** Section 3.3, equation (2), after Jaderberg et al. (2015).
 

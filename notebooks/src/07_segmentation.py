@@ -15,7 +15,7 @@
 # **Prerequisites.** Lecture [00](00_tour.ipynb); lecture [06](06_planes.ipynb) for bilinear sampling and
 # backpropagation. For the graph: [graphical models](deeper/graphical_models.ipynb). You need no deep learning.
 #
-# **Time.** 75 minutes; the computer needs about one.
+# **Time.** 111 minutes; the computer needs about one.
 #
 # **Paper.** Section 3.1, which names the three networks.
 

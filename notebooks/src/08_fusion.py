@@ -16,7 +16,7 @@
 # **Prerequisites.** Lectures [05](05_pixels.ipynb) and [06](06_planes.ipynb) (equations (1) and (2), the adjoint) and
 # [07](07_segmentation.ipynb) (image networks, raw scores, skips). The chain rule.
 #
-# **Time.** 75 minutes; the computer needs one.
+# **Time.** 110 minutes; the computer needs one.
 #
 # **Paper.** Sections 3.4 and 4.1, figures 4 and 5; claims 7 and 9 (lecture 12 has the list of the paper's claims).
 

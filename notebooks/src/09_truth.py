@@ -16,7 +16,7 @@
 # **Prerequisites.** Lectures [05](05_pixels.ipynb) (equation (1)) and [04](04_cmcdot.ipynb) (the four occupancy
 # states). The graph needs d-separation: see [graphical models](deeper/graphical_models.ipynb).
 #
-# **Time.** 75 minutes, of which the computer needs one.
+# **Time.** 102 minutes, of which the computer needs one.
 #
 # **Paper.** Section 4, the paragraph "KITTI Dataset": how its ground truth is made.
 

@@ -15,7 +15,7 @@
 # **Prerequisites.** Lecture [08](08_fusion.ipynb): the semantic grid $g$. Logarithms and expected values. If factors
 # and partition functions are new to you, read [graphical models](deeper/graphical_models.ipynb) first.
 #
-# **Time.** 75 minutes, of which the computer needs less than one.
+# **Time.** 113 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.5, equations (3) and (4); table 1; claim 2 of lecture 12.
 

@@ -16,7 +16,7 @@
 # **Prerequisites.** Lecture [10](10_crf.ipynb): equations (3) and (4), mean field with damping, normalisation.
 # Convolution, as in lecture [01](01_bayes.ipynb).
 #
-# **Time.** 75 minutes, of which the computer needs one.
+# **Time.** 106 minutes, of which the computer needs one.
 #
 # **Paper.** Section 3.5, equation (4) at full size. Its inference is that of Krähenbühl and Koltun (NIPS 2011), with
 # the lattice of Adams, Baek and Davis (Eurographics 2010).

@@ -16,7 +16,7 @@
 # **Prerequisites.** The metrics of lecture [00](00_tour.ipynb), training of lecture [08](08_fusion.ipynb). Mean,
 # variance, normal distribution.
 #
-# **Time.** 75 minutes, of which the computer needs one.
+# **Time.** 97 minutes, of which the computer needs one.
 #
 # **Paper.** Section 4: its Tables 1 and 2, and twelve of its claims. The companion
 # [more tables](deeper/12_more_tables.ipynb) has Table 3, what the paper leaves open, and how sure the maps are.

@@ -17,7 +17,7 @@
 # **Prerequisites.** Lecture [00](00_tour.ipynb); equation (1) of lecture [05](05_pixels.ipynb); intervals of lecture
 # [12](12_experiments.ipynb). Lecture [01](01_bayes.ipynb) for Bayes' rule.
 #
-# **Time.** 72 minutes, of which the computer needs one.
+# **Time.** 96 minutes, of which the computer needs one.
 #
 # **Paper.** Section 4 (experiments on KITTI). The checks are not in the paper. They are what one does before its
 # section 4 can begin.

@@ -15,7 +15,7 @@
 # **Prerequisites.** Lectures [03](03_bof.ipynb) and [04](04_cmcdot.ipynb): a filter over time, velocities of cells.
 # Lecture [08](08_fusion.ipynb): the semantic grid. For the graph: [graphical models](deeper/graphical_models.ipynb).
 #
-# **Time.** 65 minutes; the computer needs one.
+# **Time.** 88 minutes; the computer needs one.
 #
 # **Paper.** Section 3, figure 2: nothing leads from one semantic grid to the next. The rest isn't in the paper.
 

@@ -1,13 +1,13 @@
-"""Where independent tasks run: in processes of this machine, or on a dask.distributed cluster."""
+"""Where independent tasks run: in a few processes of this machine."""
 
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor, Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import active_children, current_process, get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 
 from semgrid_edu.errors import ArgumentError
 
@@ -16,8 +16,7 @@ from semgrid_edu.errors import ArgumentError
 def worker_pool(workers: int) -> Iterator[Executor]:
     """Yield a pool of processes. When the block raises an error, work that hasn't begun is dropped.
 
-    The processes are spawned. Forked ones would inherit the locks of torch's and numba's threads, and hang. A worker of
-    a dask.distributed cluster must not start processes; there one thread does all the work.
+    The processes are spawned. Forked ones would inherit the locks of torch's and numba's threads, and hang.
 
     Parameters
     ----------
@@ -34,10 +33,6 @@ def worker_pool(workers: int) -> Iterator[Executor]:
     ChildProcessError
         When a process ends before its work does.
     """
-    if current_process().daemon:
-        with ThreadPoolExecutor(1) as pool:
-            yield pool
-        return
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
         try:
             yield pool
@@ -78,12 +73,12 @@ class Workplace:
     ----------
     executor : concurrent.futures.Executor
         Takes functions and their arguments, and gives futures.
-    slots : callable
-        () -> the number of tasks that can be under way at the same time; a cluster may grow and shrink.
+    slots : int
+        The number of tasks that can be under way at the same time.
     """
 
     executor: Executor
-    slots: Callable[[], int]
+    slots: int
 
 
 def usable_cores() -> int:
@@ -106,17 +101,13 @@ def check_workers(workers: int) -> None:
 
 
 @contextmanager
-def workplace(workers: int | None = None, scheduler: str | None = None) -> Iterator[Workplace]:
+def workplace(workers: int | None = None) -> Iterator[Workplace]:
     """Open the place where tasks run.
 
     Parameters
     ----------
     workers : int, optional
-        Number of processes on this machine; one per core when left out.
-    scheduler : str, optional
-        Address of a dask.distributed scheduler, such as "tcp://10.0.0.1:8786", whose workers are used instead. They
-        must see the same folders, under the same names, and have the same version of this package. When one of them
-        dies, the scheduler gives its tasks to another one.
+        Number of processes; one per core when left out.
 
     Yields
     ------
@@ -125,34 +116,9 @@ def workplace(workers: int | None = None, scheduler: str | None = None) -> Itera
     Raises
     ------
     ArgumentError
-        When there are no workers or too many, both are given, or dask.distributed isn't installed.
-    OSError
-        When the scheduler doesn't answer.
+        When there are no workers or too many.
     """
-    if workers is not None:
-        check_workers(workers)
-    if workers is not None and scheduler:
-        raise ArgumentError("--workers", "nothing beside --scheduler, which has workers of its own", workers)
-    if scheduler:
-        with _cluster(scheduler) as place:
-            yield place
-        return
-    number = workers or usable_cores()
+    number = usable_cores() if workers is None else workers
+    check_workers(number)
     with worker_pool(number) as pool:
-        yield Workplace(pool, lambda: number)
-
-
-@contextmanager
-def _cluster(address: str) -> Iterator[Workplace]:
-    """Connect to a cluster."""
-    try:
-        from distributed import Client
-    except ImportError:
-        missing = "dask.distributed (pip install 'semgrid_edu[cluster]')"
-        raise ArgumentError("--scheduler", missing, "no module named distributed") from None
-    try:
-        connected = Client(address, set_as_default=False)
-    except ValueError as error:
-        raise ArgumentError("--scheduler", "an address like tcp://HOST:PORT", f"{address}: {error}") from error
-    with connected as client, client.get_executor(pure=False) as executor:
-        yield Workplace(executor, lambda: max(1, sum(client.nthreads().values())))
+        yield Workplace(pool, number)

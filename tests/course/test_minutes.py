@@ -42,10 +42,10 @@ NOTEBOOK = new_notebook(
 
 def test_a_notebook_counted_by_hand():
     # Before. | A section | Three more words: | Predict before you run. Really? | Answer Yes.
-    opening = ReadingTime(words=6 + 1, figures=1, lines=3)
-    section = ReadingTime(words=2 + 3 + 5 + 2, equations=1, figures=2, predictions=1)
+    opening = ReadingTime(words=6 + 1, figures=1, lines=3, numerals=2)
+    section = ReadingTime(words=2 + 3 + 5 + 2, equations=1, figures=2, predictions=1, sections=1)
     assert section_times(NOTEBOOK) == {"(header)": opening, "A section": section}
-    assert reading_time(NOTEBOOK).minutes == pytest.approx(19 / 130 + 2 + 3 * 0.5 + 1.5 + 0.3)
+    assert reading_time(NOTEBOOK).minutes == pytest.approx(19 / 130 + 4 + 3 * 1.5 + 3 + 3 / 8)
     assert stated_minutes(NOTEBOOK) == 12
 
 
@@ -83,34 +83,20 @@ def test_figures_in_the_text_count_too():
 
 
 def test_each_kind_of_work_has_its_price():
-    everything = ReadingTime(words=130, equations=1, figures=1, predictions=1, lines=10, numbers=200)
-    assert everything.parts == {
-        "prose": 1,
-        "equations": 2,
-        "figures": 0.5,
-        "predictions": 1.5,
-        "code": 1,
-        "numbers": 1,
-    }
-    assert (everything + everything).minutes == 14
+    everything = ReadingTime(words=130, equations=1, figures=1, predictions=1, lines=8, numerals=80, sections=10)
+    assert everything.parts == {"prose": 1, "equations": 4, "figures": 1.5, "predictions": 3, "code": 1}
+    assert (everything + everything).minutes == 21
 
 
 @pytest.mark.parametrize(
-    ("printed", "numbers"),
+    ("text", "numerals"),
     [
-        ("P(car): [0.06 0.91 .23 -1e-3]", 4),
-        ("x1 and y_2 are names; 27,445 cells, +16 points (+8 to +24)", 4),
-        ("no number", 0),
+        ("Of 27,445 cells .23 are wrong, +16 points (+8 to +24) for $p = 0.7$.", 6),
+        ("x1 and y_2 are names; `f(3)`, [07](07_far.ipynb) and $$a = 5$$ don't count", 0),
     ],
 )
-def test_printed_numbers_count_wherever_they_are_printed(printed, numbers):
-    def of(*outputs):
-        return reading_time(new_notebook(cells=[new_code_cell("", outputs=list(outputs))])).numbers
-
-    assert of(new_output("stream", text=printed)) == numbers
-    assert of(new_output("display_data", data={"text/markdown": printed, "text/plain": "<Markdown 7>"})) == numbers
-    assert of(new_output("execute_result", data={"text/plain": printed})) == numbers
-    assert of(new_output("display_data", data={"image/png": png(), "text/plain": "<Figure size 7x3>"})) == 0
+def test_numerals_of_the_text(text, numerals):
+    assert time_of(text).numerals == numerals
 
 
 def test_the_table_of_one_notebook_has_its_sections(tmp_path):
@@ -120,4 +106,4 @@ def test_the_table_of_one_notebook_has_its_sections(tmp_path):
     header, *rows = minutes_table([source]).splitlines()
     assert header.split()[:2] == ["stated", "computed"]
     assert [row.split()[-1] for row in rows] == ["(header)", "Section", "00_tiny"]
-    assert rows[-1].split()[:2] == ["3", "2.1"]
+    assert rows[-1].split()[:2] == ["3", "4.2"]

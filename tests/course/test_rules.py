@@ -60,10 +60,15 @@ def minutes(stated, equations):
 
 KEPT = {
     dishonest_minutes: [
-        minutes(stated=20, equations=10),
+        minutes(stated=40, equations=10),
         [text("no minutes yet")],
     ],
-    too_long: [minutes(stated=1, equations=37)],  # 74 minutes
+    too_long: [
+        minutes(stated=1, equations=19),  # 76 minutes
+        [text("word " * 3_300)],
+        [text("7 " * 110)],
+        [text("## section\n\n" * 13)],
+    ],
     answers_in_sight: [
         [text(QUESTION), code("x = 1"), code("print(2)", printed(), jupyter={"outputs_hidden": True})],
         [text(QUESTION + "\n\n## Then something else"), code("print(2)", printed())],
@@ -97,8 +102,13 @@ KEPT = {
 }
 
 BROKEN = {
-    dishonest_minutes: [minutes(stated=19, equations=10)],
-    too_long: [minutes(stated=99, equations=38)],  # 76 minutes
+    dishonest_minutes: [minutes(stated=39, equations=10)],
+    too_long: [
+        minutes(stated=99, equations=21),  # 84 minutes
+        [text("word " * 3_301)],
+        [text("7 " * 111)],
+        [text("## section\n\n" * 14)],
+    ],
     answers_in_sight: [
         [text(QUESTION), code("print(2)", printed())],
         [text("## Heading\n\n" + QUESTION), code("x = 1"), text("Now look."), code("print(2)", printed())],

@@ -38,7 +38,7 @@ def here(monkeypatch):
     monkeypatch.setitem(SCALES, "tiny", tiny)
     monkeypatch.setattr(DataRun, "work", HandMadeData.work)
     monkeypatch.setattr(training_cache, "WORKERS", 1)
-    place = Workplace(ThreadPoolExecutor(1), lambda: 1)
+    place = Workplace(ThreadPoolExecutor(1), 1)
     monkeypatch.setattr(reports, "workplace", lambda *_: nullcontext(place))
 
 

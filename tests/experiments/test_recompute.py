@@ -67,7 +67,7 @@ def made(tmp_path_factory):
         patch.setattr(DataRun, "work", HandMadeData.work)
         patch.setattr(training_cache, "WORKERS", 1)
         patch.setattr(training_runs, "seconds_per_step", lambda *_: 1.0)  # tried in test_own_backbone
-        patch.setattr(reports, "workplace", lambda *_: nullcontext(Workplace(ThreadPoolExecutor(1), lambda: 1)))
+        patch.setattr(reports, "workplace", lambda *_: nullcontext(Workplace(ThreadPoolExecutor(1), 1)))
         for name in MADE:
             places = {"runs": folder / "runs", "out": folder / "out"}
             assert reports.reproduce(reports.Request(experiment=name, scale="tiny", seeds=2, **places), print) == ""

@@ -87,7 +87,7 @@ def counted(tmp_path_factory):
     """Labels of six tiny drives, made in the usual way and without clean-up, and counted."""
     root = tmp_path_factory.mktemp("runs")
     usual, bare = (ArraysRun(HandMadeData(), "train", truth) for truth in ("lidar", "no-cleanup"))
-    run, here = LabelsRun(bare, usual), Workplace(ThreadPoolExecutor(1), lambda: 1)
+    run, here = LabelsRun(bare, usual), Workplace(ThreadPoolExecutor(1), 1)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(training_cache, "WORKERS", 1)  # six drives of two frames aren't worth a process
         assert execute_plan(with_needs([run]), root, here) == {}

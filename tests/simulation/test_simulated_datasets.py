@@ -89,7 +89,7 @@ def test_a_drive_with_missing_files_is_an_error_before_provenance_is_written(alo
 
 
 def test_the_drive_of_the_faster_worker_stays_and_the_other_one_is_removed(alone, tmp_path):
-    """A worker that lost its cluster finishes late: its drive is removed."""
+    """A worker of a killed command finishes late: its drive is removed."""
     root = shutil.copytree(alone, tmp_path / "tiny")
     before = contents(root)
     (root / DATE / f".{DATE}_drive_0001_sync-abcd.partial").mkdir()

@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Lecture [02](../02_grids.ipynb): one beam over five cells, log-odds, the clamp.
 #
-# **Time.** 31 minutes, of which the computer needs less than one.
+# **Time.** 47 minutes, of which the computer needs less than one.
 
 # %% jupyter={"source_hidden": true}
 import sys

@@ -11,7 +11,7 @@
 #
 # **Prerequisites.** Lecture [05](../05_pixels.ipynb).
 #
-# **Time.** 22 minutes; the computer needs seconds.
+# **Time.** 29 minutes; the computer needs seconds.
 
 # %% jupyter={"source_hidden": true}
 import matplotlib.pyplot as plt

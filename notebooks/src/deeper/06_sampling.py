@@ -11,7 +11,7 @@
 #
 # **Prerequisites.** Lecture [06](../06_planes.ipynb).
 #
-# **Time.** 17 minutes; the computer needs less than one.
+# **Time.** 21 minutes; the computer needs less than one.
 
 # %% jupyter={"source_hidden": true}
 from time import process_time

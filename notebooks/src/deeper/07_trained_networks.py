@@ -14,7 +14,7 @@
 #
 # **Prerequisites.** Lecture [07](../07_segmentation.ipynb).
 #
-# **Time.** 26 minutes; the computer needs less than one.
+# **Time.** 35 minutes; the computer needs less than one.
 #
 # **Paper.** Section 3.1.
 

@@ -13,7 +13,7 @@
 #
 # **Prerequisites.** Lecture [08](../08_fusion.ipynb): the loss, the gradient from map to pixels.
 #
-# **Time.** 35 minutes; the computer needs one.
+# **Time.** 49 minutes; the computer needs one.
 
 # %% jupyter={"source_hidden": true}
 import json

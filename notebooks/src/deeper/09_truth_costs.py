@@ -12,7 +12,7 @@
 # **Prerequisites.** Lectures [08](../08_fusion.ipynb) (the weighted loss) and [09](../09_truth.ipynb) (how labels are
 # made); the intervals are those of lecture [12](../12_experiments.ipynb).
 #
-# **Time.** 20 minutes; the computer needs seconds, because the results are committed.
+# **Time.** 22 minutes; the computer needs seconds, because the results are committed.
 
 # %% jupyter={"source_hidden": true}
 import json

@@ -13,7 +13,7 @@
 #
 # **Prerequisites.** Lectures [10](../10_crf.ipynb) and [11](../11_fast_crf.ipynb).
 #
-# **Time.** 26 minutes; the computer needs seconds, because the results are committed. Those with maps or networks were
+# **Time.** 31 minutes; the computer needs seconds, because the results are committed. Those with maps or networks were
 # measured on an earlier version of the simulator (flat roads, a scanner with fewer columns), but for most rows of
 # the last table.
 

@@ -12,7 +12,7 @@
 # **Prerequisites.** Lecture [12](../12_experiments.ipynb), beside which this companion stands: intervals over drives
 # and seeds, paired differences.
 #
-# **Time.** 23 minutes, of which the computer needs less than one.
+# **Time.** 31 minutes, of which the computer needs less than one.
 #
 # All numbers are read from [docs/results](../../docs/results/), or come from code that you see. The networks of the
 # ablations and of 2000 + 2000 steps were trained on a GPU, those of Tables 1 and 3 and the claims on a CPU. A cell

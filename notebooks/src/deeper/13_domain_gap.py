@@ -11,7 +11,7 @@
 #
 # **Prerequisites.** Lecture [13](../13_real_drive.ipynb), beside which this companion stands.
 #
-# **Time.** 20 minutes, of which the computer needs less than one.
+# **Time.** 27 minutes, of which the computer needs less than one.
 #
 # The real images of this page are those of the street that comes with the course, and two stretches of KITTI's drive
 # 0013, its frames 0 to 23 and 24 to 60, whose numbers are read from [docs/results/real_drive.json](../../docs/results/real_drive.json).

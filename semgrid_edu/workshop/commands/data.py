@@ -32,7 +32,6 @@ def make(
     folder: Annotated[Path, typer.Argument(help="Where the data set's own folder is made.")],
     seed: Annotated[int, typer.Option(help="Seed for the drives; the same seed gives the same bytes.")] = 0,
     workers: Annotated[int, typer.Option(help="Number of processes that share the work.")] = 2,
-    scheduler: Annotated[str | None, typer.Option(help="Instead, a dask cluster: tcp://HOST:PORT.")] = None,
 ) -> None:
     """Simulate a data set in KITTI's raw layout; "all" makes minikitti, minichroma and minisynthia.
 
@@ -41,7 +40,7 @@ def make(
     from semgrid_edu.workshop.simulation.datasets import DATA_SETS, make_dataset
 
     for one in DATA_SETS if name == "all" else [name]:
-        typer.echo(f"{one} is in {make_dataset(one, folder, seed, workers, scheduler)}")
+        typer.echo(f"{one} is in {make_dataset(one, folder, seed, workers)}")
 
 
 @data.command()

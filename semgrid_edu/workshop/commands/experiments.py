@@ -47,13 +47,12 @@ def _command(experiment: str) -> Callable[..., None]:
         ] = "quick",
         seeds: Annotated[int | None, typer.Option(min=1, max=1000, help="Seeds; by default the scale's own.")] = None,
         workers: Annotated[int | None, typer.Option(help="Runs at a time; one per core by default.")] = None,
-        scheduler: Annotated[str | None, typer.Option(help="Instead, a dask cluster: tcp://HOST:PORT.")] = None,
         device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "cpu",
         plan: Annotated[bool, typer.Option("--plan", help="Only show the runs and how long they will take.")] = False,
     ) -> None:
         from semgrid_edu.workshop.paper.reproduce import Request, reproduce
 
-        places = {"runs": runs, "out": out, "workers": workers, "scheduler": scheduler, "device": device}
+        places = {"runs": runs, "out": out, "workers": workers, "device": device}
         request = Request(experiment=experiment, scale=scale, seeds=seeds, **places)
         if problems := reproduce(request, typer.echo, plan):
             typer.echo(problems, err=True)

@@ -1,11 +1,10 @@
 """The resumable loop behind `semgrid-edu reproduce`: every run of a plan, once, several at a time."""
 
 import contextlib
-import threading
 import time
 import traceback
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -24,9 +23,6 @@ THREADS = 1
 """Threads of a run. The order of sums depends on it, so it is fixed: the same run gives the same bytes everywhere. Two
 processes of one thread keep two cores busier than one process of two."""
 
-_ONE_AT_A_TIME = threading.Lock()
-"""Threads and printed output belong to a process, so it does one run at a time, however many a cluster gives it."""
-
 
 def execute_plan(plan: Sequence[Run], root: str | Path, place: Workplace, device: str = "cpu") -> dict[Run, str]:
     """Do all runs that are left to do, each as soon as what it needs has ended.
@@ -41,7 +37,7 @@ def execute_plan(plan: Sequence[Run], root: str | Path, place: Workplace, device
     root : path-like
         The folder of all runs.
     place : Workplace
-        Where the work is done: processes of this machine, or a dask cluster.
+        Where the work is done. Threads and printed output belong to a process, so each process does one run at a time.
     device : str
         The device of the training runs, see `choose_device`.
 
@@ -57,14 +53,14 @@ def execute_plan(plan: Sequence[Run], root: str | Path, place: Workplace, device
         while waiting or under_way:
             missing = {*waiting, *under_way.values(), *failed}
             ready = [run for run in waiting if missing.isdisjoint(run.needs)]
-            for run in ready[: max(place.slots() - len(under_way), 0)]:
+            for run in ready[: max(place.slots - len(under_way), 0)]:
                 waiting.remove(run)
                 under_way[place.executor.submit(run_one, run, str(root), device)] = run
             bar.set_postfix_str(", ".join(run.name for run in under_way.values()))
             ended, _ = wait(under_way, return_when=FIRST_COMPLETED)
             for future in ended:
                 run = under_way.pop(future)
-                if error := _error(future):
+                if error := future.result():
                     failed[run] = error
                     tqdm.write(f"{run.name} failed: {error.strip().splitlines()[-1]}")
                 bar.update()
@@ -76,14 +72,6 @@ def execute_plan(plan: Sequence[Run], root: str | Path, place: Workplace, device
     return failed
 
 
-def _error(future: Future) -> str | None:
-    """Return what went wrong in a run, or with the process that did it."""
-    error = future.exception()
-    if isinstance(error, BrokenExecutor):  # no other run could start either
-        raise error
-    return f"the process of the run ended: {type(error).__name__}: {error}" if error else future.result()
-
-
 def run_one(run: Run, root: str | Path, device: str = "cpu") -> str | None:
     """Do one run in this process.
 
@@ -92,7 +80,7 @@ def run_one(run: Run, root: str | Path, device: str = "cpu") -> str | None:
     run : Run
         The run; those that it needs have ended.
     root : path-like
-        The folder of all runs, the same for all machines.
+        The folder of all runs.
     device : str
         The device of a training run, see `choose_device`.
 
@@ -104,7 +92,7 @@ def run_one(run: Run, root: str | Path, device: str = "cpu") -> str | None:
     if run.has_ended(root):
         return None
     began = time.perf_counter()
-    with _ONE_AT_A_TIME, few_threads():
+    with few_threads():
         try:
             claim_folder(run, root)
             with _printing_to(run.folder(root) / OUTPUT):

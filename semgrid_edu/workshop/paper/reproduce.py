@@ -39,8 +39,6 @@ class Request:
         Number of seeds; None for the scale's own.
     workers : int or None
         Runs at a time; None for one per core.
-    scheduler : str or None
-        Address of a cluster that does the runs; None for processes of this machine.
     device : str
         The device of the training runs, see `choose_device`.
     """
@@ -51,7 +49,6 @@ class Request:
     out: Path
     seeds: int | None = None
     workers: int | None = None
-    scheduler: str | None = None
     device: str = "cpu"
 
     @property
@@ -98,9 +95,8 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
         When something that was asked for doesn't exist, such as a GPU for each process.
     """
     check_workers(1 if request.workers is None else request.workers)
-    if request.scheduler is None:
-        choose_device(request.device)
-    root = request.runs.resolve()  # under this name every machine of a cluster finds it
+    choose_device(request.device)
+    root = request.runs.resolve()
     if root.exists() and not root.is_dir():
         raise ArgumentError("--runs", "a folder", f"the file {root}")
     root.mkdir(parents=True, exist_ok=True)
@@ -112,10 +108,10 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
         estimated = estimate(plan, root)
         minutes = sum(estimated.values()) / (request.workers or usable_cores()) / 60
         left = f"left: {len(estimated)} of {len(plan)} runs, about {minutes:.0f} min"
-        echo(f"{plan_table(plan, estimated)}\n\n{left}" + (" on this machine" if request.scheduler else ""))
+        echo(f"{plan_table(plan, estimated)}\n\n{left}")
         if plan_only:
             return ""
-        with workplace(request.workers, request.scheduler) as place:
+        with workplace(request.workers) as place:
             failed = execute_plan(plan, root, place, request.device)
         for name, experiment in request.chosen.items():
             size = request.size(experiment)

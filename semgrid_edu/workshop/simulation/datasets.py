@@ -114,7 +114,7 @@ PACKAGES = ("numpy", "numba", "embreex", "trimesh", "pillow")
 """Packages whose version can change the drive that a seed gives."""
 
 
-def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2, scheduler: str | None = None) -> Path:
+def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2) -> Path:
     """Make one of the package's data sets, or resume an interrupted run, see `make_from_recipe`.
 
     Parameters not named here are those of `make_from_recipe`.
@@ -131,12 +131,10 @@ def make_dataset(name: str, folder: Path, seed: int = 0, workers: int = 2, sched
     """
     if name not in RECIPES:
         raise ArgumentError("name", f"one of {', '.join(RECIPES)}", repr(name))
-    return make_from_recipe(RECIPES[name], folder, seed, workers, scheduler)
+    return make_from_recipe(RECIPES[name], folder, seed, workers)
 
 
-def make_from_recipe(
-    recipe: DatasetRecipe, folder: Path, seed: int, workers: int, scheduler: str | None = None
-) -> Path:
+def make_from_recipe(recipe: DatasetRecipe, folder: Path, seed: int, workers: int) -> Path:
     """Make a custom data set, or resume an interrupted run.
 
     The same name and seed give the same bytes, however many workers or interruptions there are.
@@ -151,8 +149,6 @@ def make_from_recipe(
         Seed for all drives; not negative.
     workers : int
         Number of parallel processes, at least one.
-    scheduler : str, optional
-        Address of a dask.distributed scheduler, whose workers then do the work, see `workplace`.
 
     Returns
     -------
@@ -169,7 +165,7 @@ def make_from_recipe(
     """
     check_whole(seed=seed)
     check_workers(workers)
-    root = Path(folder).resolve() / recipe.name  # absolute, because cluster workers run in other directories
+    root = Path(folder).resolve() / recipe.name
     routes = {f"{k + 1:04d}": route for k, route in enumerate(recipe.routes)}
     with sole_writer(root):
         _claim(root, {"name": recipe.name, "seed": seed, "format": recipe.edition})
@@ -177,7 +173,7 @@ def make_from_recipe(
         writer.remove_unfinished(root / writer.DATE)
         missing = [drive for drive in routes if not drive_folder(root, writer.DATE, drive).exists()]
         missing.sort(key=lambda drive: -routes[drive].n_frames)
-        made = _run(partial(_make_drive, recipe, root, seed), missing, workers, scheduler)
+        made = _run(partial(_make_drive, recipe, root, seed), missing, workers)
         list(tqdm(made, recipe.name, len(routes), initial=len(routes) - len(missing), unit="drive"))
         for drive, route in routes.items():
             writer.check_complete(drive_folder(root, writer.DATE, drive), route.n_frames, route.labelled)
@@ -200,12 +196,12 @@ def _claim(root: Path, marker: dict) -> None:
         write_json(path, marker)
 
 
-def _run(make: partial, drives: list[str], workers: int, scheduler: str | None) -> Iterator[None]:
+def _run(make: partial, drives: list[str], workers: int) -> Iterator[None]:
     """Make drives in parallel, or in this process when one is enough; yield after each."""
-    if not scheduler and (workers == 1 or len(drives) < 2):
+    if workers == 1 or len(drives) < 2:
         yield from map(make, drives)
         return
-    with workplace(None if scheduler else workers, scheduler) as place:
+    with workplace(workers) as place:
         for future in as_completed([place.executor.submit(make, drive) for drive in drives]):
             yield future.result()
 

@@ -21,11 +21,12 @@ DISPLAY_EQUATION = re.compile(
     r"\$\$.+?\$\$|\\\[.+?\\\]|\\begin\{(align|equation|gather|multline)\*?\}.+?\\end\{\1\*?\}", re.DOTALL
 )
 PICTURE = re.compile(r"!\[[^\]]*\]\([^)]*\)|<img\b[^>]*>")
+CODE_IN_LINE = re.compile(r"`[^`]+`")
 IN_LINE = re.compile(r"`[^`]+`|\$[^$]+\$")
 LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
 TAG = re.compile(r"<[A-Za-z/!][^>]*>")
 WORD = re.compile(r"\S*[^\W_]\S*")
-NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d[\d,]*(?:\.\d+)?|\.\d+)(?:e[-+]?\d+)?")
+NUMERAL = re.compile(r"(?<![\w.])[-+]?(?:\d[\d,]*(?:\.\d+)?|\.\d+)(?:e[-+]?\d+)?")
 SECTION = re.compile(r"^(?=## )", re.MULTILINE)
 
 
@@ -46,13 +47,15 @@ class ReadingTime:
         How often the words `PREDICTION` occur.
     lines : int
         Lines of code that isn't collapsed; comments count, blank lines don't.
-    numbers : int
-        Numbers that cells print, in text and in tables.
+    numerals : int
+        Numbers in the text, outside code, displayed equations and links. They take no time of their own.
+    sections : int
+        Headings `## ...`.
 
     Examples
     --------
-    >>> ReadingTime(words=260, equations=1, lines=20).minutes
-    6.0
+    >>> ReadingTime(words=260, equations=1, lines=16).minutes
+    8.0
     """
 
     words: int = 0
@@ -60,18 +63,18 @@ class ReadingTime:
     figures: int = 0
     predictions: int = 0
     lines: int = 0
-    numbers: int = 0
+    numerals: int = 0
+    sections: int = 0
 
     @property
     def parts(self) -> dict[str, float]:
         """The minutes of each kind of work."""
         return {
             "prose": self.words / 130,
-            "equations": 2.0 * self.equations,
-            "figures": 0.5 * self.figures,
-            "predictions": 1.5 * self.predictions,
-            "code": self.lines / 10,
-            "numbers": self.numbers / 200,
+            "equations": 4.0 * self.equations,
+            "figures": 1.5 * self.figures,
+            "predictions": 3.0 * self.predictions,
+            "code": self.lines / 8,
         }
 
     @property
@@ -119,7 +122,7 @@ def section_times(notebook: NotebookNode) -> dict[str, ReadingTime]:
 
 
 def time_of_text(text: str) -> ReadingTime:
-    """Return the words, displayed equations, pictures and predictions of a text in Markdown.
+    """Return the words, displayed equations, pictures, predictions, numerals and sections of a text in Markdown.
 
     Parameters
     ----------
@@ -139,6 +142,8 @@ def time_of_text(text: str) -> ReadingTime:
         equations=len(DISPLAY_EQUATION.findall(text)),
         figures=len(PICTURE.findall(prose)),
         predictions=prose.count(PREDICTION),
+        numerals=len(NUMERAL.findall(TAG.sub(" ", LINK.sub(" ", CODE_IN_LINE.sub(" ", PICTURE.sub(" ", prose)))))),
+        sections=len(SECTION.findall(text)),
     )
 
 
@@ -157,7 +162,7 @@ def stated_minutes(notebook: NotebookNode) -> int | None:
 def minutes_table(sources: list[Path]) -> str:
     """Return a table of minutes: a line for each notebook, or for each section of a single notebook.
 
-    "stated" is the header's number.
+    "stated" is the header's number. After the minutes come the counts of words, numerals and sections.
 
     Parameters
     ----------
@@ -170,27 +175,20 @@ def minutes_table(sources: list[Path]) -> str:
     if len(notebooks) == 1:
         [notebook] = notebooks.values()
         rows = section_times(notebook) | rows
-    lines = ["".join(f"{column:>12}" for column in ("stated", "computed", *ReadingTime().parts))]
+    columns = ("stated", "computed", *ReadingTime().parts, "words", "numerals", "sections")
+    lines = ["".join(f"{column:>12}" for column in columns)]
     for name, time in rows.items():
-        numbers = "".join(f"{minutes:12.1f}" for minutes in (time.minutes, *time.parts.values()))
-        lines.append(f"{stated.get(name) or '':>12}{numbers}  {name}")
+        minutes = "".join(f"{number:12.1f}" for number in (time.minutes, *time.parts.values()))
+        counts = "".join(f"{number:12}" for number in (time.words, time.numerals, time.sections))
+        lines.append(f"{stated.get(name) or '':>12}{minutes}{counts}  {name}")
     return "\n".join(lines)
 
 
 def _time_of_code(cell: NotebookNode) -> ReadingTime:
-    """Return the reading time of a code cell, and of the figures and numbers below it."""
+    """Return the reading time of a code cell and of the figures below it."""
     hidden = cell.metadata.get("jupyter", {}).get("source_hidden", False)
     lines = 0 if hidden else sum(bool(line.strip()) for line in cell.source.splitlines())
-    numbers = sum(len(NUMBER.findall(text)) for text in map(_printed, cell.get("outputs", [])))
-    return ReadingTime(lines=lines, figures=len(list(figures(cell))), numbers=numbers)
-
-
-def _printed(output: NotebookNode) -> str:
-    """Return what an output shows as text: a stream, a table in Markdown, or a value that has no picture."""
-    data = output.get("data", {})
-    if "image/png" in data:
-        return ""
-    return output.get("text") or data.get("text/markdown") or data.get("text/plain", "")
+    return ReadingTime(lines=lines, figures=len(list(figures(cell))))
 
 
 def _built(source: Path) -> NotebookNode:

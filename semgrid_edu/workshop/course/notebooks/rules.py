@@ -10,8 +10,8 @@ from semgrid_edu.plotting import FIGURE_DPI, MAX_ANIMATION_BYTES
 from semgrid_edu.workshop.course.notebooks.figures import PNG, alternative_text, figures, moves, png_bytes, resolution
 from semgrid_edu.workshop.course.notebooks.minutes import PREDICTION, reading_time, stated_minutes
 
-MAX_MINUTES = 75
-"""The longest that a lecture's main path may take."""
+LIMITS = {"minutes": 80, "words": 3_300, "numerals": 110, "sections": 13}
+"""The most that a lecture may have of each; a lecture aims at 75 minutes, 2,800 words, 80 numerals and ten sections."""
 
 MIN_ALT_WORDS = 4
 """An alternative text with fewer words than this doesn't describe a figure."""
@@ -33,16 +33,18 @@ def dishonest_minutes(notebook: NotebookNode) -> Iterator[str]:
 
 
 def too_long(notebook: NotebookNode) -> Iterator[str]:
-    """Report a lecture of more than `MAX_MINUTES` minutes.
+    """Report a lecture with more minutes, words, numerals or sections than `LIMITS`.
 
     Parameters
     ----------
     notebook : NotebookNode
         An executed notebook.
     """
-    needed = round(reading_time(notebook).minutes)
-    if needed > MAX_MINUTES:
-        yield f"takes {needed} minutes, more than {MAX_MINUTES}; move what is beside the path to a companion"
+    time = reading_time(notebook)
+    for what, limit in LIMITS.items():
+        needed = round(getattr(time, what))
+        if needed > limit:
+            yield f"has {needed} {what}, more than {limit}; move what is beside the path to a companion, or delete it"
 
 
 def answers_in_sight(notebook: NotebookNode) -> Iterator[str]:
