@@ -179,6 +179,9 @@ def check_free_energy_limits(free_energy: Callable) -> None:
     near = F([[1 - eps, eps], [eps, 1 - eps]], [[a, 9], [b, c]])
     assert close(F([[1, 0], [0, 1]], phi), near), "certain cells have no entropy, only their energy"
     assert np.isinf(F([[0.5, 0.5], [0.5, 0.5]], phi)), "an impossible class with a probability costs infinitely much"
+    assert not close(F([[0.5, 0.5], [0.5, 0.5]], np.zeros((2, 2))), F([[1, 1], [0, 0]], np.zeros((2, 2)))), (
+        "unsure cells and sure ones have the same free energy where all prices are 0"
+    )
     tiny = [[eps, 0], [1 - eps, 1]]
     rise = F(tiny, [[1e12, 0], [0, 0]]) - F(tiny, [[0, 0], [0, 0]])
     assert abs(rise) > 0.1, "a tiny probability isn't 0: times a large price it counts"

@@ -110,6 +110,7 @@ def check_clamp(update: Callable) -> None:
     opposite = answer_array(update(L.copy(), free.copy(), occupied.copy(), 0.1, 2.0, -50.0, 50.0))
     assert not close(sums, opposite), "with wide limits it doesn't matter what the scan says"
     assert got.size > 0, "no cells came back"
+    assert not close(got, sums), "no cell gets as far as its limit, old beliefs and scan together"
     assert got.max() <= 2.7 + 1e-6, "some cells are above L_max"
     assert got.min() >= -1.2 - 1e-6, "some cells are below L_min"
     assert close(got, np.clip(sums, -1.2, 2.7)), "cells within the limits are wrong"
@@ -136,13 +137,13 @@ def check_fuse_many(fuse: Callable) -> None:
     rng = generator(29)
     for_it, last = rng.uniform(0.6, 0.95, size=(1500, 2, 3)), rng.uniform(0.1, 0.9, size=(1, 2, 3))
     for posteriors in (np.concatenate([for_it, 1 - for_it]), np.concatenate([1 - for_it, for_it])):
-        got = answer_array(fuse(0.5, np.concatenate([posteriors, last])))
+        got = answer_array(fuse(0.5, np.roll(np.concatenate([posteriors, last]), rng.integers(1500), axis=0)))
         assert np.isfinite(got).all(), (
             "NaN after thousands of scans: a long product ends at 0 or infinity; add logarithms"
         )
         alone = answer_array(fuse(0.5, last.copy()))
         opposite = answer_array(fuse(0.5, 1 - last))
-        assert not close(alone, opposite), "it doesn't matter what the last scan says"
+        assert not close(alone, opposite), "it doesn't matter what one scan says"
         stuck = "thousands of scans that cancel leave a trace: no belief comes back from exactly 0 or 1; add logarithms"
         assert close(got, alone), stuck
 

@@ -157,6 +157,8 @@ def check_impossible(heights_of: Callable) -> None:
         assert alone.shape == (n,), "another shape"
         assert np.isfinite(alone).all(), "NaN where a height is possible"
         assert n == 1 or np.ptp(alone) > 0, "all have the same height"
+        others = (x, x_drawn, 1.5, 0.6), (x, x_drawn + 1, 1.5, 0.3), (x, x_drawn, 1.9, 0.3)
+        assert not any(close(alone, answer_array(heights_of(*one))) for one in others), "the same for another plane"
         never = np.concatenate([x_drawn, [np.nan, 0.0, -1e-3, -40.0]])
         got = answer_array(heights_of(np.concatenate([x, [5.0, 9.0, 8.0, 30.0]]), never, 1.5, 0.3))
         assert close(got[:n], alone), "other heights beside what is drawn nowhere"

@@ -117,6 +117,8 @@ def check_invisible(cell_means: Callable) -> None:
         alone = answer_array(cell_means(scores, pixels[seen[0]][:, seen[1]], np.ones((1, seen[1].sum()), bool)))
         assert close(got[:, cell], alone[:, 0]), "another mean than that of the visible points alone"
     assert np.ptp(got[:, some]) > 0, "all cells have the same mean"
+    other = answer_array(cell_means(scores**2, pixels.copy(), visible.copy()))
+    assert not close(other, got), "the same means of other scores"
     nothing = answer_array(cell_means(scores, np.full_like(pixels, np.nan), np.zeros_like(visible)))
     assert nothing.shape == (3, 6), "the shape is wrong where nothing is visible"
     assert (nothing == 0).all(), "not all 0 where nothing is visible"

@@ -158,6 +158,8 @@ def check_stride(atrous: Callable) -> None:
         full, got = (answer_array(atrous(maps.copy(), kernels.copy(), np.zeros(1), s, rate)) for s in (1, stride))
         wanted = full[..., ::stride, ::stride]
         assert full.size == 1 or np.ptp(full) > 0, "all outputs are the same"
+        other = answer_array(atrous(maps.copy(), -kernels, np.zeros(1), 1, rate))
+        assert not close(full, other), "the same outputs by other kernels"
         assert got.shape == wanted.shape, "wrong shape with another stride"
         assert close(got, wanted), "not the outputs of stride 1 at every step of the stride"
 
