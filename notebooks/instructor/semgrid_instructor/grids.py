@@ -110,9 +110,9 @@ def check_clamp(update: Callable) -> None:
     opposite = answer_array(update(L.copy(), free.copy(), occupied.copy(), 0.1, 2.0, -50.0, 50.0))
     assert not close(sums, opposite), "with wide limits it doesn't matter what the scan says"
     assert got.size > 0, "no cells came back"
-    assert not close(got, sums), "no cell gets as far as its limit, old beliefs and scan together"
     assert got.max() <= 2.7 + 1e-6, "some cells are above L_max"
     assert got.min() >= -1.2 - 1e-6, "some cells are below L_min"
+    assert not close(got, sums), "no cell gets as far as its limit, old beliefs and scan together"
     assert close(got, np.clip(sums, -1.2, 2.7)), "cells within the limits are wrong"
 
 
@@ -237,6 +237,8 @@ def check_beam(beam_evidence: Callable) -> None:
 def check_beam_outside(beam_evidence: Callable) -> None:
     """Try returns beyond each border of the grid, far and near: int() cuts -0.6 to 0, a row of the grid."""
     spec = GridSpec(x_min=-10.1, x_max=14.9, y_min=-6.1, y_max=9.9, cell=0.5)
+    ahead, behind = (answer_array(beam_evidence(x, 1.7, spec, 1.5, -0.4)) for x in (20.3, -12.4))
+    assert not close(ahead, behind), "the same cells, wherever the beam goes"
     ways = ((20.3, 1.7), (16.1, -9.3), (-12.4, 3.3), (4.2, 12.9), (3.1, -7.7), (15.2, 1.7), (4.2, 10.2))
     for x, y in ways + generator(28).uniform(-0.15, 0.15, (7, 2)):
         _judge_beam_beyond(beam_evidence, spec, x, y)
