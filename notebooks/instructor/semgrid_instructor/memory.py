@@ -1,7 +1,9 @@
 """Hidden tests of exercise 14, memory for classes: other frames, other maps, and the simulated drive, which moves."""
 
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,22 +95,28 @@ def check_listen(listen: Callable) -> None:
         )
 
 
+@cache
+def _poses(spec: GridSpec) -> tuple[list[Frame], NDArray, NDArray]:
+    """Return bare frames of a drive, how many frames ago each cell was seen, and the patch of the world it lies in."""
+    frames, places = sample_drive()[DRIVEN], []
+    for frame in frames:
+        motion = PlanarMotion.from_poses(frames[0].T_world_from_lidar, frame.T_world_from_lidar)
+        places.append((motion.to_previous(spec.centers().reshape(-1, 2)) // PATCH).astype(int).T + 30)
+    bare = [replace(frame, image=None, labels=None, points=frame.points[:0]) for frame in frames]
+    return bare, frames_since_seen(frames, spec), np.array(places)
+
+
 def _driven() -> tuple[list[Frame], list[NDArray], GridSpec]:
     """Return bare frames of a drive through a world that nobody knows, what is given and what is true, and the grid."""
-    rng, spec, frames = generator(1440), GridSpec.compact(), sample_drive()[DRIVEN]
-    since, world = frames_since_seen(frames, spec), rng.integers(0, 10, (150, 150))
-    truth = np.empty_like(since)
-    for t, frame in enumerate(frames):
-        motion = PlanarMotion.from_poses(frames[0].T_world_from_lidar, frame.T_world_from_lidar)
-        place = motion.to_previous(spec.centers().reshape(-1, 2)) // PATCH
-        truth[t] = world[tuple(place.astype(int).T + 30)].reshape(spec.shape)
+    rng, spec = generator(1440), GridSpec.compact()
+    frames, since, places = _poses(spec)
+    truth = rng.integers(0, 10, (150, 150))[places[:, 0], places[:, 1]].reshape(since.shape)
     right = (since == 0) & (rng.random(since.shape) < 0.85)
     said = np.where(right, truth, rng.integers(0, 10, since.shape))[:, None]
     classes = np.where(since == 0, 0.8, 0.1)[:, None] * (said == np.arange(10)[:, None, None])
     o = np.moveaxis(rng.dirichlet(np.ones(4), since.shape), -1, 1)
     grids = np.concatenate([classes, (1 - classes.sum(axis=1, keepdims=True)) * o], axis=1)
-    bare = [replace(frame, image=None, labels=None, points=frame.points[:0]) for frame in frames]
-    return bare, [o.astype(np.float32), grids.astype(np.float32), truth, since], spec
+    return deepcopy(frames), [o.astype(np.float32), grids.astype(np.float32), truth, since], spec
 
 
 @hidden
