@@ -1,9 +1,8 @@
 # %% [markdown]
-# # Exercise: graphical models
+# # Exercise 01b: graphical models
 #
-# Five pieces of a small inference library: the quotient of two tables, Bayes' rule on a table, independence read off a graph, elimination with its price, and
-# the two sweeps of messages on a chain. Then one question to answer in words. About 90 minutes. The companion is
-# [Graphical models from nothing](../deeper/graphical_models.ipynb).
+# Four pieces of a small inference library: the quotient of two tables, Bayes' rule on a table, independence read off a graph, and elimination with its cost.
+# Then one question to answer in words. About 90 minutes. The lecture is [01b: graphical models](../01b_graphical_models.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
@@ -11,8 +10,7 @@
 # | 2 | what is heard: multiply, sum out, normalise | 2 + 1 |
 # | 3 | independence read off a graph | 2 + 2 |
 # | 4 | eliminate what isn't seen, in a given order, and say what it costs | 2 + 1 |
-# | 5 | messages forward and backward: filtering and smoothing | 2 + 2 |
-# | 6 | in your own words | 2 |
+# | 5 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other inputs. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -39,7 +37,7 @@ def _explain(got, slips):
 # %% [markdown]
 # ## Task 1: divide by name (1 + 1 points)
 #
-# The companion multiplies factors: $P(z, m) = P(m)\, P(z \mid m)$. Sometimes one must go back, from $P(z, m)$ and $P(m)$ to $P(z \mid m)$, or take a message out of a belief
+# The lecture multiplies factors: $P(z, m) = P(m)\, P(z \mid m)$. Sometimes one must go back, from $P(z, m)$ and $P(m)$ to $P(z \mid m)$, or take a message out of a belief
 # that it has been multiplied into. A factor is a pair `(names, table)`: a tuple of names, one for each axis, and a table of non-negative numbers. Complete `divide`: it
 # returns the quotient, again as a pair, over the variables of `f`. An entry is the entry of `f` divided by the entry of `g` at the same states. All variables of `g` are
 # among those of `f`, but their axes may stand at other places. You may choose the order of the result's axes, as long as `names` tells it.
@@ -58,7 +56,7 @@ def divide(f, g):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "quotient-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "quotient-hints", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 _QUOTIENT_SLIPS = {  # rows m, columns z
     ((0.9, 7 / 30), (6 / 70, 0.8)): "the numbers of m divide along the axis of z: line the axes up by name",
     ((0.441, 0.049), (0.018, 0.072)): "you multiplied: a quotient divides",
@@ -68,7 +66,7 @@ _QUOTIENT_SLIPS = {  # rows m, columns z
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "divide-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "divide-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     joint, cell = (("m", "z"), np.array([[0.63, 0.07], [0.06, 0.24]])), (("m",), np.array([0.7, 0.3]))
     before = joint[1].copy(), cell[1].copy()
@@ -98,7 +96,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "divide-shared-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "divide-shared-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     f = ("m1", "m2"), np.array([[1.0, 200.0], [30.0, 0.0]])
     got = divide(f, (("m2", "m1"), np.array([[1.0, 10.0], [100.0, 0.0]])))
@@ -123,7 +121,7 @@ _test()
 # %% [markdown]
 # ## Task 2: what is heard (2 + 1 points)
 #
-# The companion slices a table at what is known for certain. A report is seldom certain. `factor` is again a pair `(names, table)`, a joint table of several variables. It need
+# The lecture slices a table at what is known for certain. A report is seldom certain. `factor` is again a pair `(names, table)`, a joint table of several variables. It need
 # not sum to 1. `heard` is a dictionary, and may be empty. For each variable of which a report has come it holds the report's likelihood: `{"z": [0.3, 0.9]}` says that the
 # report is three times as probable if z is 1 as if z is 0. So a likelihood needn't sum to 1, and `[0, 1]` is the report of a witness who is never wrong.
 # Reports are independent of each other once all variables are known. There may be one about `wanted` itself.
@@ -146,7 +144,7 @@ def posterior(factor, wanted, heard):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "posterior-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "posterior-hints", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 _POSTERIOR_SLIPS = {  # P(m2 | z is surely 1) by a common slip
     (19 / 41, 22 / 41): "you summed z out: something is heard of z, so its states don't count alike",
     (11 / 13, 2 / 13): "that is for z = 0: the first number of a likelihood is that of state 0",
@@ -165,7 +163,7 @@ _UNSURE_SLIPS = {  # P(m2 | a report of z that is three times as probable if z i
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "posterior-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "posterior-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     table = np.array([[[8.0, 2.0], [1.0, 4.0]], [[3.0, 6.0], [1.0, 16.0]]])  # axes m1, m2, z
     joint = (("m1", "m2", "z"), table.copy())
@@ -194,7 +192,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "impossible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "impossible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     silent = (("m", "z"), np.array([[0.5, 0.0], [0.5, 0.0]]))  # a sensor that never says 1
     try:
@@ -262,7 +260,7 @@ def separated(parents, a, b, given=(), exact=()):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "graphs", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "graphs", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 _CHAIN = {"before": (), "now": ("before",), "after": ("now",)}
 _FORK = {"m": (), "z1": ("m",), "z2": ("m",)}
 _MEET = {"m1": (), "m2": (), "z": ("m1", "m2")}
@@ -283,7 +281,7 @@ _EXACT_FOUR = (
 )  # fmt: skip
 
 
-# %% nbgrader={"grade": true, "grade_id": "separated-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "separated-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     graphs = [dict(parents) for parents, *_ in _THREE]
     got = [separated(graph, a, b, given) for graph, (_, a, b, given, _, _) in zip(graphs, _THREE, strict=True)]
@@ -307,7 +305,7 @@ def _test():
 
 _test()
 
-# %% nbgrader={"grade": false, "grade_id": "large-graphs", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "large-graphs", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 _RANGE = {"m1": (), "m2": (), "r": ("m1", "m2"), "z": ("r",)}
 _SCANS = {"before": (), "now": ("before",), "after": ("now",), "z1": ("before",), "z2": ("now",), "z3": ("after",)}
 _DUST = {"m": (), "dust": (), "z1": ("m", "dust"), "z2": ("m", "dust")}
@@ -330,7 +328,7 @@ _EXACT_LARGE = (
 )
 
 
-# %% nbgrader={"grade": true, "grade_id": "separated-large-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "separated-large-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     for parents, a, b, given, right, hint in _LARGE:
         answer = separated(dict(parents), a, b, given)
@@ -383,7 +381,7 @@ def eliminate(factors, order, seen, best=()):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "star", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "star", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 _AGREE = [[3.0, 1.0], [1.0, 3.0]]
 _ROW = (Factor(("m1", "m2"), _AGREE), Factor(("m2", "m3"), _AGREE))
 _SEEN = [[0.9, 0.1], [0.6, 0.4]]
@@ -396,7 +394,7 @@ _SEEN_SLIPS = {
 _SEEN_BY_HAND = "P(m1, m2 = 1): 0.05 * 0.9 + 0.2 * 0.6 and 0.05 * 0.1 + 0.2 * 0.4"
 
 
-# %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"], {})
     assert got is not None, "eliminate returned nothing: did you forget `return`?"
@@ -437,7 +435,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "eliminate-cost-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "eliminate-cost-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"], {})
     assert isinstance(got, tuple | list), f"return two things, the factor and the size, got one {type(got).__name__}"
@@ -472,142 +470,15 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: forward and backward (2 + 2 points)
+# ## Task 5: in your own words (2 points)
 #
-# One grid cell with S states is scanned T times. `start`, shape `(S,)`, is what you believe at the time of the **first** scan, before you have seen it. `M[i, j]` is the probability to
-# go from state i to state j between two scans. `likelihoods`, shape `(T, S)`, has one row per scan: P(scan | state).
-#
-# Complete `filtered`: row t is P(state at time t | scans 0 to t), shape `(T, S)`. For two more points complete `smoothed`: row t is P(state at time t | all T scans). A drive has thousands of scans, and a
-# product of so many numbers is 0 in floating point: normalise your messages on the way.
-
-
-# %% nbgrader={"grade": false, "grade_id": "messages", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def filtered(start, M, likelihoods):
-    """Return P(state at t | scans 0 to t), (T, S)."""
-    ### BEGIN SOLUTION
-    beliefs, message = [], start
-    for likelihood in likelihoods:
-        belief = message * likelihood
-        beliefs.append(belief / belief.sum())
-        message = beliefs[-1] @ M
-    return np.array(beliefs)
-    ### END SOLUTION
-
-
-def smoothed(start, M, likelihoods):
-    """Return P(state at t | all scans), (T, S)."""
-    ### BEGIN SOLUTION
-    beliefs, message = filtered(start, M, likelihoods), np.ones(len(start))
-    for t in reversed(range(len(likelihoods))):
-        beliefs[t] *= message
-        beliefs[t] /= beliefs[t].sum()
-        message = M @ (likelihoods[t] * message)
-        message /= message.sum()
-    return beliefs
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": false, "grade_id": "chain", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _rows(name, answer):
-    """Return what an answer gives for one cell in three scans, after looking at its arguments, shape and sums."""
-    start, M = np.array([0.6, 0.4]), np.array([[0.9, 0.1], [0.3, 0.7]])  # FREE, OCCUPIED
-    likelihoods = np.array([[0.95, 0.2], [0.05, 0.8], [0.6, 0.3]])  # no return, a return, a weak hint
-    arguments = start.copy(), M.copy(), likelihoods.copy()
-    got = answer_array(answer(*arguments), name)
-    for argument, array, old in zip(("start", "M", "likelihoods"), arguments, (start, M, likelihoods), strict=True):
-        assert np.array_equal(array, old), f"{name} changed its argument `{argument}`: make a new array"
-    assert got.shape == (3, 2), f"one row per scan, one column per state, shape (3, 2), got {got.shape}"
-    sums = got.sum(axis=1)
-    assert np.allclose(sums, 1), f"rows sum to {sums.round(3).tolist()}: normalise each row"
-    return got
-
-
-# %% nbgrader={"grade": true, "grade_id": "filtered-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    got = _rows("filtered", filtered)
-    slips = {
-        (0.9022, 0.0978): "`start` belongs to the time of the first scan: no move before it",
-        (0.6, 0.4): "the first scan is missing in row 0: multiply by its likelihood",
-        (0.8262, 0.1738): "that is the belief after the move: return the belief at the time of the scan",
-    }
-    _explain(got[0], slips)
-    hand = "0.6 * 0.95 and 0.4 * 0.2, divided by their sum"
-    np.testing.assert_allclose(got[0], [0.8769, 0.1231], atol=1e-4, err_msg=hand)
-    slips = {
-        (0.1255, 0.8745): "M is transposed: M[i, j] goes from i to j, so a belief stands to its left",
-        (0.3081, 0.6919): "nothing moved between the scans: multiply by M",
-        (0.0857, 0.9143): "row 1 forgets the first scan: carry the belief on, not `start`",
-        (0.1082, 0.8918): "row 1 forgets the first scan: carry the belief on, not `start`",
-        (0.8262, 0.1738): "that is the prediction: multiply by the second scan's likelihood",
-    }
-    _explain(got[1], slips)
-    np.testing.assert_allclose(got[1], [0.2290, 0.7710], atol=1e-4, err_msg="predicted 0.826, 0.174; times 0.05, 0.8")
-    np.testing.assert_allclose(got[2], [0.6086, 0.3914], atol=1e-4)
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import graphical_models
-
-    complaint = graphical_models.check_filtered(filtered)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% nbgrader={"grade": false, "grade_id": "smoothed-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_LAST_SLIPS = {  # the last row by a common slip
-    (0.7567, 0.2433): "the last scan is counted twice: the backward message into t holds only the scans after t",
-    (
-        0.8235,
-        0.1765,
-    ): "a filter run backwards holds scan t too, so it counts twice: only the scans after t belong in the message",
-    (0.7500, 0.2500): "the past is missing: start from the filtered belief",
-}
-_MIDDLE_SLIPS = {  # the row before it
-    (0.2290, 0.7710): "that is still the filter: multiply by the backward message, which holds the likelihoods",
-    (0.4093, 0.5907): "going back, M stands to the left of a column: M @ message sums over where it goes next",
-    (0.0607, 0.9393): "the message from t + 1 holds the likelihood of scan t + 1, you took that of scan t",
-    (0.3727, 0.6273): "the message must pass M: between t + 1 and t the state may change",
-    (0.2763, 0.7237): "the filter is counted twice: divide the smoothed row t + 1 by its prediction first",
-    (0.1934, 0.8066): "beliefs from both sides are multiplied, not averaged",
-}
-
-
-# %% nbgrader={"grade": true, "grade_id": "smoothed-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    got = _rows("smoothed", smoothed)
-    if not np.allclose(got, [[0.6409, 0.3591], [0.3027, 0.6973], [0.6086, 0.3914]], atol=1e-4):
-        # By hand, the messages from later scans. What they make of your own filter is right too: its faults cost no more here.
-        yours = _rows("filtered", filtered) * [[0.05685, 0.22695], [0.57, 0.39], [1, 1]]
-        if not np.allclose(got, yours / yours.sum(axis=1, keepdims=True)):
-            _explain(got[2], _LAST_SLIPS)
-            hand = "no scan follows: the last row is the filter's"
-            np.testing.assert_allclose(got[2], [0.6086, 0.3914], atol=1e-4, err_msg=hand)
-            _explain(got[1], _MIDDLE_SLIPS)
-            hand = "0.229 * 0.57 and 0.771 * 0.39, normalised"
-            np.testing.assert_allclose(got[1], [0.3027, 0.6973], atol=1e-4, err_msg=hand)
-            still = {(0.8769, 0.1231): "still the filter"}
-            _explain(got[0], {(0.6077, 0.3923): "row 0 hears of scan 1 only: pass the message on", **still})
-            hand = "row 0 must hear of both later scans"
-            np.testing.assert_allclose(got[0], [0.6409, 0.3591], atol=1e-4, err_msg=hand)
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import graphical_models
-
-    complaint = graphical_models.check_smoothed(smoothed, filtered)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 6: in your own words (2 points)
-#
-# Two cells stand one behind the other. Each of two beams crosses both, and each comes back with a range too coarse to say which cell reflected it. An occupancy grid keeps one probability per cell: after each beam it
-# updates both cells separately, by Bayes' rule with that beam's likelihood for each cell. Which edges does the true graph of two cells and two returns have, and which dependence does the grid drop after the first beam? A third sensor now reports for certain that the front cell is occupied.
-# What should happen to the probability of the rear cell, and what happens in the grid? Would ten more such beams repair that? Six sentences are enough.
+# Two cells are one behind the other on the way of a coarse beam. A return says "at least one of you is occupied", and not which. A second beam along the same way returns, too.
+# An occupancy grid keeps one probability per cell: after each beam it updates both cells separately, by Bayes' rule with that beam's likelihood for each cell. Which edges does the true graph of
+# two cells and two beams have, and which dependence does the grid forget after the first beam? Another sensor now reports for certain that the front cell is occupied.
+# What should happen to the probability of the rear cell, and what happens in the grid? Would it help the grid if ten more of the coarse beams returned along the same way, before this report? Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "dropped-edge", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # Each return has arrows from both cells, so each is a collider, and once the returns are known the two cells depend on each other. The grid keeps only the two marginals after each beam, so it drops the coupling "at
 # least one of you". When the front cell turns out to be occupied it explains the returns, so the probability of the rear cell should fall back towards its prior (explaining away). In the grid nothing happens to it, because nothing links
-# it to the front cell. Ten more beams make it worse: each raises the rear cell once more, as if it were a new witness, until the grid is sure of a wall as thick as two cells. Only something that ties the cells together helps, or a range fine enough to name its cell.
+# it to the front cell. Ten more coarse beams make it worse: each raises the rear cell once more, as if it were a new witness, until the grid is sure of a wall as thick as two cells. Only something that ties the cells together helps, or a range fine enough to name its cell.
 # One point for the collider and the dropped coupling, one for what should happen to the rear cell and why more beams don't repair it.
