@@ -16,8 +16,8 @@
 #
 # **Time.** 75 minutes, of which the computer needs a few seconds.
 #
-# **Paper.** Section 4: its Table 1 and three of its claims. The companion [more tables](deeper/12_more_tables.ipynb) has
-# the other nine, and Table 3.
+# **Paper.** Section 4: its first table and three of its claims. The companion
+# [more tables](deeper/12_more_tables.ipynb) has the other nine.
 
 # %% jupyter={"source_hidden": true}
 import matplotlib.pyplot as plt
@@ -77,8 +77,8 @@ plt.show()
 # parents are the quality $u_s$ of the training run and the difficulty $d_v$ of the drive.
 #
 # In a toy, half of the drives are easy. A cell is called right with probability 0.9 in an easy drive and 0.5 in a
-# hard one, so with 0.7 on average. You see that one frame is right. Then the drive is probably easy, and another frame
-# *of the same drive* is right with probability $(0.9^2 + 0.5^2)/2 \,/\, 0.7 = 0.757$. What about a frame of another drive?
+# hard one, so with 0.7 on average. You see that it is right in one frame. What do you expect in another frame of the
+# same drive, and in one of another drive?
 
 # %%
 names = ["y11", "y12", "y21"]  # drive, frame; all of one seed u
@@ -92,29 +92,32 @@ for other in ("y12", "y21"):
     print(
         f"P({other} right) = {both.sum(0)[1] / both.sum():.3f}, given that y11 is right {both[1, 1] / both[1].sum():.3f}"
     )
+np.testing.assert_allclose((0.9**2 + 0.5**2) / 2 / 0.7, 0.757, atol=1e-3)  # the first one by hand
 assert not d_separated(toy, "y11", "y12", given=("u",))  # two frames of one drive
 assert d_separated(toy, "y11", "y21", given=("u",))  # two drives, the same known seed
 assert not d_separated(toy, "y11", "y21")  # the seed isn't known: it joins them
 
 # %% [markdown]
-# It keeps its 0.7. So frames of one drive repeat each other, frames of two drives don't, and whatever one training run
-# produced shares its seed.
+# If one frame is right, its drive is probably easy. So frames of one drive repeat each other, frames of two drives don't,
+# and whatever one training run produced shares its seed.
 #
 # ## What do we count: cells, frames or drives?
 #
 # Four drives, three frames each. In every drive the frames happen to be alike: 90, 70, 80 and 60 % of the cells are called
 # right. The mean is 75. How far may it be from the mean over very many drives? The usual recipe is the **standard
 # error**: the standard deviation of the values, divided by the root of their number. But which values?
-#
-# | values | standard deviation | standard error |
-# |---|---|---|
-# | 4 drives | $\sqrt{500/3} = 12.9$ | 6.5 points |
-# | 12 frames | $\sqrt{1500/11} = 11.7$ | 3.4 points |
-# | 12,000 cells | $\sqrt{0.75 \cdot 0.25} = 0.43$ | 0.4 points |
-#
-# The second and the third frame told us nothing new, yet they halved the standard error. Only the first row treats as
-# independent what the graph says is independent. In general, with the variance $\sigma_d^2$ between drives and
-# $\sigma_f^2$ between the frames of a drive,
+
+# %%
+by_drive = np.array([90, 70, 80, 60])
+by_cell = np.repeat([100, 0], [9000, 3000])  # 12,000 cells, of which 75 % are right
+for name, values in {"drives": by_drive, "frames": np.repeat(by_drive, 3), "cells": by_cell}.items():
+    error = np.std(values, ddof=1) / np.sqrt(len(values))
+    print(f"{len(values):>6} {name}: standard error {error:.1f} points")
+
+# %% [markdown]
+# The second and the third frame told us nothing new, yet they halved the standard error. Only the first line treats as
+# independent what the graph says is independent. In general, let drives have the standard deviation $\sigma_d$, and the
+# frames of a drive $\sigma_f$. Then
 #
 # $$ \operatorname{Var}(\text{mean}) = \frac{\sigma_d^2}{V} + \frac{\sigma_f^2}{V F}. $$
 #
@@ -129,8 +132,8 @@ assert not d_separated(toy, "y11", "y21")  # the seed isn't known: it joins them
 #
 # <details><summary>Answer</summary>
 #
-# In about 8, 48 and 95 of 100 experiments. The mean moves mostly with the drives, by 6 / √20 = 1.3 points. The interval
-# over cells reaches only 0.13 points to each side, the one over frames 0.9.
+# In about 8, 48 and 95 of 100 experiments. The mean moves by 1.3 points, because of the drives. The interval over cells
+# reaches only 0.13 points to each side.
 #
 # </details>
 
@@ -184,9 +187,8 @@ _ = interact(
 )
 
 # %% [markdown]
-# (The dials need a running kernel or the course's site.) More frames make the left intervals worse, because they grow
-# narrower around the same drives. So count drives. In our Table 1 each test drive gives one frame, so that both are
-# the same.
+# (The dials need a running kernel or the course's site.) More frames of each drive make the left intervals worse, because
+# they get narrower around the same drives. So we count drives.
 #
 # ## What does one drive contribute, and what one seed?
 #
@@ -202,14 +204,14 @@ plt.show()
 
 # %% [markdown]
 # On the left, each row below the first leaves out one drive (×). On the right, the four scores without a drive are three
-# times as close together as the drives' own, because any two of them still share two drives of three. So their squares are
-# not divided by $V (V - 1)$, as those of independent values are, but taken nearly whole:
+# times as close together as the drives' own, because any two of them still share two drives. So their squares aren't
+# divided by the number of drives, as those of independent values are, but taken nearly whole:
 #
 # $$ e_d^2 = \frac{V - 1}{V} \sum_{v=1}^{V} \left( \theta_{-v} - \bar\theta \right)^2 $$
 #
-# Here $\theta_{-v}$ is the score without drive $v$, and $\bar\theta$ the mean of these. By hand: the scores differ from
-# their mean by 0.33, -1, 1 and -0.33, so $e_d^2 = 3/4 \cdot 2.22 = 1.67$ and $e_d = 1.29$ points. For a plain mean that is exactly
-# the standard error. But the recipe, the **jackknife**, needs no formula of its own for each metric.
+# Here $\theta_{-v}$ is the score without drive $v$, and $\bar\theta$ the mean of these. The scores of the figure give $e_d =
+# 1.29$ points. For a plain mean that is exactly the standard error. But the recipe, the **jackknife**, needs no formula
+# of its own for each metric.
 
 
 # %% tags=["jackknife"]
@@ -223,7 +225,11 @@ def jackknife_interval(matrices, metric, level=0.95):
 
 
 four = np.array([[[right, 100 - right], [0, 0]] for right in (80, 84, 78, 82)])
-print("four drives: {:.1f} {:.1f} {:.1f} %".format(*100 * np.array(jackknife_interval(four, pixel_accuracy))))
+e_d = np.sqrt(3 / 4 * (0.33**2 + 1.0**2 + 1.0**2 + 0.33**2))  # by hand
+print(
+    f"e_d {e_d:.2f};",
+    "four drives: {:.1f} {:.1f} {:.1f} %".format(*100 * np.array(jackknife_interval(four, pixel_accuracy))),
+)
 
 # %% jupyter={"source_hidden": true}
 some = np.random.default_rng(0).integers(0, 50, (9, 3, 3)) + 200 * np.eye(3, dtype=int)
@@ -241,18 +247,17 @@ print("110 frames of 4 drives: ± {:.1f} points; if frames were independent, ± 
 # last line says that from four runs SegNet's pixel accuracy is known to within 12 points, where the rows of Table 1
 # differ by two.
 #
-# **Seeds.** Three training runs give 80, 82 and 81 %. Their standard deviation is 1, so their standard error is $e_s =
-# 1/\sqrt3 = 0.58$. Student's factor is 4.3 for three seeds. For one seed there is none: **a result from one seed has no
-# interval over seeds**, however many drives there are.
+# **Seeds.** Three training runs give 80, 82 and 81 %, so their standard error is $e_s = 0.58$. Student's factor for three is
+# large, and for one seed there is none: **a result from one seed has no interval over seeds**, however many drives
+# there are.
 #
 # Seeds and drives vary independently, so their variances add. With $t_n$ for Student's factor of $n$ values, the
 # package's interval reaches to each side by
 #
 # $$ \frac{t_S\, e_s^2 + t_V\, e_d^2}{\sqrt{e_s^2 + e_d^2}} $$
 #
-# (Cochran and Cox, *Experimental designs*). Each factor counts as much as its variance. If seeds agree, $e_s = 0$, and
-# the jackknife's $t_V\, e_d$ remains. If they differ, few seeds cost width. (What one drive does to one seed alone is counted
-# once, with the seeds.) Which of the two makes the bars of Table 1 wide?
+# (Cochran and Cox, *Experimental designs*). Each factor counts as much as its variance. If the seeds agree, the jackknife's
+# $t_V\, e_d$ remains. If they differ, few seeds cost width. Which of the two makes our bars wide?
 
 # %% jupyter={"source_hidden": true}
 scores = [row["scores"]["lidar"]["all"]["pixel accuracy"] for row in table1["rows"]]
@@ -276,8 +281,8 @@ assert max(spreads) < 0.5
 #
 # <details><summary>Answer</summary>
 #
-# Yes. M wins on every drive: by 2, 3, 1 and 2 points. The mean difference is 2.0, and its standard error 0.41. With
-# Student's factor 3.2 the interval goes from 0.7 to 3.3, above zero.
+# Yes. M wins on every drive, by 2 points on average. The four differences vary little, and their interval goes from 0.7
+# to 3.3, above zero.
 #
 # </details>
 
@@ -413,9 +418,9 @@ assert round(100 * by_lidar["pixel accuracy"]["mean"]) == 5
 #
 # When is a statement rejected? Its **p-value** is the probability that a number would be at least so far on the wrong
 # side if the true value were the limit. An interval on the wrong side that just touches the limit has 2.5 %. But a claim
-# with many statements has many chances to fail. **Bonferroni's** correction compares each of $m$ p-values with 2.5 % /
-# $m$. **Holm's** is as safe and rejects more: the smallest p-value against 2.5 % / $m$, the next against 2.5 % /
-# $(m - 1)$, and so on, until one isn't rejected.
+# with many statements has many chances to fail. **Bonferroni's** correction divides these 2.5 % by the number of
+# statements. **Holm's** is as safe and rejects more: it does so for the smallest p-value alone, divides by one less for
+# the next, and so on, until one isn't rejected.
 
 
 # %% tags=["holm"]
@@ -442,9 +447,9 @@ print(f"claims that chance sinks: {plain:.0%}, with Holm's correction {corrected
 # **nothing** needs a limit other than zero, such as "less than half a point".
 #
 # And why so many seeds and drives? `semgrid-edu reproduce table1 --scale quick` makes a Table 1 of your own in some
-# minutes, with two seeds and eight drives. In [ours](../docs/results/quick/table1.md) SegNet is 5 points *ahead* of FCN. With
-# five seeds, 110 drives and longer training it is a point behind. The rule refuses such a small run before it looks at its
-# means.
+# minutes, with two seeds and eight drives. In [ours](../docs/results/quick/table1.md) SegNet is 5 points *ahead* of FCN. In
+# the forest plot above, with more of everything, it is a point behind. The rule refuses such a small run before it looks
+# at its means.
 
 # %% jupyter={"source_hidden": true}
 quick = kept("table1", "quick")
@@ -460,9 +465,9 @@ assert by_scale["reduced"]["high"] < 0
 # %% [markdown]
 # ## What became of three claims?
 #
-# The paper makes twelve claims that we can test. Three of them got the three verdicts. In each figure a short black
-# line is the statement's limit, and its arrow points to the claimed side. At the right edge stands *yes* if
-# the interval is on that side, *no* if the statement is rejected, else *?*.
+# Of the paper's twelve claims, here are three. In each figure a short black line is the statement's limit, and its arrow
+# points to the claimed side. The right edge says *yes* if the interval is on that side, *no* if the statement is
+# rejected, else *?*.
 #
 # **Claim 2: the CRF raises pixel accuracy slightly and lowers class accuracy.** Six statements, by two kinds of labels:
 
@@ -486,13 +491,16 @@ plt.show()
 # even *better* from 20 to 40 m than nearer. So before you say that near is better, say by which labels. The paper has one
 # kind, and its claim was tested in the first panel: *cannot tell*, because one bar is too wide.
 #
-# **Predict before you run.** **Claim 10: training end to end gives better grids than training in two stages.** By true labels its three p-values are
-# 0.022 (pixel accuracy), 0.37 and 0.12. All three means are on the wrong side. What is the verdict?
+# **Claim 10: training end to end gives better grids than training in two stages.** In two stages, the image network stays
+# as it was after its own training. Three statements, one for each metric.
+#
+# **Predict before you run.** By true labels all three means are on the wrong side, with p-values of 0.022, 0.37 and 0.12.
+# What is the verdict?
 #
 # <details><summary>Answer</summary>
 #
-# Cannot tell. Holm compares the smallest, 0.022, with 0.025 / 3 = 0.008. The interval of pixel accuracy excludes zero, but
-# after Holm's correction it is no longer significant.
+# Cannot tell. Holm divides 2.5 % by three, so the smallest p-value had to be below 0.008. The interval of pixel accuracy
+# excludes zero, but after Holm's correction it is no longer significant.
 #
 # </details>
 

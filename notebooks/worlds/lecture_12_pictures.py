@@ -16,7 +16,7 @@ from semgrid_edu.plotting import confusion
 from semgrid_edu.workshop.paper.published import NETWORKS
 from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval, shown
 
-RESULTS = Path(__file__).parents[2] / "docs" / "results"
+RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results"
 """The committed results of `semgrid-edu reproduce`."""
 
 SCORE_COLOUR, SEED_COLOUR = "#1f4e79", "#d95f02"
