@@ -14,7 +14,7 @@
 # **Prerequisites.** The metrics of lecture [00](00_tour.ipynb), training and its balanced loss of lecture
 # [08](08_fusion.ipynb), the graphs of lecture [01b](deeper/graphical_models.ipynb). Mean, variance, normal distribution.
 #
-# **Time.** 75 minutes, of which the computer needs a few seconds.
+# **Time.** 72 minutes, of which the computer needs a few seconds.
 #
 # **Paper.** Section 4: its first table and three of its claims. The companion
 # [more tables](deeper/12_more_tables.ipynb) has the other nine.
@@ -242,8 +242,8 @@ halves = [100 * few["half-width"][unit] for unit in ("drives", "frames")]
 print("110 frames of 4 drives: ± {:.1f} points; if frames were independent, ± {:.1f}".format(*halves))
 
 # %% [markdown]
-# The standard error is multiplied by **Student's factor**, because four drives tell us little about how much drives
-# differ. The paper is such a case: its labels come from eight long runs, about four of them for testing. We simulated as many. The
+# The standard error is multiplied by **Student's factor**, from Student's distribution with $V - 1$ degrees of freedom. It
+# is large for few drives, because they tell us little about how much drives differ. The paper is such a case: its labels come from eight long runs, about four of them for testing. We simulated as many. The
 # last line says that from four runs SegNet's pixel accuracy is known to within 12 points, where the rows of Table 1
 # differ by two.
 #
@@ -269,8 +269,8 @@ print(f"if seeds alone varied: over {alone:.1f} of it on average")
 assert max(spreads) < 0.5
 
 # %% [markdown]
-# The circles fill less than half of each bar, so most of its width comes from drives. New drives would narrow these
-# bars more than new seeds would.
+# If seeds alone varied, the circles would spread over the whole bar. They spread over less than half of it, so most of its
+# width comes from drives. New drives would narrow these bars more than new seeds would.
 #
 # ## Which of two methods is better?
 #
@@ -325,9 +325,9 @@ plt.show()
 # ## Does SegNet beat a lookup table?
 #
 # Now the sharpest comparison that we know: SegNet against a method without any network on the grid. For each cell, take the
-# class that the image network gives to the pixel that sees the cell's ground, and the cell's occupancy state. Count on the training streets
-# how often each true class goes with such a pair. To call a new cell, look up the most frequent one. That is a
-# **lookup table**. It knows no neighbours and no planes.
+# class that the image network gives to the pixel that sees the cell's ground, and the cell's occupancy state. On the
+# training streets, count how often each label goes with such a pair. To call a new cell, look up the most frequent one.
+# That is a **lookup table**. It knows no neighbours and no planes.
 #
 # **Predict before you run.** SegNet calls 70 % of all cells right, by true labels. How many points is it ahead of the
 # table, in pixel accuracy and in class accuracy?
@@ -376,9 +376,8 @@ assert without["class accuracy"]["mean"] < 0
 semantic = by_true[f"SegNet - {LOOKED_UP}"]["semantic"]["pixel accuracy"]
 assert semantic["low"] > 0
 assert round(100 * semantic["mean"], 1) == 2.4
-by_lidar = next(row["scores"] for row in table1["differences"] if row["what"] == f"SegNet - {LOOKED_UP}")["lidar"][
-    "all"
-]
+lookup = next(row for row in table1["differences"] if row["what"] == f"SegNet - {LOOKED_UP}")
+by_lidar = lookup["scores"]["lidar"]["all"]
 assert round(100 * by_lidar["pixel accuracy"]["mean"]) == 5
 
 # %% [markdown]
@@ -386,13 +385,12 @@ assert round(100 * by_lidar["pixel accuracy"]["mean"]) == 5
 # mean little beside a table.
 #
 # Where does its lead in class accuracy come from? We suspect the balanced loss of lecture [08](08_fusion.ipynb), which
-# gives rare classes more weight. So switch it off. In the last row SegNet learned without balancing, three seeds. The lead in
-# class accuracy is gone, and SegNet is ahead by a point of pixel accuracy. So over all cells balancing made that lead,
-# not what the network sees beyond one pixel.
+# gives rare classes more weight. So switch it off. In the last row SegNet learned without balancing, with three seeds. The
+# lead in class accuracy is gone, and SegNet is ahead by a point of pixel accuracy. So the lead came from balancing.
 #
-# That isn't the whole story. Over cells with a *semantic* class, such as road or car, SegNet is ahead in pixel accuracy, by
-# 2.4 points. And by the imperfect labels that the LIDAR made, from which both learned, it is ahead by five. So a score needs a
-# baseline, and the words "over which cells" and "by which labels".
+# That isn't the whole story. Over cells with a *semantic* class, such as road or car, SegNet is ahead in pixel accuracy,
+# by 2.4 points. And by the imperfect labels that the LIDAR made, from which both learned, it is ahead by five. So a score
+# needs a baseline, and the words "over which cells" and "by which labels".
 #
 # ## When is a claim reproduced?
 #

@@ -40,7 +40,8 @@ plt.show()
 
 # %% [markdown]
 # In the paper's matrix the first column is dark: what is called wrong is mostly called *void*. In ours it is mostly called
-# *vegetation*. Both networks learned on one street and were tried on another.
+# *vegetation*. Both networks learned on one street and were tried on another. Ours calls half of the cells right, and so does a table
+# of the occupancy state alone.
 #
 # **Predict before you run.** Below its matrix the paper prints 0.72 pixel accuracy, 0.36 class accuracy and 0.73
 # FmIoU. Class accuracy is the mean of the diagonal. Pixel accuracy is a mean of the same diagonal, weighted by how many
@@ -58,6 +59,9 @@ plt.show()
 
 # %% jupyter={"outputs_hidden": true}
 diagonal = np.diag(np.array(table3["paper"]["matrix"]))
+ours, state = (table3[key] for key in ("ours", "baselines"))
+for scores in (ours["scores"], state["occupancy alone"]["scores"]):
+    assert round(100 * scores["pixel accuracy"]["mean"]) == 50
 print(f"mean of the diagonal {diagonal.mean():.1f} (printed: 36)")
 print(f"at least {(72 - diagonal[1:].max()) / (diagonal[0] - diagonal[1:].max()):.2f} of the cells are void")
 
@@ -86,15 +90,13 @@ pixel, by_class = ({part: rows[part][metric] for part in parts} for metric in ("
 assert [round(100 * one["no occupancy grid"]["mean"]) for one in (pixel, by_class)] == [-16, -29]
 assert [round(100 * one["learned from true labels"]["mean"]) for one in (pixel, by_class)] == [9, 16]
 assert [round(100 * one["no balancing"]["mean"]) for one in (pixel, by_class)] == [2, -15]
-assert round(100 * pixel["1 plane"]["mean"], 1) == -0.6
 for planes in ("2 planes", "5 planes", "10 planes"):
     assert all(one[planes]["low"] < 0 < one[planes]["high"] for one in (pixel, by_class))
-print(f"one plane in place of twenty, class accuracy: {100 * by_class['1 plane']['high']:.1f} points at most")
+assert pixel["1 plane"]["low"] < 0 < pixel["1 plane"]["high"]
 
 # %% [markdown]
 # The network needs its occupancy grid most: without it 16 points of pixel accuracy are lost. True labels to learn from would
-# bring more than any choice among the paper's networks. And twenty planes? One plane is 0.6 points behind in pixel
-# accuracy. Two, five or ten can't be told from twenty.
+# bring 9. And the planes? In pixel accuracy neither one, two, five nor ten can be told from twenty.
 #
 # ## What decides the other claims?
 #
