@@ -210,8 +210,8 @@ plt.show()
 # $$ e_d^2 = \frac{V - 1}{V} \sum_{v=1}^{V} \left( \theta_{-v} - \bar\theta \right)^2 $$
 #
 # Here $\theta_{-v}$ is the score without drive $v$, and $\bar\theta$ the mean of these. The scores of the figure give $e_d =
-# 1.29$ points. For a plain mean that is exactly the standard error. But the recipe, the **jackknife**, needs no formula
-# of its own for each metric.
+# 1.29$ points. For a plain mean that is exactly the standard error. To leave out each drive once is the **jackknife**; it
+# needs no formula of its own for each metric.
 
 
 # %% tags=["jackknife"]

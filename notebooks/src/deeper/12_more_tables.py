@@ -61,7 +61,7 @@ plt.show()
 diagonal = np.diag(np.array(table3["paper"]["matrix"]))
 ours, state = (table3[key] for key in ("ours", "baselines"))
 for scores in (ours["scores"], state["occupancy alone"]["scores"]):
-    assert round(100 * scores["pixel accuracy"]["mean"]) == 50
+    assert abs(scores["pixel accuracy"]["mean"] - 0.5) < 0.006
 print(f"mean of the diagonal {diagonal.mean():.1f} (printed: 36)")
 print(f"at least {(72 - diagonal[1:].max()) / (diagonal[0] - diagonal[1:].max()):.2f} of the cells are void")
 
