@@ -85,6 +85,7 @@ def claim_picture(readings: Sequence[dict]) -> Figure:
     if common:
         names = [in_words(one["what"].removesuffix(": " + common)) for one in judged(readings[0])]
         axes[0, 0].set_yticks(range(rows), names)
-    figure.supxlabel(f"{in_words(common)} [points]".strip(), fontsize=9)
+    for ax in axes[0]:
+        ax.set_xlabel(f"{in_words(common)}\n[points]".strip(), fontsize=9)
     figure.legend(*legend_entries(axes[0, 0]), loc="outside lower center", ncols=5, fontsize=8, frameon=False)
     return figure

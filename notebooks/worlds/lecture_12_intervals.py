@@ -134,7 +134,7 @@ def some_drives(rng: np.random.Generator, n: int, share: float) -> NDArray[np.in
     return np.array([[a, x], [y, b]]).transpose(2, 0, 1)
 
 
-def held(share: float, interval: Callable, metric: Callable, trials: int = 300) -> float:
+def held(share: float, interval: Callable, metric: Callable, trials: int = 200) -> float:
     """Return how often an interval over twenty drives contains the true score.
 
     Parameters
