@@ -258,7 +258,8 @@ print("110 frames of 4 drives: ± {:.1f} points; if frames were independent, ± 
 # $$ \frac{t_S\, e_s^2 + t_V\, e_d^2}{\sqrt{e_s^2 + e_d^2}} $$
 #
 # (Cochran and Cox, *Experimental designs*). Each factor counts as much as its variance. If the seeds agree, the jackknife's
-# $t_V\, e_d$ remains. If they differ, few seeds cost width. Which of the two makes our bars wide?
+# $t_V\, e_d$ remains. If they differ, few seeds cost width. (What a drive does to one seed alone is in $e_s$ already, so the
+# package takes it out of $e_d$.) Which of the two makes our bars wide?
 
 # %% jupyter={"source_hidden": true}
 scores = [row["scores"]["lidar"]["all"]["pixel accuracy"] for row in table1["rows"]]
@@ -544,15 +545,15 @@ print(f"claim 10: all six intervals are between {min(ends):.1f} and {max(ends):.
 # in some. How often does the interval for class accuracy contain the true value?
 
 # %% jupyter={"source_hidden": true}
-for share in (0.8, 0.2, 0.05):
-    hits = lecture_12_intervals.held(share, jackknife_interval, class_accuracy)
-    print(
-        f"second class in {100 * share:2.0f} % of the drives: the truth is inside in {100 * hits:2.0f} % of experiments"
-    )
+for share, n, trials in ((0.8, 20, 200), (0.2, 20, 200), (0.05, 20, 200), (0.05, 200, 80)):
+    hits = lecture_12_intervals.held(share, jackknife_interval, class_accuracy, n, trials)
+    print(f"{n:3} drives, {100 * share:2.0f} % of them with the second class: truth inside in {100 * hits:2.0f} %")
 
 # %% [markdown]
-# With a class in most drives the intervals keep their promise. With a class in one drive of twenty they keep it half of the time, because
-# the interval can't know what it hasn't seen. So before you believe a class accuracy, count the *drives* behind each class.
+# With a class in most drives the intervals keep their promise. With a class in one drive of twenty they keep it half of
+# the time, because the interval can't know what it hasn't seen. Switch that off in the last line: in ten times as many drives the class
+# is as rare, but ten drives have it, and the promise is nearly kept. So before you believe a class accuracy, count the
+# *drives* behind each class.
 #
 # **No interval sees what didn't vary.** All our drives come from one simulator, all networks are small, and cells are
 # large. So we may say "reproduced here" or "not reproduced here", never "the paper's claim is false". Two variants

@@ -134,8 +134,8 @@ def some_drives(rng: np.random.Generator, n: int, share: float) -> NDArray[np.in
     return np.array([[a, x], [y, b]]).transpose(2, 0, 1)
 
 
-def held(share: float, interval: Callable, metric: Callable, trials: int = 200) -> float:
-    """Return how often an interval over twenty drives contains the true score.
+def held(share: float, interval: Callable, metric: Callable, n: int = 20, trials: int = 200) -> float:
+    """Return how often an interval over some drives contains the true score.
 
     Parameters
     ----------
@@ -145,12 +145,14 @@ def held(share: float, interval: Callable, metric: Callable, trials: int = 200) 
         Takes matrices (V, C, C) and a metric, returns low, score and high.
     metric : callable
         Takes a confusion matrix, such as `class_accuracy`.
+    n : int
+        Number of drives.
     trials : int
         Number of experiments.
     """
     truth = metric(some_drives(np.random.default_rng(0), 100_000, 0.99).sum(axis=0))
     rng, hits = np.random.default_rng(1), 0
     for _ in range(trials):
-        low, _, high = interval(some_drives(rng, 20, share), metric)
+        low, _, high = interval(some_drives(rng, n, share), metric)
         hits += low <= truth <= high
     return hits / trials
