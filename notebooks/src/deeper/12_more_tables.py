@@ -39,21 +39,21 @@ confusion_picture(table3)
 plt.show()
 
 # %% [markdown]
-# In the paper's matrix the first column is dark: what is called wrong is mostly called *void*. In ours it is mostly called
-# *vegetation*. Both networks learned on one street and were tried on another. Ours calls half of the cells right, and so does a table
-# of the occupancy state alone.
+# In the paper's matrix the first column is dark: what is called wrong is mostly called *void*. In ours it is mostly
+# called *vegetation*. Both networks learned on one street and were tried on another. Ours calls half of the cells
+# right, and so does a table of the occupancy state alone.
 #
-# **Predict before you run.** Below its matrix the paper prints 0.72 pixel accuracy, 0.36 class accuracy and 0.73
-# FmIoU. Class accuracy is the mean of the diagonal. Pixel accuracy is a mean of the same diagonal, weighted by how many
-# cells a class has. Void is right in 93 % of its cells, no other class in more than 57 %. What does this say about the share
+# **Predict before you run.** Below its matrix the paper prints 0.72 pixel accuracy, 0.36 class accuracy and 0.73 FmIoU.
+# Class accuracy is the mean of the diagonal. Pixel accuracy is a mean of the same diagonal, weighted by how many cells
+# a class has. Void is right in 93 % of its cells, no other class in more than 57 %. What does this say about the share
 # of void? And can FmIoU be larger than pixel accuracy?
 #
 # <details><summary>Answer</summary>
 #
-# If all other cells were of the best other class, a share q of void would give 93 q + 57 (1 - q) = 72, so q = 0.41. At least about
-# 41 % of the cells are void. And FmIoU can't be larger. It is the mean of TP / (TP + missed + falsely called), and
-# pixel accuracy is the mean of TP / (TP + missed), with the same weights. A larger denominator makes a smaller number.
-# So 0.72 and 0.73 can't both be right for the same cells, by the definitions of section 4.2.
+# If all other cells were of the best other class, a share q of void would give 93 q + 57 (1 - q) = 72, so q = 0.41. At
+# least about 41 % of the cells are void. And FmIoU can't be larger. It is the mean of TP / (TP + missed + falsely
+# called), and pixel accuracy is the mean of TP / (TP + missed), with the same weights. A larger denominator makes a
+# smaller number. So 0.72 and 0.73 can't both be right for the same cells, by the definitions of section 4.2.
 #
 # </details>
 
@@ -66,8 +66,8 @@ print(f"mean of the diagonal {diagonal.mean():.1f} (printed: 36)")
 print(f"at least {(72 - diagonal[1:].max()) / (diagonal[0] - diagonal[1:].max()):.2f} of the cells are void")
 
 # %% [markdown]
-# We don't know how the paper's 0.73 came about. Such a check needs no data, and it says how far to trust the second digit of
-# a table.
+# We don't know how the paper's 0.73 came about. Such a check needs no data, and it says how far to trust the second
+# digit of a table.
 #
 # ## What is each part worth?
 #
@@ -95,13 +95,14 @@ for planes in ("2 planes", "5 planes", "10 planes"):
 assert pixel["1 plane"]["low"] < 0 < pixel["1 plane"]["high"]
 
 # %% [markdown]
-# The network needs its occupancy grid most: without it 16 points of pixel accuracy are lost. True labels to learn from would
-# bring 9. And the planes? In pixel accuracy neither one, two, five nor ten can be told from twenty.
+# The network needs its occupancy grid most: without it 16 points of pixel accuracy are lost. True labels to learn from
+# would bring 9. And the planes? In pixel accuracy neither one, two, five nor ten can be told from twenty.
 #
 # ## What decides the other claims?
 #
 # A claim fails with its weakest statement, so that is the one to look at. Here it is for each of the nine claims that
-# the lecture left out, by each claim's first reading. The short black line is the limit, and its arrow points to the claimed side.
+# the lecture left out, by each claim's first reading. The short black line is the limit, and its arrow points to the
+# claimed side.
 
 # %% jupyter={"source_hidden": true} alt="forest plot of the weakest statement of nine claims with its limit: differences in seven rows, shares in two; claims 1 and 11 are on the wrong side, claim 12 contains its limit, 3, 6, 8 and 9 are on the claimed side; claim 4 is far below its limit of 100 per cent, 7 just above its limit of 50"
 others = {
@@ -153,5 +154,6 @@ assert [round(100 * reduction[end], 1) for end in ("low", "mean", "high")] == [1
 #
 # ## Further reading
 #
-# - [docs/results](../../docs/results.md): every table with command, seeds and deviations; also how sure the maps are, a turned
-#   camera, and four times as many steps.
+# - [ablations.md](../../docs/results/reduced/ablations.md): a turned camera, accuracy by distance, and how sure the maps
+#   are. [table1.md](../../docs/results/long/table1.md): four times as many steps.
+# - [The results](../../docs/results.md), with command, seeds and deviations.
