@@ -167,6 +167,8 @@ for way, share in zip(("cells", "frames", "drives"), contains.mean(axis=0), stri
 # %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="three panels of thirty horizontal intervals each: over cells tiny intervals that nearly all miss the true value, over frames about half miss it, over drives nearly all contain it"
 lecture_12_intervals.thirty(found[:30], ("cells", "frames", "drives"))
 plt.show()
+reach = 100 * (found[..., 1] - found[..., 0]).mean(axis=0) / 2
+assert (round(100 * found.mean(axis=(1, 2)).std(), 1), round(reach[0], 2)) == (1.3, 0.13)
 
 # %% [markdown]
 # Each line is one experiment. Blue lines with a dot contain the true value, red ones with a cross miss it. The
