@@ -413,7 +413,7 @@ assert everywhere[1] < 0.4 * everywhere[0]
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="P(DYNAMIC) of a walker over four seconds: with velocities 2 m/s apart it stays below 0.2, with 1 m/s it rises slowly and is above 0.7 after three seconds"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="P(DYNAMIC) of a walker over four seconds: with velocities 2 m/s apart it stays below 0.35, with 1 m/s it rises slowly and is above 0.7 after three seconds"
 lane, times = grid.GridSpec(x_min=4, x_max=18, y_min=-2, y_max=2, cell=0.5), np.arange(41) / 10
 fig, ax = plt.subplots(figsize=(6, 2.8), layout="constrained")
 for spacing, style in ((2, "o-"), (1, "s--")):
@@ -434,7 +434,7 @@ for spacing, style in ((2, "o-"), (1, "s--")):
         color="0.2" if spacing == 2 else "#c04000",
     )
     assert (np.mean(told[-10:]) > 0.7) == (spacing == 1)
-    assert spacing == 1 or max(told[5:]) < 0.2
+    assert spacing == 1 or max(told) < 0.35
 ax.set(xlabel="time [s]", ylabel="P(DYNAMIC) of the walker", ylim=(0, 1))
 ax.legend(fontsize=9)
 plt.show()
