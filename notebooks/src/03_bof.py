@@ -28,6 +28,7 @@ from ipywidgets import FloatSlider, IntSlider, interact
 from semgrid_edu import fast, grid, occupancy, plotting
 from semgrid_edu.datasets import samples
 from semgrid_edu.graphical import eliminate
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.plotting.moving import wheel_colours
 from worlds import lecture_02_street, lecture_03_bof, lecture_03_row, lecture_03_scenes
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
@@ -58,29 +59,31 @@ plotting.animate(
 # At **A** we know the place within three cells and nothing of the velocity: the belief is a column. At **B** nobody has
 # looked, but each row has moved at its own speed. The column is **sheared**: place and velocity, independent before, are
 # now tied together. At **C** a beam comes back from one place (red mark). It says nothing about velocities. But it picks
-# a column of the sheared belief, and only three velocities are left there. After **D** and **E** one is left, 2 m/s.
+# a column of the sheared belief, and only three velocities are left there. After **D** and **E** one velocity stands
+# out, 2 m/s.
 #
 # So scans tell velocities because motion ties velocity to place, and a scan tells places.
 #
 # ## Where did it come from?
 #
-# Now by hand. Six cells of one metre, and one thing in cell 2. It stands, or it goes one cell a second to the left or to
-# the right; each has probability 1/3. A second passes, and nobody looks. Then a beam comes back from cell 3, and all
-# other cells are passed by beams. The numbers of lecture 02: a return has probability 0.8 from an occupied cell and
-# 0.05 from a free one, a pass 0.3 and 0.7.
+# Now by hand. Six cells of one metre lie in a row, numbered from zero. One thing is in cell 2. It stands, or it goes one
+# cell a second to the left or to the right, with a third each. A second passes, and nobody looks. Then a beam comes back
+# from cell 3, and beams pass all other cells. As in lecture 02, a return has probability 0.8 from an occupied cell and
+# 0.05 from a free one, and a pass 0.3 and 0.7.
 #
 # **Predict before you run.** How surely are cells 3 and 1 occupied now?
 #
 # <details><summary>Answer</summary>
 #
-# Before the scan cells 1, 2 and 3 are occupied with 1/3 each. Cell 3: 1/3 · 0.8 = 0.267 against 2/3 · 0.05 = 0.033, so
-# 0.89, all of it to the right. Cell 1: 1/3 · 0.3 = 0.1 against 2/3 · 0.7 = 0.467, so 0.18.
+# Before the scan each of the cells 1, 2 and 3 is occupied with a third. In cell 3 *occupied* weighs 0.8 times a third and
+# *free* 0.05 times two thirds. So it is occupied with 0.8 / (0.8 + 0.1) = 0.89, and its velocity is to the right. For
+# cell 1 it is 0.3 / (0.3 + 1.4) = 0.18.
 #
 # </details>
 #
-# The two steps, for every cell: **predict** asks where it came from, **update** is Bayes' rule. What is in cell $k$ now
-# with velocity $v$ was $v\,\Delta t$ behind, in its **antecedent**. With $m_k^t$ for what cell $k$ holds at scan $t$
-# (FREE, or a velocity) and $z$ for the scan:
+# There are two steps. **Predict** asks each cell where its content came from. **Update** is Bayes' rule. What is in cell
+# $k$ now with velocity $v$ was a way of $v\,\Delta t$ behind, in its **antecedent**. Write $m_k^t$ for what cell $k$
+# holds at scan $t$, which is FREE or a velocity, and $z$ for the scan:
 #
 # $$ \begin{aligned} P(m_k^t = v) &= P(m_{k - v\,\Delta t}^{t-1} = v), \\
 #    P(m_k^t = v \mid z) &= \frac{P(z \mid \text{occupied})\, P(m_k^t = v)}
@@ -136,28 +139,29 @@ axes[0].set_ylabel("velocity [m/s]")
 plt.show()
 
 # %% [markdown]
-# The thing goes to the right, nearly for sure after two scans. (Add up the third table, though: it holds more than one
-# thing. We come back to that.) So a cell looks to its antecedents first and to its beam second.
+# The thing goes to the right, and after two scans that is nearly certain. (Add up the third table, though: it holds more
+# than one thing. We come back to that.) So a cell asks its antecedents first and its beam second.
 #
 # ## What if something arrives where something stands?
 #
-# Cell 2 holds a standing thing with probability $s = 0.5$, else it is free. From cell 1 something arrives with
+# A cell holds a standing thing with probability $s = 0.5$, else it is free. From its neighbour something arrives with
 # probability $a = 0.6$. Both can't be true, because two solid things don't share a cell. Which one gives way? Take the
 # two as independent, and write down the four pairs:
 #
-# | | stands here, 0.5 | free, 0.5 |
+# | | stands here | free |
 # |---|---|---|
-# | **arrives**, 0.6 | 0.30 ✗ | 0.30 → moves |
-# | **doesn't**, 0.4 | 0.20 → stands | 0.20 → free |
+# | **arrives** | 0.3 ✗ | 0.3 → moves |
+# | **doesn't** | 0.2 → stands | 0.2 → free |
 #
-# One pair is impossible. **Strike it out**, and scale the rest, 0.7, so that it sums to one.
+# One pair is impossible. **Strike it out**, and divide the rest by 0.7, so that it sums to one.
 #
-# **Predict before you run.** What does the cell hold now? And if it was a fence, $s = 0.99$, and $a = 0.3$?
+# **Predict before you run.** What does the cell hold now? And if a fence is there, $s = 0.99$, and something comes with
+# $a = 0.3$?
 #
 # <details><summary>Answer</summary>
 #
-# It moves with 3/7, stands with 2/7, is free with 2/7. The fence: moves 0.3 · 0.01 = 0.003, stands 0.7 · 0.99 = 0.693,
-# free 0.007, all divided by 0.703: it still stands, with 0.986. If the arrival simply won, the fence would be at 0.69.
+# It moves with 3/7, and stands or is free with 2/7 each. The fence stays: 0.7 · 0.99 / (0.7 + 0.3 · 0.01) = 0.986. If
+# the arrival simply won, the fence would be at 0.69.
 #
 # </details>
 #
@@ -209,10 +213,10 @@ for _ in range(5):
 #
 # ## How fast, and how surely?
 #
-# A cell holds 0.1 at −1 m/s, 0.2 at 0 and 0.3 at +1 m/s. What is in it? The zero velocity is called **STATIC**, all others
-# together are **DYNAMIC**. So STATIC has 0.2, DYNAMIC 0.4, and FREE the rest. *Given that something moves*, −1 has a
-# quarter and +1 three quarters: the mean is +0.5 m/s, and the variance 1 − 0.25 = 0.75 (m/s)². In general, with $D$ for
-# P(DYNAMIC):
+# A cell holds a probability of 0.1 at −1 m/s, 0.2 at zero and 0.3 at +1 m/s. What is in it? The zero velocity is called
+# **STATIC**, and all others together are **DYNAMIC**. So STATIC has 0.2, DYNAMIC 0.4, and FREE the rest. *Given that
+# something moves*, backward has a quarter and forward three quarters: the mean is +0.5 m/s. In general, with $D$ for
+# P(DYNAMIC), the mean velocity and its covariance are
 #
 # $$ D = \sum_{v \ne 0} P(m_k = v), \qquad
 #    \bar v = \frac{1}{D} \sum_{v \ne 0} v\, P(m_k = v), \qquad
@@ -227,32 +231,32 @@ np.testing.assert_allclose(mean[0, ::-1, 0][:2], [0.5, np.nan], atol=1e-6)  # wh
 np.testing.assert_allclose(covariance[0, 0, -1, 0], 0.75, atol=1e-6)
 
 # %% [markdown]
-# A cell in which nothing moves has *no* velocity. That isn't velocity zero, which would mean that something stands
-# there.
+# A cell in which nothing moves has *no* velocity. That isn't velocity zero, which would mean that something stands there.
+# So a cell tells how surely it is free, stands or moves; how fast, and how surely so, only if something may move in it.
 #
 # ## Does it still smear?
 #
 # On a street velocities have two components. They form a **lattice**, a disc of points: up to 8 m/s, 2 m/s apart, there
 # are 49. Three more things happen on a street:
 #
-# - **First sight.** A cell that no scan has reached is UNKNOWN. The first beam finds it free as a rule; if not, it is STATIC
-#   fifteen times as often as DYNAMIC. Remember this number.
-# - **Less than a cell.** In 0.1 s something at 1 m/s covers a fifth of a cell of half a metre. Rounded to zero, it
-#   would stand for ever. But a whole map flies at one velocity. So BOF keeps the **remainder** and shifts the map by a
-#   whole cell at every fifth step.
-# - **Change.** Things start, stop and get faster, by lecture 01's transition matrix and a little exchange between
-#   neighbouring velocities ([the lattice of velocities](deeper/03_lattice.ipynb)).
+# - **First sight.** A cell that no beam has reached is UNKNOWN. At its first beam it is FREE, STATIC or DYNAMIC, and
+#   before the beam speaks, STATIC is fifteen times as probable as DYNAMIC. Remember this number.
+# - **Less than a cell.** In a tenth of a second something at 1 m/s covers a fifth of a cell. Rounded to zero, it would
+#   stand for ever. But a whole map flies at one velocity. So BOF keeps the **remainder** for each map, and shifts this
+#   one by a cell at every fifth step.
+# - **Change.** Things start and stop by lecture 01's transition matrix, and a little mass goes from each velocity to its
+#   neighbours ([the lattice of velocities](deeper/03_lattice.ipynb)).
 #
-# Two boxes cross before us: one comes at 6 m/s, one goes to the left at 4 m/s, beside a wall. Lecture 02's map
-# (left) left a smear. Will BOF?
+# Two boxes move before a wall: one comes towards us at 6 m/s, one crosses to the left. In lecture 02's map both leave a
+# smear.
 #
 # **Predict before you run.** A box that moves for sure has just left a cell. What does BOF believe of this cell,
 # *before* it looks?
 #
 # <details><summary>Answer</summary>
 #
-# It is free. The mass has flown away with its velocity, and it leaves FREE behind. The map of lecture 02 must first see
-# the cell free five times.
+# It is free. The mass has flown away with its velocity, and leaves FREE behind. The map of lecture 02 must first see the
+# cell free five times.
 #
 # </details>
 
@@ -276,7 +280,7 @@ for k in range(21):
     maps.append(binary.step(points, occupancy.PlanarMotion(), dt=0.1).copy())
     beliefs.append(belief)
 
-# %% jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 places = [np.any([cells_in(world(k / 10)[box], spec) for k in range(21)], axis=0) for box in (1, 2)]
 left = [was & ~cells_in(world(2.0)[box], spec, margin=0.5) for box, was in zip((1, 2), places, strict=True)]
 smear = [sum(occupancy.smear_area(p, was, spec) for was in left) for p in (maps[-1], beliefs[-1].occupied.sum(axis=0))]
@@ -312,54 +316,12 @@ def crossing():
 plotting.animate(crossing(), 0.6, alt="two boxes cross; lecture 02's map smears them, BOF colours them by heading")
 
 # %% [markdown]
-# On the right the boxes are dark at first, because two scans tell little; then they take the colour of their
-# heading, and the wall stays dark. The smear is nearly gone, and the speed is right, because mass that moves takes itself away.
+# On the right the boxes are dark at first, because the first scans tell little. Then they take the colour of their heading,
+# and the wall stays dark. The smear is nearly gone, because mass that moves takes itself away.
 #
-# ## Can one thing be in two places?
-#
-# One thing is in cell 1. It stands, or it drives one cell to the right, with probability 1/2 each. Then a beam
-# passes cell 1, and another one comes back from cell 2.
-
-# %% tags=["graph"] jupyter={"source_hidden": true} alt="a graph: what was in cell 1 before points to what cells 1 and 2 hold now, to cell 2 by a dashed arrow marked 1 to 1.24; each cell points to its shaded beam"
-graph = lecture_03_bof.stands_or_drives()
-graph.draw(plt.subplots(figsize=(5, 3.4), layout="constrained")[1])
-plt.show()
-
-# %% [markdown]
-# Both cells ask the *same* past. If the thing drove, cell 2 is occupied **and** cell 1 is free. BOF gives each cell its own
-# copy of the past, so that a step is just a shift of maps and a formula for each cell. It deletes the dashed arrow:
-# cell 2 still gets 1/2, but the two cells don't know of each other any more.
-#
-# **Predict before you run.** How surely is cell 1 free, after both beams, if you compare the two stories as wholes? And
-# cell by cell?
-#
-# <details><summary>Answer</summary>
-#
-# As wholes: it drove, 0.7 · 0.8 = 0.56, or it stands, 0.3 · 0.05 = 0.015. So it drove, and cell 1 is free, with
-# 0.56 / 0.575 = 0.97. Cell by cell, cell 1 hears only its own beam: 0.7 against 0.3, so it is free with 0.70.
-#
-# </details>
-
-# %%
-given = {"z1,1": 0, "z2,1": 1}  # a pass, a return
-exact = [eliminate(graph.model, cell, given).normalised().table[1] for cell in ("m1,1", "m2,1")]
-alone = [0.5 * 0.3 / (0.5 * 0.3 + 0.5 * 0.7), 0.5 * 0.8 / (0.5 * 0.8 + 0.5 * 0.05)]
-for name, p in (("both together", exact), ("cell by cell", alone)):
-    print(f"{name:<14} P(occupied) of cell 1 {p[0]:.2f}, of cell 2 {p[1]:.2f}: {sum(p):.2f} things")
-package = lecture_03_bof.bof_beliefs(lecture_03_bof.STANDING_OR_DRIVING)[0]
-np.testing.assert_allclose(1 - package[:2, lecture_03_row.Cell.FREE], alone, atol=1e-9)
-
-# %% [markdown]
-# That is the price of this lecture: **there is one thing, and BOF believes in 1.24.** That the thing has been found in cell
-# 2 says nothing to cell 1. Keeping only each cell's own distribution after every step has a name, **assumed-density
-# filtering**: we assume that the cells are independent, whatever came before. It makes the filter possible, since the joint
-# belief over a map of thousands of cells would fit into no computer.
-#
-# ## Does it clear the real street?
-#
-# Here is the street of lecture 02 again, with its three lanes of ghosts. `Bof` is the two functions plus a map that
-# scrolls with the vehicle; it also checks whether what moves now would have been elsewhere half a second ago
-# ([phantoms on real streets](deeper/04_real_streets.ipynb)).
+# And the real street of lecture 02, with its three lanes of ghosts? `Bof` is the two functions, and a map that scrolls
+# with the vehicle. (It also looks back half a second: where would this thing have been, and was that place occupied?
+# See [phantoms on real streets](deeper/04_real_streets.ipynb).)
 
 # %%
 compact, sensor = grid.GridSpec.compact(), fast.SensorModel()
@@ -393,23 +355,69 @@ for lane, right, far in (("A", 5.5, 13), ("B", 2, 5.5), ("C", -2, 2)):
 everywhere = [occupancy.smear_area(occupied, truth == lecture_02_street.ROAD, compact) for occupied in (log_odds, held)]
 print(f"everywhere: {everywhere[0]:.0f} m², {everywhere[1]:.0f} m²")
 assert everywhere[1] < 0.4 * everywhere[0]
+cars = (truth == KITTI_14.index("car")) & (y > 2) & (y < 5.5) & (held > 0.5)
+assert cars.sum() > 20
+assert (p[DYNAMIC, cars] > 0.5).mean() < 0.25  # few cells of the cars in lane B
 
 # %% [markdown]
-# Data: PandaSet by Hesai and Scale AI, CC BY 4.0. The cars of lane A come towards us and turn yellow. BOF needs a second
-# to find them. Of the ghosts TODO a third is left, most of it in lane B, where cars drive away and only parts of them turn
-# blue. The car at C rolls away, too, and stays dark. Lecture 04 asks why.
+# Data: PandaSet by Hesai and Scale AI, CC BY 4.0. The cars of lane A come towards us and turn yellow. Their ghosts are
+# nearly gone. In lane B, where cars drive away, most cells of the cars stay dark, and most of the ghosts stay, too. The
+# car at C rolls away and stays dark as well. Lecture 04 asks why.
+#
+# So BOF removes the smear of what it has recognised as moving, and only of that.
+#
+# ## Can one thing be in two places?
+#
+# One thing is in cell 1. It stands, or it drives one cell to the right, with one half each. Then a beam passes cell 1,
+# and another one comes back from cell 2.
+
+# %% tags=["graph"] jupyter={"source_hidden": true} alt="a graph: what was in cell 1 before points to what cells 1 and 2 hold now, to cell 2 by a dashed arrow marked 1 to 1.24; each cell points to its shaded beam"
+graph = lecture_03_bof.stands_or_drives()
+graph.draw(plt.subplots(figsize=(5, 3.4), layout="constrained")[1])
+plt.show()
+
+# %% [markdown]
+# Both cells ask the *same* past. If the thing drove, cell 2 is occupied **and** cell 1 is free. BOF gives each cell its own
+# copy of the past, so that a step is just a shift of maps and a formula for each cell. It deletes the dashed arrow:
+# cell 2 still gets 1/2, but the two cells don't know of each other any more.
+#
+# **Predict before you run.** How surely is cell 1 free, after both beams, if you compare the two stories as wholes? And
+# cell by cell?
+#
+# <details><summary>Answer</summary>
+#
+# As wholes: it drove, 0.7 · 0.8 = 0.56, or it stands, 0.3 · 0.05 = 0.015. So it drove, and cell 1 is free, with
+# 0.56 / 0.575 = 0.97. Cell by cell, cell 1 hears only its own beam: 0.7 against 0.3, so it is free with 0.70.
+#
+# </details>
+
+# %% jupyter={"outputs_hidden": true}
+given = {"z1,1": 0, "z2,1": 1}  # a pass, a return
+exact = [eliminate(graph.model, cell, given).normalised().table[1] for cell in ("m1,1", "m2,1")]
+alone = [0.5 * 0.3 / (0.5 * 0.3 + 0.5 * 0.7), 0.5 * 0.8 / (0.5 * 0.8 + 0.5 * 0.05)]
+for name, p in (("both together", exact), ("cell by cell", alone)):
+    print(f"{name:<14} P(occupied) of cell 1 {p[0]:.2f}, of cell 2 {p[1]:.2f}: {sum(p):.2f} things")
+package = lecture_03_bof.bof_beliefs(lecture_03_bof.STANDING_OR_DRIVING)[0]
+np.testing.assert_allclose(1 - package[:2, lecture_03_row.Cell.FREE], alone, atol=1e-9)
+
+# %% [markdown]
+# That is the price of this lecture: **there is one thing, and BOF believes in 1.24.** That the thing has been found in
+# cell 2 says nothing to cell 1. A filter that keeps only each cell's own distribution after every step, as if the cells
+# were independent, does **assumed-density filtering**. That makes BOF possible, since the joint belief over a map of
+# thousands of cells would fit into no computer. So yes: for BOF one thing can be in two places.
 #
 # ## Why does a walker stand?
 #
 # A person, 0.6 m wide, comes towards us at 1.4 m/s, as people walk. The lattice has 0 and 2 m/s, but nothing between.
 #
-# **Predict before you run.** STATIC or DYNAMIC, after four seconds? And on a lattice with velocities 1 m/s apart?
+# **Predict before you run.** Will the person be STATIC or DYNAMIC after four seconds? And if velocities are 1 m/s apart?
 #
 # <details><summary>Answer</summary>
 #
-# STATIC on the first lattice: in 0.1 s the person covers 0.14 m, STATIC predicts 0 and the next velocity 0.2 m. In
-# cells of half a metre a scan hardly tells these apart, and the prior says that most things stand. On the finer
-# lattice DYNAMIC, but it takes three seconds.
+# STATIC on the first lattice. Between two scans the person moves by a third of a cell. Zero velocity predicts nothing, the
+# next velocity a little more than is true, so a scan hardly tells them apart, and the prior says that most things stand.
+# On the finer lattice the filter finds the motion, but it takes more than
+# two seconds.
 #
 # </details>
 
@@ -440,77 +448,86 @@ ax.legend(fontsize=9)
 plt.show()
 
 # %% [markdown]
-# So with the coarse lattice the filter never sees the person walk. Then why not always take a fine one? Because each
-# velocity is a whole map, and their number grows with the *area* of the disc: half the spacing, four times the memory.
-# And nearly all of it would hold nothing. Lecture 04 puts the memory where the mass is: in particles.
+# With the coarse lattice the filter never sees the person walk, and with the fine one it does. So it is the gap in the
+# lattice. Then why not always take a fine one? Because each velocity is a whole map, and their number grows with the
+# *area* of the disc: half the spacing takes four times the memory, and nearly all of it would hold nothing. Lecture 04
+# puts the memory where the mass is: into particles.
 #
 # ## Where this breaks: the flank of a bus
 #
-# A bus, 12 m long, comes and passes us at 8 m/s, which the lattice has exactly. Its flank is 2.25 m to our left.
-# Our scanner has 300 columns in its half circle. Look at panel A: each column is a cell along the flank, each row
-# one instant, later ones higher. The front of the bus is the red line. What it reaches turns orange, DYNAMIC. But far from us
-# there are dark stripes behind it, where the bus seems to stand.
+# A long bus comes and passes us at 8 m/s, which the lattice has exactly. Its flank is 2.25 m to our left, and our
+# scanner has 300 columns in its half circle. In panel A each column is a cell along the flank and each row one instant,
+# later ones higher. What the front of the bus reaches turns orange: DYNAMIC. But behind it, far from us, there are dark
+# stripes, where the bus seems to stand. Why?
 
-# %% jupyter={"source_hidden": true} alt="three maps of place against time along the flank of a bus. A, 300 columns: orange up to 11 m, behind that dark stripes between free ones. B, 1000 columns: orange everywhere. C, 1000 columns, filter switched on when the bus is beside us: dark where the bus was at that instant and a few metres before it, orange only in the cells that its front reached later"
-runs = {"A   300 columns": (300, 0), "B   1000 columns": (1000, 0), "C   1000, switched on late": (1000, 1.6)}
+# %% jupyter={"source_hidden": true} alt="three maps of place against time along the flank of a bus. A, 300 columns: orange up to 11 m, behind that dark stripes between free ones. B, 1000 columns: orange everywhere. C, 1000 columns, filter switched on when the bus is beside us: dark where the bus was at that instant and a few metres before it, orange only where its front came later. D, as C with the odds of first sight reversed: orange"
+runs = {
+    "A   300 columns": (300, 0),
+    "B   1000 columns": (1000, 0),
+    "C   as B, switched on late": (1000, 1.6),
+    "D   as C, first sight reversed": (1000, 1.6, (0.952, 0.003, 0.045)),
+}
 passed = {name: lecture_03_scenes.pass_by(*run) for name, run in runs.items()}
-fig, axes = plt.subplots(1, 3, figsize=(10, 3.6), layout="constrained", sharey=True)
-for ax, (name, run) in zip(axes, passed.items(), strict=True):
+fig, axes = plt.subplots(2, 2, figsize=(8.4, 6.2), layout="constrained", sharex=True, sharey=True)
+for ax, (name, run) in zip(axes.flat, passed.items(), strict=True):
     lecture_03_scenes.draw_flank(ax, *run, name)
-axes[0].set_ylabel("time [s]")
+    ax.label_outer()
 lecture_03_scenes.flank_legend(fig)
 plt.show()
 
 # %% [markdown]
-# A tempting explanation: one cell in the middle of a flank can't tell a bus that drives from one that stands, because it
-# is occupied before and after. Is that the cause of the stripes? First look at the scanner.
+# A tempting explanation: a cell in the middle of the flank is occupied before and after, so it can't tell a bus that
+# drives from one that stands. But first look at the scanner.
 #
-# **Predict before you run.** Neighbouring columns are $\Delta\varphi$ = 0.6° = 0.0105 rad apart. How far apart do they hit the
-# flank, 10 m ahead of us?
+# **Predict before you run.** Neighbouring columns are $\Delta\varphi$ = 0.6° = 0.0105 rad apart. How far apart do they
+# hit the flank, 10 m ahead of us?
 #
 # <details><summary>Answer</summary>
 #
-# About 0.5 m, one cell. A beam in direction $\varphi$ hits the flank at $x = y / \tan\varphi$. Its slope,
-# $(x^2 + y^2)/y$ = 105 / 2.25 = 47 m for each radian, times 0.0105 is 0.49 m. Farther away, it grows with the square of the distance.
+# About 0.5 m, which is one cell. A beam in the direction $\varphi$ hits the flank at $x = y / \tan\varphi$. The
+# derivative has the size $(x^2 + y^2)/y$ = 105 / 2.25 = 47 m per radian, and 47 · 0.0105 = 0.49. Farther away the gap
+# grows with the square of the distance.
 #
 # </details>
 #
-# With $x$ for the distance ahead and $y$ for that to the side, the gap between two columns on the flank is
+# With $x$ for the distance ahead and $y$ for the one to the side, the gap between two columns on the flank is
 #
 # $$ \text{gap} = \frac{x^2 + y^2}{y}\, \Delta\varphi. $$
 #
-# Beyond 10 m the gap is wider than a cell. So some cells of the flank are never hit, and beams to the cells beyond pass
-# through them. Such a cell looks free. Mass that moves must cross it, and is wiped out there. Mass that stands in a
-# cell that is hit never has to. So only standing survives.
+# Beyond 10 m the gap is wider than a cell. So some cells of the flank are never hit. Beams to the cells beyond pass
+# through them, and they look free. Mass that moves must cross such cells, and is wiped out there. Mass that stands, in a
+# cell that is hit, need not cross anything. So only standing survives.
 #
-# Switch this cause off: KITTI's scanner has 1000 columns in the same half circle, and the gap stays below a cell up to
-# 19 m. In panel B the stripes are gone. **The scanner made them, not the filter.**
+# **Switch this cause off.** KITTI's scanner has 1000 columns in the same half circle, and its gap stays below a cell up
+# to 19 m. In panel B the stripes are gone. So the scanner made them.
 
-# %%
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 assert [round(float(np.sqrt(0.5 * 2.25 / np.radians(180 / n) - 2.25**2))) for n in (300, 1000)] == [10, 19]
-x = lecture_03_scenes.BUS.centers()[::-1, 0, 0]
+x, moving = lecture_03_scenes.BUS.centers()[::-1, 0, 0], {}
 for name, (times, states) in passed.items():
     k = int(np.argmin(abs(times - 2.2)))  # the bus covers 6.4 to 18.4 m
-    near, far = (x > 7) & (x < 10), (x > 13) & (x < 18)
-    print(
-        f"{name:<27} P(DYNAMIC) at 7 to 10 m {states[DYNAMIC, k, near].mean():.2f}, at 13 to 18 m {states[DYNAMIC, k, far].mean():.2f}"
-    )
-far_dark = {name: states[DYNAMIC, -7, far].mean() for name, (_, states) in passed.items()}
-assert far_dark["A   300 columns"] < 0.05 < 0.9 < far_dark["B   1000 columns"]
-assert far_dark["C   1000, switched on late"] < 0.05
+    moving[name[0]] = [states[DYNAMIC, k, (x > low) & (x < high)].mean() for low, high in ((7, 10), (13, 18))]
+    print(f"{name:<31} P(DYNAMIC) at 7 to 10 m {moving[name[0]][0]:.2f}, at 13 to 18 m {moving[name[0]][1]:.2f}")
+assert moving["A"][1] < 0.01 < 0.95 < min(moving["B"][1], moving["A"][0])
+assert moving["C"][1] < 0.01 < 0.9 < moving["D"][1]
+times, states = passed["C   as B, switched on late"]
+for t, held in zip(times[1:], states[STATIC, 1:], strict=True):
+    assert held[(x > 11.25) & (x < min(18, 36 - 8 * t - 0.25))].min() > 0.95  # covered at first, and still
 
 # %% [markdown]
-# And the tempting explanation? It has a case of its own. In panel C the scanner is the same as in B, the bus, too, but the filter is
-# switched on when the bus is already beside us. Every cell that the bus covers then is dark, for as long as the bus covers it. In
-# B the same cells, at the same time, are orange. The difference is **first sight**. In C these cells were never seen empty,
-# so they are taken to be STATIC, fifteen to one. From then on both stories, standing and driving, have an antecedent inside the bus and
-# explain each scan of the cell equally well. So the odds stay what they were. This is the
-# **aperture problem**: through a small window, here one cell, motion along an edge can't be seen. In B there is a scan that
-# can tell: the one before the front arrives, when the cell is free. (The dark even spreads forward by some metres, because a
-# cell that is believed to stand sends nothing ahead.)
+# And the tempting explanation? It has a case of its own. In panel C bus and scanner are those of B, but the filter is
+# switched on when the bus is already beside us. Every cell that the bus covers at this instant stays dark, as long as
+# the bus covers it. In B the same cells, at the same time, are orange. The cause is **first sight**. In C nobody has
+# seen these cells empty, so they are taken for STATIC, fifteen to one. From then on standing and driving both have an
+# antecedent inside the bus. Both explain each scan of the cell equally well, so their odds stay what they were. Switch
+# this cause off, too: panel D takes the same cells for DYNAMIC, fifteen to one, and they turn orange.
 #
-# Could *any* filter see it? Ask exact inference. A bus of three cells stands (0.7 for each) or drives (0.3), and is seen
-# twice, one cell further each time:
+# This is the **aperture problem**: through a small window, here one cell, motion along an edge can't be seen, so the
+# first guess decides. In B one scan could tell, the one before the front arrived, when the cell was free. (In C the dark
+# even spreads forward by some metres, because a cell that is taken for standing sends nothing ahead.)
+#
+# Could *any* filter see it? Ask exact inference. Each of three cells in a row, a small bus, stands (0.7) or drives (0.3).
+# Two scans follow, and each finds it one cell further:
 
 # %%
 bus = lecture_03_row.CellsInARow(
@@ -524,10 +541,10 @@ print(
 assert exact > 0.99
 
 # %% [markdown]
-# So the scans do tell it. If the front has moved on and its place is still occupied, then the next cell has moved up,
-# and so on to the rear. Such a conclusion goes from cell to cell, and BOF's cells don't know of each other.
+# So the scans do tell it. If the front has moved on and its place is still occupied, then the next cell has moved up, and
+# so on to the rear. Such a conclusion goes from cell to cell, and BOF's cells don't know of each other.
 #
-# So half a bus seems to stand for two reasons: columns that leave gaps, and a first sight that nothing corrects.
+# So half a bus seems to stand where columns leave gaps, and where it was in view from the start.
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="the flank of the bus over time, for one number of columns and one time at which the filter is switched on"
@@ -552,18 +569,19 @@ _ = interact(
 #
 # 1. What is in a cell now was in its antecedent before: each velocity of a lattice shifts its own map.
 # 2. A scan measures no velocity. It picks places, and places pick velocities.
-# 3. Where something arrives and something stands, strike the pair out. The zero velocity is STATIC, the others are
-#    DYNAMIC.
-# 4. BOF keeps each cell by itself, so one thing may be believed in two places: 1.24 things instead of one.
-# 5. A flank seems to stand where columns leave gaps, or where it was in view from the start: there a cell
-#    alone can't tell. What is slower than half the lattice's spacing seems to stand, too. TODO
+# 3. Where something arrives and something stands, strike the pair out, and neither wins.
+# 4. BOF keeps each cell by itself. So one thing may be believed in two places: 1.24 things instead of one.
+# 5. Seeming to stand has three causes: a velocity that the lattice lacks, columns that leave gaps, and a first sight
+#    that a cell alone can't correct.
 #
-# **Further reading.** Coué, Pradalier, Laugier, Fraichard, Bessière, *Bayesian occupancy filtering for multitarget
-# tracking: an automotive application*, International Journal of Robotics Research 25(1), 2006: the filter. Boyen, Koller,
-# *Tractable inference for complex stochastic processes*, UAI 1998: assumed densities, and why their error stays bounded
-# when each step is exact. Nègre, Rummelhard, Laugier, *Hybrid sampling Bayesian occupancy filter*, IEEE Intelligent
-# Vehicles Symposium 2014: what stands in the grid, what moves in particles; the step to lecture 04. The companion
-# [time beliefs](deeper/time_beliefs.ipynb): what BOF is among filters.
+# ## Further reading and exercise
 #
-# **Exercise.** [Exercise 03](exercises/03_bof.ipynb): one velocity's flight, a scanner that measures velocities, one
-# thing followed exactly, and your own filter on both streets. Next: lecture [04](04_cmcdot.ipynb), particles.
+# - Coué, Pradalier, Laugier, Fraichard, Bessière, *Bayesian occupancy filtering for multitarget tracking: an automotive
+#   application*, International Journal of Robotics Research 25(1), 2006: the filter.
+# - Boyen, Koller, *Tractable inference for complex stochastic processes*, UAI 1998: assumed densities.
+# - Nègre, Rummelhard, Laugier, *Hybrid sampling Bayesian occupancy filter*, IEEE Intelligent Vehicles Symposium 2014:
+#   what stands in the grid, what moves in particles.
+# - The companion [time beliefs](deeper/time_beliefs.ipynb): what BOF is among filters.
+#
+# [Exercise 03](exercises/03_bof.ipynb): one velocity's flight, a scanner that measures velocities, one thing followed
+# exactly, and your own filter on both streets. Next: lecture [04](04_cmcdot.ipynb), particles.

@@ -57,7 +57,9 @@ def watch(
     return states
 
 
-def pass_by(columns: int, first: float = 0.0) -> tuple[NDArray, NDArray]:
+def pass_by(
+    columns: int, first: float = 0.0, first_sight: tuple[float, float, float] = WorldModel.first_sight
+) -> tuple[NDArray, NDArray]:
     """Let the bus pass: return the times of the scans (T,) and the four states along its flank, (4, T, H).
 
     Parameters
@@ -66,9 +68,12 @@ def pass_by(columns: int, first: float = 0.0) -> tuple[NDArray, NDArray]:
         Directions of the scanner in its half circle.
     first : float
         When the filter is switched on, seconds.
+    first_sight : (float, float, float)
+        Probabilities of FREE, STATIC and DYNAMIC when a cell is first seen.
     """
     times = np.arange(round(10 * first), 29) / 10
-    states = watch(bus_at, BUS, BofParams(VelocityLattice(8, spacing=2)), times, columns)
+    params = BofParams(VelocityLattice(8, spacing=2), WorldModel(first_sight=first_sight))
+    states = watch(bus_at, BUS, params, times, columns)
     _, (col,), _ = BUS.cells(np.array([[1.0, FLANK]]))
     return times, np.stack([state.probability[:, ::-1, col] for state in states], axis=1)
 
