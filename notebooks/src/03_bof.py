@@ -12,12 +12,12 @@
 # - say what a filter forgets that keeps each cell by itself;
 # - find out by switching off a cause why half a bus seems to stand.
 #
-# **Prerequisites.** Lectures [01](01_bayes.ipynb) (Bayes' rule, transition matrix) and [02](02_grids.ipynb) (what a beam
-# says, ghosts behind moving cars).
+# **Prerequisites.** Lectures [01](01_bayes.ipynb) (Bayes' rule, transition matrix) and [02](02_grids.ipynb) (what a
+# beam says, ghosts behind moving cars).
 #
 # **Time.** 75 minutes, of which the computer needs less than one.
 #
-# **Paper.** Section 3.2: the ancestor of its filter, the Bayesian occupancy filter (**BOF**) of Coué and others (2006).
+# **Paper.** Section 3.2: the ancestor of its filter, the Bayesian occupancy filter (**BOF**) of Coué and others.
 # The paper prints no equation for it.
 
 # %% jupyter={"source_hidden": true}
@@ -57,33 +57,33 @@ plotting.animate(
 
 # %% [markdown]
 # At **A** we know the place within three cells and nothing of the velocity: the belief is a column. At **B** nobody has
-# looked, but each row has moved at its own speed. The column is **sheared**: place and velocity, independent before, are
-# now tied together. At **C** a beam comes back from one place (red mark). It says nothing about velocities. But it picks
-# a column of the sheared belief, and only three velocities are left there. After **D** and **E** one velocity stands
-# out, 2 m/s.
+# looked, but each row has moved at its own speed. The column is **sheared**: place and velocity, independent before,
+# are now tied together. At **C** a beam comes back from one place (red mark). It says nothing about velocities. But it
+# picks a column of the sheared belief, and only three velocities are left there. After **D** and **E** one velocity
+# stands out, 2 m/s.
 #
 # So scans tell velocities because motion ties velocity to place, and a scan tells places.
 #
 # ## Where did it come from?
 #
-# Now by hand. Six cells of one metre lie in a row, numbered from zero. One thing is in cell 2. It stands, or it goes one
-# cell a second to the left or to the right, with a third each. A second passes, and nobody looks. Then a beam comes back
-# from cell 3, and beams pass all other cells. As in lecture 02, a return has probability 0.8 from an occupied cell and
-# 0.05 from a free one, and a pass 0.3 and 0.7.
+# Now by hand. Take a row of six cells of one metre, numbered from zero. One thing is in cell 2. It stands, or it goes
+# one cell a second to the left or to the right, with a third each. A second passes, and nobody looks. Then a beam comes
+# back from cell 3, and beams pass all other cells. As in lecture 02, a return has probability 0.8 from an occupied cell
+# and 0.05 from a free one, and a pass 0.3 and 0.7.
 #
 # **Predict before you run.** How surely are cells 3 and 1 occupied now?
 #
 # <details><summary>Answer</summary>
 #
-# Before the scan each of the cells 1, 2 and 3 is occupied with a third. In cell 3 *occupied* weighs 0.8 times a third and
-# *free* 0.05 times two thirds. So it is occupied with 0.8 / (0.8 + 0.1) = 0.89, and its velocity is to the right. For
-# cell 1 it is 0.3 / (0.3 + 1.4) = 0.18.
+# Before the scan, cell 2 and its two neighbours are occupied with a third each. In cell 3 *occupied* weighs 0.8 times a
+# third and *free* 0.05 times two thirds. So it is occupied with 0.8 / (0.8 + 0.1) = 0.89, and its velocity is to the
+# right. For cell 1 it is 0.3 / (0.3 + 1.4) = 0.18.
 #
 # </details>
 #
-# There are two steps. **Predict** asks each cell where its content came from. **Update** is Bayes' rule. What is in cell
-# $k$ now with velocity $v$ was a way of $v\,\Delta t$ behind, in its **antecedent**. Write $m_k^t$ for what cell $k$
-# holds at scan $t$, which is FREE or a velocity, and $z$ for the scan:
+# There are two steps. **Predict** asks each cell where its content came from. **Update** is Bayes' rule. What is in
+# cell $k$ now with velocity $v$ was a way of $v\,\Delta t$ behind, in its **antecedent**. Write $m_k^t$ for what cell
+# $k$ holds at scan $t$, which is FREE or a velocity, and $z$ for the scan:
 #
 # $$ \begin{aligned} P(m_k^t = v) &= P(m_{k - v\,\Delta t}^{t-1} = v), \\
 #    P(m_k^t = v \mid z) &= \frac{P(z \mid \text{occupied})\, P(m_k^t = v)}
@@ -139,8 +139,8 @@ axes[0].set_ylabel("velocity [m/s]")
 plt.show()
 
 # %% [markdown]
-# The thing goes to the right, and after two scans that is nearly certain. (Add up the third table, though: it holds more
-# than one thing. We come back to that.) So a cell asks its antecedents first and its beam second.
+# The thing goes to the right, and after two scans that is nearly certain. (Add up the third table, though: it holds
+# more than one thing. We come back to that.) So a cell asks its antecedents first and its beam second.
 #
 # ## What if something arrives where something stands?
 #
@@ -160,8 +160,8 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# It moves with 3/7, and stands or is free with 2/7 each. The fence stays: 0.7 · 0.99 / (0.7 + 0.3 · 0.01) = 0.986. If
-# the arrival simply won, the fence would be at 0.69.
+# It moves with 3/7, and stands or is free with 2/7 each. The fence stays, with 0.986. If the arrival simply won, the
+# fence would be at 0.69.
 #
 # </details>
 #
@@ -231,8 +231,9 @@ np.testing.assert_allclose(mean[0, ::-1, 0][:2], [0.5, np.nan], atol=1e-6)  # wh
 np.testing.assert_allclose(covariance[0, 0, -1, 0], 0.75, atol=1e-6)
 
 # %% [markdown]
-# A cell in which nothing moves has *no* velocity. That isn't velocity zero, which would mean that something stands there.
-# So a cell tells how surely it is free, stands or moves; how fast, and how surely so, only if something may move in it.
+# A cell in which nothing moves has *no* velocity. That isn't velocity zero, which would mean that something stands
+# there. So a cell tells how surely it is free, stands or moves; how fast, and how surely so, only if something may move
+# in it.
 #
 # ## Does it still smear?
 #
@@ -244,8 +245,8 @@ np.testing.assert_allclose(covariance[0, 0, -1, 0], 0.75, atol=1e-6)
 # - **Less than a cell.** In a tenth of a second something at 1 m/s covers a fifth of a cell. Rounded to zero, it would
 #   stand for ever. But a whole map flies at one velocity. So BOF keeps the **remainder** for each map, and shifts this
 #   one by a cell at every fifth step.
-# - **Change.** Things start and stop by lecture 01's transition matrix, and a little mass goes from each velocity to its
-#   neighbours ([the lattice of velocities](deeper/03_lattice.ipynb)).
+# - **Change.** Things start and stop by lecture 01's transition matrix, and a little mass goes from each velocity to
+#   its neighbours ([the lattice of velocities](deeper/03_lattice.ipynb)).
 #
 # Two boxes move before a wall: one comes towards us at 6 m/s, one crosses to the left. In lecture 02's map both leave a
 # smear.
@@ -255,8 +256,8 @@ np.testing.assert_allclose(covariance[0, 0, -1, 0], 0.75, atol=1e-6)
 #
 # <details><summary>Answer</summary>
 #
-# It is free. The mass has flown away with its velocity, and leaves FREE behind. The map of lecture 02 must first see the
-# cell free five times.
+# It is free. The mass has flown away with its velocity, and leaves FREE behind. The map of lecture 02 must first see
+# the cell free five times.
 #
 # </details>
 
@@ -316,8 +317,8 @@ def crossing():
 plotting.animate(crossing(), 0.6, alt="two boxes cross; lecture 02's map smears them, BOF colours them by heading")
 
 # %% [markdown]
-# On the right the boxes are dark at first, because the first scans tell little. Then they take the colour of their heading,
-# and the wall stays dark. The smear is nearly gone, because mass that moves takes itself away.
+# On the right the boxes are dark at first, because the first scans tell little. Then they take the colour of their
+# heading, and the wall stays dark. The smear is nearly gone, because mass that moves takes itself away.
 #
 # And the real street of lecture 02, with its three lanes of ghosts? `Bof` is the two functions, and a map that scrolls
 # with the vehicle. (It also looks back half a second: where would this thing have been, and was that place occupied?
@@ -377,17 +378,17 @@ graph.draw(plt.subplots(figsize=(5, 3.4), layout="constrained")[1])
 plt.show()
 
 # %% [markdown]
-# Both cells ask the *same* past. If the thing drove, cell 2 is occupied **and** cell 1 is free. BOF gives each cell its own
-# copy of the past, so that a step is just a shift of maps and a formula for each cell. It deletes the dashed arrow:
-# cell 2 still gets 1/2, but the two cells don't know of each other any more.
+# Both cells ask the *same* past. If the thing drove, the second cell is occupied **and** the first one is free. BOF
+# gives each cell its own copy of the past, so that a step is just a shift of maps and a formula for each cell. It
+# deletes the dashed arrow: the second cell still gets a half, but the two cells don't know of each other any more.
 #
-# **Predict before you run.** How surely is cell 1 free, after both beams, if you compare the two stories as wholes? And
-# cell by cell?
+# **Predict before you run.** How surely is the first cell free, after both beams, if you compare the two stories as
+# wholes? And cell by cell?
 #
 # <details><summary>Answer</summary>
 #
-# As wholes: it drove, 0.7 · 0.8 = 0.56, or it stands, 0.3 · 0.05 = 0.015. So it drove, and cell 1 is free, with
-# 0.56 / 0.575 = 0.97. Cell by cell, cell 1 hears only its own beam: 0.7 against 0.3, so it is free with 0.70.
+# As wholes: it drove, 0.7 · 0.8 = 0.56, or it stands, 0.3 · 0.05 = 0.015. So it drove, and the first cell is free, with
+# 0.97. Cell by cell, it hears only its own beam and is free with 0.70.
 #
 # </details>
 
@@ -402,22 +403,22 @@ np.testing.assert_allclose(1 - package[:2, lecture_03_row.Cell.FREE], alone, ato
 
 # %% [markdown]
 # That is the price of this lecture: **there is one thing, and BOF believes in 1.24.** That the thing has been found in
-# cell 2 says nothing to cell 1. A filter that keeps only each cell's own distribution after every step, as if the cells
-# were independent, does **assumed-density filtering**. That makes BOF possible, since the joint belief over a map of
-# thousands of cells would fit into no computer. So yes: for BOF one thing can be in two places.
+# one cell says nothing to the other. A filter that keeps only each cell's own distribution after every step, as if the
+# cells were independent, does **assumed-density filtering**. That makes BOF possible, since the joint belief over a map
+# of thousands of cells would fit into no computer. So yes: for BOF one thing can be in two places.
 #
 # ## Why does a walker stand?
 #
 # A person, 0.6 m wide, comes towards us at 1.4 m/s, as people walk. The lattice has 0 and 2 m/s, but nothing between.
 #
-# **Predict before you run.** Will the person be STATIC or DYNAMIC after four seconds? And if velocities are 1 m/s apart?
+# **Predict before you run.** Will the person be STATIC or DYNAMIC after four seconds? And if velocities are 1 m/s
+# apart?
 #
 # <details><summary>Answer</summary>
 #
-# STATIC on the first lattice. Between two scans the person moves by a third of a cell. Zero velocity predicts nothing, the
-# next velocity a little more than is true, so a scan hardly tells them apart, and the prior says that most things stand.
-# On the finer lattice the filter finds the motion, but it takes more than
-# two seconds.
+# STATIC on the first lattice. Between two scans the person moves by a third of a cell. Zero velocity predicts nothing,
+# the next velocity a little more than is true, so a scan hardly tells them apart, and the prior says that most things
+# stand. On the finer lattice the filter finds the motion, but it takes more than two seconds.
 #
 # </details>
 
@@ -460,7 +461,7 @@ plt.show()
 # later ones higher. What the front of the bus reaches turns orange: DYNAMIC. But behind it, far from us, there are dark
 # stripes, where the bus seems to stand. Why?
 
-# %% jupyter={"source_hidden": true} alt="three maps of place against time along the flank of a bus. A, 300 columns: orange up to 11 m, behind that dark stripes between free ones. B, 1000 columns: orange everywhere. C, 1000 columns, filter switched on when the bus is beside us: dark where the bus was at that instant and a few metres before it, orange only where its front came later. D, as C with the odds of first sight reversed: orange"
+# %% jupyter={"source_hidden": true} alt="four maps of place against time along the flank of a bus. A, 300 columns: orange up to 11 m, behind that dark stripes between free ones. B, 1000 columns: orange everywhere. C, 1000 columns, filter switched on when the bus is beside us: dark where the bus was at that instant and a few metres before it, orange only where its front came later. D, as C with the odds of first sight reversed: orange"
 runs = {
     "A   300 columns": (300, 0),
     "B   1000 columns": (1000, 0),
@@ -472,6 +473,7 @@ fig, axes = plt.subplots(2, 2, figsize=(8.4, 6.2), layout="constrained", sharex=
 for ax, (name, run) in zip(axes.flat, passed.items(), strict=True):
     lecture_03_scenes.draw_flank(ax, *run, name)
     ax.label_outer()
+fig.supylabel("time [s]", fontsize=10)
 lecture_03_scenes.flank_legend(fig)
 plt.show()
 
@@ -479,13 +481,13 @@ plt.show()
 # A tempting explanation: a cell in the middle of the flank is occupied before and after, so it can't tell a bus that
 # drives from one that stands. But first look at the scanner.
 #
-# **Predict before you run.** Neighbouring columns are $\Delta\varphi$ = 0.6° = 0.0105 rad apart. How far apart do they
+# **Predict before you run.** Neighbouring columns are $\Delta\varphi$ = 0.0105 rad apart. How far apart do they
 # hit the flank, 10 m ahead of us?
 #
 # <details><summary>Answer</summary>
 #
-# About 0.5 m, which is one cell. A beam in the direction $\varphi$ hits the flank at $x = y / \tan\varphi$. The
-# derivative has the size $(x^2 + y^2)/y$ = 105 / 2.25 = 47 m per radian, and 47 · 0.0105 = 0.49. Farther away the gap
+# About 0.5 m, which is one cell. A beam in the direction $\varphi$ hits the flank at $x = y / \tan\varphi$. The derivative has the
+# size $(x^2 + y^2)/y$, here 47 m per radian; times 0.0105 rad, that is 0.5 m. Farther away the gap
 # grows with the square of the distance.
 #
 # </details>
@@ -495,8 +497,8 @@ plt.show()
 # $$ \text{gap} = \frac{x^2 + y^2}{y}\, \Delta\varphi. $$
 #
 # Beyond 10 m the gap is wider than a cell. So some cells of the flank are never hit. Beams to the cells beyond pass
-# through them, and they look free. Mass that moves must cross such cells, and is wiped out there. Mass that stands, in a
-# cell that is hit, need not cross anything. So only standing survives.
+# through them, and they look free. Mass that moves must cross such cells, and is wiped out there. Mass that stands, in
+# a cell that is hit, need not cross anything. So only standing survives.
 #
 # **Switch this cause off.** KITTI's scanner has 1000 columns in the same half circle, and its gap stays below a cell up
 # to 19 m. In panel B the stripes are gone. So the scanner made them.
@@ -523,11 +525,11 @@ for t, held in zip(times[1:], states[STATIC, 1:], strict=True):
 # this cause off, too: panel D takes the same cells for DYNAMIC, fifteen to one, and they turn orange.
 #
 # This is the **aperture problem**: through a small window, here one cell, motion along an edge can't be seen, so the
-# first guess decides. In B one scan could tell, the one before the front arrived, when the cell was free. (In C the dark
-# even spreads forward by some metres, because a cell that is taken for standing sends nothing ahead.)
+# first guess decides. In B one scan could tell, the one before the front arrived, when the cell was free. (In C the
+# dark even spreads forward by some metres, because a cell that is taken for standing sends nothing ahead.)
 #
-# Could *any* filter see it? Ask exact inference. Each of three cells in a row, a small bus, stands (0.7) or drives (0.3).
-# Two scans follow, and each finds it one cell further:
+# Could *any* filter see it? Ask exact inference. Each of three cells in a row, a small bus, stands (0.7) or drives
+# (0.3). Two scans follow, and each finds it one cell further:
 
 # %%
 bus = lecture_03_row.CellsInARow(
@@ -541,8 +543,8 @@ print(
 assert exact > 0.99
 
 # %% [markdown]
-# So the scans do tell it. If the front has moved on and its place is still occupied, then the next cell has moved up, and
-# so on to the rear. Such a conclusion goes from cell to cell, and BOF's cells don't know of each other.
+# So the scans do tell it. If the front has moved on and its place is still occupied, then the next cell has moved up,
+# and so on to the rear. Such a conclusion goes from cell to cell, and BOF's cells don't know of each other.
 #
 # So half a bus seems to stand where columns leave gaps, and where it was in view from the start.
 
@@ -577,7 +579,7 @@ _ = interact(
 # ## Further reading and exercise
 #
 # - Coué, Pradalier, Laugier, Fraichard, Bessière, *Bayesian occupancy filtering for multitarget tracking: an automotive
-#   application*, International Journal of Robotics Research 25(1), 2006: the filter.
+#   application*, International Journal of Robotics Research, 2006: the filter.
 # - Boyen, Koller, *Tractable inference for complex stochastic processes*, UAI 1998: assumed densities.
 # - Nègre, Rummelhard, Laugier, *Hybrid sampling Bayesian occupancy filter*, IEEE Intelligent Vehicles Symposium 2014:
 #   what stands in the grid, what moves in particles.
