@@ -411,8 +411,7 @@ _test()
 def predicted(joint, unknown, ways):
     """Return the states (4, H, W) and the mass of what moves (V - 1, H, W): fly, and meet what each cell holds."""
     flown = np.stack([np.asarray(shift(mass, down, right)) for mass, (down, right) in zip(joint, ways, strict=True)])
-    static = flown[0]
-    own = np.stack([1 - static - unknown, static, np.zeros_like(static), unknown])
+    own = np.stack([1 - flown[0] - unknown, flown[0], 0 * unknown, unknown])
     states = np.asarray(arrive(own, np.minimum(flown[1:].sum(axis=0), 0.999)))
     return states, flown[1:] * (states[2] / np.maximum(flown[1:].sum(axis=0), 1e-12))
 
