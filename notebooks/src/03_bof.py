@@ -275,7 +275,7 @@ def world(t):
 
 rng, maps, beliefs = np.random.default_rng(0), [], []
 for k in range(21):
-    points = scan_boxes(world(k / 10), noise=0.02, rng=rng)
+    points = scan_boxes(world(k / 10), rings=32, noise=0.02, rng=rng)
     belief = occupancy.bof_predict(belief, spec, params, dt=0.1)
     belief = occupancy.bof_update(belief, spec, fast.scan_evidence(points, spec, params.world.sensor), params)
     maps.append(binary.step(points, occupancy.PlanarMotion(), dt=0.1).copy())
@@ -304,7 +304,7 @@ axes[1].set_ylabel("")
 
 def crossing():
     """Draw both grids, scan by scan."""
-    for k in range(0, 21, 4):
+    for k in range(0, 21, 5):
         state = beliefs[k]
         axes[0].images[-1].set_data(plotting.occupancy_colours(plotting.binary_states(maps[k])))
         axes[1].images[-1].set_data(wheel_colours(spec, state.probability, occupancy.bof_velocity(state)[0]))
@@ -341,7 +341,7 @@ fig, ax = plt.subplots(figsize=(4.6, 6.2), layout="constrained")
 lecture_02_street.note(ax, {"A": ((8.5, 18.0), (13.5, 22.0)), "B": ((4.0, 26.0), (-0.5, 23.0)),
                             "C": ((0.3, 13.0), (4.5, 8.0)), "W": ((-7.8, 12.0), (-12.0, 14.5))})  # fmt: skip
 plotting.animate_occupancy(
-    compact, on_street[::2], [frame.time for frame in street[::2]], "a real street with oncoming cars in yellow", ax
+    compact, on_street[::3], [frame.time for frame in street[::3]], "a real street with oncoming cars in yellow", ax
 )
 
 # %% jupyter={"source_hidden": true}

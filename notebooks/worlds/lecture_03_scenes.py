@@ -50,7 +50,7 @@ def watch(
     rng, dt = np.random.default_rng(0), times[1] - times[0]
     state, states = BofState.nothing_known(spec, params.lattice), []
     for t in times:
-        points = scan_boxes(boxes_at(t), columns=columns, rings=24, field=field, noise=0.02, rng=rng)
+        points = scan_boxes(boxes_at(t), columns=columns, rings=16, field=field, noise=0.02, rng=rng)
         state = bof_predict(state, spec, params, dt)
         state = bof_update(state, spec, fast.scan_evidence(points, spec, params.world.sensor), params)
         states.append(state)
