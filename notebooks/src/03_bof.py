@@ -15,7 +15,7 @@
 # **Prerequisites.** Lectures [01](01_bayes.ipynb) (Bayes' rule, transition matrix) and [02](02_grids.ipynb) (what a
 # beam says, ghosts behind moving cars).
 #
-# **Time.** 75 minutes, of which the computer needs less than one.
+# **Time.** 73 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.2: the ancestor of its filter, the Bayesian occupancy filter (**BOF**) of Coué and others.
 # The paper prints no equation for it.
@@ -160,8 +160,8 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# It moves with 3/7, and stands or is free with 2/7 each. The fence stays, with 0.986. If the arrival simply won, the
-# fence would be at 0.69.
+# It moves with 3/7, and stands or is free with 2/7 each. The fence stays, with 0.986, by the formula below. If the
+# arrival simply won, the fence would be at 0.69.
 #
 # </details>
 #
@@ -215,8 +215,9 @@ for _ in range(5):
 #
 # A cell holds a probability of 0.1 at −1 m/s, 0.2 at zero and 0.3 at +1 m/s. What is in it? The zero velocity is called
 # **STATIC**, and all others together are **DYNAMIC**. So STATIC has 0.2, DYNAMIC 0.4, and FREE the rest. *Given that
-# something moves*, backward has a quarter and forward three quarters: the mean is +0.5 m/s. In general, with $D$ for
-# P(DYNAMIC), the mean velocity and its covariance are
+# something moves*, backward has a quarter and forward three quarters: the mean is +0.5 m/s, and the variance is 0.75
+# (m/s)², the mean square less the square of the mean. In general, with $D$ for P(DYNAMIC), the mean velocity and its
+# covariance are
 #
 # $$ D = \sum_{v \ne 0} P(m_k = v), \qquad
 #    \bar v = \frac{1}{D} \sum_{v \ne 0} v\, P(m_k = v), \qquad
@@ -318,7 +319,8 @@ plotting.animate(crossing(), 0.6, alt="two boxes cross; lecture 02's map smears 
 
 # %% [markdown]
 # On the right the boxes are dark at first, because the first scans tell little. Then they take the colour of their
-# heading, and the wall stays dark. The smear is nearly gone, because mass that moves takes itself away.
+# heading, and the wall stays dark. The smear is nearly gone, because mass that moves takes itself away. And the front
+# of the oncoming box has its true speed, nearly for sure.
 #
 # And the real street of lecture 02, with its three lanes of ghosts? `Bof` is the two functions, and a map that scrolls
 # with the vehicle. (It also looks back half a second: where would this thing have been, and was that place occupied?
@@ -353,9 +355,18 @@ for lane, right, far in (("A", 5.5, 13), ("B", 2, 5.5), ("C", -2, 2)):
     road = (truth == lecture_02_street.ROAD) & (y >= right) & (y < far)
     ghosts = [occupancy.smear_area(occupied, road, compact) for occupied in (log_odds, held)]
     print(f"lane {lane}: ghosts {ghosts[0]:2.0f} m² in lecture 02's map, {ghosts[1]:2.0f} m² in BOF")
-everywhere = [occupancy.smear_area(occupied, truth == lecture_02_street.ROAD, compact) for occupied in (log_odds, held)]
-print(f"everywhere: {everywhere[0]:.0f} m², {everywhere[1]:.0f} m²")
-assert everywhere[1] < 0.4 * everywhere[0]
+rules = {
+    "last scan alone": lecture_02_street.alone(street[-1:], compact, sensor)[0],
+    "lecture 02's map": log_odds,
+    "BOF": held,
+}
+thing = lecture_02_street.things(truth)
+everywhere = {}
+for name, occupied in rules.items():
+    ghosts = occupancy.smear_area(occupied, truth == lecture_02_street.ROAD, compact)
+    everywhere[name] = ghosts, (thing & (occupied > 0.5)).sum() * compact.cell**2
+    print("everywhere, {:<16} ghosts {:2.0f} m², found {:3.0f} m² of things".format(name, *everywhere[name]))
+assert everywhere["BOF"][0] < 0.4 * everywhere["lecture 02's map"][0]
 cars = (truth == KITTI_14.index("car")) & (y > 2) & (y < 5.5) & (held > 0.5)
 assert cars.sum() > 20
 assert (p[DYNAMIC, cars] > 0.5).mean() < 0.25  # few cells of the cars in lane B
@@ -416,9 +427,9 @@ np.testing.assert_allclose(1 - package[:2, lecture_03_row.Cell.FREE], alone, ato
 #
 # <details><summary>Answer</summary>
 #
-# STATIC on the first lattice. Between two scans the person moves by a third of a cell. Zero velocity predicts nothing,
-# the next velocity a little more than is true, so a scan hardly tells them apart, and the prior says that most things
-# stand. On the finer lattice the filter finds the motion, but it takes more than two seconds.
+# STATIC on the first lattice. Between two scans the person moves by a third of a cell. Zero velocity predicts no way at
+# all, the next velocity a little more than is true, so a scan hardly tells them apart, and the prior says that most
+# things stand. On the finer lattice the filter finds the motion, but it takes more than two seconds.
 #
 # </details>
 
@@ -459,7 +470,7 @@ plt.show()
 # A long bus comes and passes us at 8 m/s, which the lattice has exactly. Its flank is 2.25 m to our left, and our
 # scanner has 300 columns in its half circle. In panel A each column is a cell along the flank and each row one instant,
 # later ones higher. What the front of the bus reaches turns orange: DYNAMIC. But behind it, far from us, there are dark
-# stripes, where the bus seems to stand. Why?
+# stripes, where the bus seems to stand. Why? (White in C and D: not yet switched on.)
 
 # %% jupyter={"source_hidden": true} alt="four maps of place against time along the flank of a bus. A, 300 columns: orange up to 11 m, behind that dark stripes between free ones. B, 1000 columns: orange everywhere. C, 1000 columns, filter switched on when the bus is beside us: dark where the bus was at that instant and a few metres before it, orange only where its front came later. D, as C with the odds of first sight reversed: orange"
 runs = {
@@ -486,8 +497,8 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# About 0.5 m, which is one cell. A beam in the direction $\varphi$ hits the flank at $x = y / \tan\varphi$. The derivative has the
-# size $(x^2 + y^2)/y$, here 47 m per radian; times 0.0105 rad, that is 0.5 m. Farther away the gap
+# About 0.5 m, which is one cell. A beam in the direction $\varphi$ hits the flank at $x = y / \tan\varphi$. The
+# derivative has the size $(x^2 + y^2)/y$, here 47 m per radian; times 0.0105 rad, that is 0.5 m. Farther away the gap
 # grows with the square of the distance.
 #
 # </details>

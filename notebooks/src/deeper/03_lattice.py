@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Lecture [03](../03_bof.ipynb).
 #
-# **Time.** 25 minutes, of which the computer needs less than one.
+# **Time.** 30 minutes, of which the computer needs less than one.
 
 # %% jupyter={"source_hidden": true}
 import sys
