@@ -12,7 +12,7 @@
 # - say what an interval can't see.
 #
 # **Prerequisites.** The metrics of lecture [00](00_tour.ipynb), training and its balanced loss of lecture
-# [08](08_fusion.ipynb), the graphs of lecture [01b](deeper/graphical_models.ipynb). Mean, variance, normal
+# [08](08_fusion.ipynb), the graphs of lecture [01b](01b_graphical_models.ipynb). Mean, variance, normal
 # distribution.
 #
 # **Time.** 74 minutes, of which the computer needs a few seconds.
