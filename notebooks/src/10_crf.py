@@ -621,7 +621,7 @@ assert centre["mean field, centre 0.48"][-1] < 0.01
 # The shipped real street has a sidewalk along the left border of the map. We refine five of its maps and count how many
 # of the sidewalk's labelled cells are found.
 
-# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true}
 street = samples.real_drive()
 net = fast.load_net(samples.real_weights(), street.camera)
 pictures = list(run_pipeline(street[:10:2], net))
@@ -651,6 +651,7 @@ def sidewalk_found(pad=None):
     return guesses, (guesses == labels)[on_sidewalk].mean()
 
 
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 before, after, padded = sidewalk_found(), sidewalk_found(0), sidewalk_found(8)
 in_two_columns = (before[0] == labels)[on_sidewalk] & (after[0] != labels)[on_sidewalk]
 columns = np.argwhere(on_sidewalk)[in_two_columns][:, 2]

@@ -56,7 +56,7 @@ def frames_missing(times, period):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "frames-missing-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "frames-missing-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # Steps of 0.09, 0.11, 0.31, 0.19 and 0.10 s with a period of 0.1 s: none, none, two, one and none are missing.
     got = answer_array(frames_missing([0.0, 0.09, 0.20, 0.51, 0.70, 0.80], 0.1), "frames_missing").ravel()
@@ -121,7 +121,7 @@ def _seen(slope, lean):
     return np.column_stack([x, y, z]) @ turn.T, wall @ turn.T
 
 
-# %% nbgrader={"grade": true, "grade_id": "slope-and-lean-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "slope-and-lean-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     got = answer_array(slope_and_lean(*_seen(2.0, 3.0)), "slope_and_lean").ravel()
     assert got.size == 2, f"return two angles; got {got.size} numbers"
@@ -198,7 +198,7 @@ def _poles(ahead, spread=0.0):
     return before, now, T
 
 
-# %% nbgrader={"grade": true, "grade_id": "judge-motion-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "judge-motion-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     before, now, T = _poles(1.0)
     back = np.linalg.inv(T)
@@ -282,7 +282,7 @@ def _held_out_slips(margin):
     }
 
 
-# %% nbgrader={"grade": true, "grade_id": "held-out-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "held-out-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     truths, called, learned = _two_frames()
     for margin in (1, 2, 0):
@@ -334,7 +334,7 @@ def refine(log_g, o):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "refine-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "refine-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     rng = np.random.default_rng(0)
     for shape in ((6, 5), (3, 8)):
@@ -378,7 +378,7 @@ def _gains(refine, drive=None, stop=10):
     return {name: paired_interval(*counts, METRICS[name]) for name in ("pixel accuracy", "class accuracy")}
 
 
-# %% nbgrader={"grade": true, "grade_id": "better-map-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "better-map-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     gain = {name: 100 * np.array(interval) for name, interval in _gains(refine).items()}
     says = "; ".join(
