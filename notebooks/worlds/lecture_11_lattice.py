@@ -99,10 +99,10 @@ def draw_simplex(features: ArrayLike, ax: Axes) -> Axes:
         ax.plot(*place, "s", color="0.2", markersize=7)
         white = {"fc": "w", "ec": "none", "pad": 1}
         ax.annotate(f"{weight:.2f}", (features + place) / 2, ha="center", va="center", fontsize=9, bbox=white)
-        below = place[1] < np.mean(vertex_places(corners)[:, 1])
-        offset, side = ((0, -9), "top") if below else ((0, 9), "bottom")
-        style = {"textcoords": "offset points", "ha": "center", "va": side, "fontsize": 9}
-        ax.annotate(str(tuple(corner)), place, offset, **style)
+        if str(tuple(corner)) not in {text.get_text() for text in ax.texts}:
+            outward = (place - features) / np.maximum(np.linalg.norm(place - features), 1e-9)
+            style = {"textcoords": "offset points", "ha": "center", "va": "center", "fontsize": 9}
+            ax.annotate(str(tuple(corner)), place, (26, 13) * outward, **style)
     ax.plot(*features, "o", color="#fc7200", markersize=9, markeredgecolor="k", zorder=3)
     return ax
 
