@@ -49,8 +49,8 @@ CAR, ROAD = KITTI_14.index("car"), KITTI_14.index("road")
 # On the left is what a network says of a street. In the middle is the same map after the CRF of lecture 10. On the
 # right is the occupancy grid, which tells the CRF where things end.
 
-# %% jupyter={"source_hidden": true} alt="three maps of one street: the network's classes with ragged edges, the refined classes with smoother regions, and the occupancy grid; at A single wrong cells vanish, at B a car that the network found in part is gone"
-LETTERS = {"A": (-8.5, 42), "B": (2.5, 15.5)}
+# %% jupyter={"source_hidden": true} alt="three maps of one street: the network's classes with ragged edges, the refined classes with smoother regions, and the occupancy grid; at A single wrong cells vanish, at B a car that the network found in part is gone after the CRF"
+LETTERS = {"A": (-8.5, 42), "B": (5.2, 22.5)}
 
 
 def note(ax, letters=LETTERS):
@@ -70,11 +70,11 @@ for ax in axes:
 plt.show()
 
 # %% [markdown]
-# At A, single cells of other classes vanish. At B the network had found parts of an oncoming car. After the CRF they are
-# gone. Remember B: at the end we ask who is to blame.
+# At A, single cells of other classes vanish. At B the network had found a part of a car, left of the letter. After the CRF
+# it is gone. Remember B: at the end we ask who is to blame.
 #
 # The map has 8804 cells. In lecture 10 every cell heard every other one, in each of ten iterations. That is 39 million
-# pairs. What does hearing mean? Take three cells in a row and one class, car. The network gives it the probabilities
+# pairs. What does hearing mean? Take three cells in a row and one class, car. The network gives it
 # 0.9, 0.5 and 0.1. A neighbour counts 0.6, a cell two places away 0.1. Each cell adds up kernel times probability:
 #
 # ```
@@ -88,7 +88,7 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# 55,025 cells make 55,025², 3 billion, products. The matrix takes 24 GB, and there are two kernels.
+# 55,025 cells make the square of that, 3 billion, products. The matrix takes 24 GB, and there are two kernels.
 #
 # </details>
 #
@@ -128,8 +128,8 @@ np.testing.assert_allclose(ours, crf.mean_field_naive(-log_g[small], o[small], p
 #
 # ## Can we blur the rows first, then the columns?
 #
-# The *spatial* kernel of equation (4) depends on the place alone. Take a map that is 1 in the middle and 0 elsewhere, and a kernel
-# that is 1 at distance zero and 0.6 at distance one. Blur each row by itself, then each column:
+# The *spatial* kernel of equation (4) depends on the place alone. Take a map that is one in the middle and zero
+# elsewhere, and a kernel that is one at distance zero and 0.6 at distance one. Blur each row by itself, then each column:
 #
 # ```
 #  0   0   0          0    0    0          0.36  0.6  0.36
@@ -137,7 +137,7 @@ np.testing.assert_allclose(ours, crf.mean_field_naive(-log_g[small], o[small], p
 #  0   0   0   ───▶   0    0    0   ───▶   0.36  0.6  0.36
 # ```
 #
-# The corner has got 0.6 · 0.6. Is this what a Gaussian gives at distance $\sqrt 2$? It is, because the exponential
+# The corner has got `0.6 · 0.6`. Is this what a Gaussian gives at distance $\sqrt 2$? It is, because the exponential
 # turns a sum into a product. For cells that are $u$ rows and $v$ columns apart,
 #
 # $$ \exp\!\left(-\frac{u^2 + v^2}{2\sigma^2}\right)
@@ -185,7 +185,7 @@ plt.show()
 # width. We call them the **features** $f$ of the cell. In this space the kernel is
 # $\exp(-|f_i - f_j|^2 / 2)$. It depends on the distance and on nothing else. The wall is still there: it has become
 # a gap that no cell is in. (The four probabilities sum to 1, so three numbers are enough. A change of basis keeps all
-# distances, and $d$ = 5 features remain.)
+# distances, and `d = 5` features remain.)
 
 # %%
 features = lattice.bilateral_features(o, params)  # (N, 5)
@@ -194,13 +194,12 @@ probabilities = o.reshape(4, -1).T[some] / params.sigma_beta
 np.testing.assert_allclose(
     cdist(features[some, 2:], features[some, 2:]), cdist(probabilities, probabilities), atol=1e-4
 )
-print(f"{len(features)} cells are points in {features.shape[1]} dimensions")
 
 # %% [markdown]
 # In five dimensions we can't visit every place. Most of the space is empty. So we lay out a coarse grid
 # of vertices, let each cell give its value to the vertices around it, blur between vertices, and read the result back.
-# How many vertices surround a cell? A square has 4 corners, a cube 8, and a cube in five dimensions 32. A triangle
-# has 3 corners, a tetrahedron 4: these shapes are **simplices**. In five dimensions a simplex has only 6. So a blur
+# How many vertices surround a cell? A square has four corners, a cube eight, and a cube in five dimensions 32. A
+# triangle has three corners, a tetrahedron four: these shapes are **simplices**. In five dimensions a simplex has only 6. So a blur
 # stops at a wall when it runs on simplices in the space of features.
 #
 # ## Which triangle is a point in?
@@ -212,11 +211,11 @@ print(f"{len(features)} cells are points in {features.shape[1]} dimensions")
 # $$ y = \left(\sqrt 3\, f_1 + f_2,\;\; -\sqrt 3\, f_1 + f_2,\;\; -2 f_2\right) $$
 #
 # (Why these factors? The section after the next one derives them.) A vertex of the lattice is a $y$ of three **integers that have the
-# same remainder modulo 3**. So (3, 0, -3) is a vertex, with remainder 0. So is (4, 1, -5), with remainder 1. But
-# (2, 0, -2) isn't one. A step to a neighbour adds 1 to two of the numbers and takes 2 from the third, or does the
+# same remainder modulo 3**. So `(3, 0, -3)` is a vertex, with remainder zero. So is `(4, 1, -5)`, with remainder one. But
+# `(2, 0, -2)` isn't one. A step to a neighbour adds one to two of the numbers and takes two from the third, or does the
 # opposite.
 #
-# Let us find the triangle around $y$ = (4.2, -0.4, -3.8):
+# Let us find the triangle around `y = (4.2, -0.4, -3.8)`:
 #
 # ```
 # 1. Round each number to a multiple of 3:       (3, 0, -3)      sums to zero, so it is a vertex
@@ -230,15 +229,15 @@ print(f"{len(features)} cells are points in {features.shape[1]} dimensions")
 # ```
 #
 # These are **barycentric weights**. They sum to 1, and the weighted mean of the corners is the point. Check
-# the first number: 0.33 · 3 + 0.13 · 4 + 0.53 · 5 = 4.2.
+# the first number: `0.33 · 3 + 0.13 · 4 + 0.53 · 5 = 4.2`.
 #
-# **Predict before you run.** Now $y$ = (1.7, 1.6, -3.3). Rounding gives (3, 3, -3). Its sum is 3, so it is no vertex.
-# Which number do you round the other way?
+# **Predict before you run.** Now `y = (1.7, 1.6, -3.3)`. Rounding gives `(3, 3, -3)`. The sum isn't zero, so this is no
+# vertex. Which number do you round the other way?
 #
 # <details><summary>Answer</summary>
 #
-# The second. Its residual, -1.4, is the smallest: it was rounded up the farthest. So the first corner is (3, 0, -3) again,
-# and the residuals are (-1.3, 1.6, -0.3).
+# The second. Its residual, -1.4, is the smallest: it was rounded up the farthest. So the first corner is `(3, 0, -3)`
+# again, and the residuals are `(-1.3, 1.6, -0.3)`.
 #
 # </details>
 
@@ -257,7 +256,7 @@ ax.set(xlabel="first feature [widths]", ylabel="second feature [widths]")
 plt.show()
 
 # %% [markdown]
-# The two triangles share the corner (3, 0, -3). With $d$ features the recipe is the same: $d + 1$ numbers that sum
+# The two triangles share the corner `(3, 0, -3)`. With $d$ features the recipe is the same: $d + 1$ numbers that sum
 # to zero, multiples of $d + 1$, a sort, $d + 1$ corners. Here is the book's code. It does all points at once:
 
 # %% jupyter={"source_hidden": true}
@@ -307,7 +306,8 @@ Lattice = crf.PermutohedralLattice
 lecture_11_lattice.code_of(Lattice.build.__func__, lattice._blur, Lattice.__call__)
 
 # %% [markdown]
-# Only vertices around cells are numbered, so empty space costs nothing. Watch the filter work on a row of 36 cells. The left
+# Only vertices around cells are numbered, so empty space costs nothing. (What a blur would move to a vertex that isn't there
+# is lost. The exercise mends that.) Watch the filter work on a row of 36 cells. The left
 # half is FREE, the right half STATIC. The network gives *road* about 0.75 on the left and 0.25 on the right, with much
 # noise. Each cell is a point: to the right its place in the row, upwards its P(FREE).
 
@@ -381,23 +381,25 @@ assert np.mean(errors["by place and occupancy"]) < 0.6 * np.mean(errors["by plac
 # Large triangles blur widely, small ones hardly. We want the Gaussian's variance, 1 along each axis. Call the side of
 # a triangle $a$ and follow a value through the three steps.
 #
-# 1. **One blur** moves a quarter of the value by $a$ forward, a quarter by $a$ back. Along that direction the variance is
-#    $a^2/4 + a^2/4 = a^2/2$.
-# 2. **Three blurs** have directions 60° apart. Along any axis their squared cosines sum to 3/2. That makes
-#    $3a^2/4$.
-# 3. **Splat** moves the value from the point to the corners. Seen from the middle of the triangle, the squared distance of a corner is
-#    $a^2/3$; that of a point is $a^2/12$ on average. The difference, $a^2/4$, is the variance of both axes together: $a^2/8$
-#    for each.
-# 4. **Slice** does the same backwards: $a^2/8$.
+# ```
+# one blur     moves a quarter by a forward, a quarter by a back;  along its direction  a²/4 + a²/4  =  a²/2
+# three blurs  60° apart, squared cosines sum to 3/2;              along any axis       3/2 · a²/2   =  3a²/4
+# splat        moves a point to its corners                        (see below)                          a²/8
+# slice        the same backwards                                                                       a²/8
+# ```
+#
+# Splat needs a thought. Seen from the middle of the triangle, the squared distance of a corner is $a^2/3$. That of a
+# point is $a^2/12$, on average over the triangle. What splat adds is the difference, `a²/4`, half of it along each axis. All four
+# together must be 1:
 #
 # $$ \frac{3a^2}{4} + \frac{a^2}{8} + \frac{a^2}{8} = a^2 = 1 $$
 #
-# 5. So **the sides are exactly one width long**. A step such as (1, 1, -2) has the length $\sqrt 6$ as three
-#    numbers, hence the factors of $y$ above: they stretch the plane by $\sqrt 6$.
+# So **the sides are exactly one width long**. As three numbers a step such as `(1, 1, -2)` has the length $\sqrt 6$.
+# Hence the factors of $y$ above: they stretch the plane by $\sqrt 6$.
 #
 # And how high is the kernel? Splat and blur keep the sum. Slice reads the vertices at every place, so over the plane a
 # value of 1 adds up to the area that belongs to one vertex. A vertex touches six triangles and shares each with two others, so it has
-# two: an area of $\sqrt 3 / 2$. A Gaussian of height 1 has the integral $2\pi$. So the filter must be multiplied by
+# two: an area of `√3/2`. A Gaussian of height 1 has the integral `2π`. So the filter must be multiplied by
 #
 # ```
 # 2π / (√3 / 2) = 4π / √3 = 7.26
@@ -428,16 +430,21 @@ np.testing.assert_allclose(lattice.peak(2), 4 * np.pi / np.sqrt(3))
 # The filter adds up all cells, the listening one included. A cell is no pair with itself, so $k_{ii}\, Q_i$ must be
 # subtracted. For a Gaussian $k_{ii}$ is 1. For the lattice we can find it by hand. Put a 1 on one vertex and blur three
 # times. In the middle (½)³ stays. A part comes back: one step forward in each of the three directions leads to
-# where it began, and so does one step back in each. So the middle keeps (½)³ + (¼)³ + (¼)³ = 10/64. In the same way,
-# a neighbour gets 6/64.
+# where it began, and so does one step back in each. A neighbour is reached by one step, or by two steps back along the
+# other directions:
 #
-# **Predict before you run.** A cell on a vertex gives it everything and reads it back: 10/64 · 7.26 = 1.13. What does a cell get
-# back that is in the middle of a triangle, with weight ⅓ on each corner?
+# ```
+# middle     1/2 · 1/2 · 1/2 + 1/4 · 1/4 · 1/4 + 1/4 · 1/4 · 1/4  =  10/64
+# neighbour  1/4 · 1/2 · 1/2 + 1/2 · 1/4 · 1/4                    =   6/64
+# ```
+#
+# **Predict before you run.** A cell on a vertex gives it everything and reads it back: `10/64 · 7.26 = 1.13`. What does
+# a cell get back that is in the middle of a triangle, with weight ⅓ on each corner?
 #
 # <details><summary>Answer</summary>
 #
-# Each corner gets ⅓ and holds ⅓ · (10 + 6 + 6)/64 after the blur: its own part and those of the two others. The
-# cell reads the mean of three equal numbers, 22/192, times 7.26: 0.83.
+# Each corner gets ⅓. After the blur it holds `⅓ · (10 + 6 + 6)/64`: its own part and those of the two others. The
+# cell reads the mean of three equal numbers: `22/192 · 7.26 = 0.83`.
 #
 # </details>
 
@@ -499,7 +506,7 @@ assert (off > 0.1).mean() < 0.1
 # On 60 x 40 cells around B all pairs can still be written down, so the first two can be measured. We compare
 # probabilities, as mean difference. A trivial way to run the CRF is not to run it: that is the first line.
 
-# %% tags=["nbval-ignore-output"]
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 near_B = np.s_[:, 78:138, 6:46]
 unary, values = -log_g[near_B], o[near_B]
 exact = list(islice(crf.mean_field_updates(unary, values, params), 31))  # all pairs, 0 to 30 iterations
@@ -559,7 +566,7 @@ assert found["CRF, all pairs"] < 0.8 * found["network"] < 0.9 * found["CRF, latt
 # as their occupancy is alike. If this explanation is right, the cars come back when the bilateral kernel reaches no
 # farther than the spatial one. That is the last line above, and the last map here:
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="four maps of the street around B: the truth with six cars, the network's map with most of them in part, the CRF's, in which the car at B is gone, and the CRF's with a short reach, in which it is there again"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="four maps of the street around B: the truth with seven cars, the network's map with most of them in part, the CRF's, in which the car at B is gone, and the CRF's with a short reach, in which it is there again"
 maps = {"truth": truth, "network": by_network, "CRF": refined,
         "CRF, short reach": fast.mean_field(-log_g, o, short).argmax(axis=0)}  # fmt: skip
 fig, axes = plt.subplots(1, 4, figsize=(10, 3.9), layout="compressed", sharey=True)
@@ -573,7 +580,7 @@ plt.show()
 # %% [markdown]
 # They do. Is a short reach the better choice, then? Ask five frames of the drive:
 
-# %% tags=["nbval-ignore-output"]
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 scores = {}
 for way, chosen in (("network", None), ("CRF", params), ("CRF, short reach", short)):
     answers = [(s.log_g if chosen is None else fast.mean_field(-s.log_g, s.o, chosen)).argmax(axis=0) for s in street]
@@ -608,6 +615,6 @@ assert all(scores["CRF"][k] > scores["CRF, short reach"][k] > scores["network"][
 # - Paris, Durand, *A fast approximation of the bilateral filter using a signal processing approach*, ECCV 2006: cubes,
 #   before simplices.
 #
-# [Exercise 11](exercises/11_fast_crf.ipynb): a blur over gaps, the neighbours that a lattice lacks, a blur that loses
-# nothing, the self-response of many cells at once; and a CRF of your own that refines the drive. Next: lecture
-# [12](12_experiments.ipynb), what the paper's experiments can tell.
+# [Exercise 11](exercises/11_fast_crf.ipynb): a blur over gaps, a blur that loses nothing, the self-response of
+# many cells at once; and a CRF of your own that refines the drive. Next: lecture [12](12_experiments.ipynb), what the
+# paper's experiments can tell.
