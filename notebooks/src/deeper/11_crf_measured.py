@@ -52,6 +52,10 @@ true, dotted, dashed = curves.values()
 here = np.interp(start, t, true)
 assert true[dotted.argmin()] > here > true[dashed.argmin()]
 assert (dashed >= true - 1e-9).all()
+undamped = [start]
+for _ in range(3):  # mean field of lecture 10, all cells at once
+    undamped.append(1 / (1 + np.exp(-np.log(0.7 / 0.3) + price * (2 * undamped[-1] - 1))))
+assert undamped[1] < 0.4 < 0.9 < undamped[2] > 0.5 > undamped[3]
 
 # %% jupyter={"source_hidden": true} alt="free energy along a line of opposite opinions, with a tangent curve that dips below it and a damped curve that touches it and lies above it"
 fig, ax = plt.subplots(figsize=(6, 3.6), layout="constrained")
@@ -82,7 +86,7 @@ plt.show()
 # LIDAR returns. Here the answers are side by side, as points gained over the network alone on 110 test frames. In brackets are
 # 95 % intervals over drives, and over runs where there are several. A row can be read by itself: if its interval holds zero, the sign is open.
 
-# %% jupyter={"source_hidden": true} tags=["crf-joined"]
+# %% jupyter={"source_hidden": true}
 METRIC_NAMES = ("class accuracy", "pixel accuracy")
 FILES = {"SegNet": "crf_search", "FCN": "crf_search_fcn", "DeepLab": "crf_search_deeplab"}
 
@@ -92,6 +96,7 @@ def kept(name):
     return json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
 
 
+# %% jupyter={"source_hidden": true} tags=["crf-joined"]
 reduced = json.loads((results / "reduced" / "table1.json").read_text(encoding="utf-8"))
 by_network = {row["what"].partition(":")[0].removesuffix(" v2"): row["scores"] for row in reduced["differences"][:3]}
 head = "| points gained by the default CRF | trained on | judged by | pixel accuracy | class accuracy |"
