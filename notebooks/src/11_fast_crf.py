@@ -280,7 +280,7 @@ def show(first, second):
 _ = interact(
     show,
     first=FloatSlider(value=0.3, min=-0.5, max=1.5, step=0.2),
-    second=FloatSlider(value=0.4, min=-0.5, max=1.5, step=0.2),
+    second=FloatSlider(value=0.5, min=-0.5, max=1.5, step=0.2),
 )
 
 # %% [markdown]
