@@ -1,8 +1,8 @@
 # %% [markdown]
 # # 11 · The fast CRF: pairs become filters
 #
-# **In one sentence.** Mean field asks every cell about every other one; that sum over pairs is a blur, and a blur can be
-# computed without visiting pairs: along rows and columns, or on a lattice of triangles.
+# **In one sentence.** Mean field asks every cell about every other one; that sum over pairs is a blur, and a blur can
+# be computed without visiting pairs: along rows and columns, or on a lattice of triangles.
 #
 # **You will be able to**
 # - rewrite a sum over all pairs as a filter, and say what it saves;
@@ -70,8 +70,8 @@ for ax in axes:
 plt.show()
 
 # %% [markdown]
-# At A, single cells of other classes vanish. At B the network had found a part of a car, left of the letter. After the CRF
-# it is gone. Remember B: at the end we ask who is to blame.
+# At A, single cells of other classes vanish. At B the network had found a part of a car, left of the letter. After
+# the CRF it is gone. Remember B: at the end we ask who is to blame.
 #
 # The map has 8804 cells. In lecture 10 every cell heard every other one, in each of ten iterations. That is 39 million
 # pairs. What does hearing mean? Take three cells in a row and one class, car. The network gives it
@@ -83,8 +83,8 @@ plt.show()
 # cell 3 hears   0.1 · 0.9 + 0.6 · 0.5 = 0.39
 # ```
 #
-# **Predict before you run.** Three cells need six products. The paper's grid has 355 x 155 cells. How many products does
-# it need, for one class and one iteration? How large is the matrix of all kernel values, with 8 bytes for each?
+# **Predict before you run.** Three cells need six products. The paper's grid has 355 x 155 cells. How many products
+# does it need, for one class and one iteration? How large is the matrix of all kernel values, with 8 bytes for each?
 #
 # <details><summary>Answer</summary>
 #
@@ -93,10 +93,10 @@ plt.show()
 # </details>
 #
 # Now look at the three lines again, and let each cell also count itself, with weight 1. Each cell then computes a
-# weighted mean around its own place, but for a division. A photo editor does this when it blurs an image. The
-# probabilities of one class are such an image. In the field's words, **message passing is filtering**. With $Q_i(l)$ the
-# probability of class $l$ in cell $i$, $\phi_i(l)$ the network's price and $k_{ij}$ the kernel, an update of lecture
-# 10 is
+# weighted sum, with the largest weight at its own place. A photo editor does the same when it blurs an image. The
+# probabilities of one class are such an image. In the field's words, **message passing is filtering**. With $Q_i(l)$
+# the probability of class $l$ in cell $i$, $\phi_i(l)$ the network's price and $k_{ij}$ the kernel, an update of
+# lecture 10 is
 #
 # $$ \log Q_i(l) \leftarrow -\phi_i(l) + \underbrace{\sum_{j} k_{ij}\, Q_j(l)}_{\text{blurred map}}
 #    - \underbrace{k_{ii}\, Q_i(l)}_{\text{the cell itself}} + \text{const.} $$
@@ -123,13 +123,14 @@ ours = mean_field_by_filters(-log_g[small], [lambda Q: matrix @ Q], np.diag(matr
 np.testing.assert_allclose(ours, crf.mean_field_naive(-log_g[small], o[small], params), atol=1e-6)
 
 # %% [markdown]
-# The last line says: if the blur is a product with the matrix, this is lecture 10's mean field. So each cell can hear all
-# others if we have a fast blur. We need one for each kernel of equation (4).
+# The last line says: if the blur is a product with the matrix, this is lecture 10's mean field. So each cell can hear
+# all others if we have a fast blur. We need one for each kernel of equation (4).
 #
 # ## Can we blur the rows first, then the columns?
 #
 # The *spatial* kernel of equation (4) depends on the place alone. Take a map that is one in the middle and zero
-# elsewhere, and a kernel that is one at distance zero and 0.6 at distance one. Blur each row by itself, then each column:
+# elsewhere, and a kernel that is one at distance zero and 0.6 at distance one. Blur each row by itself, then each
+# column:
 #
 # ```
 #  0   0   0          0    0    0          0.36  0.6  0.36
@@ -171,8 +172,9 @@ for ax, (title, picture) in zip(axes, pictures.items(), strict=True):
 plt.show()
 
 # %% [markdown]
-# The two passes give the sum over all pairs, but for rounding. The package's `SeparableGaussian` is this function. So the
-# spatial kernel is solved, and nothing is lost.
+# The two passes give the sum over all pairs, but for rounding. The package's `SeparableGaussian` does the same. It
+# also normalises as in lecture 10, because the kernel's row sums separate, too. So the spatial kernel is solved, and
+# nothing is lost.
 #
 # ## How can a blur stop at a wall?
 #
@@ -181,11 +183,11 @@ plt.show()
 # $e^{-25}$: the two don't hear each other. So this blur must stop at the edge of a wall. It has another shape around
 # each cell. Two passes with the same weights everywhere can't do that.
 #
-# Here is the trick. Give each cell more coordinates: its row, its column and its four probabilities, each divided by its
-# width. We call them the **features** $f$ of the cell. In this space the kernel is
-# $\exp(-|f_i - f_j|^2 / 2)$. It depends on the distance and on nothing else. The wall is still there: it has become
-# a gap that no cell is in. (The four probabilities sum to 1, so three numbers are enough. A change of basis keeps all
-# distances, and `d = 5` features remain.)
+# Here is the trick. Give each cell more coordinates: its row, its column and its four probabilities, each divided by
+# its width. We call them the **features** $f$ of the cell. In this space the kernel is $\exp(-|f_i - f_j|^2 / 2)$. It
+# depends on the distance and on nothing else. The wall is still there: it has become a gap that no cell is in. (The
+# four probabilities sum to 1, so three numbers are enough. A change of basis keeps all distances, and `d = 5`
+# features remain.)
 
 # %%
 features = lattice.bilateral_features(o, params)  # (N, 5)
@@ -196,11 +198,11 @@ np.testing.assert_allclose(
 )
 
 # %% [markdown]
-# In five dimensions we can't visit every place. Most of the space is empty. So we lay out a coarse grid
-# of vertices, let each cell give its value to the vertices around it, blur between vertices, and read the result back.
-# How many vertices surround a cell? A square has four corners, a cube eight, and a cube in five dimensions 32. A
-# triangle has three corners, a tetrahedron four: these shapes are **simplices**. In five dimensions a simplex has only 6. So a blur
-# stops at a wall when it runs on simplices in the space of features.
+# In five dimensions we can't visit every place. Most of the space is empty. So we lay out a coarse grid of vertices,
+# let each cell give its value to the vertices around it, blur between vertices, and read the result back. How many
+# vertices surround a cell? A square has four corners, a cube eight, and a cube in five dimensions 32. A triangle has
+# three corners, a tetrahedron four: these shapes are **simplices**. In five dimensions a simplex has only 6. So a
+# blur stops at a wall when it runs on simplices in the space of features.
 #
 # ## Which triangle is a point in?
 #
@@ -210,10 +212,10 @@ np.testing.assert_allclose(
 #
 # $$ y = \left(\sqrt 3\, f_1 + f_2,\;\; -\sqrt 3\, f_1 + f_2,\;\; -2 f_2\right) $$
 #
-# (Why these factors? The section after the next one derives them.) A vertex of the lattice is a $y$ of three **integers that have the
-# same remainder modulo 3**. So `(3, 0, -3)` is a vertex, with remainder zero. So is `(4, 1, -5)`, with remainder one. But
-# `(2, 0, -2)` isn't one. A step to a neighbour adds one to two of the numbers and takes two from the third, or does the
-# opposite.
+# (Why these factors? The section after the next one derives them.) A vertex of the lattice is a $y$ of three
+# **integers that have the same remainder modulo 3**. So `(3, 0, -3)` is a vertex, with remainder zero. So is `(4, 1,
+# -5)`, with remainder one. But `(2, 0, -2)` isn't one. A step to a neighbour adds one to two of the numbers and takes
+# two from the third, or does the opposite.
 #
 # Let us find the triangle around `y = (4.2, -0.4, -3.8)`:
 #
@@ -228,7 +230,8 @@ np.testing.assert_allclose(
 #       first corner   the rest         = 0.33
 # ```
 #
-# These are **barycentric weights**. They sum to 1, and the weighted mean of the corners is the point. Check
+# The gap below the largest residual belongs to the last corner, and so on backwards. These are
+# **barycentric weights**. They sum to 1, and the weighted mean of the corners is the point. Check
 # the first number: `0.33 · 3 + 0.13 · 4 + 0.53 · 5 = 4.2`.
 #
 # **Predict before you run.** Now `y = (1.7, 1.6, -3.3)`. Rounding gives `(3, 3, -3)`. The sum isn't zero, so this is no
@@ -284,8 +287,8 @@ _ = interact(
 )
 
 # %% [markdown]
-# A weight becomes zero on the opposite side of the triangle, where the point leaves it. So nothing jumps when a point goes
-# from one triangle to the next. The triangle costs a rounding and a sort, and no cell needs another cell for it.
+# A weight becomes zero on the opposite side of the triangle, where the point leaves it. So nothing jumps when a point
+# goes from one triangle to the next. The triangle costs a rounding and a sort, and no cell needs another cell for it.
 #
 # ## How do cells talk through the vertices?
 #
@@ -306,10 +309,10 @@ Lattice = crf.PermutohedralLattice
 lecture_11_lattice.code_of(Lattice.build.__func__, lattice._blur, Lattice.__call__)
 
 # %% [markdown]
-# Only vertices around cells are numbered, so empty space costs nothing. (What a blur would move to a vertex that isn't there
-# is lost. The exercise mends that.) Watch the filter work on a row of 36 cells. The left
-# half is FREE, the right half STATIC. The network gives *road* about 0.75 on the left and 0.25 on the right, with much
-# noise. Each cell is a point: to the right its place in the row, upwards its P(FREE).
+# Only vertices around cells are numbered, so empty space costs nothing. (What a blur would move to a vertex that
+# isn't there is lost. The exercise mends that.) Watch the filter work on a row of 36 cells. The left half is FREE,
+# the right half STATIC. The network gives *road* about 0.75 on the left and 0.25 on the right, with much noise. Each
+# cell is a point: to the right its place in the row, upwards its P(FREE).
 
 
 # %%
@@ -331,14 +334,15 @@ def smoothed(points, values):
 # %% jupyter={"source_hidden": true} alt="animation: 36 points in two groups give their colours to corners of triangles, the corners blur along three directions, and the points take smoothed colours back; the two groups never mix"
 def pictures(points, values):
     """Yield the frames of the animation on one figure."""
-    fig, ax = plt.subplots(figsize=(6.4, 4.4))
+    fig, ax = plt.subplots(figsize=(6, 4.1))
     fig.subplots_adjust(left=0.09, right=0.98, bottom=0.11, top=0.93)
+    lecture_11_lattice.draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
+    ax.set(xlabel="place in the row / 4 cells", ylabel="P(FREE) / 0.2")
     story = list(lecture_11_lattice.lattice_story(points, values, between=1))
     for frame, following in zip(story, [*story[1:], story[0]], strict=True):
-        ax.clear()
-        lecture_11_lattice.draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
+        for marks in ax.collections[1:]:
+            marks.remove()
         lecture_11_lattice.draw_lattice_frame(frame, ax)
-        ax.set(xlabel="place in the row / 4 cells", ylabel="P(FREE) / 0.2")
         for _ in range(4 if following.title != frame.title else 1):
             yield fig
 
@@ -364,12 +368,12 @@ plt.show()
 # %%
 near_wall, right = slice(14, 22), np.repeat([0.75, 0.25], 18)
 errors = {"network": [], "by place": [], "by place and occupancy": []}
-for seed in range(50):
+for seed in range(20):
     points, p_road = row(seed)
     ways = p_road, smoothed(points[:, :1], p_road), smoothed(points, p_road)
     for found, way in zip(errors.values(), ways, strict=True):
         found.append(np.abs(way - right)[near_wall].mean())
-print("mean error near the wall, 50 rows:", {way: float(np.mean(found).round(2)) for way, found in errors.items()})
+print("mean error near the wall, 20 rows:", {way: float(np.mean(found).round(2)) for way, found in errors.items()})
 assert np.mean(errors["by place and occupancy"]) < 0.6 * np.mean(errors["by place"])
 
 # %% [markdown]
@@ -475,10 +479,10 @@ axes[2].legend(fontsize=9, frameon=False)
 plt.show()
 
 # %% [markdown]
-# The kernel follows the Gaussian, but it is a little hexagonal or triangular, and it depends on where a cell is
-# in its triangle. So we must subtract what *this* filter gives back at *this* cell, its **self-response**: the diagonal
-# of $S M S^\top$, with $M$ for the three blurs together. Does it matter? Run the CRF of the street with the right diagonal, and with
-# nothing subtracted:
+# The kernel follows the Gaussian, but it is a little hexagonal or triangular, and it depends on where a cell is in
+# its triangle. So we must subtract what *this* filter gives back at *this* cell, its **self-response**: the diagonal
+# of $S M S^\top$, with $M$ for the three blurs together. Does it matter? Run the CRF of the street with the right
+# diagonal, and with nothing subtracted:
 
 # %% tags=["nbval-ignore-output"]
 bilateral = crf.bilateral_kernel(o, params)
@@ -493,8 +497,8 @@ assert off.max() > 0.3
 assert (off > 0.1).mean() < 0.1
 
 # %% [markdown]
-# In most cells it doesn't matter, because many others drown what a cell tells itself. But a cell whose occupancy is unlike
-# that of its neighbours hears little else. It would confirm its own opinion.
+# In most cells it doesn't matter, because many others drown what a cell tells itself. But a cell whose occupancy is
+# unlike that of its neighbours hears little else. It would confirm its own opinion.
 #
 # ## Where this breaks: is the lattice to blame?
 #
@@ -560,11 +564,10 @@ assert abs(found["CRF, lattice"] - found["CRF, all pairs"]) <= 4
 assert found["CRF, all pairs"] < 0.8 * found["network"]
 
 # %% [markdown]
-# Neither the lattice nor the early stop is to blame. What is left is mean field itself, or the model. Look at the model's
-# widths. The spatial kernel has a width of 1.2 cells, the
-# bilateral one 3.2. A car is four cells wide. So a cell at its edge hears more strangers than cells of the car, as far
-# as their occupancy is alike. If this explanation is right, the cars come back when the bilateral kernel reaches no
-# farther than the spatial one:
+# Neither the lattice nor the early stop is to blame. What is left is mean field itself, or the model. Look at the
+# model's widths. The spatial kernel has a width of 1.2 cells, the bilateral one 3.2. A car is four cells wide. So a
+# cell at its edge hears more strangers than cells of the car, as far as their occupancy is alike. If this explanation
+# is right, the cars come back when the bilateral kernel reaches no farther than the spatial one:
 
 # %% tags=["nbval-ignore-output"]
 short = replace(params, sigma_alpha=params.sigma_gamma)

@@ -8,8 +8,8 @@
 # - show in a picture why updating all cells at once can fail, and why damping repairs it;
 # - read one table of gains, and say when the CRF helps.
 #
-# **Prerequisites.** Lectures [10](../10_crf.ipynb) and [11](../11_fast_crf.ipynb); for the table, intervals as in lecture
-# [12](../12_experiments.ipynb).
+# **Prerequisites.** Lectures [10](../10_crf.ipynb) and [11](../11_fast_crf.ipynb); for the table, intervals as in
+# lecture [12](../12_experiments.ipynb).
 #
 # **Time.** 15 minutes; the computer needs seconds.
 
@@ -35,9 +35,10 @@ results = Path("../../docs/results")
 # %% [markdown]
 # ## Why do damped updates never make things worse?
 #
-# Take two cells of one state that pull each other, as in lecture 10. Cell 1 says road with 0.7, cell 2 says car with 0.7. Two different
-# labels cost 4. Both cells move alike, so one number holds their state: $Q_1$(road) = $Q_2$(car). When all cells move at
-# once, an update treats the pair term of the free energy $F$ as if it changed along its **tangent** at the present $Q$:
+# Take two cells of one state that pull each other, as in lecture 10. Cell 1 says road with 0.7, cell 2 says car with
+# 0.7. Two different labels cost 4. Both cells move alike, so one number holds their state: $Q_1$(road) = $Q_2$(car).
+# When all cells move at once, an update treats the pair term of the free energy $F$ as if it changed along its
+# **tangent** at the present $Q$:
 
 # %% tags=["tangent"] jupyter={"source_hidden": true}
 t, start, price = np.linspace(0.02, 0.98, 193), 0.7, 4.0
@@ -73,8 +74,8 @@ plt.show()
 # $F$ (solid). It promises a gain on the far side that isn't there: at the dotted curve's minimum, $F$ is higher than at
 # the star. The two cells would jump across, and back again in the next update.
 #
-# The remedy is a penalty for moving, large enough that tangent and penalty together (dashed) are nowhere below $F$. At its
-# minimum the dashed curve is lower than at the star. $F$ is lower still. So $F$ can't rise.
+# The remedy is a penalty for moving, large enough that tangent and penalty together (dashed) are nowhere below $F$.
+# At its minimum the dashed curve is lower than at the star. $F$ is lower still. So $F$ can't rise.
 #
 # How large must the penalty be? A sum of Gaussians has no negative eigenvalue. So the pair term bends upwards
 # only as much as the prices of cells with themselves, $k_{ii}$, allow, and
@@ -82,9 +83,10 @@ plt.show()
 #
 # ## Does the default CRF help?
 #
-# Lecture 10 answers for networks that learned from true labels, lecture 12 for networks that learned from labels made of
-# LIDAR returns. Here the answers are side by side, as points gained over the network alone on 110 test frames. In brackets are
-# 95 % intervals over drives, and over runs where there are several. A row can be read by itself: if its interval holds zero, the sign is open.
+# Lecture 10 answers for networks that learned from true labels, lecture 12 for networks that learned from labels made
+# of LIDAR returns. Here the answers are side by side, as points gained over the network alone on 110 test frames. In
+# brackets are 95 % intervals over drives, and over runs where there are several. A row can be read by itself: if its
+# interval holds zero, the sign is open.
 
 # %% jupyter={"source_hidden": true}
 METRIC_NAMES = ("class accuracy", "pixel accuracy")
@@ -122,11 +124,11 @@ Markdown("\n".join(table))
 # gain, by either judge. Those that learned from true labels gain almost nothing, and the sign is open. So *the CRF
 # helps* is no statement without the score, the training and the judge.
 #
-# The rows differ in more than labels. The networks of the true labels are one training run each, longer than those of the LIDAR
-# labels, which are five runs each.
+# The rows differ in more than labels. The networks of the true labels are one training run each, longer than those of
+# the LIDAR labels, which are five runs each.
 #
-# **Would other weights help?** 120 settings of the two weights and three widths were tried for each network on other drives, and the
-# best for each score was judged on the test frames:
+# **Would other weights help?** 120 settings of the two weights and three widths were tried for each network on other
+# drives, and the best for each score was judged on the test frames:
 
 # %% jupyter={"source_hidden": true} tags=["crf-searched"]
 lines = ["| points gained by a searched CRF | searched for | pixel accuracy | class accuracy |", "|---|---|---|---|"]
@@ -141,13 +143,13 @@ for name, file in FILES.items():
 Markdown("\n".join(lines))
 
 # %% [markdown]
-# A CRF that gains pixel accuracy costs class accuracy. A CRF that doesn't cost class accuracy hardly does anything. As in
-# lecture 11, it is a trade.
+# A CRF that gains pixel accuracy costs class accuracy. A CRF that doesn't cost class accuracy hardly does anything.
+# As in lecture 11, it is a trade.
 #
 # ## What this does not show
 #
-# All frames come from one simulator, and each network was searched for once. A network whose classes are better calibrated
-# might gain more from its neighbours.
+# All frames come from one simulator, and each network was searched for once. A network whose classes are better
+# calibrated might gain more from its neighbours.
 #
 # ## Further reading
 #
