@@ -13,7 +13,7 @@
 # - say what each of the five parameters does to a map, and why equation (4) is normalised in practice.
 #
 # **Prerequisites.** Lecture [08](08_fusion.ipynb): the semantic grid $g$. Logarithms and expected values. If factors
-# and partition functions are new to you, read [graphical models](deeper/graphical_models.ipynb) first.
+# and partition functions are new to you, read [graphical models](01b_graphical_models.ipynb) first.
 #
 # **Time.** 113 minutes, of which the computer needs less than one.
 #
@@ -400,7 +400,7 @@ print(f"labellings of {n_cells} cells with 14 classes: a number of {int(n_cells 
 
 # %% [markdown]
 # No. And because every pair is linked, no clever order of summation avoids a table of all cells
-# ([graphical models](deeper/graphical_models.ipynb) shows how this works on graphs with fewer links). We need an
+# ([graphical models](01b_graphical_models.ipynb) shows how this works on graphs with fewer links). We need an
 # approximation.
 #
 # ## Mean field: ask how the others are on average
@@ -874,7 +874,7 @@ plt.show()
 # package's default, it says 0.998 where 0.52 is right. Move the centre's opinion from 0.52
 # to 0.48 and mean field jumps to the other side, while the exact answer moves by 0.04.
 #
-# *Loopy sum-product* passes the messages of [graphical models](deeper/graphical_models.ipynb) along a graph with loops,
+# *Loopy sum-product* passes the messages of [graphical models](01b_graphical_models.ipynb) along a graph with loops,
 # as if it were a tree. At a coupling of 1 its error is about half that of mean field (right). From 1.25 to 1.75 its
 # fifty rounds don't converge, so what it says there depends on when one stops; at 2 and beyond it has picked a side too.
 # So a probability of 0.998 doesn't mean that one can be 99.8 % sure.
@@ -1105,7 +1105,7 @@ Markdown(ledger_table(ledger("crf")))
 #
 # ## Further reading
 #
-# - [Graphical models from nothing](deeper/graphical_models.ipynb), a companion: factors, elimination, messages, and
+# - Lecture [01b](01b_graphical_models.ipynb), graphical models: factors, elimination, messages, and
 #   mean field on three variables.
 # - [The CRF, measured](deeper/11_crf_measured.ipynb), a companion (after lecture 11): approximate against exact inference
 #   on random grids, as the coupling grows.

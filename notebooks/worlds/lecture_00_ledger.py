@@ -39,7 +39,7 @@ class Stage(NamedTuple):
     check : str
         The test that compares exact inference on the model with the package: "tests/worlds/test_file.py::test_name".
     lecture : str
-        "NN_name#tag": the cell that draws the graph.
+        "NN_name#tag": the cell that draws the graph, or that says what its cut edges mean.
     """
 
     id: str
@@ -55,7 +55,7 @@ STAGES = (
         "line",
         "Bayes' rule on a line",
         lecture_01_line.bayes_on_a_line,
-        lecture_01_line.CUT,
+        (),
         "tests/worlds/test_line.py::test_forward_messages_are_lecture_01s_recursion",
         "01_bayes#graph",
     ),
@@ -73,7 +73,7 @@ STAGES = (
         lecture_02_cell.one_cell,
         lecture_02_cell.CUT_CELL,
         "tests/worlds/test_cell.py::test_predict_and_update_are_the_forward_messages",
-        "deeper/graphical_models#stages",
+        "01b_graphical_models#stages",
     ),
     Stage(
         "beam",
@@ -169,7 +169,7 @@ STAGES = (
         lecture_00_system.whole_system,
         lecture_00_system.CUT,
         "tests/worlds/test_system.py::test_o_is_the_exact_filter_of_each_cell",
-        "00_tour#system-graph",
+        "00_tour#prices",
     ),
     Stage(
         "memory",
@@ -209,7 +209,7 @@ class LedgerLine(NamedTuple):
 def ledger(stage: str | None = None) -> tuple[LedgerLine, ...]:
     """Measure the price of every cut edge that has one, in one stage or in all (which takes a few seconds)."""
     return tuple(
-        LedgerLine(each.id, edge.edge, *edge.price(), each.lecture[:2])
+        LedgerLine(each.id, edge.edge, *edge.price(), each.lecture.partition("_")[0])
         for each in STAGES
         if stage in (None, each.id)
         for edge in each.cut
