@@ -93,10 +93,10 @@ STAGES = (
     ),
     Stage(
         "bof",
-        "BOF: cells, velocities, antecedents",
-        lecture_03_bof.bof_stage,
+        "BOF: one thing, two cells",
+        lecture_03_bof.stands_or_drives,
         lecture_03_bof.CUT,
-        "tests/worlds/test_bof_row.py::test_bof_adds_what_two_antecedents_send",
+        "tests/worlds/test_bof_row.py::test_a_thing_that_stands_or_drives_is_believed_in_both_places",
         "03_bof#graph",
     ),
     Stage(

@@ -43,12 +43,12 @@ def check_drive_scores(drive_scores: Callable) -> None:
 
 @hidden
 def check_hochberg(hochberg: Callable) -> None:
-    """One to twelve statements, sure ones and doubtful ones, and some that lie near their limits; other levels."""
+    """One to twelve statements, sure and doubtful, and some near their limits, equal ones among them; other levels."""
     rng = generator(119)
     for count in rng.integers(1, 13, 60):
         for level in (0.025, 0.1):
             near = level / np.arange(1, count + 1) * rng.uniform(0.8, 1.3, count)
-            for p_values in (rng.beta(0.3, 3, count), rng.permutation(near)):
+            for p_values in (rng.beta(0.3, 3, count), rng.permutation(near), rng.choice(near, 2 * count)):
                 wanted = _hochberg(p_values, level)
                 got = answer_array(hochberg(p_values.tolist(), level)).ravel().astype(bool)
                 right = got.shape == wanted.shape and (got == wanted).all()
@@ -73,7 +73,7 @@ def check_towns(town_interval: Callable) -> None:
         rng.shuffle(number)
         pooled = np.stack([matrices[number == g].sum(axis=0) for g in range(n_towns)])
         for (name, metric), level in product(METRICS.items(), (0.95, 0.8)):
-            got = answer_array(town_interval(matrices.copy(), [f"town-{g}" for g in number], metric, level))
+            got = answer_array(town_interval(matrices.copy(), [f"town-{g}" for g in number], metric, level)).ravel()
             without = [metric(np.delete(pooled, g, axis=0).sum(axis=0)) for g in range(n_towns)]
             wanted = drive_interval(pooled[None], metric, level)
             _compare(got, [wanted, _around(wanted[1], without, level, wanted[1])], name)
@@ -86,7 +86,7 @@ def check_paired(paired: Callable, jackknife: Callable) -> None:
         a = _matrices(124 + seed, n, n_classes)
         b = a + generator(127 + seed).integers(0, 6, a.shape)
         for (name, metric), level in product(METRICS.items(), (0.95, 0.8)):
-            got = answer_array(paired(a.copy(), b.copy(), metric, level))
+            got = answer_array(paired(a.copy(), b.copy(), metric, level)).ravel()
             share = _share(metric)
             middle = share((a.sum(0), b.sum(0)))
             without = [share((np.delete(a, v, axis=0).sum(0), np.delete(b, v, axis=0).sum(0))) for v in range(n)]
