@@ -636,34 +636,31 @@ labels = np.stack(
 on_sidewalk = labels == KITTI_14.index("sidewalk")
 
 
-def sidewalk_found(pad=None):
-    """Return the labels of all maps, and the share of the sidewalk's cells that is found; without `pad`, no CRF."""
-    guesses = np.stack(
-        [
-            (
-                r.grid
-                if pad is None
-                else fast.mean_field(crf.unary_from_probability(r.grid), r.belief.probability, default, pad=pad)
-            ).argmax(axis=0)
-            for r in pictures
-        ]
-    )
-    return guesses, (guesses == labels)[on_sidewalk].mean()
+def share_found(guesses):
+    """Return the share of the sidewalk's cells that is found."""
+    return (guesses == labels)[on_sidewalk].mean()
+
+
+def refined_with(pad):
+    """Return all maps after the CRF, with a border of `pad` cells around them."""
+    pieces = [(crf.unary_from_probability(r.grid), r.belief.probability) for r in pictures]
+    return np.stack([fast.mean_field(*piece, default, pad=pad) for piece in pieces]).argmax(axis=1)
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
-before, after, padded = sidewalk_found(), sidewalk_found(0), sidewalk_found(8)
-in_two_columns = (before[0] == labels)[on_sidewalk] & (after[0] != labels)[on_sidewalk]
+before = np.stack([r.grid for r in pictures]).argmax(axis=1)
+after, padded = refined_with(pad=0), refined_with(pad=8)
+in_two_columns = (before == labels)[on_sidewalk] & (after != labels)[on_sidewalk]
 columns = np.argwhere(on_sidewalk)[in_two_columns][:, 2]
 print(
-    f"sidewalk found: network {before[1]:.0%}, after the CRF {after[1]:.0%}, with a border of 8 cells {padded[1]:.0%}"
+    f"sidewalk found: network {share_found(before):.0%}, after the CRF {share_found(after):.0%}, with a border of 8 cells {share_found(padded):.0%}"
 )
 print(f"of the cells that the CRF loses {(columns < 2).mean():.0%} are in the two columns at the edge")
 
 # %% jupyter={"source_hidden": true} alt="three maps of a real street: the network's has a strip of sidewalk one or two cells wide along its left border, the refined one has lost most of it, with a border of eight cells it is there again"
 plotting.label_maps(
     net.architecture.grid,
-    {"network": before[0][-1], "after the CRF": after[0][-1], "CRF with a border": padded[0][-1]},
+    {"network": before[-1], "after the CRF": after[-1], "CRF with a border": padded[-1]},
     KITTI_14,
 )
 plt.gcf().supxlabel(street.credit, fontsize=8)
