@@ -1,9 +1,9 @@
 """The class of one cell over time: the value of earlier images when a network repeats its errors (section 3).
 
-The paper forgets classes at every frame. Here they are remembered, exactly, for one
-cell of the toy street. Its contents change by the filter's own rates, so a parked car stays, a moving one takes its
-class along, and new contents have the street's shares. Each frame has a scan and a class that the network names. Beside
-them runs a chain of errors: what made the network wrong at one frame is mostly still there at the next.
+The paper forgets classes at every frame. Here they are remembered, exactly, for one cell of the toy street. Its content
+changes by the filter's own rates, so a parked car stays, a moving one takes its class along, and new contents have the
+street's shares. Each frame has a scan and a class that the network names. Beside them runs a chain of errors: what made
+the network wrong at one frame is mostly still there at the next.
 """
 
 from collections.abc import Sequence
