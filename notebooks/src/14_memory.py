@@ -65,7 +65,7 @@ measured = json.loads(Path("../docs/results/memory.json").read_text())
 # the laser scan. Follow the ring, which appears when the filter finds that the car moves.
 
 
-# %% jupyter={"source_hidden": true} alt="animation of a real street: A, the camera image; B, the map of one frame, in which the ringed oncoming car turns from car to unknown-dynamic as it leaves the image; C, the map with memory, in which it stays a car"
+# %% jupyter={"source_hidden": true}
 def oncoming(result):
     """Return the middle of the oncoming car's cells, x and y in metres: the largest patch that moves on the left."""
     x, y = np.moveaxis(spec.centers(), -1, 0)
@@ -74,28 +74,33 @@ def oncoming(result):
     return np.array([x[cells].mean(), y[cells].mean()]) if cells.sum() > 5 else None
 
 
-def passing():
-    """Yield image, map of one frame and map with memory, of every second frame."""
+def pictures():
+    """Return the figure of image and two maps, its parts that change, and the most probable classes of all frames."""
     fig = plt.figure(figsize=(9.6, 3.9), layout="constrained")
     axes = fig.subplot_mosaic([["A", "B", "C"]], width_ratios=(2.2, 1, 1))
     fig.supxlabel(real.credit, fontsize=8)
-    maps = {"B": [result.grid.argmax(axis=0) for result in street]}
-    maps["C"] = [result.remembered.argmax(axis=0) for result in street]
-    photo = axes["A"].imshow(street[0].frame.image[::2, ::2])
+    maps = [[grid.argmax(axis=0) for grid in (result.grid, result.remembered)] for result in street]
+    photo, rings = axes["A"].imshow(street[0].frame.image[::2, ::2]), []
     axes["A"].set_axis_off()
-    for letter, title in (("B", "B: one frame"), ("C", "C: with memory")):
-        plotting.grid_labels(spec, maps[letter][0], KITTI_14, ax=axes[letter], legend=False)
-        axes[letter].set_ylim(0, 45)
-        axes[letter].set_title(title, fontsize="medium")
+    for letter, title, first in zip("BC", ("B: one frame", "C: with memory"), maps[0], strict=True):
+        ax = plotting.grid_labels(spec, first, KITTI_14, ax=axes[letter], legend=False)
+        ax.set_ylim(0, 45)
+        ax.set_title(title, fontsize="medium")
+        rings += [ax.plot([], [], "o", ms=26, mfc="none", mec=c, mew=w)[0] for c, w in (("white", 4), ("red", 2))]
     axes["C"].set_ylabel("")
-    plotting.class_legend(axes["C"], KITTI_14, np.stack([*maps["B"], *maps["C"]]))
-    rings = [axes[letter].plot([], [], "o", ms=26, mfc="none", mec=colour, mew=width)[0]
-             for letter in "BC" for colour, width in (("white", 4), ("red", 2))]  # fmt: skip
-    for k, result in list(enumerate(street))[::2]:
+    plotting.class_legend(axes["C"], KITTI_14, np.array(maps))
+    return fig, axes, photo, rings, maps
+
+
+# %% jupyter={"source_hidden": true} alt="animation of a real street: A, the camera image; B, the map of one frame, in which the ringed oncoming car turns from car to unknown-dynamic as it leaves the image; C, the map with memory, in which it stays a car"
+def passing():
+    """Yield image, map of one frame and map with memory, of every second frame."""
+    fig, axes, photo, rings, maps = pictures()
+    for result, both in list(zip(street, maps, strict=True))[::2]:
         photo.set_data(result.frame.image[::2, ::2] // 16 * 16)
         axes["A"].set_title(f"A: image, {result.frame.time:.1f} s", fontsize="medium")
-        for letter in "BC":
-            axes[letter].images[0].set_data(KITTI_14.colours(maps[letter][k]))
+        for letter, one in zip("BC", both, strict=True):
+            axes[letter].images[0].set_data(KITTI_14.colours(one))
         place = oncoming(result)
         for ring in rings if place is not None else ():
             ring.set_data(*place[::-1, None])
@@ -249,7 +254,7 @@ _ = interact(show, repeats=FloatSlider(value=0.6, min=0.0, max=0.95, step=0.05, 
 
 # %% [markdown]
 # (The slider works with a running kernel.) A textbook formula gives the exponent without a search. If the errors of $T$
-# readings have the correlation $r$ from each to the next one (which is what our $r$ gives), their mean is as good as that of
+# readings have the correlation $r$ from each to the next one, as in the toy, their mean is as good as that of
 #
 # $$ T_\text{eff} = 1 + (T - 1)\,\frac{1 - r}{1 + r} $$
 #
@@ -302,7 +307,7 @@ def errors_last(results, apart):
 # </details>
 
 
-# %% tags=["nbval-ignore-output", "weights"] jupyter={"outputs_hidden": true}
+# %%
 def log_loss(maps):
     """Return the log loss in view, and how sure the maps are there; the unknown classes left aside."""
     found = []
@@ -320,15 +325,14 @@ def tried_with(weights, most):
     return np.array([log_loss(remember_drive(views, spec, one)) for one in params])
 
 
+# %% tags=["nbval-ignore-output", "weights"] jupyter={"outputs_hidden": true}
 views = [memory.View(result.frame, result.belief, result.grid) for result in driven]
 weights = (0.1, 0.35, 1.0)
-newest, product = (
-    log_loss([result.grid for result in driven]),
-    tried_with(weights, most=20.0),
-)  # more than ten: no limit
+newest = log_loss([result.grid for result in driven])
+product = tried_with(weights, most=20.0)  # more than ten frames can weigh, so there is no limit
 print(f"newest frame alone: {newest[0]:.2f} nats, {100 * newest[1]:.0f} % sure")
 for w, (loss, sure) in zip(weights, product, strict=True):
-    print(f"w = {w:<15}: {loss:.2f} nats, {100 * sure:.0f} % sure")
+    print(f"w = {w:<4}: {loss:.2f} nats, {100 * sure:.0f} % sure")
 assert newest[0] < product[:, 0].min() < product[2, 0] - 0.04
 
 # %% [markdown]
@@ -389,7 +393,7 @@ for p in ([0.8, 0.2], [0.5, 0.5], [0.3, 0.7]):
     np.testing.assert_allclose(package.evidence[0, :, 0, 0], mean, atol=1e-5)
     print(f"frame says {p}: P = {(np.exp(mean) / np.exp(mean).sum()).round(2)}")
 
-# %% jupyter={"source_hidden": true} alt="left, P(building) of a cell over twelve frames: one frame alone drops at a blunder in frame 5, the running mean only to one half, the product not at all; when the cell changes at frame 9 the mean follows at once and the product three frames later; right, a table of who decides: in view the mean for what stays and this frame alone for car, person, bicycle; seen before the memory, and for cars memory times laser; never seen the four unknown classes"
+# %% jupyter={"source_hidden": true}
 said = np.array([0.8] * 4 + [0.1] + [0.8] * 3 + [0.1] * 4)
 logs = np.log(np.stack([said, 1 - said], axis=1))
 kept = [logs[0]]
@@ -397,6 +401,8 @@ for p in logs[1:]:
     kept.append(0.65 * kept[-1] + 0.35 * p)
 histories = {"this frame": (logs, "0.5", ":"), "product": (logs.cumsum(axis=0), "tab:red", "--")}
 histories["running mean, a = 0.35"] = (np.array(kept), "tab:blue", "-")
+
+# %% jupyter={"source_hidden": true} alt="left, P(building) of a cell over twelve frames: one frame alone drops at a blunder in frame 5, the running mean only to one half, the product not at all; when the cell changes at frame 9 the mean follows at once and the product three frames later; right, a table of who decides: in view the mean for what stays and this frame alone for car, person, bicycle; seen before the memory, and for cars memory times laser; never seen the four unknown classes"
 fig, (left, ax) = plt.subplots(1, 2, figsize=(9.8, 3.3), layout="constrained", width_ratios=(1, 1.15))
 for name, (scores, colour, line) in histories.items():
     left.plot(np.arange(1, 13), np.exp(scores[:, 0]) / np.exp(scores).sum(axis=1), line, color=colour, label=name)
