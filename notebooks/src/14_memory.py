@@ -11,7 +11,7 @@
 # - score a memory against the rivals that cost nothing, and find the ghosts that it keeps.
 #
 # **Prerequisites.** Lectures [03](03_bof.ipynb) and [04](04_cmcdot.ipynb): a filter over time, velocities of cells.
-# Lecture [08](08_fusion.ipynb): the semantic grid. For d-separation: [graphical models](deeper/graphical_models.ipynb).
+# Lecture [08](08_fusion.ipynb): the semantic grid. For d-separation: lecture [01b](01b_graphical_models.ipynb).
 #
 # **Time.** 68 minutes, of which the computer needs less than one.
 #
