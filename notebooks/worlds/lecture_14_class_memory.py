@@ -1,9 +1,9 @@
 """The class of one cell over time: the value of earlier images when a network repeats its errors (section 3).
 
-The paper forgets classes at every frame: the edge g0 -> g1 of the whole system. Here it is put back, exactly, for one
-cell of the toy street. Its contents change by the filter's own rates, so a parked car stays, a moving one takes its
-class along, and new contents have the street's shares. Each frame has a scan and a class that the network names. Beside
-them runs a chain of errors: what made the network wrong at one frame is mostly still there at the next.
+The paper forgets classes at every frame. Here they are remembered, exactly, for one cell of the toy street. Its content
+changes by the filter's own rates, so a parked car stays, a moving one takes its class along, and new contents have the
+street's shares. Each frame has a scan and a class that the network names. Beside them runs a chain of errors: what made
+the network wrong at one frame is mostly still there at the next.
 """
 
 from collections.abc import Sequence
@@ -190,6 +190,12 @@ def memory_price(world: MemoryWorld | None = None) -> MemoryPrice:
     return MemoryPrice(loss(1.0, memory=False), loss(1.0), loss(best), exact, best)
 
 
+def loss_by_exponent(world: MemoryWorld, exponents: Sequence[float]) -> list[float]:
+    """Return the mean of -log P(true class) at the last frame for each exponent, nats, by exact sums."""
+    joint, *seen = _all_readings(world)
+    return [_log_loss(joint, factored_classes(world, *seen, exponent)) for exponent in exponents]
+
+
 def frames_worth(frames: int, repeats: float) -> float:
     """Return the number of independent frames that are worth as much as these, whose errors are correlated.
 
@@ -235,13 +241,5 @@ CUT = (
         errors_by_themselves,
         bend=-0.7,
     ),
-    CutEdge(
-        "l1 - z1, over the content",
-        "The occupancy filter and the memory of classes each keep their own belief, so that something is STATIC and "
-        "that it is a building are known apart. Only a car, a person or a bicycle that the camera no longer sees "
-        "counts as far as the laser finds something there.",
-        ("l1", "z1"),
-        bend=0.3,
-    ),
 )
-"""The edges that the memory of classes cuts."""
+"""The edge that the memory of classes cuts."""

@@ -10,6 +10,7 @@ from worlds.lecture_14_class_memory import (
     exact_classes,
     factored_classes,
     frames_worth,
+    loss_by_exponent,
     memory_price,
     readings,
 )  # fmt: skip
@@ -48,6 +49,8 @@ def test_one_frame_is_the_whole_systems_image():
 def test_a_product_of_frames_that_err_together_is_worse_than_forgetting_and_an_exponent_repairs_most():
     price = memory_price(MemoryWorld(steps=3, repeats=0.6))
     assert price.exact < price.weighted < price.forgotten < price.independent
+    losses = loss_by_exponent(MemoryWorld(steps=3, repeats=0.6), (price.exponent, 1.0))
+    assert losses == pytest.approx([price.weighted, price.independent])
 
 
 @pytest.mark.parametrize("frames", [2, 3, 4])

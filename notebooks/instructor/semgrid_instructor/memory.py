@@ -1,4 +1,4 @@
-"""Hidden tests of exercise 14, memory for classes: other frames, other maps, and the simulated drive, which moves."""
+"""Hidden tests of exercise 14, memory for classes: other frames, other cells, and the simulated drive, which moves."""
 
 from collections.abc import Callable
 from copy import deepcopy
@@ -56,22 +56,6 @@ def check_errors_last(errors_last: Callable) -> None:
         assert close(got[:1], [r], atol=1e-3), "another r, for other numbers of places and frames"
         assert close(got[1:], [1 + (frames - 1) * (1 - r) / (1 + r)], rtol=1e-3, atol=1e-3), (
             "r is right, its worth isn't"
-        )
-
-
-@hidden
-@keeping
-def check_moved(moved: Callable) -> None:
-    """Other maps, motions in all directions, and some beyond the map."""
-    for seed, (ahead, left) in enumerate(((2, 1), (-1, 3), (0, -2), (-3, -4), (1, 0), (6, 1), (2, -9))):
-        rng = generator(1420 + seed)
-        grid, fill = rng.normal(0, 1, (3, 6, 8)), rng.normal(0, 1, 3)
-        wanted = np.empty_like(grid)
-        for r, c in np.ndindex(6, 8):
-            inside = 0 <= r - ahead < 6 and 0 <= c - left < 8
-            wanted[:, r, c] = grid[:, r - ahead, c - left] if inside else fill
-        assert close(answer_array(moved(grid, ahead, left, fill)), wanted), (
-            "a motion in another direction, or beyond the map"
         )
 
 

@@ -1,17 +1,16 @@
 # %% [markdown]
 # # Exercise 14: memory for classes
 #
-# Weigh frames, measure how long errors last, move a map, let the laser correct the memory, and write a memory of your own; one question to answer in words.
-# About 90 minutes. The lecture is [14: the edge that the paper cut](../14_memory.ipynb).
+# Weigh frames, measure how long errors last, let the laser correct the memory, and write a memory of your own; one question to answer in words.
+# About 90 minutes. The lecture is [14: memory for classes](../14_memory.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
 # | 1 | several frames, each with its exponent | 2 |
 # | 2 | how long errors last, and what that makes of T frames | 2 |
-# | 3 | a map that moves under the vehicle | 2 |
-# | 4 | the laser corrects the memory | 3 |
-# | 5 | your memory, on the real street | 3 |
-# | 6 | in your own words | 2 |
+# | 3 | the laser corrects the memory | 3 |
+# | 4 | your memory, on the real street | 3 |
+# | 5 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers and other frames. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -27,8 +26,8 @@ import numpy as np
 from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_edu.memory import View
 from semgrid_edu.memory import remember_drive as _remember_drive
-from semgrid_edu.occupancy import Belief, PlanarMotion  # for task 5
-from semgrid_edu.occupancy.planar_motion import look_up  # for task 5
+from semgrid_edu.occupancy import Belief, PlanarMotion  # for task 4
+from semgrid_edu.occupancy.planar_motion import look_up  # for task 4
 from semgrid_edu.stages.stepping import CheckedMemory
 from semgrid_edu.workshop.course.street import street_results as _street_results
 
@@ -55,13 +54,15 @@ def combine(p, w):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "combine-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "combine-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # By hand: 0.8 and 0.2 with exponent 1, then 0.5 and 0.5: the second frame says nothing.
     got = answer_array(combine(np.array([[0.8, 0.2], [0.5, 0.5]]), np.array([1.0, 0.5])), "combine")
     assert got.shape == (2,), f"expected one number per class, shape (2,), got {got.shape}"
     assert np.isclose(got.sum(), 1), f"the belief sums to {got.sum():.3f}: divide by the sum"
-    assert np.allclose(got, [0.8, 0.2], atol=1e-3), f"the second frame says nothing, so 0.8 and 0.2 stay; got {got.round(3)}"
+    assert np.allclose(got, [0.8, 0.2], atol=1e-3), (
+        f"the second frame says nothing, so 0.8 and 0.2 stay; got {got.round(3)}"
+    )
     # Odds of 4 with exponent 1 and of 4 with exponent 0.5: 4 * 2 = 8, so 8/9.
     got = answer_array(combine(np.array([[0.8, 0.2], [0.8, 0.2]]), np.array([1.0, 0.5])), "combine")
     slips = {
@@ -106,7 +107,7 @@ def errors_last(wrong):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "errors-last-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "errors-last-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # Four places, three frames: eight pairs (1,1) (1,0) (0,0) (0,0) (0,1) (1,1) (0,0) (0,0). Both means are 3/8,
     # both variances 15/64, the covariance is 2/8 - 9/64 = 7/64: r = 7/15.
@@ -128,7 +129,9 @@ def _test():
     expected = 1 + 2 * (1 - 7 / 15) / (1 + 7 / 15)
     assert not np.isclose(worth, 1 + 3 * (1 - 7 / 15) / (1 + 7 / 15), atol=1e-3), "T frames: T - 1 follow the first"
     assert not np.isclose(worth, expected / 3, atol=1e-3), "that is the exponent of each frame: don't divide by T"
-    assert np.isclose(worth, expected, atol=1e-3), f"r is right; by the formula three frames are worth {expected:.3f}, got {worth:.3f}"
+    assert np.isclose(worth, expected, atol=1e-3), (
+        f"r is right; by the formula three frames are worth {expected:.3f}, got {worth:.3f}"
+    )
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import memory
 
@@ -140,85 +143,10 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: a map that moves under the vehicle (2 points)
+# ## Task 3: the laser corrects the memory (3 points)
 #
-# `grid` is a map around the vehicle, `(C, H, W)`: row 0 is the farthest ahead, column 0 the leftmost. Now the vehicle has moved by `ahead` cells forward and by `left`
-# cells to the left; both are whole numbers and may be negative. What stood in the world stays where it stood.
-#
-# Complete `moved`: it returns the map around the vehicle's new place, `(C, H, W)`. Cells that weren't in the old map take `fill`, `(C,)`. Leave `grid` unchanged.
-
-
-# %% nbgrader={"grade": false, "grade_id": "moved", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def moved(grid, ahead, left, fill):
-    """Return the map around the new place of the vehicle, (C, H, W)."""
-    ### BEGIN SOLUTION
-    _, height, width = grid.shape
-    now = np.empty_like(grid)
-    now[:] = np.asarray(fill)[:, None, None]
-    rows, cols = np.arange(height) - ahead, np.arange(width) - left  # where the new cells were
-    r, c = (rows >= 0) & (rows < height), (cols >= 0) & (cols < width)
-    now[:, r[:, None] & c] = grid[:, rows[r]][:, :, cols[c]].reshape(len(grid), -1)
-    return now
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": false, "grade_id": "moved-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _moved_slips(grid, ahead, left, fill):
-    """Return what common slips give, by hint."""
-    rolled = {
-        "what leaves the map at one side comes in again at the other: use `fill`": (ahead, left),
-        "the other way: the vehicle moves forward, so what stood in a row is now in a row nearer to it": (-ahead, left),
-        "left and right are swapped: column 0 is the leftmost": (ahead, -left),
-        "both directions are the wrong way": (-ahead, -left),
-        "rows and columns are swapped": (left, ahead),
-    }
-    slips = {}
-    for hint, (down, right) in rolled.items():
-        now = np.roll(grid, (down, right), axis=(1, 2))
-        if "comes in again" not in hint:
-            rows, cols = np.indices(grid.shape[1:])
-            rows, cols = rows - down, cols - right
-            outside = (rows < 0) | (rows >= grid.shape[1]) | (cols < 0) | (cols >= grid.shape[2])
-            now[:, outside] = np.asarray(fill)[:, None]
-        slips[hint] = now
-    return slips
-
-
-# %% nbgrader={"grade": true, "grade_id": "moved-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    grid = np.arange(24.0).reshape(2, 4, 3)
-    kept = grid.copy()
-    got = answer_array(moved(grid, 1, 0, np.array([-1.0, -2.0])), "moved")
-    assert np.array_equal(grid, kept), "it changes `grid`: make a new array"
-    assert got.shape == grid.shape, f"expected shape {grid.shape}, got {got.shape}"
-    # One cell forward: the old row 0 is row 1 now, the old row 3 has left the map, row 0 is new.
-    for ahead, left in ((1, 0), (0, 1), (-1, 0), (2, -1), (0, 0)):
-        got = answer_array(moved(grid.copy(), ahead, left, np.array([-1.0, -2.0])), "moved")
-        expected = np.full_like(grid, -1.0)
-        expected[1] = -2.0
-        for r, c in np.ndindex(4, 3):
-            if 0 <= r - ahead < 4 and 0 <= c - left < 3:
-                expected[:, r, c] = grid[:, r - ahead, c - left]
-        where = f"{ahead} ahead, {left} to the left"
-        for hint, slip in _moved_slips(grid, ahead, left, [-1.0, -2.0]).items():
-            assert np.array_equal(slip, expected) or not np.array_equal(got, slip), f"{where}: {hint}"
-        assert np.allclose(got, expected), f"{where}: the world stays, so the map moves back and right:\n{expected[0]} in the first class, got\n{got[0]}"
-    gone = answer_array(moved(grid.copy(), 9, 0, np.array([-1.0, -2.0])), "moved")
-    assert (gone[0] == -1).all(), "9 cells ahead: everything is new, so all cells take `fill`"
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import memory
-
-    complaint = memory.check_moved(moved)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 4: the laser corrects the memory (3 points)
-#
-# The lecture's last ghosts are cells that the memory calls *car* though the scan says FREE. The package lets the laser speak of cars, people and bicycles; here it speaks of all that stands. `p` is what the memory says of C classes, `(C, H, W)`; it sums to
+# The lecture's ghosts are cells that the memory calls *car* though the car has left. The package lets the laser speak of cars, people and bicycles; here it speaks of
+# all that stands. `p` is what the memory says of C classes, `(C, H, W)`; it sums to
 # 1 in each cell. `o` is the occupancy grid, `(4, H, W)`, in the order FREE, STATIC, DYNAMIC, UNKNOWN. `standing` lists the numbers of the classes that stand up, such as car
 # and building. A standing thing can't be in a free cell, so its probability is multiplied by 1 - P(FREE); a class of the ground keeps its own. Then each cell is divided by
 # its sum.
@@ -238,7 +166,7 @@ def listen(p, o, standing):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "listen-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "listen-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # One row of four cells; road, car, building. By hand, cell 0: car 0.8 * 0.1 = 0.08, road 0.2: P(car) = 0.08 / 0.28.
     p = np.array([[0.2, 0.2, 0.0, 0.7], [0.8, 0.8, 0.5, 0.2], [0.0, 0.0, 0.5, 0.1]]).reshape(3, 1, 4)
@@ -274,7 +202,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: your memory, on the real street (3 points)
+# ## Task 4: your memory, on the real street (3 points)
 #
 # Complete `remember(views, spec)`: a generator that takes a view, yields a semantic grid, and only then takes the next view. A view has `view.grid`, `(14, H, W)`, what the
 # network made of this frame alone: ten semantic classes, then unknown-free, unknown-static, unknown-dynamic and unknown-unobserved. `view.belief.probability` is the
@@ -317,7 +245,7 @@ def maps(frames, occupancy, grids, spec):
     return np.array(called)
 
 
-# %% nbgrader={"grade": false, "grade_id": "street", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "street", "locked": true, "schema_version": 3, "solution": false, "task": false}
 def _street():
     """Return what `maps` takes of the real street, the true classes, and which cells are in view and were seen before."""
     results, spec = _street_results(None, 10)
@@ -342,7 +270,7 @@ def _right(called, truth, cells):
     return 100 * (called == truth)[cells].mean()
 
 
-# %% nbgrader={"grade": true, "grade_id": "remember-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "remember-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     given, truth, seen, before = _street()
     got = answer_array(maps(*_copy(given)), "maps").astype(int)
@@ -371,11 +299,11 @@ _test()
 # %% [markdown]
 # To see it on the demo's page, save `remember` and its imports as `my_stages.py`, and run `semgrid-edu demo --stages my_stages.py`: your map stands beside the package's.
 #
-# ## Task 6: in your own words (2 points)
+# ## Task 5: in your own words (2 points)
 #
 # A colleague's memory multiplies the class probabilities of all frames, with exponent 1. On a parking lot, where the vehicle stands for a minute, its map gets surer from frame
 # to frame, and a hedge that the network takes for a building becomes a building with 99.99 %. What is wrong with the colleague's model, and what do you change? And name one
-# situation in which *your* memory of task 5 makes the map worse than one frame, and what you would measure to notice. Six sentences are enough.
+# situation in which *your* memory of task 4 makes the map worse than one frame, and what you would measure to notice. Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "parking-lot", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # The product takes frames as independent given the content of a cell. They share the network's error: what makes it take this hedge for a building is still there at the next
