@@ -26,6 +26,7 @@ from ipywidgets import FloatSlider, interact
 
 from semgrid_edu import fast, labels, networks, planes, plotting, training
 from semgrid_edu.datasets import samples
+from semgrid_edu.plotting.colours import colour_legend
 from worlds import lecture_08_pictures, lecture_08_street, lecture_08_worth
 
 # %% jupyter={"source_hidden": true}
@@ -33,16 +34,16 @@ plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 torch.set_num_threads(1)
 right, classes, NEAR = lecture_08_street.right, lecture_08_street.classes, lecture_08_street.NEAR
 KITTI_14, IGNORE = labels.KITTI_14, labels.IGNORE
-ROAD, CAR, FENCE, BUILDING = map(KITTI_14.index, ("road", "car", "fence", "building"))
+ROAD, CAR, SIGNAGE = map(KITTI_14.index, ("road", "car", "signage"))
 drive, shown = samples.sample_drive(), 2
-frames = [drive[k] for k in range(10)]
+frames = [drive[k] for k in range(6)]
 stage_one, shipped = (
     fast.load_net(path, drive.camera).requires_grad_(False)
     for path in (samples.sample_image_stage(), samples.sample_weights())
 )
-six = lecture_08_street.training_streets(stage_one)  # frames to learn from
-new = lecture_08_street.new_streets(stage_one, frames)  # a street that nothing learns from
-end_to_end = lecture_08_street.rescored(shipped, new)  # the same with the shipped network's scores
+six = lecture_08_street.training_streets(stage_one, drive.camera)  # frames to learn from
+new = lecture_08_street.new_streets(stage_one, drive.camera, frames)  # a street that nothing learns from
+end_to_end = lecture_08_street.rescored(shipped, drive.camera, new)  # the same with the shipped network's scores
 
 # %% [markdown]
 # ## What does each sensor know that the other doesn't?
@@ -59,8 +60,8 @@ plotting.grid_labels(NEAR, label[shown], KITTI_14, ax=axes[0], legend=False).set
 plotting.occupancy(NEAR, new.o[shown].numpy(), ax=axes[1], legend=False).set_title("B: occupancy grid $o$")
 plotting.grid_labels(NEAR, new.truth[shown].numpy(), KITTI_14, ax=axes[2], legend=False).set_title("C: truth")
 plotting.class_legend(axes[2], KITTI_14, np.stack([label[shown], new.truth[shown]]))
-plotting.colour_legend(axes[1], plotting.STATE_NAMES, plotting.STATE_COLOURS, loc="upper center",
-                       bbox_to_anchor=(0.5, -0.13), ncols=2)  # fmt: skip
+colour_legend(axes[1], plotting.STATE_NAMES, plotting.STATE_COLOURS, loc="upper center",
+                       bbox_to_anchor=(0.5, -0.2), ncols=2)  # fmt: skip
 plt.show()
 
 # %% [markdown]
@@ -80,12 +81,12 @@ plt.show()
 # Here is the simplest way to use both. Make a **table**: for each pair of a label and a state, the most frequent true
 # class in six training frames. It has nothing to learn but counts.
 #
-# **Predict before you run.** Count on a street that the table hasn't seen. With $o$ alone, the table names 41 % of all
-# cells correctly, with the label alone 61 %. With both: about 65, 80 or 95 %?
+# **Predict before you run.** Count on a street that the table hasn't seen. With $o$ alone, the table names 40 % of all
+# cells correctly, with the label alone 64 %. With both: about 65, 80 or 95 %?
 #
 # <details><summary>Answer</summary>
 #
-# 80 %. Neither sensor repeats the other. (If they did, it would stay near 61.)
+# 79 %. Neither sensor repeats the other. (If one did, the table would stay at 64 %.)
 #
 # </details>
 
@@ -114,15 +115,16 @@ for name, (every, semantic) in scores.items():
 
 # %% jupyter={"source_hidden": true}
 table = scores["table of both"][0]
-assert [round(scores[name][0]) for name in ("label alone", "o alone", "table of both")] == [61, 41, 80]
+assert [round(scores[name][0]) for name in ("label alone", "o alone", "table of both")] == [64, 40, 79]
 assert scores["shipped network"][0] > table + 8
+assert [round(value) for value in lecture_08_worth.by_planes()] == [53, 54]
 
 # %% [markdown]
 # The first column contains a gift. A cell that nobody has seen counts as *unknown*, and $o$ itself decides which cells
-# these are. So look at the second column, too: among cells with a real class (road, car, ...) the table is no better
-# than the label alone. Only the shipped network is.
+# these are. So look at the second column, too. Among cells with a real class (road, car, ...) the table is no better
+# than the label alone. The shipped network is; it has the layers of this lecture.
 #
-# So 80 % is the number to beat. What does a network know that the table doesn't? It sees all planes, not only the
+# So 79 % is the number to beat. What does a network know that the table doesn't? It sees all planes, not only the
 # ground; and it sees the cells around.
 #
 # ## How do 280 numbers become a few?
@@ -260,26 +262,19 @@ print("f", f, "  alpha", alpha, f"  loss {loss:.2f}")
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="three bar charts of each class's share of the weight: without weights unobserved, road and unknown-free have most of it; balanced nearly all classes have the same share; with the limit of 4 the large classes have most again"
+# %% jupyter={"outputs_hidden": true}
 cells = np.bincount(six.truth.numpy().ravel(), minlength=14)[:14]
 balanced, limited = (training.median_frequency_weights(six.truth.numpy(), 14, *limit) for limit in ((), (4,)))
-fig, axes = plt.subplots(1, 3, figsize=(9, 3.8), sharey=True, layout="constrained")
-kept = {}
-for ax, (name, weight) in zip(
-    axes, {"no weights": np.ones(14), "balanced": balanced, "balanced, limit 4": limited}.items(), strict=True
-):
-    share = 100 * (weight * cells / (weight * cells).sum())[cells > 0]
-    kept[name] = np.sort(share)[-3:].sum()
-    names = [f"{KITTI_14.names[c]} ({cells[c]})" for c in np.flatnonzero(cells)]
-    ax.barh(names, share, color=np.divide(KITTI_14.rgb, 255)[cells > 0], edgecolor="0.4", linewidth=0.5)
-    ax.set(xlabel="share of the weight [%]", xlim=(0, 50), title=name)
-axes[0].invert_yaxis()
-plt.show()
-print("share of the three largest:", {name: f"{share:.0f} %" for name, share in kept.items()})
+for name, weight in (("no weights", np.ones(14)), ("balanced", balanced), ("balanced, limit 4", limited)):
+    share = 100 * weight * cells / (weight * cells).sum()
+    print(
+        f"{name:<18} share of road {share[ROAD]:2.0f} %, of car {share[CAR]:.0f} %, of signage {share[SIGNAGE]:.1f} %"
+    )
+print(f"cells: road {cells[ROAD]}, car {cells[CAR]}, signage {cells[SIGNAGE]}")
 
 # %% [markdown]
-# Behind each name is the number of its cells. The package keeps weights between 1/4 and 4 (the paper has no limit), so
-# training is a compromise between the left and the middle.
+# Balanced, 27 cells of signage have as much weight as thousands of road. The package therefore keeps weights between
+# 1/4 and 4 (the paper has no limit), and most of the balance goes again.
 #
 # So the weights decide which mistakes count, and a limit keeps a few odd cells from ruling the rest.
 #
@@ -319,12 +314,11 @@ def learn(fusion, streets, alpha, steps, eta=0.05, kappa=0.9):
         yield step + 1, loss.item()
 
 
-theta = torch.nn.Parameter(torch.ones(1))
-optimiser = torch.optim.SGD([theta], lr=0.1, momentum=0.9)
+theta, delta = 1.0, 0.0
 for by_hand in (0.9, 0.72, 0.486):
-    theta.grad = theta.detach().clone()
-    optimiser.step()
-    np.testing.assert_allclose(theta.item(), by_hand, rtol=1e-6)
+    delta = 0.9 * delta + theta
+    theta = theta - 0.1 * delta
+    np.testing.assert_allclose(theta, by_hand)
 
 # %% [markdown]
 # ## Does your network beat the table?
@@ -333,7 +327,7 @@ for by_hand in (0.9, 0.72, 0.486):
 # from random weights, and learns from the six frames that the table was counted on.
 #
 # **Predict before you run.** What is the first loss, if the network spreads its belief evenly over 14 classes? And
-# after 40 steps, does it beat the table's 80 % on the new street?
+# after 30 steps, does it beat the table's 79 % on the new street?
 #
 # <details><summary>Answer</summary>
 #
@@ -342,12 +336,12 @@ for by_hand in (0.9, 0.72, 0.486):
 # </details>
 
 # %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
-STEPS = 40  # set it to 600 for a training of a minute
+STEPS = 30  # set it to 600 for a training of a minute
 fusion = fast.build_net(shipped.architecture, drive.camera, seed=0).fusion
 story, losses = [(0, classes(fusion, six), classes(fusion, new))], []
 for step, loss in learn(fusion, six, torch.from_numpy(limited).float(), STEPS):
     losses.append(loss)
-    if step in (STEPS // 8, STEPS // 4, STEPS // 2, STEPS):
+    if step in (STEPS // 8, STEPS // 3, STEPS):
         story.append((step, classes(fusion, six), classes(fusion, new)))
 own, other = ([right(grids[k], part.truth)[0] for grids in story] for k, part in ((1, six), (2, new)))
 print(f"loss {losses[0]:.2f} -> {losses[-1]:.2f}; right: own frames {own[-1]:.0f} %, new street {other[-1]:.0f} %")
@@ -357,23 +351,21 @@ print(f"loss {losses[0]:.2f} -> {losses[-1]:.2f}; right: own frames {own[-1]:.0f
 
 def taking_shape():
     """Draw the map of the new street after some steps, beside the truth and both curves."""
-    fig = plt.figure(figsize=(9.6, 3.7), layout="compressed")
-    axes = fig.subplot_mosaic([["A", "B", "C"]], width_ratios=(1, 1, 1.3))
+    fig, axes = plt.subplots(1, 3, figsize=(9.2, 3.6), layout="compressed", width_ratios=(1, 1, 1.3))
+    plotting.grid_labels(NEAR, new.truth[shown].numpy(), KITTI_14, ax=axes[1], legend=False).set_title("B: truth")
     everything = np.stack([grids[shown] for _, _, grids in story] + [new.truth[shown]])
+    plotting.class_legend(axes[1], KITTI_14, everything, fontsize=8)
+    axes[2].axhline(table, color="0.4", linestyle=":", label="table")
+    curves = [
+        axes[2].plot([], [], style, label=name)[0] for style, name in (("o--", "own frames"), ("s-", "new street"))
+    ]
+    axes[2].set(xlim=(-1, STEPS + 1), ylim=(0, 100), xlabel="step", ylabel="cells right [%]", title="C")
+    axes[2].legend(loc="lower right", fontsize=9)
     for k, (step, _, grids) in enumerate(story):
-        for ax in axes.values():
-            ax.clear()
-        plotting.grid_labels(NEAR, grids[shown], KITTI_14, ax=axes["A"], legend=False)
-        plotting.grid_labels(NEAR, new.truth[shown].numpy(), KITTI_14, ax=axes["B"], legend=False)
-        plotting.class_legend(axes["B"], KITTI_14, everything, fontsize=8)
-        steps = [step for step, *_ in story[: k + 1]]
-        axes["C"].plot(steps, own[: k + 1], "o--", label="own frames")
-        axes["C"].plot(steps, other[: k + 1], "s-", label="new street")
-        axes["C"].axhline(table, color="0.4", linestyle=":", label="table")
-        axes["C"].set(xlim=(-1, STEPS + 1), ylim=(0, 100), xlabel="step", ylabel="cells right [%]", title="C")
-        axes["C"].legend(loc="lower right", fontsize=9)
-        axes["A"].set_title(f"A: step {step}")
-        axes["B"].set(title="B: truth", ylabel="")
+        axes[0].clear()
+        plotting.grid_labels(NEAR, grids[shown], KITTI_14, ax=axes[0], legend=False).set_title(f"A: step {step}")
+        for curve, values in zip(curves, (own, other), strict=True):
+            curve.set_data([step for step, *_ in story[: k + 1]], values[: k + 1])
         yield fig
         fig.set_layout_engine("none")  # only the first frame is laid out
 
@@ -381,9 +373,9 @@ def taking_shape():
 plotting.animate(taking_shape(), period=1.0, alt="road and things take shape in the map while both curves rise")
 
 # %% jupyter={"source_hidden": true}
-if STEPS == 40:
+if STEPS == 30:
     assert 2.3 < losses[0] < 3.0
-    assert 70 < other[-1] < table
+    assert 70 < other[-1] < table + 1
 
 # %% [markdown]
 # The map takes shape within seconds, and a table of counts still wins. Now set `STEPS` to 600, and wait a minute. Which
@@ -391,17 +383,18 @@ if STEPS == 40:
 #
 # <details><summary>Answer</summary>
 #
-# The one of its own frames, far above 90 %. On the new street the network only draws level with the table. It learns
-# the six frames by heart. The gap between the two curves is **overfitting**, and what holds on the new street is
-# **generalisation**.
+# The one of its own frames: 93 % in our run, against 81 % on the new street. The network learns the six frames by heart,
+# and on the new street it is hardly better than the table.
 #
 # </details>
 #
-# The shipped network has the same layers and gets 91 %. It has seen 142 frames, in 2,000 steps of six frames each, with
+# What holds on the new street is **generalisation**. The gap between the two curves, a minute later, is **overfitting**.
+#
+# The shipped network has the same layers and gets 90 %. It has seen 142 frames, in 2,000 steps of six frames each, with
 # varied brightness and mirrored streets (**data augmentation**). Frames, steps and augmentation changed together, so
 # this doesn't tell which of them helped.
 #
-# So a network of a minute ties with a table. The lead comes with more streets.
+# So a network of a minute hardly beats a table. The shipped network does, with more frames and more steps.
 #
 # ## How far back does the loss reach?
 #
@@ -446,7 +439,7 @@ plt.show()
 # pixels show. What did 2,000 such steps do to the labels of pixels?
 
 # %% jupyter={"source_hidden": true} alt="A, the true classes of a street's pixels; B, after stage one the large parts are right, with ragged borders; C, after training end to end road, sidewalk and cars are still recognised, and in place of the fence there are patches of other classes"
-pixel_truth = lecture_08_street.pixel_labels(frames[1::2], new.image.shape[2:])
+pixel_truth = lecture_08_street.pixel_labels(frames, new.image.shape[2:])
 pictures = {"A: truth": pixel_truth, "B: after stage one": new.scores.argmax(dim=1).numpy(),
             "C: after training end to end": end_to_end.scores.argmax(dim=1).numpy()}  # fmt: skip
 fig, axes = plt.subplots(3, 1, figsize=(6.4, 6.7), layout="constrained")
@@ -460,7 +453,7 @@ for name, one in list(pictures.items())[1:]:
     print(f"{name}: {100 * (one == pixel_truth)[pixel_truth != IGNORE].mean():.0f} % of pixels right")
 
 # %% [markdown]
-# From 80 to 67 %. Nothing holds the scores to the labels of pixels any more. They serve the map.
+# From 80 to 68 %. Nothing holds the scores to the labels of pixels any more. They serve the map.
 #
 # Is the map better for it? The control is to keep stage one frozen for the same 2,000 steps: then the labels of pixels
 # stay at 80 %. Three seeds of both ways, on 110 frames:
@@ -525,8 +518,7 @@ assert shares["table of o"]["car"] > 0.45 > 0.2 > shares["height rule"]["car"]
 # %% jupyter={"source_hidden": true}
 def with_turned_camera(which, **angles):
     """Return the maps of some frames with a camera that is turned by some degrees."""
-    sampler = fast.load_net(samples.sample_weights(), lecture_08_street.turned(drive.camera, **angles)).sampler
-    moved = lecture_08_street.planes_of(sampler, end_to_end.scores[which])
+    moved = lecture_08_street.planes_of(end_to_end.scores[which], lecture_08_street.turned(drive.camera, **angles))
     return classes(shipped.fusion, end_to_end._replace(planes=moved, o=new.o[which]))
 
 
@@ -542,7 +534,7 @@ def show(pitch):
 _ = interact(show, pitch=FloatSlider(value=1.0, min=-3, max=3, step=0.25, description="pitch [°]"))
 
 # %% jupyter={"source_hidden": true} alt="accuracy against the error of pitch and of yaw from minus three to three degrees: with pitch it falls steeply when the camera points too high and little when it points too low; with yaw it falls a little on both sides"
-angles, which = (-3, -1.5, 0, 1.5, 3), [1, 3]
+angles, which = (-3, -1.5, 0, 1.5, 3), [0, 2]
 curves = {
     axis: [right(with_turned_camera(which, **{axis: angle}), new.truth[which])[1] for angle in angles]
     for axis in ("pitch", "yaw")
@@ -559,16 +551,20 @@ for axis, curve in curves.items():
     print(f"{axis:<5}", " ".join(f"{angle:+.1f}°: {value:.0f} %" for angle, value in zip(angles, curve, strict=True)))
 
 # %% [markdown]
-# TODO
+# Yaw costs little, and so does a camera that points too low. If it points three degrees too high, 88 % become 63. Each
+# cell then reads a pixel whose ray really points higher. It ends on road that is farther away, on what stands there, or
+# in the sky.
+#
+# So a calibration is part of the network: it has learned what its own camera shows, and takes a new error for the street.
 #
 # ## In five lines
 #
-# 1. The image knows what, $o$ knows where. A table of both, counted on six frames, gets 80 % of the cells of a new
+# 1. The image knows what, $o$ knows where. A table of both, counted on six frames, gets 79 % of the cells of a new
 #    street.
 # 2. A 1x1 convolution is a matrix product in each cell: it finds what several planes agree on.
-# 3. Training repeats four things: a batch, its loss, the gradient, a step. A network of a minute ties with the table;
-#    the shipped one, with 142 frames, gets 91 %.
-# 4. End to end, the loss of the map reaches the pixels: their labels get worse (80 to 67 %), and here the map gets no
+# 3. Training repeats four things: a batch, its loss, the gradient, a step. A network of a minute hardly beats the table;
+#    the shipped one, with 142 frames, gets 90 %.
+# 4. End to end, the loss of the map reaches the pixels: their labels get worse (80 to 68 %), and here the map gets no
 #    better.
 # 5. On cameras that it hasn't seen, the network loses to a table of $o$ (75 and 81 %), and both to a rule on heights
 #    (84 %), because $o$ forgets height.

@@ -58,9 +58,15 @@ def map_sizes(net: FusionNet, n_rows: int, n_cols: int) -> list[tuple[str, str, 
     sizes += [("1x1", str(reduction.out_channels), 0), ("o joins", str(n_joined), 0)]
     stages = list(zip(net.conv_deconv.encoder, net.conv_deconv.decoder, strict=True))
     for level, (encode, _) in enumerate(stages):
-        sizes += [(f"conv{' x2' * (len(encode) > 1)}", str(_width(encode)), level), ("pool", str(_width(encode)), level + 1)]
+        sizes += [
+            (f"conv{' x2' * (len(encode) > 1)}", str(_width(encode)), level),
+            ("pool", str(_width(encode)), level + 1),
+        ]
     for level, (_, decode) in reversed(list(enumerate(stages))):
-        sizes += [("unpool\n+ skip", str(_first_width(decode)), level), (f"conv{' x2' * (len(decode) > 1)}", str(_width(decode)), level)]
+        sizes += [
+            ("unpool\n+ skip", str(_first_width(decode)), level),
+            (f"conv{' x2' * (len(decode) > 1)}", str(_width(decode)), level),
+        ]
     return [(what, f"{channels}\n{n_rows >> level} x {n_cols >> level}", level) for what, channels, level in sizes]
 
 

@@ -14,13 +14,13 @@ from semgrid_edu.camera import Camera, rigid_transform
 from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.samples import sample_frames
-from semgrid_edu.fast import track_drive
+from semgrid_edu.fast import PlaneSampler, track_drive
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.networks import SemanticGridNet, unit_image
 from semgrid_edu.pipeline import network_image
-from semgrid_edu.planes import PlaneSampler, plane_heights, plane_pixels
+from semgrid_edu.planes import plane_heights, plane_pixels
 
 SPEC = GridSpec.compact()
 """The grid of the shipped networks."""
@@ -57,53 +57,57 @@ class Streets(NamedTuple):
 
 
 @torch.no_grad()
-def streets(net: SemanticGridNet, image: Tensor, o: Tensor, truth: Tensor) -> Streets:
+def streets(net: SemanticGridNet, camera: Camera, image: Tensor, o: Tensor, truth: Tensor) -> Streets:
     """Return frames with the scores of a network; o and truth are those of the whole grid.
 
     Parameters
     ----------
     net : SemanticGridNet
         The network whose image stage scores the images.
+    camera : Camera
+        The camera that took them.
     image, o, truth : Tensor
         As in `Streets`.
     """
     scores = torch.cat([net.segmenter(one[None]) for one in image])
-    return Streets(image, scores, planes_of(net.sampler, scores), o[..., ROWS, :], truth[..., ROWS, :].long())
+    return Streets(image, scores, planes_of(scores, camera), o[..., ROWS, :], truth[..., ROWS, :].long())
 
 
 @torch.no_grad()
-def planes_of(sampler: PlaneSampler, scores: Tensor) -> Tensor:
+def planes_of(scores: Tensor, camera: Camera) -> Tensor:
     """Return the planes of some frames, (N, C, D, H, W), of the nearest 32 m.
 
     Parameters
     ----------
-    sampler : PlaneSampler
-        Equation (2), for a camera and the whole grid.
     scores : (N, C, h, w) float
         The image network's scores.
+    camera : Camera
+        The calibration to read them with.
     """
-    return torch.cat([sampler(one[None])[..., ROWS, :] for one in scores])
+    size = tuple(scores.shape[2:])
+    sampler = PlaneSampler(*plane_pixels(NEAR, plane_heights(), camera.resized(size)), size)
+    return torch.cat([sampler(one[None]) for one in scores])
 
 
 @torch.no_grad()
-def rescored(net: SemanticGridNet, some: Streets) -> Streets:
+def rescored(net: SemanticGridNet, camera: Camera, some: Streets) -> Streets:
     """Return the same frames with the scores of another network's image stage. Parameters are those of `streets`."""
     scores = torch.cat([net.segmenter(one[None]) for one in some.image])
-    return some._replace(scores=scores, planes=planes_of(net.sampler, scores))
+    return some._replace(scores=scores, planes=planes_of(scores, camera))
 
 
-def training_streets(net: SemanticGridNet) -> Streets:
-    """Return the six shipped training frames. The parameter is that of `streets`."""
+def training_streets(net: SemanticGridNet, camera: Camera) -> Streets:
+    """Return the six shipped training frames. Parameters are those of `streets`."""
     image, _, o, truth = map(torch.stack, zip(*sample_frames(), strict=True))
-    return streets(net, unit_image(image), o, truth)
+    return streets(net, camera, unit_image(image), o, truth)
 
 
-def new_streets(net: SemanticGridNet, frames: Sequence[Frame]) -> Streets:
+def new_streets(net: SemanticGridNet, camera: Camera, frames: Sequence[Frame]) -> Streets:
     """Return every second frame of a drive, and its occupancy grids.
 
     Parameters
     ----------
-    net : SemanticGridNet
+    net, camera
         As in `streets`.
     frames : sequence of Frame
         The drive.
@@ -111,7 +115,7 @@ def new_streets(net: SemanticGridNet, frames: Sequence[Frame]) -> Streets:
     beliefs = [belief.probability for belief in track_drive(frames, SPEC)][1::2]
     truth = [grid_truth(frame.labels, o, SPEC) for frame, o in zip(frames[1::2], beliefs, strict=True)]
     image = [network_image(frame, net.architecture.image_size) for frame in frames[1::2]]
-    return streets(net, *(torch.from_numpy(np.stack(part)) for part in (image, beliefs, truth)))
+    return streets(net, camera, *(torch.from_numpy(np.stack(part)) for part in (image, beliefs, truth)))
 
 
 def pixel_labels(frames: Sequence[Frame], size: tuple[int, int]) -> NDArray[np.uint8]:

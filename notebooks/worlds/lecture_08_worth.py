@@ -1,15 +1,15 @@
 """Results that lecture 08 shows: what the camera is worth on a real street, and what training end to end buys."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.storage.files import shipped_folder
 from worlds.lecture_08_counts import by_camera, counts_of_text
 
-RESULTS = Path(__file__).parents[2] / "docs" / "results"
+RESULTS = shipped_folder("docs") / "results"
 """The folder of the results."""
 
 UNSEEN = "each pair of cameras left out"
@@ -63,6 +63,12 @@ def calls_of(name: str) -> dict[str, dict[str, float]]:
 def _matrix(text: dict[str, list[str]]) -> NDArray[np.int64]:
     """Return the confusion matrix of all cameras together."""
     return by_camera({camera: counts_of_text(lines) for camera, lines in text.items()})[0].sum(axis=0)
+
+
+def by_planes() -> tuple[float, float]:
+    """Return the pixel accuracy of networks trained with one plane and with twenty, by true labels, per cent."""
+    variants = {one["what"]: one["scores"]["true"]["semantic"] for one in _read("reduced/ablations.json")["variants"]}
+    return tuple(100 * variants[name]["pixel accuracy"]["mean"] for name in ("1 plane", "usual"))
 
 
 def end_to_end() -> tuple[float, float, float]:
