@@ -13,7 +13,7 @@
 # **Prerequisites.** Lectures [06](06_planes.ipynb) (planes, and the way back to pixels) and
 # [07](07_segmentation.ipynb) (scores, soft-max, cross-entropy, SegNet). The chain rule.
 #
-# **Time.** 75 minutes, of which the computer needs less than one.
+# **Time.** 67 minutes, of which the computer needs less than one.
 #
 # **Paper.** Sections 3.4 and 4.1, figures 4 and 5.
 
@@ -151,14 +151,15 @@ plt.show()
 # car is. So let *car* be the sum of both planes' scores for car, less 3, and let *road* believe the ground. A score is
 # 2 for "looks like it" and 0 for "doesn't":
 #
-# | | cell a | cell b | cell c | weight for *road* | weight for *car* |
-# |---|---|---|---|---|---|
-# | road, ground | 2 | 0 | 0 | 1 | 0 |
-# | road, 1.4 m | 0 | 0 | 2 | 0 | 0 |
-# | car, ground | 0 | 2 | 2 | 0 | 1 |
-# | car, 1.4 m | 2 | 2 | 0 | 0 | 1 |
+# ```
+#                  cell a   cell b   cell c     weight for road   weight for car
+#  road, ground       2        0        0              1                 0
+#  road, 1.4 m        0        0        2              0                 0
+#  car,  ground       0        2        2              0                 1
+#  car,  1.4 m        2        2        0              0                 1
+# ```
 #
-# *Car* becomes (2 - 3, 4 - 3, 2 - 3) = (-1, 1, -1): positive only in cell b. In general, with $p_{c,d,j}$ the score of
+# *Car* becomes -1, 1, -1: positive only in cell b. In general, with $p_{c,d,j}$ the score of
 # class $c$ on plane $d$ in cell $j$, the reduced map number $k$ has weights $\theta$ and a bias $\beta$:
 #
 # $$ r_{k,j} = \beta_k + \sum_{c=1}^C \sum_{d=1}^D \theta_{k,c,d}\; p_{c,d,j} $$
@@ -220,15 +221,27 @@ with torch.no_grad():
 #  map 1   R R R R S S S S -          map 2   R R R R R R C C -
 # ```
 #
-# Let $f(c)$ be how frequent class $c$ is *in the maps in which it occurs*: road 10 of 16, sidewalk 4 of 8, car 2 of 8.
-# Its weight is $\alpha_c = \operatorname{median}(f) / f(c)$. The median of 5/8, 1/2 and 1/4 is 1/2, so the weights are
-# 0.8, 1 and 2. This is **median frequency balancing**. The loss is a weighted mean of cross-entropies. With $c(j)$ the
-# true class of cell $j$, and $g$ the soft-max of the logits:
+# Let $f(c)$ be how frequent class $c$ is *in the maps in which it occurs*. Its weight is $\alpha_c =
+# \operatorname{median}(f) / f(c)$. This is **median frequency balancing**.
+#
+# ```
+#              f        alpha
+#  road      10/16    (1/2) / (10/16) = 0.8       road is in both maps: 10 of their 16 labelled cells
+#  sidewalk   4/8     (1/2) / (4/8)   = 1         sidewalk is in map 1 only
+#  car        2/8     (1/2) / (2/8)   = 2         car is in map 2 only; the median of f is 4/8
+# ```
+#
+# The loss is a weighted mean of cross-entropies. With $c(j)$ the true class of cell $j$, and $g$ the soft-max of the
+# logits:
 #
 # $$ \text{loss} = -\frac{\sum_j \alpha_{c(j)} \log g_{c(j),j}}{\sum_j \alpha_{c(j)}} $$
 #
-# Say a road gets probability 1/2 and a car 1/4. Then the loss is $(0.8 \log 2 + 2 \log 4) / 2.8 = 1.19$. The car
-# counts two and a half times as much. An unlabelled cell doesn't count.
+# ```
+#  a road that got g = 1/2, a car that got g = 1/4, an unlabelled cell:
+#  loss = (0.8 log 2  +  2 log 4) / (0.8 + 2) = 1.19
+# ```
+#
+# The car counts two and a half times as much as the road. The unlabelled cell doesn't count.
 
 
 # %% tags=["median-frequency", "loss"]
@@ -273,23 +286,30 @@ for name, weight in (("no weights", np.ones(14)), ("balanced", balanced), ("bala
 print(f"cells: road {cells[ROAD]}, car {cells[CAR]}, signage {cells[SIGNAGE]}")
 
 # %% [markdown]
-# Balanced, 27 cells of signage have as much weight as thousands of road. The package therefore keeps weights between
-# 1/4 and 4 (the paper has no limit), and most of the balance goes again.
+# Balanced, a few cells of signage have as much weight as thousands of road. The package therefore keeps weights between
+# a quarter and 4 (the paper has no limit), and most of the balance goes again.
 #
 # So the weights decide which mistakes count, and a limit keeps a few odd cells from ruling the rest.
 #
-# ## What is one step of training?
+# ## Does a minute of training beat the table?
 #
-# A step goes against the gradient of the loss. **Momentum** adds the steps before: with $\theta$ all that is learned,
+# First, one step. It goes against the gradient of the loss. **Momentum** adds the steps before: with $\theta$ all that is learned,
 # $\eta$ the learning rate and $\kappa = 0.9$,
 #
 # $$ \Delta \leftarrow \kappa\,\Delta + \frac{\partial\,\text{loss}}{\partial \theta}, \qquad
 #    \theta \leftarrow \theta - \eta\,\Delta $$
 #
-# By hand: one parameter, the loss $\theta^2 / 2$, whose gradient is $\theta$. Start at $\theta = 1$ with $\eta = 0.1$.
-# First $\Delta = 1$, so $\theta = 0.9$. Then $\Delta = 0.9 + 0.9 = 1.8$, so $\theta = 0.72$. Then $\Delta = 1.62 +
-# 0.72 = 2.34$, so $\theta = 0.486$. Each step is longer than the last, because the gradients agree. Where they keep
-# changing sign, they cancel in $\Delta$.
+# By hand: one parameter $\theta$ and the loss $\theta^2 / 2$, whose gradient is $\theta$ itself, with $\eta = 0.1$:
+#
+# ```
+#  step    gradient    delta                      theta, from 1 on
+#   1       1          1                          1    - 0.1 * 1    = 0.9
+#   2       0.9        0.9 * 1   + 0.9  = 1.8     0.9  - 0.1 * 1.8  = 0.72
+#   3       0.72       0.9 * 1.8 + 0.72 = 2.34    0.72 - 0.1 * 2.34 = 0.486
+# ```
+#
+# Each step is longer than the last, because the gradients agree. Where they keep changing sign, they cancel in
+# $\Delta$.
 #
 # Now the whole loop: a batch, its loss, the gradient, a step. Training is this and nothing more. The learning rate
 # falls to zero along half a cosine, so that the last steps average over many frames.
@@ -321,8 +341,6 @@ for by_hand in (0.9, 0.72, 0.486):
     np.testing.assert_allclose(theta, by_hand)
 
 # %% [markdown]
-# ## Does your network beat the table?
-#
 # Train it. The image network stays as it is (*frozen*), so the planes are computed once. The fusion network starts
 # from random weights, and learns from the six frames that the table was counted on.
 #
@@ -359,7 +377,7 @@ def taking_shape():
     curves = [
         axes[2].plot([], [], style, label=name)[0] for style, name in (("o--", "own frames"), ("s-", "new street"))
     ]
-    axes[2].set(xlim=(-1, STEPS + 1), ylim=(0, 100), xlabel="step", ylabel="cells right [%]", title="C")
+    axes[2].set(xlim=(-1, STEPS + 1), ylim=(0, 100), xlabel="step", ylabel="cells right [%]", title="C: learning")
     axes[2].legend(loc="lower right", fontsize=9)
     for k, (step, _, grids) in enumerate(story):
         axes[0].clear()
