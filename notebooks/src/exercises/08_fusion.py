@@ -440,7 +440,7 @@ _test()
 # labelled cells. `height`, `(N,)`, says how far the highest return of each is above the ground, metres, and is NaN in a cell without a return; `truth`, `(N,)`, is as
 # above. `new_o` and `new_height` are those of other cells. There are 14 classes.
 #
-# Complete `name_new`: it returns a class for each new cell, `(M,)`. It must be right more often, by five points, than *always road* and than a table of the most probable state of `o`. How is
+# Complete `name_new`: it returns a class for each new cell, `(M,)`. It must be right more often, by two points, than *always road* and than a table of the most probable state of `o`. How is
 # yours to choose: which features to make, `train` or something else. Your instructor's street has other classes at other heights.
 
 
@@ -506,7 +506,7 @@ def _test():
     right = (got == new_truth).mean()
     for name, other in baselines.items():
         told = f"{100 * right:.0f} % right, and {name} gets {100 * other:.0f} %"
-        assert right >= other + 0.05, f"{told}: what does the table not know? Give it to your features in pieces"
+        assert right >= other + 0.02, f"{told}: what does the table not know? Give it to your features in pieces"
     print(f"{100 * right:.0f} % right;", ", ".join(f"{name} {100 * other:.0f} %" for name, other in baselines.items()))
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fusion
