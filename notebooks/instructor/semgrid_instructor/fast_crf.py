@@ -119,7 +119,7 @@ def check_others_say(others_say: Callable) -> None:
 
         def blur(values: NDArray, kernel: NDArray = kernel, left: list[int] = left) -> NDArray:
             values = np.asarray(values, float)
-            left[0] -= values.shape[1] if values.ndim == 2 else 1
+            left[0] -= values.size // len(kernel)
             assert left[0] >= 0, "blur got more columns than it may get"
             return kernel @ values
 

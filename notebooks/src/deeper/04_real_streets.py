@@ -12,7 +12,7 @@
 # - derive the rules that CMCDOT uses against it, and say what they cost and what they leave.
 #
 # **Prerequisites.** Lecture [04](../04_cmcdot.ipynb); factors and d-separation, as in
-# [graphical models](graphical_models.ipynb).
+# [graphical models](../01b_graphical_models.ipynb).
 #
 # **Time.** 70 minutes, of which the computer needs less than one.
 
@@ -433,7 +433,7 @@ plt.show()
 # ## The mend
 #
 # Could the filter use the right graph? Not exactly: all cells of the map would depend on one another, and
-# [graphical models](graphical_models.ipynb) shows what that costs on a grid. We need a rule that one cell can
+# [graphical models](../01b_graphical_models.ipynb) shows what that costs on a grid. We need a rule that one cell can
 # apply by itself, and that tells a wall from a car. What tells them apart?
 #
 # The three rules that follow are the filter's **look-back rules**. BOF and CMCDOT share them, and no other page derives

@@ -285,8 +285,8 @@ def _counting(kernel, columns):
 
     def blur(values):
         values = np.asarray(values, float)
-        values = values if values.ndim == 2 else values[:, None]
-        left[0] -= values.shape[1]
+        values = values if values.ndim > 1 else values[:, None]
+        left[0] -= values.size // len(kernel)
         assert left[0] >= 0, (
             f"blur got more than the {columns} columns that it may get: ask several cells in one column"
         )
