@@ -14,7 +14,6 @@ from worlds import (
     lecture_05_pixel_ray,
     lecture_06_shared_pixel,
     lecture_07_post,
-    lecture_08_late_fusion,
     lecture_09_label,
     lecture_10_crf,
     lecture_14_class_memory,
@@ -138,14 +137,6 @@ STAGES = (
         lecture_07_post.CUT,
         "tests/worlds/test_pixels.py::test_a_post_is_the_sum_over_all_its_labels",
         "07_segmentation#graph",
-    ),
-    Stage(
-        "fusion",
-        "A cell, seen or hidden, and both sensors",
-        lecture_08_late_fusion.late_fusion,
-        lecture_08_late_fusion.CUT,
-        "tests/worlds/test_late_fusion.py::test_a_cell_whose_pixel_shows_a_car_and_that_no_beam_reached",
-        "08_fusion#graph",
     ),
     Stage(
         "label",

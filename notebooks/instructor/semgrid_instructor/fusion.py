@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_softmax
 
-from semgrid_edu.workshop.course.answers import answer_array, answer_number
+from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_instructor import close, generator, hidden, in_any_order, keeping
 
 
@@ -133,58 +133,6 @@ def check_one_number(wrong_derivative: Callable) -> None:
         assert told == ("none" if complaint == rounding else name), complaint
 
 
-def _classes(seed: int, n_classes: int) -> tuple[NDArray, NDArray]:
-    """Return cells and weights of classes of which one is absent."""
-    rng = generator(seed)
-    cells = np.round(10 ** rng.uniform(1, 4.5, n_classes)).astype(int)
-    alpha = np.median(cells) / cells * rng.uniform(0.7, 1, n_classes)
-    cells[1], alpha[1] = 0, 0
-    return cells, alpha
-
-
-def _shares(cells: NDArray, alpha: NDArray, limit: float) -> NDArray[np.float64]:
-    """Return the shares, class by class."""
-    weights = [n * min(max(a, 1 / limit), limit) for n, a in zip(cells.tolist(), alpha.tolist(), strict=True)]
-    return np.array(weights) / sum(weights)
-
-
-@hidden
-@keeping
-def check_shares(shares: Callable) -> None:
-    """Other numbers of classes, limits from 1, which undoes the balancing, to one that limits nothing."""
-    for seed, n_classes in ((100, 5), (101, 14)):
-        cells, alpha = _classes(seed, n_classes)
-        for limit in (1, 1.5, 4, 1e6):
-            assert close(answer_array(shares(cells, alpha, limit)), _shares(cells, alpha, limit)), "wrong shares"
-
-
-def _chosen(cells: NDArray, alpha: NDArray, limits: NDArray, c: int, at_least: float, at_most: float) -> float:
-    """Return the limit to choose, by trying all."""
-    fits = []
-    for limit in limits.tolist():
-        share = _shares(cells, alpha, limit)
-        per_cell = max(s / n for s, n in zip(share, cells, strict=True) if n)
-        fits += [limit] if share[c] >= at_least and per_cell <= at_most else []
-    return min(fits, default=0)
-
-
-@hidden
-@keeping
-def check_choose_limit(choose_limit: Callable) -> None:
-    """Demands that the smallest limit fits, one in between, or none; for a rare class and for a frequent one."""
-    limits = np.sort([12.0, 1.0, 3.0, 40.0, 6.0, 1.7])
-    for seed in (102, 103):
-        cells, alpha = _classes(seed, 6)
-        by_limit = np.array([_shares(cells, alpha, limit) for limit in limits])
-        per_cell = np.sort(by_limit[3, cells > 0] / cells[cells > 0])
-        for c in np.flatnonzero(cells):
-            enough = 0.5 * (by_limit[:-1, c] + by_limit[1:, c])
-            for at_least in (0.0, enough[0], enough[3], 0.99):
-                for at_most in (1.0, 0.5 * (per_cell[-1] + per_cell[-2]), 1e-9):
-                    given = cells, alpha, limits[[4, 0, 2, 5, 3, 1]], int(c), at_least, at_most
-                    assert close(answer_number(choose_limit(*given)), _chosen(*given)), "the wrong limit, or none"
-
-
 def _random_cells(seed: int) -> tuple[NDArray, NDArray, NDArray]:
     """Return logits, truth of which a third is unlabelled, and the weights of the classes."""
     rng = generator(seed)
@@ -254,10 +202,58 @@ def check_rate_and_momentum(rate_and_momentum: Callable) -> None:
         assert close(got, [eta, kappa], rtol=1e-4, atol=1e-5), "wrong for another path"
 
 
+def _theta(features: NDArray, truth: NDArray, alpha: NDArray, rates: tuple[float, float], steps: int) -> NDArray:
+    """Return the weights after some steps; delta is the sum of all earlier gradients, cell by cell."""
+    (eta, kappa), gradients = rates, []
+    theta = np.zeros((len(alpha), len(features)))
+    for step in range(steps):
+        g = np.exp(log_softmax(theta @ features, axis=0))
+        labelled = [j for j, c in enumerate(truth.tolist()) if c != 255]
+        total = sum(alpha[truth[j]] for j in labelled)
+        one_hot = np.eye(len(alpha))
+        back = [alpha[truth[j]] / total * np.outer(g[:, j] - one_hot[truth[j]], features[:, j]) for j in labelled]
+        gradients.append(np.sum(back, axis=0))
+        theta = theta - eta * sum(kappa ** (step - k) * one for k, one in enumerate(gradients))
+    return theta
+
+
 @hidden
 @keeping
-def check_rates(rates: Callable) -> None:
-    """Rates that fall, rise and are zero in between."""
-    for seed, chosen in enumerate(([0.5, 0.2, 0.1, 0.4], [0.3, 0.0, 0.3], 0.1 / np.arange(1, 9))):
-        path, gradients = _trained(116 + seed, np.array(chosen), 0.8, 3)
-        assert close(answer_array(rates(path, gradients, 0.8)).ravel(), chosen, rtol=1e-4), "wrong rates"
+def check_train(train: Callable) -> None:
+    """Other numbers of classes, features, cells and steps; weights of classes, and unlabelled cells."""
+    for seed, (n_classes, n_features, n_cells, steps, eta, kappa) in enumerate(
+        [(3, 4, 30, 7, 0.3, 0.9), (5, 2, 12, 3, 0.8, 0.0), (14, 6, 50, 5, 0.1, 0.5)]
+    ):
+        rng = generator(120 + seed)
+        features, alpha = rng.normal(size=(n_features, n_cells)), rng.uniform(0.3, 4, n_classes)
+        truth = rng.integers(0, n_classes, n_cells)
+        truth[rng.random(n_cells) < 0.3] = 255
+        got = answer_array(train(features, truth, alpha, steps, eta, kappa))
+        wanted = _theta(features, truth, alpha, (eta, kappa), steps)
+        assert close(got, wanted, rtol=1e-4, atol=1e-5), "wrong weights after some steps"
+
+
+def _cells(seed: int, n_cells: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Return o (4, N), height (N,) and truth (N,): of four classes, three share a state, at heights of their own."""
+    names = generator(seed).permutation(10)[:4]
+    rng = np.random.default_rng([seed, n_cells])
+    kind = rng.choice(4, n_cells, p=[0.4, 0.25, 0.2, 0.15])
+    state = np.where(rng.random(n_cells) < 0.1, rng.integers(0, 4, n_cells), kind > 0)
+    o = np.full((4, n_cells), 0.05)
+    o[state, np.arange(n_cells)] = 0.85
+    height = np.array([0.05, 0.75, 1.75, 3.6])[kind] + rng.uniform(-0.04, 0.2, n_cells)
+    height[rng.random(n_cells) < 0.1] = np.nan
+    return o, height, names[kind]
+
+
+@hidden
+@keeping
+def check_name_new(name_new: Callable) -> None:
+    """Other classes at other heights; most cells unlabelled, some without a return."""
+    for seed in (130, 131):
+        o, height, truth = _cells(seed, 3000)
+        truth = np.where(np.arange(3000) % 3 > 0, 255, truth)
+        new_o, new_height, wanted = _cells(seed, 1000)
+        got = answer_array(name_new(o, height, truth, new_o, new_height))
+        assert got.shape == wanted.shape, "another number of classes than of cells"
+        assert (got == wanted).mean() > 0.8, "too few cells are right on another street"
