@@ -33,7 +33,7 @@ def three_filters(
     for ax in axes:
         plotting.velocity_wheel(spec, by_bof[0].probability, by_bof[0].velocity, ax=ax, legend=ax is axes[-1])
         ax.set(xlim=(15, -11), ylim=(0, 42), ylabel="x, forward [m]" if ax is axes[0] else "")
-    for k in range(0, len(by_bof), 2):
+    for k in range(0, len(by_bof), 3):
         pictures = [plotting.occupancy_colours(plotting.binary_states(by_log_odds[k]))]
         pictures += [wheel_colours(spec, b[k].probability, b[k].velocity) for b in (by_bof, by_cmcdot)]
         b, d = 38.3 - 1.72 * k, 36.5 - 0.86 * k
@@ -66,7 +66,7 @@ def draw_round(
 
 def legend_of_round(fig: Figure) -> None:
     """Add the legend of `draw_round` below its panels."""
-    scan = plt.get_cmap("RdGy")([1.0, 0.0, 0.5])[:, :3] * 255
+    scan = plt.get_cmap("RdGy")([1.0, 0.5 + 0.5 * np.log10(0.3 / 0.7), 0.5])[:, :3] * 255
     named = colour_patches(plotting.STATE_NAMES, plotting.STATE_COLOURS)
     named += colour_patches(("hit", "passed", "not seen"), scan)
     named += colour_patches(("particle: our way", "towards us"), HEADING_COLOURS[::2])
@@ -86,9 +86,11 @@ def draw_error(error: SamplingError) -> None:
     ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.02, 1), fontsize=9)
 
 
-def draw_crossing(ax: Axes, particles: int, stop_speed: float = PARAMS.stop_speed, legend: bool = True) -> None:
-    """Draw the street with a car and a person after 2.5 s of filtering, with the first seed."""
-    *_, last = watch(crossing, 2.5, params=replace(PARAMS, n_particles=particles, stop_speed=stop_speed))
+def draw_crossing(
+    ax: Axes, particles: int, stop_speed: float = PARAMS.stop_speed, seed: int = 0, legend: bool = True
+) -> None:
+    """Draw the street with a car and a person after 2.5 s of filtering."""
+    *_, last = watch(crossing, 2.5, params=replace(PARAMS, n_particles=particles, stop_speed=stop_speed), seed=seed)
     belief, things = last.belief, crossing(last.time)
     plotting.velocity(
         SPEC, belief.probability, belief.velocity, plotting.occupancy(SPEC, belief.probability, ax, legend)
@@ -96,7 +98,7 @@ def draw_crossing(ax: Axes, particles: int, stop_speed: float = PARAMS.stop_spee
     for name, thing in (("car", things[CAR]), ("person", things[PERSON])):
         ax.text(thing.y_min - 0.6, thing.x_max + 0.3, name, fontsize=9, weight="bold", zorder=4)
     ax.set(xlim=(9, -9), ylim=(0, 30))
-    ax.set_title(f"{particles:,} particles, one seed", fontsize=10)
+    ax.set_title(f"{particles:,} particles, seed {seed}", fontsize=10)
 
 
 def draw_luck(ax: Axes, luck: dict[int, NDArray]) -> None:
@@ -114,3 +116,11 @@ def draw_luck(ax: Axes, luck: dict[int, NDArray]) -> None:
     ax.set_xticks(numbers, [f"{number:,}" for number in numbers])
     ax.xaxis.minorticks_off()
     ax.legend(frameon=False, loc="lower right", fontsize=9)
+
+
+def draw_street(ax: Axes, spec: GridSpec, belief: Belief, title: str, legend: bool) -> None:
+    """Draw a belief of the real street, with letters at the oncoming cars E and at the car F ahead of us."""
+    plotting.velocity_wheel(spec, belief.probability, belief.velocity, ax=ax, legend=legend)
+    for letter, place in (("E", (5.4, 14)), ("F", (2.4, 12))):
+        ax.text(*place, letter, weight="bold", ha="center", zorder=3)
+    ax.set_title(title, fontsize=10)
