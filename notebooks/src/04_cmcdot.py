@@ -473,7 +473,7 @@ assert round(error.bias, 2) == 0.05
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, the street after 2.5 s in two runs with 300 particles: in one the car and the person are orange, in the other mostly dark; right, dots for 24 seeds and their mean: of the car 43, 85, 92 per cent are DYNAMIC at 300, 3,000 and 30,000 particles, of the person 23, 55, 82; the dots spread widely at 300"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, the street after 2.5 s in two runs with 300 particles: in one the car and the person are orange, in the other mostly dark and grey; right, dots for 24 seeds and their mean: of the car 43, 85, 92 per cent are DYNAMIC at 300, 3,000 and 30,000 particles, of the person 23, 55, 82; the dots spread widely at 300"
 luck = lecture_04_crossing.luck()
 fig, axes = plt.subplots(1, 3, figsize=(9.6, 4.1), layout="constrained", width_ratios=(1, 1, 1.5))
 for ax, seed in zip(axes, (0, 3), strict=False):
@@ -533,7 +533,8 @@ assert abs(lecture_04_crossing.speed_ahead(real) - 2.4) < 0.1
 
 # %% [markdown]
 # At first the cars in lane E are STATIC, by first sight. After about a second particles have arrived with them in free
-# cells, and both are DYNAMIC. On the right hardly a cell ever is. But F, which rolls at 2.4 m/s, stays dark. Why?
+# cells, and they are DYNAMIC. (At 1.8 s one has passed us.) On the right hardly a cell ever is. But F, which rolls at
+# 2.4 m/s, stays dark. Why?
 #
 # Two causes are at hand. The first is **first sight**, as for the bus of lecture 03. We see only F's rear. It was there when
 # the filter began, so it is STATIC. As it moves on, it arrives in cells that its own body had hidden. These were never

@@ -155,3 +155,15 @@ def speed_ahead(frames: Sequence[Frame]) -> float:
         points = frame.points_grid[(np.abs(frame.points_grid[:, 1]) < 1) & (frame.points_grid[:, 2] > 0.4)]
         rear.append(np.percentile(points[(points[:, 0] > 3) & (points[:, 2] < 2), 0], 2))
     return float((rear[1] - rear[0]) / (frames[-1].time - frames[0].time))
+
+
+def mean_dynamic(
+    scene: Callable[[float], list[Box]], thing: int, seconds: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the times of the scans, and the mean P(DYNAMIC) over the hit cells of a thing; NaN while it isn't seen."""
+    times, means = [], []
+    for seen in watch(scene, seconds):
+        cells = cells_in(scene(seen.time)[thing], SPEC, seen.x, margin=0.3) & hit_cells(seen.points, SPEC)
+        times.append(seen.time)
+        means.append(seen.belief.probability[State.DYNAMIC, cells].mean() if cells.any() else np.nan)
+    return np.array(times), np.array(means)
