@@ -1,4 +1,4 @@
-"""The site's page of terms and symbols, quoted from the lectures that introduce them, as `glossary.toml` lists them."""
+"""The site's page of terms, quoted from the lectures that introduce them, as `glossary.toml` lists them."""
 
 import re
 import tomllib
@@ -16,14 +16,14 @@ def glossary_page() -> str:
     terms = tomllib.loads((HERE / "glossary.toml").read_text(encoding="utf-8"))
     entries = [(term, name, number) for name, of in terms.items() for term, number in of.items()]
     parts = [
-        "# Terms and symbols",
+        "# Terms",
         "Each term in the words of the lecture that introduces it, and a link to it.",
         *("", "| term | in the words of the lecture | lecture |", "|---|---|---|"),
     ]
     for term, name, number in sorted(entries, key=lambda entry: entry[0].lower()):
         words = definition(texts(name), term, number).rstrip(" ;:,").replace("|", "\\|")
         parts.append(f"| {term} | {words} | {link(name)} |")
-    return "\n".join([*parts, "", "## What the letters mean", "", *symbols()]) + "\n"
+    return "\n".join(parts) + "\n"
 
 
 def texts(name: str) -> list[str]:
@@ -77,10 +77,3 @@ def definition(cells: list[str], term: str, number: int = 1) -> str:
             if re.search(rf"\*{re.escape(term)}\.?\*", sentence):
                 return " ".join(sentences[k : k + number] if number > 0 else sentences[max(0, k + number) : k + 1])
     raise ValueError(f"{term!r} is nowhere emphasised")
-
-
-def symbols() -> list[str]:
-    """Return the lines of lecture 00 on symbols: the table of all, and what stands below it."""
-    (cell,) = (cell for cell in texts("00_tour") if "### What the letters mean" in cell)
-    section = cell.partition("### What the letters mean")[2].partition("\n## ")[0]
-    return section.strip().splitlines()

@@ -213,7 +213,14 @@ def write_graphs(folder: Path) -> None:
         cuts = "; ".join(f"{edge.edge}: {edge.cost}" for edge in graph.cut) or "no edge is cut"
         words = f"Graph of {graph.title}. Nodes {', '.join(graph.model.names)}. Cut: {cuts}"
         shown = f"![{words.replace('[', '(').replace(']', ')')}](graphs/{entry.id}.png)"
-        parts += ["", f"## {entry.title}", "", f"Drawn in {in_notebooks(notebook_link(entry.lecture))}.", "", shown]
+        parts += [
+            "",
+            f"## {entry.title}",
+            "",
+            f"Belongs to lecture {in_notebooks(notebook_link(entry.lecture))}.",
+            "",
+            shown,
+        ]
         parts += ["", *(f"- `{edge.edge}`: {edge.cost}" for edge in graph.cut)]
     tables = {
         "The ledger of cut edges": ledger_table(ledger()),

@@ -39,7 +39,7 @@ class Stage(NamedTuple):
     check : str
         The test that compares exact inference on the model with the package: "tests/worlds/test_file.py::test_name".
     lecture : str
-        "NN_name#tag": the cell that draws the graph.
+        "NN_name#tag": the cell that draws the graph, or that says what its cut edges mean.
     """
 
     id: str
@@ -169,7 +169,7 @@ STAGES = (
         lecture_00_system.whole_system,
         lecture_00_system.CUT,
         "tests/worlds/test_system.py::test_o_is_the_exact_filter_of_each_cell",
-        "00_tour#system-graph",
+        "00_tour#prices",
     ),
     Stage(
         "memory",

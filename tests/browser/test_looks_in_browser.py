@@ -258,3 +258,13 @@ def test_errors_are_offered_only_where_the_truth_is_known(open_page, tiny_page, 
     unlabelled = tmp_path / "index.html"
     unlabelled.write_text(tiny_page.read_text(encoding="utf-8").replace('"truth":', '"other":'), encoding="utf-8")
     assert open_page(unlabelled).locator("#errors").is_hidden()
+
+
+@pytest.mark.parametrize(("width", "height", "highest"), [(1500, 1000, 620), (1100, 900, 1300), (390, 844, 1300)])
+def test_maps_come_first_and_the_inset_of_a_phone_is_on_phones_alone(open_page, shipped_page, width, height, highest):
+    page = open_page(shipped_page, CELL, viewport={"width": width, "height": height})
+    page.locator("#telling h3").first.wait_for()
+    assert page.locator("#inset").evaluate("(one) => getComputedStyle(one).display") == (
+        "block" if width == 390 else "none"
+    )
+    assert page.locator(".grids figure").first.evaluate("(one) => one.getBoundingClientRect().top + scrollY") < highest

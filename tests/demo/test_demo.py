@@ -262,7 +262,7 @@ class TestBothStreets:
         assert "2026_01_01_drive_0001_sync" in simulated
         assert "Data: PandaSet by Hesai and Scale AI, CC BY 4.0" in real
         assert "PandaSet" not in simulated
-        assert '<p class="notice"><b>' not in simulated
+        assert '<details class="notice">' not in simulated
 
     def test_what_the_truth_leaves_out_is_white_and_explained(self, folder):
         real, simulated = ((folder / name / "index.html").read_text(encoding="utf-8") for name in (".", "simulated"))
@@ -413,7 +413,7 @@ class TestChoice:
     def test_the_page_says_which_frames_it_shows(self, weights, tmp_path):
         write_tiny_drive(tmp_path, n_frames=6)
         html = write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path, frames=":5:2").read_text("utf-8")
-        assert "Here are 3 frames of the drive" in html
+        assert "3 frames of the drive" in html
         assert "(one in 2 of frames 0 to 4; it has 6)" in html
 
     def test_another_network_is_taken_and_one_of_the_image_stage_refused(self, drive, tmp_path):

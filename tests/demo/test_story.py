@@ -2,14 +2,12 @@
 
 import dataclasses
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import torch
 from scipy.special import softmax
 from tiny_drive import STEP
 from torch import nn
-from worlds.lecture_00_cell_story import draw_cell_story
 
 from semgrid_edu.crf import CrfParams, damping, gram_matrix, mean_field_naive, pair_weights, unary_from_probability
 from semgrid_edu.datasets.grid_truth import grid_truth
@@ -212,17 +210,3 @@ class TestStory:
         story = cell_story(plain, (90, 30), net)
         assert list(story.steps) == ["shown"]
         assert (story.truth, story.fault) == (None, "none")
-
-
-def test_the_figure_shows_the_numbers(stories, told):
-    story = stories[1]
-    figure = draw_cell_story(story, told[-1].frame.image)
-    column, steps, kinds, planes, *_ = figure.axes
-    image, occupancy, constants, total = (bar.get_width() for bar in kinds.patches)
-    assert image + occupancy + constants == pytest.approx(total, abs=1e-4)
-    assert sum(bar.get_width() for bar in planes.patches) == pytest.approx(image, abs=1e-4)
-    assert total == pytest.approx(story.why.score)
-    ends = [bar.get_x() + bar.get_width() for bar in steps.patches[-len(story.steps) :]]
-    np.testing.assert_allclose(ends, 1, atol=1e-5)
-    np.testing.assert_allclose(column.collections[0].get_offsets(), story.pixels[story.visible])
-    plt.close(figure)

@@ -106,26 +106,3 @@ def check_fm_iou(fm_iou: Callable) -> None:
         square = np.zeros((15, 15), int)  # no claim as a class that no cell is of
         square[:14] = confusion
         assert close(found, frequency_weighted_iou(square)), "wrong FmIoU (some classes have no truth)"
-
-
-@hidden
-@keeping
-def check_forgetting(forgetting: Callable) -> None:
-    """Random joint tables, with cases that never happen and two images that never follow each other."""
-    rng = generator(7)
-    for _ in range(5):
-        joint = rng.dirichlet(np.full(3 * 4 * 5, 0.5)).reshape(3, 4, 5)
-        joint[1, 2] = joint[:, 3, 4] = 0
-        joint /= joint.sum()
-        found = answer_array(forgetting(joint.copy()))
-        assert found.shape == (2,), "return two numbers"
-        assert np.isfinite(found).all(), "NaN or infinity: what never happens adds nothing"
-        both = _entropy(joint) - _entropy(joint.sum(axis=0))
-        present = _entropy(joint.sum(axis=1)) - _entropy(joint.sum(axis=(0, 1)))
-        assert close(found[1], present), "wrong surprise with the present image alone"
-        assert close(found[0], both), "wrong surprise with both images"
-
-
-def _entropy(p: np.ndarray) -> float:
-    """Return the entropy of a table, nats."""
-    return float(-np.sum(p[p > 0] * np.log(p[p > 0])))

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 00: the tour
 #
-# Six small functions, one for each idea that the whole course stands on, and one question to answer in words. About 60 minutes.
+# Five small functions, one for each idea that the whole course stands on, and a question to answer in words. About 60 minutes.
 # The lecture is [00: the tour](../00_tour.ipynb).
 #
 # | task | about | points |
@@ -11,8 +11,7 @@
 # | 3 | from a point to its pixel, equation (1) | 2 + 1 |
 # | 4 | two accuracies that disagree | 3 |
 # | 5 | FmIoU, which also charges for wrong claims, of a map with gaps | 3 |
-# | 6 | the price of a cut edge | 3 |
-# | 7 | in your own words | 2 |
+# | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -46,7 +45,7 @@ def cell_of(x, y, x_max, y_max, cell):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "cell-of-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "cell-of-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # A grid 6 m ahead, 2 m to each side, in cells of 0.5 m. By hand: 1.4 m below the top edge, 0.8 m from the left edge.
     got = cell_of(x=4.6, y=1.2, x_max=6, y_max=2, cell=0.5)
@@ -91,7 +90,7 @@ def bayes_update(belief, likelihood):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "bayes-update-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "bayes-update-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     belief = np.full((4, 2, 3), 0.25)
     belief[:, 0, 1] = [0.7, 0.1, 0.1, 0.1]
@@ -124,11 +123,14 @@ _test()
 # %% [markdown]
 # ## Task 3: from a point to its pixel (2 + 1 points)
 #
-# $$ \begin{pmatrix} u \\ v \\ 1 \end{pmatrix} = K \begin{pmatrix} X/Z \\ Y/Z \\ 1 \end{pmatrix} \qquad (1) $$
+# The lecture's two formulas for $u$ and $v$ are the first two rows of one product:
+#
+# $$ \begin{pmatrix} u \\ v \\ 1 \end{pmatrix} = K \begin{pmatrix} X/Z \\ Y/Z \\ 1 \end{pmatrix}, \qquad
+#    K = \begin{pmatrix} f & 0 & u_0 \\ 0 & f & v_0 \\ 0 & 0 & 1 \end{pmatrix} \qquad (1) $$
 #
 # `point` is (x, y, z) in the grid frame, metres. `T_camera_from_grid`, 4 x 4, takes it to the camera frame: X right, Y down, Z ahead.
 # (A 4 x 4 matrix takes a point as (x, y, z, 1), so that its last column can shift the point.) `K`, 3 x 3, is the camera's intrinsic
-# matrix, in pixels; the centre of the first pixel is (0, 0).
+# matrix, in pixels; it may have two focal lengths, one for each row. The centre of the first pixel is (0, 0).
 #
 # Complete `pixel_of`: it returns `(u, v)`. For one more point: a point that is not in front of the camera has no pixel, so return
 # `(nan, nan)`.
@@ -146,7 +148,7 @@ def pixel_of(point, K, T_camera_from_grid):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "pixel-of-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "pixel-of-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     K = np.array([[100.0, 0, 50], [0, 100, 20], [0, 0, 1]])
     ahead = np.array([[0.0, -1, 0, 0], [0, 0, -1, 1.5], [1, 0, 0, 0], [0, 0, 0, 1]])  # a camera 1.5 m above the ground
@@ -177,7 +179,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "pixel-behind-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "pixel-behind-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     K = np.array([[100.0, 0, 50], [0, 100, 20], [0, 0, 1]])
     ahead = np.array([[0.0, -1, 0, 0], [0, 0, -1, 1.5], [1, 0, 0, 0], [0, 0, 0, 1]])
@@ -216,7 +218,7 @@ def accuracies(confusion):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "accuracies-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "accuracies-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     confusion = np.array([[6, 2, 1], [2, 2, 0], [0, 0, 0]])  # nothing is truly of class 2, though one cell is called so
     got = answer_array(accuracies(confusion), "accuracies")
@@ -272,7 +274,7 @@ def fm_iou(confusion):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "fmiou-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "fmiou-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     confusion = np.array([[3, 1, 0, 1], [0, 1, 0, 0], [0, 0, 0, 0]])  # road, car, and a class that never occurs
     before = confusion.copy()
@@ -304,77 +306,21 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 6: the price of a cut edge (3 points)
+# ## Task 6: in your own words (2 points)
 #
-# The system cuts the edge from $g_{t-1}$ to $g_t$, so it forgets what the earlier image showed. What does that cost? Take one cell of a street of which
-# everything is known: `joint`, shape `(C, I, J)`, holds P(class, earlier image, present image). There are C classes; the earlier image shows one of I
-# things, the present image one of J. All entries sum to 1. What is impossible has an entry of 0, and perhaps two images never follow each other at all.
+# First: thirty metres ahead, the semantic grid says *road* in a cell that the occupancy grid calls STATIC with probability 0.9. Name two
+# stages that may be the cause, and say for each what you would look at to find out.
 #
-# Complete `forgetting`: it returns two numbers, both **mean surprise** in nats, that is $-\log P(\text{true class} \mid \text{images used})$ averaged over
-# everything that may happen, each case as often as it happens. The first number is for both images, the second for the present image alone. Which of the
-# two is smaller, and can it ever be the other way round?
-
-
-# %% nbgrader={"grade": false, "grade_id": "forgetting", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def forgetting(joint):
-    """Return the mean surprise at the class, in nats: with both images, and with the present one alone."""
-    ### BEGIN SOLUTION
-    happens = joint > 0
-    both = np.log(np.where(happens, joint, 1)) - np.log(np.where(happens, joint.sum(axis=0), 1))
-    seen = joint.sum(axis=1, keepdims=True)
-    present = np.log(np.where(happens, seen, 1)) - np.log(np.where(happens, seen.sum(axis=0), 1))
-    return -(joint * both).sum(), -(joint * present).sum()
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": true, "grade_id": "forgetting-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    # Two classes, equally frequent. The earlier image names the right one with 0.9, the present one with 0.7, each by itself.
-    earlier, present = np.array([[0.9, 0.1], [0.1, 0.9]]), np.array([[0.7, 0.3], [0.3, 0.7]])
-    joint = 0.5 * earlier[:, :, None] * present[:, None, :]
-    before = joint.copy()
-    got = answer_array(forgetting(joint), "forgetting")
-    assert got.shape == (2,), f"return two numbers, with both images and with the present one, got {got}"
-    assert np.array_equal(joint, before), "forgetting changed its argument `joint`: make new arrays"
-    both, alone = got
-    slips = {
-        0.8813: "that is in bits: take the natural logarithm",
-        0.3251: "that is the earlier image alone: the system keeps the present one, the last axis",
-        0.6931: "that uses no image at all: condition on what the image shows",
-        1.3040: "that is the surprise at class and image together: divide by the probability of what the image shows",
-        0.7803: "every case counts as often as it happens: weight the surprise by `joint`",
-        0.7: "that is how probable the right class is: surprise is minus its logarithm",
-        0.2949: "the two are swapped: first with both images, then with the present one alone",
-    }
-    for slip, hint in slips.items():
-        assert not np.isclose(alone, slip, atol=1e-3), f"with the present image alone {alone:.3f}: {hint}"
-    by_hand = "-0.7 log 0.7 - 0.3 log 0.3 = 0.611"
-    assert np.isclose(alone, 0.6109, atol=1e-3), f"with the present image alone {alone:.3f}, by hand {by_hand}"
-    assert both < alone, f"both images leave {both:.3f}, one alone {alone:.3f}: knowing more can't cost more on average"
-    by_hand = "P(truth) is 0.95 where both images are right: 0.63 / (0.63 + 0.03)"
-    assert np.isclose(both, 0.2949, atol=1e-3), f"with both images {both:.3f}, expected 0.295: {by_hand}"
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import tour
-
-    complaint = tour.check_forgetting(forgetting)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 7: in your own words (2 points)
-#
-# Thirty metres ahead, the semantic grid says *road* in a cell that the occupancy grid calls STATIC with probability 0.9. Name two
-# stages of the pipeline that may be the cause, and say for each what you would look at to find out. Then name one dashed edge of the
-# lecture's graph that could have prevented the mistake, and say what would flow along it. Six sentences are enough.
+# Then: somebody reports that a map finds every pedestrian, a recall of 100 %. The labels come from LIDAR beams that came back. Name one more
+# number or one test that you ask for, and say which mistake it would show. Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "blame", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # The image network may have taken the object for road, or the object is so small from afar that its pixels are mixed with road: look at
 # its scores at the pixels where the cell projects to, at several heights. If the scores are right there, the fusion did not use
 # the right plane, or it trusts road too much because road is the most frequent class: look at the planes one by one. The occupancy grid
 # itself may be wrong: on a slope, ground returns rise above 0.3 m and count as an obstacle: look at the LIDAR points in the cell.
-# The dashed edge from the image to the occupancy grid could tell a grazing return on road from an obstacle; the one from the earlier
-# semantic grid would carry the class that the cell had when it was nearer or better seen.
-# One point for two stages, each with a check that would tell it from the other; one for the edge and what would flow along it.
+#
+# I ask how many cells the map calls pedestrian in all, and how many of these have a label: inventions in cells without a label lower
+# neither recall nor IoU. Or I paint the people out of the image: if the map still finds them, it knows this street by heart, and I ask
+# for another street.
+# One point for two stages, each with a check that would tell it from the other; one for a number or test and the mistake it would show.

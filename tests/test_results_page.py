@@ -1,0 +1,52 @@
+"""docs/results.md quotes the committed results."""
+
+import json
+from pathlib import Path
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+def table(heading):
+    """The cells of the table below a heading, row by row."""
+    section = (DOCS / "results.md").read_text(encoding="utf-8").split(f"## {heading}")[1].split("\n## ")[0]
+    lines = [line for line in section.splitlines() if line.startswith("|")][2:]
+    return [[cell.strip(" *") for cell in line.split("|")[1:-1]] for line in lines]
+
+
+def scores(name):
+    return json.loads((DOCS / "results" / f"{name}.json").read_text(encoding="utf-8"))["scores"]
+
+
+def per_cent(share):
+    return f"{100 * share:.1f}"
+
+
+def interval(score):
+    return f"{per_cent(score['mean'])} ({per_cent(score['low'])} to {per_cent(score['high'])})"
+
+
+def test_the_camera_beside_rules_without_one():
+    left_out, _ = scores("camera_worth").values()
+    for name, cells, classes in table("A real street"):
+        assert cells == interval(left_out[name]["pixel accuracy"])
+        assert classes == interval(left_out[name]["class accuracy"])
+
+
+def test_memory():
+    for data, cells, *quoted, gain in table("Memory for classes"):
+        found = scores("memory")[data][cells]
+        ways = ("one frame", "mean of five maps", "memory")
+        assert quoted == [per_cent(found["methods"][way]["pixel accuracy"]["mean"]) for way in ways]
+        assert gain == interval(found["gain"]["pixel accuracy"])
+
+
+def test_filters():
+    filters = scores("occupancy")["HDL-64E"]["paper"]
+    for name, *quoted in table("Occupancy filters"):
+        found = filters[name]
+        recalls = [row[state] / sum(row) for state, row in enumerate(found["confusion"][:3])]
+        expected = [per_cent(recall) for recall in recalls]
+        precision = found["dynamic"]["precision"]
+        expected.append("-" if precision is None else per_cent(precision))
+        expected.append(per_cent(found["smear"]["occupied"]))
+        assert quoted == [*expected, per_cent(found["hit cells"]["walking pedestrians, to 25 m"]["dynamic"])]
