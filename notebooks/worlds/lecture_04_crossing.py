@@ -158,11 +158,11 @@ def speed_ahead(frames: Sequence[Frame]) -> float:
 
 
 def mean_dynamic(
-    scene: Callable[[float], list[Box]], thing: int, seconds: float
+    scene: Callable[[float], list[Box]], thing: int, seconds: float, params: CmcdotParams = PARAMS, seed: int = 0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the times of the scans, and the mean P(DYNAMIC) over the hit cells of a thing; NaN while it isn't seen."""
     times, means = [], []
-    for seen in watch(scene, seconds):
+    for seen in watch(scene, seconds, params=params, seed=seed):
         cells = cells_in(scene(seen.time)[thing], SPEC, seen.x, margin=0.3) & hit_cells(seen.points, SPEC)
         times.append(seen.time)
         means.append(seen.belief.probability[State.DYNAMIC, cells].mean() if cells.any() else np.nan)
