@@ -246,16 +246,6 @@ assert graphical.d_separated(model, "z1", "q1", given=["m1", "one1"])
 # DYNAMIC with 0.9, the surer fence with 0.009 / 0.109 = 0.08. It goes on standing when particles cross it.
 #
 # </details>
-#
-# The package's `predict` is no longer than this section:
-
-# %% tags=["cmcdot-2"]
-print(inspect.getsource(predict).split('"""')[2].strip("\n"))
-
-# %% [markdown]
-# Line by line: `M` is the matrix of lecture 01, and `mix` applies it in each cell. `fly` moves the particles, and
-# `vacated` is the mass that has left a cell. `collide` is the table above, and what is `blocked` is struck out.
-# `doubt` adds to it; the paper's filter has no doubt, `walls=None`, and we come to it at the end.
 
 # %% jupyter={"outputs_hidden": true}
 x, v, weight = np.array([1.2, 1.5, 1.8, 3.4]), np.array([10, 10, 0, 10]), np.array([0.2, 0.2, 0.2, 0.5])
@@ -271,6 +261,16 @@ for b_s, expected in ((0, 0.9), (0.99, 0.0826)):
     np.testing.assert_allclose(got, expected, atol=1e-4)
 
 # %% [markdown]
+# The package's `predict` is no longer than this section:
+
+# %% tags=["cmcdot-2"]
+print(inspect.getsource(predict).split('"""')[2].strip("\n"))
+
+# %% [markdown]
+# Line by line: `M` is the matrix of lecture 01, and `mix` applies it in each cell. `fly` moves the particles, and
+# `vacated` is the mass that has left a cell. `collide` is the table above, and what is `blocked` is struck out.
+# `doubt` adds to it; the paper's filter has no doubt, `walls=None`, and we come to it at the end.
+#
 # So neither wins by rule. An arrival in free space is DYNAMIC, and a fence that is known to stand goes on standing.
 #
 # ## What does a scan change?
@@ -298,7 +298,7 @@ for b_s, expected in ((0, 0.9), (0.99, 0.0826)):
 # </details>
 
 
-# %% tags=["cmcdot-3"]
+# %% tags=["cmcdot-3"] jupyter={"outputs_hidden": true}
 def update_cell(b, occupied, free, first_sight):
     """Share UNKNOWN out, then Bayes' rule; what nothing explains is UNKNOWN."""
     b = np.array(b, dtype=float)

@@ -180,7 +180,7 @@ def behind_a_van(width):
     return lambda t: [Box.around(22, -16 + 5 * t, 1.8, 4, 1.5), Box.around(10, 0, 2.5, width, 3)]
 
 
-# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true, "outputs_hidden": true}
 far = {speed: distance_to_notice(speed) for speed in (0.7, 1.4, 2.8, 5.0)}
 for speed, walked in far.items():
     print(f"{speed} m/s: DYNAMIC " + (f"after {walked:.1f} m" if np.isfinite(walked) else "not within 3 s"))
