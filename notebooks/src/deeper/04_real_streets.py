@@ -12,7 +12,7 @@
 #
 # **Prerequisites.** Lecture [04](../04_cmcdot.ipynb); factors and elimination, as in lecture 01b.
 #
-# **Time.** 45 minutes, of which the computer needs less than one.
+# **Time.** 48 minutes, of which the computer needs less than one.
 
 # %% jupyter={"source_hidden": true}
 import json
@@ -80,6 +80,7 @@ def phantoms(scene, belief):
     return scene.hit & (scene.truth.state == STATIC) & (p[DYNAMIC] > p[STATIC]) & (p[DYNAMIC] > LEAST_DYNAMIC)
 
 
+# %% jupyter={"source_hidden": true}
 def show(ax, belief, title, marks, legend=False):
     """Draw a belief with its velocities, and letters with arrows at the phantoms."""
     plotting.occupancy(spec, belief.probability, ax=ax, legend=legend)
@@ -254,6 +255,7 @@ def uncover(cells, walls):
     return np.array(found)
 
 
+# %% jupyter={"outputs_hidden": true}
 n = np.arange(1, 7)
 odds = P0 / (1 - P0) / P_STATIC**n
 as_it_was = uncover(6, walls=None)
