@@ -33,7 +33,7 @@ def three_filters(
     for ax in axes:
         plotting.velocity_wheel(spec, by_bof[0].probability, by_bof[0].velocity, ax=ax, legend=ax is axes[-1])
         ax.set(xlim=(15, -11), ylim=(0, 42), ylabel="x, forward [m]" if ax is axes[0] else "")
-    for k in range(0, len(by_bof), 3):
+    for k in range(0, len(by_bof), 4):
         pictures = [plotting.occupancy_colours(plotting.binary_states(by_log_odds[k]))]
         pictures += [wheel_colours(spec, b[k].probability, b[k].velocity) for b in (by_bof, by_cmcdot)]
         b, d = 38.3 - 1.72 * k, 36.5 - 0.86 * k
@@ -89,8 +89,8 @@ def draw_error(error: SamplingError) -> None:
 def draw_crossing(
     ax: Axes, particles: int, stop_speed: float = PARAMS.stop_speed, seed: int = 0, legend: bool = True
 ) -> None:
-    """Draw the street with a car and a person after 2.5 s of filtering."""
-    *_, last = watch(crossing, 2.5, params=replace(PARAMS, n_particles=particles, stop_speed=stop_speed), seed=seed)
+    """Draw the street with a car and a person after 2 s of filtering."""
+    *_, last = watch(crossing, 2.0, params=replace(PARAMS, n_particles=particles, stop_speed=stop_speed), seed=seed)
     belief, things = last.belief, crossing(last.time)
     plotting.velocity(
         SPEC, belief.probability, belief.velocity, plotting.occupancy(SPEC, belief.probability, ax, legend)

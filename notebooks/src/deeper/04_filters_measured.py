@@ -24,8 +24,9 @@ import numpy as np
 from IPython.display import Markdown
 
 from semgrid_edu import plotting
+from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
-from semgrid_edu.occupancy import State
+from semgrid_edu.occupancy import CmcdotParams, State, VelocityLattice
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 
 sys.path.append("..")  # for worlds/, in the folder above
@@ -135,14 +136,18 @@ assert walkers(cmcdot) > walkers(bof) > cmcdot["dynamic"]["recall"]
 assert walkers(cmcdot) > 0.9
 assert standing(cmcdot) < 0.01
 assert static(log_odds) > static(cmcdot) + 0.03
+cells = np.prod(GridSpec.paper().shape)
+assert 30 < (len(VelocityLattice()) + 2) * cells / (4 * cells + 5 * CmcdotParams().n_particles) < 40
+hit = PARAMS.sensor.p_hit_occupied / PARAMS.sensor.p_hit_free
+assert hit * PARAMS.first_sight[STATIC] < PARAMS.first_sight[FREE]  # after one hit a new cell is still FREE
 
 # %% [markdown]
 # Walkers and standing cars count only where a beam hits them, walkers only after 1.5 s in view. Three lessons:
 #
 # 1. **A binary grid pays twice.** It can't say DYNAMIC, and of the cells that something has left it holds several times
 #    as many occupied.
-# 2. **Particles cost little.** BOF and CMCDOT are close in all rows, but BOF keeps about forty times as many numbers.
-#    Of walkers CMCDOT finds more, because no lattice limits their speed.
+# 2. **Particles cost little.** BOF and CMCDOT are close in all rows, but BOF keeps more than thirty times as many
+#    numbers. Of walkers CMCDOT finds more.
 # 3. **What has been in view for a while is found.** Over all cells that move, the recall is much lower than that of
 #    near walkers: it counts cells without returns, and movers that have only just come into view.
 #
@@ -228,7 +233,7 @@ assert out[3.5] > 0.65 > 0.45 > out[6]
 # ## In five lines
 #
 # 1. A map that is mixed by parts of a cell blurs for ever. Scroll by whole cells and keep the remainder.
-# 2. BOF and CMCDOT find about the same share of what moves, CMCDOT with a fortieth of the numbers.
+# 2. BOF and CMCDOT find about the same share of what moves, CMCDOT with a thirtieth of the numbers.
 # 3. What is near, hit, and in view for a while is nearly all found; recall over all cells is much lower.
 # 4. A person who sets out is DYNAMIC after about three cells, at a walk as at a run.
 # 5. Particles fly on unseen for about a second. What hides for longer comes out as something new.
