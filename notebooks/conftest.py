@@ -4,7 +4,7 @@ import pytest
 
 from tests.forked_kernel import fork_kernels
 
-BEFORE_THE_NETWORKS = ("01_bayes", "02_grids", "03_bof", "04_cmcdot", "05_pixels")
+BEFORE_THE_NETWORKS = ("01_bayes", "01b_graphical_models", "02_grids", "03_bof", "04_cmcdot", "05_pixels")
 """Lectures that a student without a deep-learning library could run."""
 
 

@@ -46,7 +46,8 @@ def link(name: str) -> str:
     name : str
         Name of the notebook.
     """
-    return f"[{name[:2]}](notebooks/{name}.ipynb)"
+    number = name.partition("_")[0]
+    return f"[{number}](notebooks/{name}.ipynb)"
 
 
 def definition(cells: list[str], term: str, number: int = 1) -> str:

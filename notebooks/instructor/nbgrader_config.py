@@ -1,6 +1,7 @@
 """nbgrader's settings for this course, written by `semgrid-edu course build`."""
 
 import os
+import sys
 import sysconfig
 from pathlib import Path
 
@@ -44,6 +45,13 @@ c.Autograde.autograde_preprocessors = [
 
 # The formgrader and feedback show a submission's text without the scripts that it may hold.
 c.HTMLExporter.filters = {"strip_files_prefix": "semgrid_edu.workshop.course.nbgrader.cleaning.without_scripts"}
+
+# A file that was handed in and is opened in Formgrader runs no script there.
+if formgrader := sys.modules.get("nbgrader.server_extensions.formgrader.handlers"):
+    formgrader.SubmissionFilesHandler.content_security_policy = "sandbox; default-src 'none'"
+
+# What a platform's archive holds is unpacked within limits, and no archive in it.
+c.ZipCollectApp.extractor_plugin = "semgrid_edu.workshop.course.nbgrader.collecting.UnpackNotebooks"
 
 c.ExecuteApart.course = c.ShowRubric.course = str(course)
 

@@ -431,7 +431,7 @@ for report in (1, 2, 3):
 # %% [markdown]
 # What did the grid forget? After the report the cells are coupled: if you learn that the first is occupied, the second
 # falls back to 0.2, because the first already explains the report. This is **explaining away**, and the report is
-# a **collider** ([graphical models](deeper/graphical_models.ipynb)). A plausible culprit. So switch it off: infer
+# a **collider** ([graphical models](01b_graphical_models.ipynb)). A plausible culprit. So switch it off: infer
 # all $2^8$ maps of a row of eight cells together, and then cell by cell with the same beam.
 
 # %% tags=["thick-walls"]

@@ -14,7 +14,7 @@
 #   graphical model.
 #
 # **Prerequisites.** Lecture [00](00_tour.ipynb): the grid, a first look at equation (1). A matrix times a vector; a
-# rotation as a matrix. For the graph: [graphical models](deeper/graphical_models.ipynb).
+# rotation as a matrix. For the graph: [graphical models](01b_graphical_models.ipynb).
 #
 # **Time.** 118 minutes; the computer needs less than one.
 #

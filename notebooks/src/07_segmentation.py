@@ -13,7 +13,7 @@
 # - tell a network that has learnt a street from one that has learnt a view.
 #
 # **Prerequisites.** Lecture [00](00_tour.ipynb); lecture [06](06_planes.ipynb) for bilinear sampling and
-# backpropagation. For the graph: [graphical models](deeper/graphical_models.ipynb). You need no deep learning.
+# backpropagation. For the graph: [graphical models](01b_graphical_models.ipynb). You need no deep learning.
 #
 # **Time.** 111 minutes; the computer needs about one.
 #

@@ -14,7 +14,7 @@
 # - name what no recipe can know.
 #
 # **Prerequisites.** Lectures [05](05_pixels.ipynb) (equation (1)) and [04](04_cmcdot.ipynb) (the four occupancy
-# states). The graph needs d-separation: see [graphical models](deeper/graphical_models.ipynb).
+# states). The graph needs d-separation: see [graphical models](01b_graphical_models.ipynb).
 #
 # **Time.** 102 minutes, of which the computer needs one.
 #

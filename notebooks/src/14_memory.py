@@ -13,7 +13,7 @@
 # - say where a memory makes the map worse, and why.
 #
 # **Prerequisites.** Lectures [03](03_bof.ipynb) and [04](04_cmcdot.ipynb): a filter over time, velocities of cells.
-# Lecture [08](08_fusion.ipynb): the semantic grid. For the graph: [graphical models](deeper/graphical_models.ipynb).
+# Lecture [08](08_fusion.ipynb): the semantic grid. For the graph: [graphical models](01b_graphical_models.ipynb).
 #
 # **Time.** 88 minutes; the computer needs one.
 #

@@ -55,13 +55,13 @@ def notebook_link(place: str | None, folder: str = "") -> str:
 
     >>> notebook_link("02_grids#update", "exercises/")
     '[02](exercises/02_grids.ipynb), `update`'
-    >>> notebook_link("deeper/graphical_models#messages")
-    '[graphical models](deeper/graphical_models.ipynb), `messages`'
+    >>> notebook_link("01b_graphical_models#messages")
+    '[01b](01b_graphical_models.ipynb), `messages`'
     """
     if place is None:
         return "to come"
     name, _, part = place.partition("#")
-    title = name[:2] if name[:2].isdigit() else name.rpartition("/")[2].replace("_", " ")
+    title = name.partition("_")[0] if name[:2].isdigit() else name.rpartition("/")[2].replace("_", " ")
     return f"[{title}]({folder}{name}.ipynb), `{part}`"
 
 

@@ -55,7 +55,7 @@ STAGES = (
         "line",
         "Bayes' rule on a line",
         lecture_01_line.bayes_on_a_line,
-        lecture_01_line.CUT,
+        (),
         "tests/worlds/test_line.py::test_forward_messages_are_lecture_01s_recursion",
         "01_bayes#graph",
     ),
@@ -73,7 +73,7 @@ STAGES = (
         lecture_02_cell.one_cell,
         lecture_02_cell.CUT_CELL,
         "tests/worlds/test_cell.py::test_predict_and_update_are_the_forward_messages",
-        "deeper/graphical_models#stages",
+        "01b_graphical_models#stages",
     ),
     Stage(
         "beam",
@@ -93,10 +93,10 @@ STAGES = (
     ),
     Stage(
         "bof",
-        "BOF: cells, velocities, antecedents",
-        lecture_03_bof.bof_stage,
+        "BOF: one thing, two cells",
+        lecture_03_bof.stands_or_drives,
         lecture_03_bof.CUT,
-        "tests/worlds/test_bof_row.py::test_bof_adds_what_two_antecedents_send",
+        "tests/worlds/test_bof_row.py::test_a_thing_that_stands_or_drives_is_believed_in_both_places",
         "03_bof#graph",
     ),
     Stage(
@@ -209,7 +209,7 @@ class LedgerLine(NamedTuple):
 def ledger(stage: str | None = None) -> tuple[LedgerLine, ...]:
     """Measure the price of every cut edge that has one, in one stage or in all (which takes a few seconds)."""
     return tuple(
-        LedgerLine(each.id, edge.edge, *edge.price(), each.lecture[:2])
+        LedgerLine(each.id, edge.edge, *edge.price(), each.lecture.partition("_")[0])
         for each in STAGES
         if stage in (None, each.id)
         for edge in each.cut

@@ -1,18 +1,16 @@
 """Bayes on a line: a vehicle's position on a ring road as a hidden Markov model (paper, section 3.2).
 
-A filter is half of message passing on a chain: its beliefs are the messages that run forward in time. The messages that
-run backward carry the evidence of later readings about earlier positions.
+A filter's beliefs are the messages that run forward in time. Those that run backward carry what later readings
+tell about earlier positions: smoothing, another question.
 """
 
-from collections.abc import Callable, Sequence
-from functools import cache
-from itertools import product as every_combination
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.graphical import Factor, eliminate, in_rows, max_product, sum_product
-from worlds.lecture_00_stage_graph import CutEdge, Price, StageGraph, directed
+from semgrid_edu.graphical import Factor, in_rows, sum_product
+from worlds.lecture_00_stage_graph import StageGraph, directed
 
 
 def bayes_on_a_line(
@@ -59,7 +57,6 @@ def bayes_on_a_line(
         positions=in_rows(places, readings),
         observed=tuple(readings),
         equations={places[-1]: "place", readings[-1]: "reading"},
-        cut=CUT,
     )
 
 
@@ -81,41 +78,5 @@ def smoothed(stage: StageGraph, readings: Sequence[int]) -> NDArray[np.float64]:
     return np.array([marginals[f"n{t}"] for t in range(len(readings))])
 
 
-def most_likely_path(stage: StageGraph, readings: Sequence[int]) -> list[int]:
-    """Return the most likely sequence of places given all readings, one cell per step (Viterbi)."""
-    best = max_product(stage.model, _given(stage, readings))
-    return [best[f"n{t}"] for t in range(len(readings))]
-
-
 def _given(stage: StageGraph, readings: Sequence[int]) -> dict[str, int]:
     return {name: int(reading) for name, reading in zip(stage.observed, readings, strict=True)}
-
-
-@cache
-def the_future() -> Price:
-    """How often the most probable position is right in trips of six steps, with all readings and with past ones."""
-    stage = bayes_on_a_line(steps=6)
-    return Price(_right(stage, smoothed), _right(stage, filtered), "place right, mean of six steps")
-
-
-def _right(stage: StageGraph, beliefs: Callable) -> float:
-    """Return the probability that the most probable position is right, over all readings and steps."""
-    total = 0.0
-    for readings in every_combination((0, 1), repeat=len(stage.observed)):
-        probability = eliminate(stage.model, (), _given(stage, readings)).table
-        total += float(probability) * beliefs(stage, readings).max(axis=1).mean()
-    return total
-
-
-CUT = (
-    CutEdge(
-        "n1 <- n2",
-        "The filter passes messages forward in time and none backward, so a later reading never corrects what was "
-        "believed of an earlier place: over a trip of six steps the most probable place is right with probability "
-        "0.34, and with 0.46 if all six readings were used for each.",
-        ("n2", "n1"),
-        the_future,
-        bend=-0.55,
-    ),
-)
-"""The edges that the filter cuts."""

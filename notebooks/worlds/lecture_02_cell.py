@@ -172,7 +172,7 @@ def package_log_odds_cell(scans: ArrayLike, params: LogOddsParams | None = None)
 
 
 def read_scans(letters: str, sensor: SensorModel | None = None) -> NDArray[np.float64]:
-    """Translate the scans of a cell, in lecture 01's letters, into the package's likelihoods.
+    """Translate the scans of a cell, one letter each, into the package's likelihoods.
 
     Parameters
     ----------

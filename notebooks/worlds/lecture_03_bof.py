@@ -1,4 +1,4 @@
-"""BOF as a graphical model: joint inference over four cells, and the loss from filtering each cell separately.
+"""BOF as a graphical model: joint inference over a few cells, and the loss from filtering each cell separately.
 
 The antecedents of a cell are the cells from which something may move into it. The package's BOF keeps one distribution
 per cell, and combines arrivals from the antecedents by two rules. The probabilities of arrivals add up, as if at most
@@ -10,9 +10,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.occupancy import BofState, bof_predict, bof_update
-from worlds.lecture_00_stage_graph import CutEdge, Price, StageGraph
-from worlds.lecture_03_row import DT, SPEED, Cell, CellsInARow, exact_beliefs, row_evidence, row_model
+from semgrid_edu.graphical import Factor
+from semgrid_edu.occupancy import BofState, SensorModel, bof_predict, bof_update
+from worlds.lecture_00_stage_graph import CutEdge, Price, StageGraph, directed
+from worlds.lecture_03_row import DT, SPEED, Cell, CellsInARow, exact_beliefs, hit_probability, row_evidence, row_model
 
 AT_THE_EDGE = CellsInARow(({"left": 0.3, "right": 0.5}, {}, {}, {"static": 0.4}), (".x..", "..x.", "...x"))
 """A thing in cell 1 either leaves the row at once or crosses it, towards cell 4, which may be STATIC.
@@ -61,6 +62,32 @@ def expected_things(beliefs: NDArray) -> NDArray[np.float64]:
     return beliefs[..., [Cell.STATIC, Cell.LEFT, Cell.RIGHT]].sum(axis=(1, 2))
 
 
+def stands_or_drives() -> StageGraph:
+    """Return the graph of one thing that stands in cell 1 or drives into cell 2: its past, two cells, their beams.
+
+    It is `STANDING_OR_DRIVING` up to its first scan. The states of m1,0 are "stands" and "drives", those of the cells
+    afterwards free and occupied, those of the scans pass and hit.
+    """
+    sees = hit_probability(SensorModel())[[Cell.FREE, Cell.STATIC]]
+    factors = [
+        Factor("m1,0", [0.5, 0.5]),
+        Factor(("m1,0", "m1,1"), [[0, 1], [1, 0]]),
+        Factor(("m1,0", "m2,1"), [[1, 0], [0, 1]]),
+        Factor(("m1,1", "z1,1"), sees),
+        Factor(("m2,1", "z2,1"), sees),
+    ]
+    places = {"m1,0": (0, 1.2), "m1,1": (0, 0), "m2,1": (1.9, 0), "z1,1": (0, -1.1), "z2,1": (1.9, -1.1)}
+    return StageGraph(
+        "one thing, two cells",
+        directed(factors),
+        positions=places,
+        observed=("z1,1", "z2,1"),
+        labels={name: f"${name[0]}_{name[1]}^{{{'t' if name[3] == '1' else 't-1'}}}$" for name in places},
+        equations={"m1,0": "stands or drives", "m2,1": "free or occupied", "z2,1": "pass or return"},
+        cut=CUT,
+    )
+
+
 def bof_stage(world: CellsInARow = STANDING_OR_DRIVING) -> StageGraph:
     """Return the graph of two time slices, from the row's first belief and first scan: cells, and their antecedents."""
     columns = range(1, len(world.cells) + 1)
@@ -79,7 +106,6 @@ def bof_stage(world: CellsInARow = STANDING_OR_DRIVING) -> StageGraph:
         observed=tuple(row_evidence(world, 1)),
         labels={name.format(k): text.format(k) for name, text in labels.items() for k in columns},
         equations={name.format(columns[-1]): text for name, text in words.items()},
-        cut=CUT,
     )
 
 
@@ -106,45 +132,13 @@ def in_both_places() -> Price:
     return Price(exact[0], bof[0], "things in the row")
 
 
-@cache
-def before_a_fence() -> Price:
-    """Return P(STATIC) of the cell with the thing before a fence."""
-    exact = exact_beliefs(TOWARDS_A_FENCE)[0, 1, Cell.STATIC]
-    bof = bof_beliefs(TOWARDS_A_FENCE)[0, 1, Cell.STATIC]
-    return Price(exact, bof, "P(STATIC) before a fence")
-
-
-@cache
-def head_on() -> Price:
-    """Return P(occupied) of the cell between two things that would arrive there at once."""
-    exact = 1 - exact_beliefs(HEAD_ON)[0, 1, Cell.FREE]
-    bof = 1 - bof_beliefs(HEAD_ON)[0, 1, Cell.FREE]
-    return Price(exact, bof, "P(occupied) between two that come")
-
-
 CUT = (
     CutEdge(
-        "m1,t - m2,t",
-        "BOF keeps each cell's marginal, so cells that share an antecedent count as independent, and a thing that "
-        "either stands or drives is believed to be in both places: 1.24 things instead of 1.",
-        ("m1,1", "m2,1"),
+        "m1,t-1 -> m2,t",
+        "BOF keeps each cell's marginal and forgets that both cells ask about the same past, so a thing that either "
+        "stands or drives is believed to be in both places: 1.24 things instead of 1.",
+        ("m1,0", "m2,1"),
         in_both_places,
     ),
-    CutEdge(
-        "one3,t -> m2,t-1",
-        "That two things can't share cell 3 also tells something about what was in cell 2, but BOF rules combinations "
-        "out in cell 3 alone, so the probability that a thing stands before a fence stays at 0.30 instead of 0.43.",
-        ("one3,1", "m2,0"),
-        before_a_fence,
-    ),
-    CutEdge(
-        "m1,t-1 - m3,t-1",
-        "BOF adds what two antecedents send, as if only one of them could send something, so two independent ones "
-        "with probability 1/2 each make cell 2 occupied with probability 1, where 2/3 is right.",
-        ("m1,0", "m3,0"),
-        head_on,
-        bend=-0.17,
-        at=0.33,
-    ),
 )
-"""The edges that BOF cuts."""
+"""The edge that BOF cuts: after the flight, cell 2 has a copy of cell 1's past."""

@@ -1,10 +1,14 @@
 """The permutohedral lattice of points with two features, drawn: splat, blur, slice (Adams, Baek, Davis 2010)."""
 
-from collections.abc import Iterator
+import ast
+import inspect
+import textwrap
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
+from IPython.display import Markdown
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike, NDArray
@@ -78,6 +82,31 @@ def draw_triangles(low: ArrayLike, high: ArrayLike, ax: Axes) -> Axes:
     return ax
 
 
+def draw_simplex(features: ArrayLike, ax: Axes) -> Axes:
+    """Draw a point, the corners of its triangle with their coordinates, and a weight at each link.
+
+    Parameters
+    ----------
+    features : (2,) float
+        The point, in widths.
+    ax : Axes
+        Axes to draw into.
+    """
+    (y,) = elevated([features])
+    (corners,), (weights,) = enclosing_simplices(y[None])
+    for corner, weight, place in zip(corners.tolist(), weights, vertex_places(corners), strict=True):
+        ax.plot(*zip(features, place, strict=True), color="0.3", linewidth=1.2)
+        ax.plot(*place, "s", color="0.2", markersize=7)
+        white = {"fc": "w", "ec": "none", "pad": 1}
+        ax.annotate(f"{weight:.2f}", (features + place) / 2, ha="center", va="center", fontsize=9, bbox=white)
+        if str(tuple(corner)) not in {text.get_text() for text in ax.texts}:
+            outward = (place - features) / np.maximum(np.linalg.norm(place - features), 1e-9)
+            style = {"textcoords": "offset points", "ha": "center", "va": "center", "fontsize": 9}
+            ax.annotate(str(tuple(corner)), place, (26, 13) * outward, **style)
+    ax.plot(*features, "o", color="#fc7200", markersize=9, markeredgecolor="k", zorder=3)
+    return ax
+
+
 def draw_lattice_frame(frame: LatticeFrame, ax: Axes | None = None) -> Axes:
     """Draw one picture of `lattice_story`.
 
@@ -145,6 +174,24 @@ def lattice_story(features: NDArray, values: NDArray, between: int = 0) -> Itera
     yield from journey(title, at_corners, at_points, found[:, 0] / found[:, 1])
     sums = lattice.shares @ held
     yield LatticeFrame(title, features, sums[:, 0] / sums[:, 1], np.ones(len(values)))
+
+
+def code_of(*functions: Callable) -> Markdown:
+    """Return the code of functions without their docstrings, to be shown in a notebook.
+
+    Parameters
+    ----------
+    functions : callable
+        Functions of the package.
+    """
+    shown = []
+    for function in functions:
+        source = textwrap.dedent(inspect.getsource(function))
+        lines, body = source.splitlines(), ast.parse(source).body[0].body
+        documented = ast.get_docstring(ast.parse(source).body[0]) is not None
+        first, last = (body[0].lineno, body[0].end_lineno) if documented else (1, 0)
+        shown.append("\n".join(lines[: first - 1] + lines[last:]))
+    return Markdown("```python\n" + "\n\n".join(shown) + "\n```")
 
 
 def _parts(between: int) -> NDArray[np.float64]:

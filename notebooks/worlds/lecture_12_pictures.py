@@ -1,6 +1,8 @@
 """Pictures of scores: forest plots, and Tables 1 to 3 beside the paper's values (sections 4.2 to 4.4)."""
 
+import json
 from collections.abc import Mapping
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -14,10 +16,26 @@ from semgrid_edu.plotting import confusion
 from semgrid_edu.workshop.paper.published import NETWORKS
 from semgrid_edu.workshop.scoring.score_with_interval import ScoreWithInterval, shown
 
+RESULTS = Path(__file__).resolve().parents[2] / "docs" / "results"
+"""The committed results of `semgrid-edu reproduce`."""
+
 SCORE_COLOUR, SEED_COLOUR = "#1f4e79", "#d95f02"
 """The colours of interval and mean, and of single seeds."""
 _SEED_DROP = 0.24
 """How far below the interval the seeds are drawn, rows."""
+
+
+def kept(name: str, scale: str = "reduced") -> dict:
+    """Return a committed result of `semgrid-edu reproduce`.
+
+    Parameters
+    ----------
+    name : str
+        Its name, such as "table1".
+    scale : str
+        Its folder.
+    """
+    return json.loads((RESULTS / scale / f"{name}.json").read_text(encoding="utf-8"))
 
 
 def forest_plot(

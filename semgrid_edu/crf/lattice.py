@@ -112,20 +112,18 @@ def enclosing_simplices(points: NDArray[np.float64]) -> tuple[NDArray[np.int64],
     ([[3, 0, -3], [4, 1, -5], [5, -1, -4]], [0.33, 0.13, 0.53])
     """
     size = points.shape[1]
-    steps = np.rint(points / size).astype(np.int64)  # the nearest point whose coordinates are multiples of d + 1
-    residual = points - size * steps
-    rank = np.argsort(np.argsort(-residual, axis=1, kind="stable"), axis=1)  # 0 for the largest residual
-    # Rounding may leave the zero-sum hyperplane by some steps: round the largest residuals the other way instead.
-    rank += steps.sum(axis=1, keepdims=True)
-    other_way = (rank < 0).astype(np.int64) - (rank >= size)
-    steps += other_way
-    rank += size * other_way
-    # Corner m is m steps from the origin, in the directions of the m smallest residuals.
-    origin = size * steps
+    origin = size * np.rint(points / size).astype(np.int64)  # each number to the nearest multiple of d + 1
+    rank = np.argsort(np.argsort(origin - points, axis=1, kind="stable"), axis=1)  # 0 for the largest residual
+    # If the sum isn't zero, the numbers that were rounded the farthest are rounded the other way.
+    rank += origin.sum(axis=1, keepdims=True) // size
+    other_way = size * ((rank < 0).astype(np.int64) - (rank >= size))
+    origin += other_way
+    rank += other_way
+    # Corner m is m steps from the origin: a step adds 1 to all numbers but one, the smallest residuals in turn.
     m = np.arange(size)[:, None]
     corners = origin[:, None] + m - size * (rank[:, None] >= size - m)
-    ranked = -np.sort(origin - points, axis=1) / size  # the residuals, largest first
-    gaps = ranked[:, :-1] - ranked[:, 1:]
+    residuals = -np.sort(origin - points, axis=1) / size  # the largest first
+    gaps = residuals[:, :-1] - residuals[:, 1:]
     return corners, np.hstack([1 - gaps.sum(axis=1, keepdims=True), gaps[:, ::-1]])
 
 
@@ -171,20 +169,14 @@ class PermutohedralLattice:
             When `features` isn't a table of finite numbers, or the points are too many standard deviations apart.
         """
         points = elevated(features)
-        spans = np.ceil(np.ptp(points, axis=0)) + 3 * points.shape[1]  # of the vertices and their neighbours
-        if np.abs(points).max() > FARTHEST or np.prod(spans[:-1]) > 2**62:
-            expected = "points fewer standard deviations apart, so larger sigmas"
-            raise ArgumentError("features", expected, f"{np.ptp(features, axis=0).max():.4g}")
+        digits = _digits(points)  # the coordinates of a vertex become the digits of one number
         corners, weights = enclosing_simplices(points)
         n_points, size = weights.shape
         corners = corners.reshape(-1, size)
-        # Coordinates become the digits of one integer, so a step along the lattice adds a constant to it. The last #
-        # coordinate needs no digit, because it follows from the others.
-        digits = np.append(np.cumprod([1, *spans[:-2]]), 0).astype(np.int64)
         numbers, first, members = np.unique(corners @ digits, return_index=True, return_inverse=True)
-        ends = np.arange(0, corners.shape[0] + 1, size)
+        ends = np.arange(0, len(corners) + 1, size)
         shares = csr_array((weights.ravel(), members, ends), shape=(n_points, len(numbers)))
-        steps = digits.sum() - size * digits
+        steps = digits.sum() - size * digits  # so a step along the lattice adds a constant to it
         return cls(corners[first], shares, tuple(_blur(numbers, step) for step in steps))
 
     @property
@@ -211,6 +203,15 @@ class PermutohedralLattice:
         for blur in self.blurs:
             held = blur @ held
         return peak(len(self.blurs) - 1) * (self.shares @ held)  # slice
+
+
+def _digits(points: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return the worth of each coordinate of a vertex as a digit: none for the last, which follows from the others."""
+    spans = np.ceil(np.ptp(points, axis=0)) + 3 * points.shape[1]  # of the vertices and their neighbours
+    if np.abs(points).max() > FARTHEST or np.prod(spans[:-1]) > 2**62:
+        expected = "points fewer standard deviations apart, so larger sigmas"
+        raise ArgumentError("features", expected, f"{spans.max():.4g} in lattice space")
+    return np.append(np.cumprod([1, *spans[:-2]]), 0).astype(np.int64)
 
 
 def _blur(numbers: NDArray[np.int64], step: int) -> csr_array:

@@ -15,10 +15,8 @@ MAX_CELLS = 10_000
 """The largest grid whose pairs are written out: two matrices of 10,000 x 10,000 numbers are 1.6 GB."""
 
 
-def kernels(
-    values: ArrayLike, params: CrfParams, cells: slice | NDArray = slice(None)
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Compute both kernels of eq. (4), without their weights, between some cells i and all cells j.
+def kernels(values: ArrayLike, params: CrfParams) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Compute both kernels of eq. (4), without their weights, between all cells.
 
     With c the row and column of a cell and o its occupancy, they are
 
@@ -31,12 +29,10 @@ def kernels(
         o_i, the occupancy probabilities of each cell.
     params : CrfParams
         The widths.
-    cells : slice or (n,) int
-        The cells i, counted row by row; all of them when left out.
 
     Returns
     -------
-    bilateral, spatial : (n, H W) float64
+    bilateral, spatial : (H W, H W) float64
         k1 and k2.
     """
     values = np.asarray(values, dtype=np.float64)
@@ -44,7 +40,7 @@ def kernels(
     occupancy = values.reshape(len(values), -1).T
     both = np.hstack([place / params.sigma_alpha, occupancy / params.sigma_beta])
     alone = place / params.sigma_gamma
-    bilateral, spatial = (np.exp(-cdist(features[cells], features, "sqeuclidean") / 2) for features in (both, alone))
+    bilateral, spatial = (np.exp(-cdist(features, features, "sqeuclidean") / 2) for features in (both, alone))
     return bilateral, spatial
 
 

@@ -1,12 +1,25 @@
 """A text cell's HTML as the instructor's browser gets it: nothing runs, nothing is fetched, and it takes no time."""
 
+import struct
 import time
+import zlib
+from base64 import b64encode
 
 import pytest
+from nbgrader.server_extensions.formgrader import handlers
 
+from semgrid_edu.workshop.course.nbgrader.build import course_api
 from semgrid_edu.workshop.course.nbgrader.cleaning import without_scripts
 
-PICTURE = "data:image/png;base64,iVBORw0KGgo="
+
+def png(side):
+    """Return the beginning of a square picture, in base64."""
+    header = b"IHDR" + struct.pack(">IIBBBBB", side, side, 1, 0, 0, 0, 0)
+    chunk = struct.pack(">I", 13) + header + struct.pack(">I", zlib.crc32(header))
+    return b64encode(b"\x89PNG\r\n\x1a\n" + chunk + struct.pack(">I", 0) + b"IDAT" + bytes(4)).decode()
+
+
+PICTURE, HUGE = f"data:image/png;base64,{png(8)}", png(50_000)
 
 
 @pytest.mark.parametrize(
@@ -20,6 +33,9 @@ PICTURE = "data:image/png;base64,iVBORw0KGgo="
         ('<a href="data:text/html,x">x</a>', "data"),
         ('<a href="java&#115;cript:alert(1)">x</a>', "script"),
         ('<a href="/formgrader/delete">x</a>', "formgrader"),
+        ('<a href="http:derivation.html">x</a>', "derivation"),
+        ('<a href="https:/derivation.html">x</a>', "derivation"),
+        (f'<img src="data:image/png;base64,{HUGE}">', "base64"),
         ('<p id="toc">x</p>', "toc"),
         ('<a name="toc">x</a>', "name"),
         ('<div class="modal navbar-fixed-top">x</div>', "modal"),
@@ -51,6 +67,11 @@ def test_what_could_act_in_a_browser_is_gone(html, gone):
 )
 def test_what_markdown_becomes_stays(html):
     assert without_scripts(html) == html
+
+
+def test_a_file_that_was_handed_in_runs_nothing_in_formgrader(course):
+    with course_api(course):
+        assert handlers.SubmissionFilesHandler.content_security_policy.startswith("sandbox; ")
 
 
 SLOW = {"div": "<div>", "p": "<p><b>", "li": "<ul><li>", "closed": "<div></x>", "open": "<a ", "less": "&lt;"}

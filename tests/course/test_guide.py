@@ -20,6 +20,7 @@ from semgrid_edu.workshop.course.notebooks.minutes import reading_time
 
 CLONE = NOTEBOOKS.parent
 GUIDE = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")
+NUMBER = r"\b\d\d[a-z]?\b"
 EXERCISES = {source.stem: source for source in exercise_sources()}
 
 
@@ -88,16 +89,23 @@ def check_points(name):
     assert set(written) < set(tasks(EXERCISES[name]))
 
 
+def number_of(name):
+    """The number of a lecture or an exercise, such as "01b"."""
+    return name.partition("_")[0]
+
+
 def test_the_hours_of_the_eight_weeks_are_right():
-    lectures = {s.stem[:2]: reading_time(nbformat.read(built_path(s), as_version=4)).minutes for s in lecture_sources()}
-    exercises = {name[:2]: minutes_of_exercise(source) for name, source in EXERCISES.items()}
+    lectures = {
+        number_of(s.stem): reading_time(nbformat.read(built_path(s), as_version=4)).minutes for s in lecture_sources()
+    }
+    exercises = {number_of(name): minutes_of_exercise(source) for name, source in EXERCISES.items()}
     weeks = re.findall(r"^\| \d \| ([^|]+) \| ([^|]+) \| ([^|]+) \|", GUIDE, re.MULTILINE)
     assert len(weeks) == 8
-    taught = [number for lecture, _, _ in weeks for number in re.findall(r"\d\d", lecture)]
+    taught = [number for lecture, _, _ in weeks for number in re.findall(NUMBER, lecture)]
     assert sorted(taught) == sorted(lectures)
     for lecture, exercise, hours in weeks:
-        counted = sum(lectures[n] for n in re.findall(r"\d\d", lecture))
-        counted += sum(exercises[n] for n in re.findall(r"\d\d", exercise))
+        counted = sum(lectures[n] for n in re.findall(NUMBER, lecture))
+        counted += sum(exercises[n] for n in re.findall(NUMBER, exercise))
         assert eval(hours.replace(" 1/2", ".5")) == pytest.approx(counted / 60, abs=0.75), lecture
 
 

@@ -1,5 +1,6 @@
 """Submissions as platforms, editors and students leave them: none is merged with another, none lost without a word."""
 
+import io
 import os
 import re
 import subprocess
@@ -18,6 +19,7 @@ from tiny_course import TINY
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.reading import read_json
+from semgrid_edu.workshop.course.nbgrader import gradebook
 from semgrid_edu.workshop.course.nbgrader import preprocessors as steps
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UnfitError, place, student_variant
 from semgrid_edu.workshop.course.nbgrader.build import MARKER, build_course, exercise_sources
@@ -101,6 +103,14 @@ UNFIT = {
 """Files that can't be graded, and say what the grader might."""
 
 
+def test_a_byte_order_mark_costs_nothing(course, right):
+    path = place(course, "submitted", "marked", TINY)
+    write_notebook(right, path)
+    path.write_text(path.read_text(encoding="utf-8"), encoding="utf-8-sig")
+    result = grade_one(course, TINY, "marked", GradeSettings(timeout=5))
+    assert (result.score, result.note) == (2, "")
+
+
 @pytest.mark.parametrize("kind", UNFIT)
 def test_no_note_quotes_what_a_student_wrote(course, right, kind):
     path = place(course, "submitted", re.sub(r"\W", "-", kind), TINY)
@@ -168,10 +178,19 @@ def test_each_student_of_a_platform_gets_a_folder(course):
     with zipfile.ZipFile(archive / "all of them.zip", "w") as file:
         for one in names:
             file.writestr(name.format(one), one)
+        for kind, hers in enumerate((name.format("nobody"), name.format("o'neill").replace("2027", "2028"))):
+            inner = io.BytesIO()
+            with zipfile.ZipFile(inner, "w") as nested:
+                nested.writestr(hers, "hers")
+            file.writestr(name.format("silva").replace("00_tiny.ipynb", f"{kind}.zip"), inner.getvalue())
+            file.writestr(name.format("silva").replace("00_tiny.ipynb", hers), "hers")
+            file.writestr(f"silva/deep/{hers}", "hers")
+        file.writestr(name.format("large"), bytes(gradebook.MAX_BYTES + 1), zipfile.ZIP_DEFLATED)
     option = "--FileNameCollectorPlugin.named_regexp=" + re.search(r"named_regexp='(.*)'", GUIDE)[1]
     command = [sys.executable, "-m", "nbgrader", "zip_collect", TINY, option]
     subprocess.run(command, cwd=course, check=True, capture_output=True)
     assert [place(course, "submitted", student, TINY).read_text() for student in students] == names
+    assert not {"nobody", "large"} & {folder.name for folder in (course / "submitted").iterdir()}
 
 
 def test_every_written_question_has_a_rubric():

@@ -1,5 +1,6 @@
 """The instructor's decorator: whatever a student's function does, one sentence comes back."""
 
+import ast
 import sys
 
 import numpy as np
@@ -96,6 +97,21 @@ def test_an_argument_that_changes_costs_the_points_where_it_must_not(instructor,
     with pytest.raises(AssertionError, match="it changes an argument"):
         check(change)
     check(len)
+
+
+def _calls(function):
+    return {node.id for node in ast.walk(function) if isinstance(node, ast.Name)}
+
+
+def test_hidden_inputs_are_drawn_for_each_student_or_the_guide_says_so():
+    guide = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")
+    for path in (NOTEBOOKS / "instructor" / "semgrid_instructor").glob("*.py"):
+        module = ast.parse(path.read_text(encoding="utf-8"))
+        calls = {one.name: _calls(one) for one in module.body if isinstance(one, ast.FunctionDef)}
+        for _ in calls:  # what a helper calls, its caller calls as well
+            calls = {name: found.union(*(calls[one] for one in found & calls.keys())) for name, found in calls.items()}
+        same = [name for name, found in calls.items() if name.startswith("check_") and "generator" not in found]
+        assert [name for name in same if f"`{name.removeprefix('check_')}`" not in guide] == [], path.name
 
 
 def test_hidden_tests_compare_by_the_helper_alone(tmp_path):

@@ -1,6 +1,10 @@
 """A submission that ends the grader's own process: it is marked, and everybody else is graded in a fresh pool."""
 
+import os
+import signal
 import tempfile
+import threading
+import time
 
 import pytest
 from submissions import reference_answers, submission
@@ -9,6 +13,7 @@ from tiny_course import TINY, tiny_notebooks
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place
 from semgrid_edu.workshop.course.nbgrader.build import build_course
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course
+from semgrid_edu.workshop.course.nbgrader.gradebook import has_begun, ungraded
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
 
 KILLS = "if twice(0) == 'kill': import os; os._exit(9)\n    "
@@ -51,6 +56,27 @@ def test_who_ends_the_grader_is_marked_and_nobody_else(course, hand_in, tmp_path
     assert {name for name, one in results.items() if one.note} == {"killer"}
     assert list((tmp_path / "temporary").glob("semgrid-*")) == []
     assert list(grade_course(course, GradeSettings(timeout=5))) == []
+
+
+def test_who_interrupts_the_main_process_alone_does_not_wait(course, hand_in):
+    endless = type("Endless", (), {"__repr__": lambda self: "__import__('time').sleep(1000)"})()
+    hand_in("endless", endless)
+    graded = grade_course(course, GradeSettings(timeout=200))
+    interrupt = threading.Thread(target=_interrupt_when, args=(lambda: has_begun(course, TINY, "endless"),))
+    interrupt.start()
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        list(graded)
+    assert time.monotonic() - began < 60
+    assert ungraded(course) == [(TINY, "endless")]
+
+
+def _interrupt_when(begun):
+    """Send Ctrl-C to this process, not to its children, soon after something has begun."""
+    while not begun():
+        time.sleep(0.1)
+    time.sleep(2)
+    os.kill(os.getpid(), signal.SIGINT)
 
 
 def test_memory_that_an_answer_takes_in_a_test_costs_its_points_alone(course, hand_in):

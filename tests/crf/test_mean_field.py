@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 from scipy.special import log_softmax, softmax
-from worlds.lecture_11_accurate import mean_field_accurate
 
 from semgrid_edu import crf, fast
 from semgrid_edu.crf import CrfParams, mean_field, mean_field_naive, unary_from_probability
@@ -16,7 +15,6 @@ EVERY = {
     "naive": mean_field_naive,
     "filters": mean_field,
     "fast": fast.mean_field,
-    "accurate": mean_field_accurate,
 }
 WAYS = pytest.mark.parametrize("infer", EVERY.values(), ids=EVERY)
 FILTERS = pytest.mark.parametrize("infer", [mean_field, fast.mean_field], ids=["book", "fast"])

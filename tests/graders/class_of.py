@@ -11,9 +11,9 @@ from semgrid_edu.workshop.course.sandbox.notebook import cell_name
 NAME = "01_bayes"
 SOURCE = NOTEBOOKS / "src" / "exercises" / f"{NAME}.py"
 REFERENCE = {name: code for name, code in reference_answers(SOURCE).items() if name != "parked"}
-"""Right answers to the six tasks of code, 15 points; the written one, 2 points, is left out."""
+"""Right answers to the five tasks of code, 13 points; the written one, 2 points, is left out."""
 
-POINTS = {"locate": 2, "predict": 3, "follow": 3, "transition": 3, "fuse": 2, "build-map": 2}
+POINTS = {"locate": 2, "predict": 3, "follow": 3, "transition": 3, "build-map": 2}
 SETTINGS = GradeSettings(timeout=5)
 
 

@@ -26,7 +26,7 @@ PATIENT = replace(SETTINGS, timeout=30)
 def with_entries(entries):
     """Return a notebook in which catalogued answers stand in place of the reference, and what it should earn."""
     answers = REFERENCE | {entry.task: entry.code(REFERENCE) for entry in entries}
-    return handed_in(answers), 15 - sum(entry.loses for entry in entries)
+    return handed_in(answers), 13 - sum(entry.loses for entry in entries)
 
 
 def students_of_each_kind():
@@ -37,12 +37,12 @@ def students_of_each_kind():
     entries, tasks = entries_of(NAME), list(POINTS)
     rights = {task: [e for e in entries if e.task == task and not e.loses] for task in tasks}
     wrongs = {task: [e for e in entries if e.task == task and e.loses and "timeout" not in e.says] for task in tasks}
-    found = {"right-0": (handed_in(), 15), "untouched-0": (handed_in({}), 0)}
+    found = {"right-0": (handed_in(), 13), "untouched-0": (handed_in({}), 0)}
     found["right-1"] = with_entries([ways[0] for ways in rights.values()])
     half = {task: code for task, code in REFERENCE.items() if task in tasks[::2]}
     found["half"] = handed_in(half), sum(POINTS[task] for task in half)
     found |= {f"wrong-{k}": with_entries([ways[k % len(ways)] for ways in wrongs.values()]) for k in range(2)}
-    found["unlucky-exit"] = handed_in(inside("predict", "exit()")), 12
+    found["unlucky-exit"] = handed_in(inside("predict", "exit()")), 10
     found["hostile-transformer"] = handed_in(sound.EASIER, sound.EASY + sound.ATTACKS["transformer"]), 0
     return found
 
@@ -88,11 +88,11 @@ def test_who_earns_little_gets_feedback(graded):
         with course_api(course) as api:
             assert api.generate_feedback(NAME, student)["success"]
         page = place(course, "feedback", student, NAME).with_suffix(".html").read_text()
-        assert f"{expected[student]:.1f} / 17.0" in page
+        assert f"{expected[student]:.1f} / 15.0" in page
 
 
 def test_what_is_graded_is_not_graded_again_unless_it_is_handed_in_again(graded):
     course, _, _ = graded
     assert list(grade_course(course, PATIENT)) == []
     write_notebook(handed_in(), place(course, "submitted", "untouched-0", NAME))
-    assert [(one.student, one.score) for one in grade_course(course, PATIENT)] == [("untouched-0", 15)]
+    assert [(one.student, one.score) for one in grade_course(course, PATIENT)] == [("untouched-0", 13)]

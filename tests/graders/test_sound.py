@@ -19,7 +19,7 @@ from semgrid_edu.workshop.course.sandbox.notebook import cell_name
 
 EASY = "\n".join(
     f"def {name}(*_, **__): return 0"
-    for name in ("locate", "predict", "follow", "transition", "half_life", "fuse", "build_map")
+    for name in ("locate", "predict", "follow", "transition", "half_life", "build_map")
 )
 
 ATTACKS = {
@@ -62,17 +62,17 @@ def steal(*_, **__):
         for name in ("expected", "right", "by_hand"):
             if name in frame.frame.f_locals: return frame.frame.f_locals[name]
     raise ValueError
-locate = predict = follow = transition = half_life = fuse = build_map = steal
+locate = predict = follow = transition = half_life = build_map = steal
 """,
     "subclass": """
 class Same(np.ndarray):
     def __array_function__(self, *a, **k): return True
     def __array_ufunc__(self, *a, **k): return True
     def __eq__(self, other): return True
-locate = predict = follow = transition = half_life = fuse = build_map = lambda *a, **k: np.zeros(4).view(Same)
+locate = predict = follow = transition = half_life = build_map = lambda *a, **k: np.zeros(4).view(Same)
 """,
     "ends-loops": """
-locate = predict = follow = transition = half_life = fuse = build_map = lambda *a, **k: next(iter(()))
+locate = predict = follow = transition = half_life = build_map = lambda *a, **k: next(iter(()))
 """,
     "more-names": """
 import __main__
@@ -103,7 +103,7 @@ class Silent(BaseException):
     def __str__(self): return ""
     __mro__ = ()
 def f(*a, **k): raise Silent
-locate = predict = follow = transition = half_life = fuse = build_map = f
+locate = predict = follow = transition = half_life = build_map = f
 """,
 }
 
@@ -112,14 +112,14 @@ EASIER = dict.fromkeys(REFERENCE, "pass")
 """Answer cells that leave to the first cell what they should define."""
 
 
-FUNCTIONS = ("locate", "predict", "follow", "transition", "fuse", "build_map")
+FUNCTIONS = ("locate", "predict", "follow", "transition", "build_map")
 """The first function of each task."""
 
 
 @pytest.mark.parametrize("first", range(0, len(tries.RETURNED), len(FUNCTIONS)))
 def test_what_is_no_answer_earns_nothing_in_any_task(start, first):
     kinds = [*tries.RETURNED.values()][first : first + len(FUNCTIONS)]
-    code = "\n".join(f"{attack}\n{name} = attack" for name, attack in zip(FUNCTIONS, kinds, strict=True))
+    code = "\n".join(f"{attack}\n{name} = attack" for name, attack in zip(FUNCTIONS, kinds, strict=False))
     assert scores(handed_in(EASIER, first=f"{EASY}\n{code}"), start) == {}
 
 
@@ -133,7 +133,7 @@ def test_what_stops_an_answer_costs_its_task_alone(start, first):
     lines = [*tries.STOPS.values()][first : first + 3]
     answers = [inside(name, line)[name] for name, line in zip(FUNCTIONS, lines, strict=False)]
     notebook = handed_in(REFERENCE | dict(zip(FUNCTIONS, answers, strict=False)))
-    assert scores(notebook, start) == {"transition-test": 2, "half-life-test": 1, "fuse-test": 2, "build-map-test": 2}
+    assert scores(notebook, start) == {"transition-test": 2, "half-life-test": 1, "build-map-test": 2}
 
 
 def scores(notebook, start):
@@ -203,7 +203,7 @@ def test_changed_tests_earn_nothing(forked, kind):
     for change in CHANGES[kind]:
         change(notebook)
     result = graded(forked, kind, notebook)
-    assert (result.score, result.points) == (0, 17)
+    assert (result.score, result.points) == (0, 15)
 
 
 def test_nobodys_grades_or_tests_can_be_changed(forked):
@@ -222,16 +222,16 @@ try:
     with sqlite3.connect({str(forked / "gradebook.db")!r}) as db: db.execute("update grade set auto_score = 0")
 except sqlite3.Error: pass
 """
-    assert graded(forked, "vandal", handed_in(first=code)).score == 15
+    assert graded(forked, "vandal", handed_in(first=code)).score == 13
     assert contents() == before
-    assert graded(forked, "victim-again", handed_in()).score == 15
+    assert graded(forked, "victim-again", handed_in()).score == 13
 
 
 def test_hidden_inputs_are_not_in_the_feedback(forked):
     """The secret: hidden tests of `locate` draw thirty cells, visible ones have four."""
     spy = "seen.append(len(belief)); print('cells:', len(belief)); assert len(belief) < 5, f'cells: {len(belief)}'"
     notebook = handed_in(inside("locate", spy), first="seen = []", last="print('cells:', max(seen))")
-    assert graded(forked, "spy", notebook).score == 13
+    assert graded(forked, "spy", notebook).score == 11
     with course_api(forked) as api:
         assert api.generate_feedback(NAME, "spy")["success"]
     page = place(forked, "feedback", "spy", NAME).with_suffix(".html").read_text()
@@ -249,7 +249,7 @@ TELLS = {
 @pytest.mark.parametrize("kind", TELLS)
 def test_an_error_does_not_tell_hidden_inputs(forked, kind):
     notebook = handed_in(inside("locate", TELLS[kind]), first="UNREADABLE = 'ascii', b'x', 0, 1, ''")
-    assert graded(forked, f"tells-{kind}", notebook).score == 13
+    assert graded(forked, f"tells-{kind}", notebook).score == 11
     graded_notebook = place(forked, "autograded", f"tells-{kind}", NAME).read_text()
     assert "cells: 30" not in graded_notebook
 
@@ -272,7 +272,7 @@ display({"image/svg+xml": "<svg onload=" + "'alert(3)'/>", "image/png": '"><scri
     notebook.metadata["language_info"] = {"name": "python", "pygments_lexer": "<script>alert(13)</script>"}
     notebook.metadata["title"] = "<script>alert(7)</script>"
     notebook.metadata["widgets"] = {"application/vnd.jupyter.widget-state+json": {"x": "<script>alert(8)</script>"}}
-    assert graded(forked, "scripts", notebook).score == 15
+    assert graded(forked, "scripts", notebook).score == 13
     with course_api(forked) as api:
         assert api.generate_feedback(NAME, "scripts")["success"]
     page = place(forked, "feedback", "scripts", NAME).with_suffix(".html").read_text()
@@ -290,7 +290,7 @@ def test_nothing_beside_a_notebook_runs(course, tmp_path):
     for name in names:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')")
-    assert graded(course, "beside", handed_in()).score == 15
+    assert graded(course, "beside", handed_in()).score == 13
     assert not (tmp_path / "ran").exists()
 
 
@@ -342,4 +342,4 @@ if any(pathlib.Path(folder, "left").exists() for folder in ("/tmp", "/dev/shm", 
 def test_nothing_is_left_for_the_next_student(course):
     graded(course, "leaves", handed_in(first=LEAVE))
     answers = {name: FIND + code for name, code in REFERENCE.items()}
-    assert graded(course, "finds", handed_in(answers)).score == 15
+    assert graded(course, "finds", handed_in(answers)).score == 13

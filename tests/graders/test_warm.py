@@ -38,8 +38,8 @@ assert not any(pathlib.Path(folder, "left").exists() for folder in (".", "..", t
 
 
 def test_nothing_of_one_student_reaches_the_next(start):
-    assert points(start, REFERENCE | {"locate": REFERENCE["locate"] + SPOILS + "\nSPOILED = 1"}) < 15
-    assert points(start, {name: FINDS + code for name, code in REFERENCE.items()}) == 15
+    assert points(start, REFERENCE | {"locate": REFERENCE["locate"] + SPOILS + "\nSPOILED = 1"}) < 13
+    assert points(start, {name: FINDS + code for name, code in REFERENCE.items()}) == 13
 
 
 def test_nbgrader_with_fresh_processes_gives_the_same_points_and_messages(start, new_course):
@@ -49,11 +49,11 @@ def test_nbgrader_with_fresh_processes_gives_the_same_points_and_messages(start,
     warm = grade_warm(SOURCE, answers, start, timeout=30)
     scores = autograde(new_course(NAME), NAME, {"ada": submission(SOURCE, answers)})["ada"]
     assert {name: scores[name] for name in warm} == warm
-    assert 0 < sum(cell.score or 0 for cell in warm.values()) < 15
+    assert 0 < sum(cell.score or 0 for cell in warm.values()) < 13
 
 
 @pytest.mark.skipif(not landlock_version(), reason="this system has no Landlock")
 def test_the_reference_cannot_be_read(start):
     reads = f"open({str(SOURCE)!r}).read()"
-    assert points(start, inside("predict", reads)) == 12
-    assert points(start, inside("predict", "from semgrid_instructor import bayes")) == 12
+    assert points(start, inside("predict", reads)) == 10
+    assert points(start, inside("predict", "from semgrid_instructor import bayes")) == 10

@@ -14,6 +14,7 @@ from worlds.lecture_03_bof import (
     bof_beliefs,
     bof_stage,
     expected_things,
+    stands_or_drives,
 )  # fmt: skip
 from worlds.lecture_03_row import (
     NO_CHANGE,
@@ -106,6 +107,14 @@ def test_a_thing_that_stands_or_drives_is_believed_in_both_places():
     np.testing.assert_allclose(expected_things(exact), 1, atol=1e-12)
     assert expected_things(bof)[0] == pytest.approx(0.3 + 0.8 / 0.85, abs=1e-12)
     assert expected_things(bof)[0] == pytest.approx(1.24, abs=5e-3)
+
+
+def test_the_small_graph_is_the_row_after_its_first_scan():
+    graph = stands_or_drives()
+    exact = exact_beliefs(STANDING_OR_DRIVING)[0]
+    for cell in (1, 2):
+        posterior = eliminate(graph.model, f"m{cell},1", {"z1,1": 0, "z2,1": 1}).normalised().table
+        assert posterior[0] == pytest.approx(exact[cell - 1, Cell.FREE], abs=1e-12)
 
 
 def test_before_the_scan_only_the_joint_distribution_tells_the_two_worlds_apart():

@@ -1,14 +1,12 @@
 """Bayes on a line: filterpy, lecture 01 and brute force are the messages on the chain."""
 
-import itertools
-
 import numpy as np
 import pytest
 from filterpy import discrete_bayes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyagrum_oracle import assert_oracle_agrees
-from worlds.lecture_01_line import bayes_on_a_line, filtered, most_likely_path, smoothed
+from worlds.lecture_01_line import bayes_on_a_line, filtered, smoothed
 
 from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, sum_product, why_dependent
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
@@ -88,31 +86,15 @@ def test_a_backward_message_is_the_likelihood_of_later_readings():
     np.testing.assert_allclose(backward, later / later.sum(), atol=1e-12)
 
 
-@pytest.mark.parametrize("readings", list(itertools.product((0, 1), repeat=3)))
-def test_the_most_likely_path_is_the_best_of_all(readings):
-    stage = bayes_on_a_line(3, n_cells=5, poles=(1, 2))
-    known = dict(zip(stage.observed, readings, strict=True))
-    weights = {
-        path: stage.model.weight({f"n{t}": n for t, n in enumerate(path)} | known)
-        for path in itertools.product(range(5), repeat=3)
-    }
-    assert weights[tuple(most_likely_path(stage, readings))] == pytest.approx(max(weights.values()))
-
-
-def test_the_best_path_is_not_the_path_of_best_places():
-    """Nothing, pole, nothing, pole: the best places one by one are 6, 7, 1, 2, and nobody gets from 7 to 1."""
-    stage, readings = bayes_on_a_line(4), [0, 1, 0, 1]
-    known = dict(zip(stage.observed, readings, strict=True))
-    one_by_one = smoothed(stage, readings).argmax(axis=1).tolist()
-    path = most_likely_path(stage, readings)
-    weights = [stage.model.weight({f"n{t}": n for t, n in enumerate(places)} | known) for places in (one_by_one, path)]
-    assert weights[0] == 0 < weights[1]
-
-
 def test_the_present_place_screens_the_past_off():
     model = bayes_on_a_line(4).model
     assert d_separated(model, ("n0", "z0"), ("n2", "z3"), given="n1")
     assert why_dependent(model, "z0", "z2", given="z1") == ("z0", "n0", "n1", "n2", "z2")
+
+
+def test_no_edge_is_cut():
+    """A later reading is no deleted edge: the filter answers another question."""
+    assert (bayes_on_a_line().cut, bayes_on_a_line().dashed) == ((), [])
 
 
 def test_pyagrum_agrees():

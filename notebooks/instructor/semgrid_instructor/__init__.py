@@ -7,7 +7,7 @@ answers out of them. For the same reason the answer works in a process of which 
 
 import copy
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,12 @@ def choose_variant(*number: int) -> None:
 def generator(seed: int) -> np.random.Generator:
     """Return the generator from which a hidden test draws its inputs, by the variant that was chosen last."""
     return np.random.default_rng([seed, *_variant])
+
+
+def in_any_order(cases: Iterable) -> list:
+    """Return cases in an order that is never the same, so that no answer knows which one it is asked."""
+    cases = list(cases)
+    return [cases[k] for k in np.random.default_rng().permutation(len(cases))]
 
 
 def close(got: ArrayLike, wanted: ArrayLike, rtol: float = 1e-5, atol: float = 1e-6, equal_nan: bool = False) -> bool:

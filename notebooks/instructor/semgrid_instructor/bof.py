@@ -11,23 +11,6 @@ from semgrid_instructor import close, generator, hidden, keeping
 
 
 @hidden
-def check_antecedent(antecedent: Callable) -> None:
-    """Ways of whole cells in every direction, most of them a last digit off in floating point."""
-    rng = generator(1)
-    for cell, dt in ((0.1, 0.3), (0.2, 0.1), (0.5, 0.7)):
-        for row, col in ((0, 0), (1, 3), (100, 100)):  # near 0 a sum keeps the last digits, and indices get negative
-            for way in rng.integers(-6, 7, size=(20, 2)):
-                velocity = tuple((way * cell / dt).tolist())
-                got = answer_array(antecedent(row, col, velocity, dt, cell))
-                assert got.shape == (2,), "return two numbers, row and column"
-                off = np.abs(got - np.add([row, col], way)).max()
-                assert off < 0.5 or off >= 1.5, (
-                    "one cell off: a way of 2.9999999 cells is one of 3, so round it, don't cut it"
-                )
-                assert off == 0, "wrong cell (velocities may be negative or zero, and so may indices)"
-
-
-@hidden
 @keeping
 def check_shift(shift: Callable) -> None:
     """Every direction, no way at all, and ways that leave the map."""
@@ -178,18 +161,3 @@ def check_follow(follow: Callable) -> None:
             weight *= np.where(here, occupied[t, place], free[t, place])
         left = "wrong where a thing leaves the line" if start == 0 else "wrong values"
         assert close(got, weight / weight.sum()), left
-
-
-@hidden
-@keeping
-def check_collect(collect: Callable) -> None:
-    """Random beliefs on another lattice; in one cell more than 1 arrives."""
-    rng = generator(7)
-    belief = rng.dirichlet(np.ones(7), size=(3, 4)).transpose(2, 0, 1)  # five velocities, FREE, UNKNOWN
-    flown, unknown = belief[:5].copy(), belief[6].copy()
-    flown[1:, 1, 1] = [0.5, 0.4, 0.3, 0.2]
-    own, arrives = answer_arrays(collect(flown.copy(), unknown.copy()), 2)
-    assert (own.shape, arrives.shape) == ((4, 3, 4), (3, 4)), "wrong shapes (there need not be three velocities)"
-    assert close(arrives, np.minimum(flown[1:].sum(axis=0), 0.999)), "wrong probability of arrivals"
-    wanted = [1 - flown[0] - unknown, flown[0], np.zeros((3, 4)), unknown]
-    assert close(own, np.array(wanted)), "wrong states"

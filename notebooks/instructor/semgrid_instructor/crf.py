@@ -146,7 +146,9 @@ def check_update_limits(update: Callable) -> None:
         assert np.isfinite(got).all(), "a result isn't finite when prices are thousands"
     small = np.where(np.isinf(phi), np.inf, np.arange(18).reshape(3, 6) / 6)
     got, wanted = (answer_array(update(Q.copy(), small + more, k.copy(), _potts(3))) for more in (3000, 0))
-    assert not close(other, wanted), "the same, whatever classes cost and other cells say"
+    assert not close(other, wanted), "the same, whatever classes cost"
+    alone = answer_array(update(Q.copy(), small, 0 * k, _potts(3)))
+    assert not close(alone, wanted), "the same, whatever other cells say"
     assert close(got, wanted, atol=2e-3), "not the same when all prices are 3000 higher"
 
 
@@ -172,10 +174,14 @@ def check_free_energy_limits(free_energy: Callable) -> None:
         k = np.array([[3, 0.5], [0.5, 3]])
         return answer_number(free_energy(np.array(Q, float), np.array(phi, float), k, _potts(2)))
 
-    phi, eps = [[0.3, np.inf], [0.7, 0.4]], 1e-12
-    near = F([[1 - eps, eps], [eps, 1 - eps]], [[0.3, 9], [0.7, 0.4]])
+    a, b, c = generator(114).uniform(0.2, 0.9, 3)
+    phi, eps = [[a, np.inf], [b, c]], 1e-12
+    near = F([[1 - eps, eps], [eps, 1 - eps]], [[a, 9], [b, c]])
     assert close(F([[1, 0], [0, 1]], phi), near), "certain cells have no entropy, only their energy"
     assert np.isinf(F([[0.5, 0.5], [0.5, 0.5]], phi)), "an impossible class with a probability costs infinitely much"
+    assert not close(F([[0.5, 0.5], [0.5, 0.5]], np.zeros((2, 2))), F([[1, 1], [0, 0]], np.zeros((2, 2)))), (
+        "unsure cells and sure ones have the same free energy where all prices are 0"
+    )
     tiny = [[eps, 0], [1 - eps, 1]]
     rise = F(tiny, [[1e12, 0], [0, 0]]) - F(tiny, [[0, 0], [0, 0]])
     assert abs(rise) > 0.1, "a tiny probability isn't 0: times a large price it counts"

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from semgrid_edu.crf import enclosing_simplices
-from semgrid_edu.workshop.course.answers import answer_array, answer_number, peak_megabytes
-from semgrid_instructor import close, generator, hidden, keeping
+from semgrid_edu.workshop.course.answers import answer_array, peak_megabytes
+from semgrid_instructor import close, generator, hidden
 
 
 @hidden
@@ -28,44 +28,6 @@ def check_blur_known(blur_known: Callable) -> None:
     known = generator(114).random((60, 50)) < 0.5
     _, megabytes = peak_megabytes(blur_known, np.where(known, 1.0, np.nan), known, 3.0)
     assert megabytes < 20, "a map of 60 x 50 cells took far more memory than passes along rows and columns need"
-
-
-def _vertices(d: int, n: int, seed: int) -> NDArray:
-    """Return the corners of the simplices of a cloud of n points in d dimensions, (V, d + 1), shuffled."""
-    rng = generator(seed)
-    points = rng.normal(0, 4, (n, d + 1))
-    corners, _ = enclosing_simplices(points - points.mean(axis=1, keepdims=True))
-    return rng.permutation(np.unique(corners.reshape(-1, d + 1), axis=0))
-
-
-@hidden
-@keeping
-def check_missing_share(missing_share: Callable) -> None:
-    """Clouds in one to five dimensions, and a single vertex: every neighbour sought by itself."""
-    for d, n in ((1, 3), (2, 12), (3, 20), (5, 15)):
-        vertices = _vertices(d, n, 115 + d)
-        there, missing = set(map(tuple, vertices.tolist())), 0
-        for vertex in there:
-            for j in range(d + 1):
-                for sign in (1, -1):
-                    neighbour = tuple(c + sign * (1 - (d + 1) * (i == j)) for i, c in enumerate(vertex))
-                    missing += neighbour not in there
-        got = answer_number(missing_share(vertices.copy()))
-        wanted = missing / (2 * (d + 1) * len(vertices))
-        assert close(got, wanted), "a wrong share, in another number of dimensions"
-    assert close(answer_number(missing_share(np.array([[3, 0, -3]]))), 1.0), "a single vertex lacks all its neighbours"
-
-
-@hidden
-def check_missing_memory(missing_share: Callable) -> None:
-    """Thousands of vertices of a cloud: memory must grow with their number, not with its square."""
-    vertices = _vertices(5, 1200, 121)
-    share, megabytes = peak_megabytes(missing_share, vertices)
-    there = set(map(tuple, vertices.tolist()))
-    ahead = (vertices[:, None] + 1 - 6 * np.eye(6, dtype=int)).reshape(-1, 6)
-    found = 2 * sum(tuple(vertex) in there for vertex in ahead.tolist())
-    assert close(answer_number(share), 1 - found / (12 * len(vertices))), "wrong share for a large cloud"
-    assert megabytes < 40, "thousands of vertices took more memory than a set of them needs"
 
 
 def _blurred(vertices: dict[tuple[int, ...], NDArray], direction: int) -> dict[tuple[int, ...], NDArray]:
@@ -119,7 +81,7 @@ def check_others_say(others_say: Callable) -> None:
 
         def blur(values: NDArray, kernel: NDArray = kernel, left: list[int] = left) -> NDArray:
             values = np.asarray(values, float)
-            left[0] -= values.shape[1] if values.ndim == 2 else 1
+            left[0] -= values.size // len(kernel)
             assert left[0] >= 0, "blur got more columns than it may get"
             return kernel @ values
 

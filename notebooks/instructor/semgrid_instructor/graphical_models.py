@@ -2,10 +2,9 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from itertools import combinations, pairwise, permutations
+from itertools import combinations, permutations
 
 import numpy as np
-from scipy.special import logsumexp
 
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, enumerate_marginals
 from semgrid_edu.graphical import eliminate as eliminate_exactly
@@ -229,91 +228,3 @@ def check_cost(eliminate: Callable) -> None:
             "wrong size of the largest table, for variables of two to four states: count the entries of the tables "
             "from which a variable is taken out, not of what is left"
         )
-
-
-def _chain(seed: int, length: int, n_states: int) -> tuple:
-    """Return start, M and likelihoods of a random chain."""
-    rng = generator(seed)
-    likelihoods = rng.uniform(0.02, 0.9, size=(length, n_states))
-    likelihoods[length // 2] = 0
-    likelihoods[length // 2, 1] = 0.5
-    return rng.dirichlet(np.ones(n_states)), rng.dirichlet(np.ones(n_states), size=n_states), likelihoods
-
-
-def _exact(start: np.ndarray, M: np.ndarray, likelihoods: np.ndarray, t: int) -> np.ndarray:
-    """Return P(state at t | all these scans) by elimination."""
-    names = [f"x{k}" for k in range(len(likelihoods))]
-    pairs = [Factor(pair, M) for pair in pairwise(names)]
-    scans = [Factor(name, row) for name, row in zip(names, likelihoods, strict=True)]
-    model = GraphicalModel([Factor(names[0], start), *pairs, *scans])
-    return eliminate_exactly(model, names[t]).normalised().table
-
-
-LONG = 400
-"""Scans: so many that products underflow, and so few that a recursion over them is allowed."""
-
-
-def _long_chain(seed: int) -> tuple:
-    """Return a chain whose scans are all improbable: the product of their likelihoods is about 10^-600."""
-    start, M, likelihoods = _chain(seed, LONG, 3)
-    return start, M, likelihoods / 20
-
-
-def _in_logarithms(start: np.ndarray, M: np.ndarray, likelihoods: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return what is filtered and the messages from later scans, (T, S) each, from sums of logarithms: no underflow."""
-    with np.errstate(divide="ignore"):
-        seen, forward, backward = np.log(likelihoods), [np.log(start)], [np.zeros(len(start))]
-    for row in seen[:-1]:
-        forward.append(np.logaddexp.reduce((forward[-1] + row)[:, None] + np.log(M), axis=0))
-    for row in seen[:0:-1]:
-        backward.append(np.logaddexp.reduce(np.log(M) + row + backward[-1], axis=1))
-    beliefs = np.array(forward) + seen, np.array(backward[::-1])
-    return tuple(np.exp(rows - logsumexp(rows, axis=1, keepdims=True)) for rows in beliefs)
-
-
-def _check_long(got: np.ndarray, expected: np.ndarray) -> None:
-    """Compare every row of a long chain."""
-    assert got.shape == expected.shape, "another shape"
-    assert np.isfinite(got).all(), "NaN after hundreds of scans: normalise the message on the way"
-    assert close(got, expected), "wrong after hundreds of scans: normalise the message on the way"
-
-
-@hidden
-def check_filtered(filtered: Callable) -> None:
-    """Four states, one scan only, and hundreds of scans."""
-    for length, n_states in ((1, 3), (6, 4)):
-        chain = _chain(26, length, n_states)
-        got = answer_array(filtered(*(array.copy() for array in chain)))
-        assert got.shape == (length, n_states), "another shape"
-        for t in range(length):
-            expected = _exact(chain[0], chain[1], chain[2][: t + 1], t)
-            assert close(got[t], expected), "wrong with another number of states"
-    chain = _long_chain(27)
-    got = answer_array(filtered(*(array.copy() for array in chain)))
-    _check_long(got, _in_logarithms(*chain)[0])
-
-
-def _smoothed_by(forward: np.ndarray, later: np.ndarray) -> np.ndarray:
-    """Return what a filter and the messages from later scans, (T, S) each, say together."""
-    product = forward * later
-    return product / product.sum(axis=1, keepdims=True)
-
-
-def _follows(got: np.ndarray, forward: np.ndarray, later: np.ndarray) -> bool:
-    """Return whether rows are right for a student's own filter, wherever that is a number: at the start at least."""
-    usable = np.isfinite(forward).all(axis=1)
-    return usable[:50].all() and close(got[usable], _smoothed_by(forward, later)[usable])
-
-
-@hidden
-def check_smoothed(smoothed: Callable, filtered: Callable) -> None:
-    """Four states, one scan only, and hundreds of scans; a fault of `filtered` costs nothing here."""
-    for chain in (_chain(28, 1, 3), _chain(28, 6, 4), _long_chain(29)):
-        got = answer_array(smoothed(*(array.copy() for array in chain)))
-        forward, later = _in_logarithms(*chain)
-        assert got.shape == forward.shape, "another shape"
-        if not close(got, _smoothed_by(forward, later)):
-            yours = answer_array(filtered(*(array.copy() for array in chain)))
-            fault = "wrong" if np.isfinite(got).all() else "NaN"
-            advice = " after hundreds of scans: normalise the message on the way" if len(got) == LONG else ""
-            assert _follows(got, yours, later), fault + (advice or " with few scans")

@@ -112,6 +112,7 @@ def check_clamp(update: Callable) -> None:
     assert got.size > 0, "no cells came back"
     assert got.max() <= 2.7 + 1e-6, "some cells are above L_max"
     assert got.min() >= -1.2 - 1e-6, "some cells are below L_min"
+    assert not close(got, sums), "no cell gets as far as its limit, old beliefs and scan together"
     assert close(got, np.clip(sums, -1.2, 2.7)), "cells within the limits are wrong"
 
 
@@ -136,13 +137,13 @@ def check_fuse_many(fuse: Callable) -> None:
     rng = generator(29)
     for_it, last = rng.uniform(0.6, 0.95, size=(1500, 2, 3)), rng.uniform(0.1, 0.9, size=(1, 2, 3))
     for posteriors in (np.concatenate([for_it, 1 - for_it]), np.concatenate([1 - for_it, for_it])):
-        got = answer_array(fuse(0.5, np.concatenate([posteriors, last])))
+        got = answer_array(fuse(0.5, np.roll(np.concatenate([posteriors, last]), rng.integers(1500), axis=0)))
         assert np.isfinite(got).all(), (
             "NaN after thousands of scans: a long product ends at 0 or infinity; add logarithms"
         )
         alone = answer_array(fuse(0.5, last.copy()))
         opposite = answer_array(fuse(0.5, 1 - last))
-        assert not close(alone, opposite), "it doesn't matter what the last scan says"
+        assert not close(alone, opposite), "it doesn't matter what one scan says"
         stuck = "thousands of scans that cancel leave a trace: no belief comes back from exactly 0 or 1; add logarithms"
         assert close(got, alone), stuck
 
@@ -159,6 +160,10 @@ def check_highest_clamp(highest_clamp: Callable) -> None:
         assert 0 < got < 1, "that is no probability to clamp at"
         wrong = "wrong clamp (a tail may be so short that no pass is survived)"
         assert abs(got - expit((survived + 1) * np.log(free / occupied))) < 2e-4, wrong
+        if survived:  # numbers that a computer holds exactly
+            got = answer_number(highest_clamp(survived * 2.0, 8.0, 0.25, occupied, free))
+            longest = "wrong clamp where the tail may be exactly a number of passes long: it may be at most that long"
+            assert abs(got - expit((survived + 1) * np.log(free / occupied))) < 2e-4, longest
 
 
 @hidden
@@ -232,5 +237,8 @@ def check_beam(beam_evidence: Callable) -> None:
 def check_beam_outside(beam_evidence: Callable) -> None:
     """Try returns beyond each border of the grid, far and near: int() cuts -0.6 to 0, a row of the grid."""
     spec = GridSpec(x_min=-10.1, x_max=14.9, y_min=-6.1, y_max=9.9, cell=0.5)
-    for x, y in ((20.3, 1.7), (16.1, -9.3), (-12.4, 3.3), (4.2, 12.9), (3.1, -7.7), (15.2, 1.7), (4.2, 10.2)):
+    ahead, behind = (answer_array(beam_evidence(x, 1.7, spec, 1.5, -0.4)) for x in (20.3, -12.4))
+    assert not close(ahead, behind), "the same cells, wherever the beam goes"
+    ways = ((20.3, 1.7), (16.1, -9.3), (-12.4, 3.3), (4.2, 12.9), (3.1, -7.7), (15.2, 1.7), (4.2, 10.2))
+    for x, y in ways + generator(28).uniform(-0.15, 0.15, (7, 2)):
         _judge_beam_beyond(beam_evidence, spec, x, y)

@@ -158,16 +158,23 @@ def check_stride(atrous: Callable) -> None:
         full, got = (answer_array(atrous(maps.copy(), kernels.copy(), np.zeros(1), s, rate)) for s in (1, stride))
         wanted = full[..., ::stride, ::stride]
         assert full.size == 1 or np.ptp(full) > 0, "all outputs are the same"
+        other = answer_array(atrous(maps.copy(), -kernels, np.zeros(1), 1, rate))
+        assert not close(full, other), "the same outputs by other kernels"
         assert got.shape == wanted.shape, "wrong shape with another stride"
         assert close(got, wanted), "not the outputs of stride 1 at every step of the stride"
+
+
+def _of_test_size(image: NDArray) -> NDArray:
+    """Return an image that an answer shows to a box, unless it would keep the box busy."""
+    assert np.size(image) < 10_000, "a box takes images of at most 100 x 100 pixels"
+    return np.asarray(image, float)
 
 
 def _pooling(kind: int, depth: int, weight: float) -> Callable:
     """Return a box of maxima: 0 indices, 1 skips."""
 
     def box(image: NDArray) -> NDArray:
-        image = np.asarray(image, float)
-        pooled, levels = image, []
+        pooled, levels = _of_test_size(image), []
         for _ in range(depth):
             levels.append((pooled, _pool(pooled[None], 2, 2)[1][0]))
             pooled = _pool(pooled[None], 2, 2)[0][0]
@@ -187,7 +194,7 @@ def _convolving(kind: int, depth: int, kernels: NDArray) -> Callable:
     """Return a box of sums: 2 strided, 3 atrous."""
 
     def box(image: NDArray) -> NDArray:
-        result = np.asarray(image, float)
+        result = _of_test_size(image)
         for level in range(depth):
             rate = 1 if kind == 2 else 2**level
             spread = np.zeros((2 * rate + 1, 2 * rate + 1))

@@ -10,7 +10,8 @@
 # - compute by hand how fast a wrong belief grows under this assumption;
 # - say how `occupancy/walls.py` mends it, who pays, and what is left.
 #
-# **Prerequisites.** Lecture [04](../04_cmcdot.ipynb); factors and elimination, as in lecture 01b.
+# **Prerequisites.** Lecture [04](../04_cmcdot.ipynb); factors and elimination, lecture
+# [01b](../01b_graphical_models.ipynb).
 #
 # **Time.** 48 minutes, of which the computer needs less than one.
 

@@ -10,12 +10,12 @@
 # - say which question is answered by a filter, a smoother and Viterbi's path;
 # - name the two moments at which BOF projects its belief, and measure which of them costs more;
 # - write a particle filter, say why it needs resampling, and reduce its variance by computing what can be computed;
-# - say what data association is, and why a grid has none.
+# - say why a grid needs no data association, and can't count.
 #
 # **Prerequisites.** Lectures [01](../01_bayes.ipynb) and [03](../03_bof.ipynb); factors and d-separation, as in
-# [graphical models](graphical_models.ipynb). Lecture [04](../04_cmcdot.ipynb) comes after this page.
+# [graphical models](../01b_graphical_models.ipynb). Lecture [04](../04_cmcdot.ipynb) comes after this page.
 #
-# **Time.** 45 minutes, of which the computer needs a few seconds.
+# **Time.** 61 minutes, of which the computer needs a few seconds.
 
 # %% jupyter={"source_hidden": true}
 import sys
@@ -92,8 +92,8 @@ np.testing.assert_allclose(exact, [[0, 0.5], [0.5, 0]], atol=1e-12)
 # Draw the cells of one step, the cells of the next, and an arrow from each cell to those where its contents may be one
 # step later. This two-slice graph is repeated over time. Such a model is a **dynamic Bayesian network**:
 
-# %% jupyter={"source_hidden": true} alt="two rows of four cells, before and now, with arrows from each cell to itself and its neighbours one step later, a scan below each cell, and above each cell a node that says at most one thing; dashed lines mark the edges that BOF cuts"
-stage = bof_stage()
+# %% jupyter={"source_hidden": true} alt="two rows of four cells, before and now, with arrows from each cell to itself and its neighbours one step later, a scan below each cell, and above each cell a node that says at most one thing"
+stage = replace(bof_stage(), cut=())
 stage.draw(plt.subplots(figsize=(7.6, 4.4), layout="constrained")[1])
 plt.show()
 
@@ -123,7 +123,7 @@ print("given the slice before:   ", d_separated(stage.model, "m1,1", "m2,1", giv
 #
 # ## Three questions about the same chain
 #
-# Before we approximate, let us be clear about what is asked. A cell is FREE or OCCUPIED. By lecture 01, the *filter*
+# Before we approximate, let us be clear about what is asked. A cell is FREE or OCCUPIED. The *filter* (lecture 01)
 # answers "what is it now?", with the scans up to now. The *smoother* answers "what was it then?", with all scans. And
 # *Viterbi's path* answers "what is the most probable story?". On any chain, all three are messages on one graph:
 
@@ -192,8 +192,34 @@ for a, b in rng.uniform(0.05, 0.95, size=(200, 2)):  # no other product is neare
     assert np.sum(exact[kept] * np.log(exact[kept] / other[kept])) >= mutual
 
 # %% [markdown]
-# A step consists of prediction and update. So there are two moments at which one may project. `whole_step` predicts and
-# updates jointly, then projects. `twice` projects after the prediction already, and updates each cell by itself.
+# A step consists of prediction and update. So there are two moments at which one may project, before the scan or after
+# it. `whole_step` predicts and updates jointly, then projects. `twice` projects after the prediction already, so that the
+# scan must update each cell by itself.
+
+# %% jupyter={"source_hidden": true} alt="three rows of boxes: exact, predict then update, always a joint table; whole step, predict, update, then project after the scan; twice, predict, project before the scan, then update cell by cell; solid arrows carry a joint table, dashed arrows one table per cell"
+FILTERS = {
+    "exact": (("predict", 1), None, ("update", 3), None),
+    "whole step": (("predict", 1), None, ("update", 3), ("project", 4)),
+    "twice": (("predict", 1), ("project", 2), ("update\ncell by cell", 3), None),
+}
+fig, ax = plt.subplots(figsize=(8, 2.9), layout="constrained")
+for y, (name, boxes) in zip((2, 1, 0), FILTERS.items(), strict=True):
+    ax.text(-0.1, y, name, ha="right", va="center", fontsize=10)
+    x, joint = 0.0, name == "exact"
+    for text, at in [box for box in boxes if box] + [("", 5)]:
+        style = {"ls": "-", "color": "black", "lw": 1.5} if joint else {"ls": "--", "color": "#d55e00", "lw": 1.5}
+        ax.annotate("", (at - 0.36 * bool(text), y), (x, y), arrowprops={"arrowstyle": "->", **style})
+        colour = "#f4c9a8" if text == "project" else "0.92"
+        ax.text(at, y, text, ha="center", va="center", fontsize=9, bbox={"fc": colour, "pad": 5} if text else None)
+        x, joint = at + 0.36, joint if text.startswith("update") else text == "predict" or name == "exact"
+ax.plot([2.5, 2.5], [-0.4, 2.4], ":", color="0.6")
+ax.text(2.5, 2.5, "the scan arrives", ha="center", fontsize=9)
+for style, label in (("-", "a joint table"), ("--", "one table per cell")):
+    ax.plot([], [], style, color="black" if style == "-" else "#d55e00", label=label)
+ax.legend(loc="lower center", bbox_to_anchor=(0.5, -0.2), ncols=2, frameon=False, fontsize=9)
+ax.set(xlim=(-1.1, 5.1), ylim=(-0.5, 2.7))
+ax.set_axis_off()
+plt.show()
 
 
 # %% tags=["assumed-density"]
@@ -236,7 +262,7 @@ def assumed_density(world, step):
 # <details><summary>Answer</summary>
 #
 # The projection after the whole step: the scan of cell 2 says that the thing has left cell 1, and it can say so only as
-# long as the two cells are coupled. `twice` has cut this coupling just before the scan arrives. BOF stores a grid after
+# long as the two cells are coupled. `twice` has forgotten this coupling just before the scan arrives. BOF stores a grid after
 # the prediction and updates cell by cell, so it is `twice`. The table has one more surprise.
 #
 # </details>
@@ -487,26 +513,6 @@ fig.colorbar(axes[0].images[0], ax=axes, label="probability")
 plt.show()
 
 # %% [markdown]
-# ## Whose return is it? Data association
-#
-# Trackers that keep a list of things meet a problem that grids don't have. A scan has several returns, and nobody says
-# which thing each came from. To decide that is **data association**. Two things are expected at 0 and 2 m, and returns
-# come from 0.9 and 1.4 m, with a standard deviation of 1 m. Straight: the errors are 0.9 and -0.6. Crossed: 1.4 and
-# -1.1. By the Gaussian, the odds are $\exp\left((1.4^2 + 1.1^2 - 0.9^2 - 0.6^2)/2\right) = e$ to 1, so straight has 0.73.
-# A tracker that takes the nearest return claims 1. With $k$ things and $k$ returns there are $k!$ assignments, and they
-# couple all things with each other: this is one more joint distribution that nobody can store. Methods differ in what
-# they keep: the best assignment (nearest neighbour), the marginals (joint probabilistic data association, which is
-# assumed-density filtering again), a few good assignments (multi-hypothesis tracking), or a sample of them.
-#
-# A grid names no things, so it has nothing to associate: it asks *whether* something arrived in a cell, not which thing.
-# The price is that a grid can't count: above, it held 1.24 things where there is one.
-
-# %% jupyter={"source_hidden": true}
-straight, crossed = (np.exp(-0.5 * np.sum(np.square(gap))) for gap in ((0.9, 0.6), (1.4, 1.1)))
-np.testing.assert_allclose(straight / crossed, np.e)
-assert round(straight / (straight + crossed), 2) == 0.73
-
-# %% [markdown]
 # ## Which filter is which
 #
 # | filter | what it keeps | its error |
@@ -515,6 +521,11 @@ assert round(straight / (straight + crossed), 2) == 0.73
 # | BOF | a product over cells (assumed density) | stays, however long you compute |
 # | particle filter | a sample | random, falls like $N^{-1/2}$ |
 # | CMCDOT | a sample of what moves, a product over cells for the rest | both |
+#
+# Trackers that keep a list of things have one more joint belief: which return came from which thing. To decide that is
+# **data association**. With $k$ things and $k$ returns there are $k!$ answers, and trackers differ in what they keep of
+# them: the best one, the marginals, or a few. A grid names no things. It asks *whether* something arrived in a cell, so
+# it has nothing to associate. But it can't count, either: above, it held 1.24 things where there is one.
 #
 # ## Where this breaks
 #

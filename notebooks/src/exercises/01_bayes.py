@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Exercise 01: Bayes' rule on a line
 #
-# Seven small functions: one reading on a map, a move on ice, a filter that waits before it answers, a matrix from what was counted, a rule about witnesses,
-# and a map put together from them. Then one question to answer in words. About 75 minutes. The lecture is [01: Bayes' rule on a line](../01_bayes.ipynb).
+# Six small functions: one reading on a map, a move on ice, a filter that waits before it answers, a matrix from what was counted and its half-life,
+# and a map put together from them. Then one question to answer in words. About 90 minutes. The lecture is [01: Bayes' rule on a line](../01_bayes.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
@@ -10,9 +10,8 @@
 # | 2 | predict: a move where the road is slippery, on a ring and before a wall | 2 + 1 |
 # | 3 | a filter, and a smoother that waits for a few scans | 1 + 2 |
 # | 4 | a transition matrix from counts, for any time step; its half-life | 2 + 1 |
-# | 5 | each witness once | 2 |
-# | 6 | put together: a map from scans at any times | 2 |
-# | 7 | in your own words | 2 |
+# | 5 | put together: a map from scans at any times | 2 |
+# | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -56,7 +55,7 @@ def locate(belief, says_pole, poles, hit, false_alarm):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "locate-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "locate-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     belief = np.array([0.4, 0.3, 0.2, 0.1])
     before = belief.copy()
@@ -82,7 +81,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "locate-nothing-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "locate-nothing-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     belief, poles = np.array([0.4, 0.3, 0.2, 0.1]), [1, 3]
     got = answer_array(locate(belief.copy(), False, poles, hit=0.8, false_alarm=0.1), "locate")
@@ -132,7 +131,7 @@ def predict(belief, moved, ring=True):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "predict-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "predict-hints", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 _MOVE_SLIPS = {
     (0.09, 0.38, 0.26, 0.20): "that is the row of the cell of arrival: the ice is where it starts",
     (0.09, 0.38, 0.33, 0.20): "row 0 of `moved` for all cells: each cell has its own row",
@@ -145,7 +144,7 @@ _MOVE_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "predict-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "predict-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     dry, icy = (0.1, 0.7, 0.2), (0.6, 0.3, 0.1)
     belief, moved = np.array([0.5, 0.3, 0.2, 0.0]), np.array([dry, dry, icy, dry])
@@ -169,7 +168,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "predict-wall-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "predict-wall-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     dry, icy = (0.1, 0.7, 0.2), (0.6, 0.3, 0.1)
     belief, moved = np.array([0.5, 0.3, 0.2, 0.0]), np.array([dry, dry, icy, dry])
@@ -202,9 +201,8 @@ _test()
 # %% [markdown]
 # ## Task 3: a filter that may wait (1 + 2 points)
 #
-# Now one grid cell with S states. `belief`, shape `(S,)`, is what you believe before the first scan. `M[i, j]` is the probability that a cell in state i is in
-# state j at the next scan. `likelihoods`, shape `(T, S)`, has one row per scan: P(z | state). Between two scans the world changes, and before the first scan too. A drive
-# has thousands of scans.
+# Now one grid cell with S states. `belief`, shape `(S,)`, is what you believe at the time of the first scan, before you have seen it: there is no move before it. `M[i, j]` is the
+# probability that a cell in state i is in state j at the next scan. `likelihoods`, shape `(T, S)`, has one row per scan: P(z | state). A drive has thousands of scans.
 #
 # Complete `follow`: row t of what it returns, shape `(T, S)`, is the belief in the state at scan t, given the scans 0 to t + `lag`, as far as there are so many. With `lag=0`
 # that is the filter (one point). With `lag=2` the filter waits for two more scans before it says what the cell was: this is a *fixed-lag smoother* (two points). The last rows, for which
@@ -216,9 +214,9 @@ def follow(belief, likelihoods, M, lag=0):
     """Return the belief in the state at each scan, given the scans up to `lag` later (T, S)."""
     ### BEGIN SOLUTION
     history = []
-    for likelihood in likelihoods:
-        product = (belief @ M) * likelihood
-        belief = product / product.sum()
+    for t, likelihood in enumerate(likelihoods):
+        prior = belief @ M if t else belief
+        belief = prior * likelihood / (prior @ likelihood)
         history.append(belief)
     history = np.array(history)
     for t in range(len(history)):
@@ -232,7 +230,7 @@ def follow(belief, likelihoods, M, lag=0):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "follow-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "follow-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     belief, M = np.array([0.6, 0.4]), np.array([[0.9, 0.1], [0.3, 0.7]])  # FREE, OCCUPIED
     likelihoods = np.array([[0.2, 0.8], [0.5, 0.5], [0.9, 0.3]])  # a return, silence, a pass
@@ -247,18 +245,21 @@ def _test():
     wrong = np.abs(sums - 1).argmax()
     assert np.allclose(sums, 1), f"the belief after scan {wrong} sums to {sums[wrong]:.2f}: normalise each belief"
     slips = {
-        (0.2397, 0.7603): "M is transposed: M[i, j] goes from i to j, so a belief stands to its left",
-        (0.2727, 0.7273): "the first scan comes after a time step: predict first, then update",
-        (0.4636, 0.5364): "that is update, then predict; a scan speaks of now: predict first",
-        (0.66, 0.34): "that is the prediction before the scan: return what is believed after it",
+        (0.3267, 0.6733): "`belief` is at the time of the first scan: no move before it",
+        (0.4636, 0.5364): "that is the prediction for the next scan: return what is believed at this one",
+        (0.6, 0.4): "that is the belief before the scan: return what is believed after it",
     }
     _explain(got[0], slips)
-    np.testing.assert_allclose(got[0], [0.3267, 0.6733], atol=1e-4, err_msg="0.66, 0.34 predicted; times 0.2, 0.8")
-    _explain(got[1], {(0.66, 0.34): "each scan starts from the first belief again: carry on from the last one"})
-    _explain(got[1], {(0.3267, 0.6733): "nothing was predicted before the second scan: a silent scan takes time, too"})
+    np.testing.assert_allclose(got[0], [0.2727, 0.7273], atol=1e-4, err_msg="0.6, 0.4; times 0.2, 0.8")
+    slips = {
+        (0.35, 0.65): "M is transposed: M[i, j] goes from i to j, so a belief stands to its left",
+        (0.6, 0.4): "each scan starts from the first belief again: carry on from the last one",
+        (0.2727, 0.7273): "nothing was predicted before the second scan: a silent scan takes time, too",
+    }
+    _explain(got[1], slips)
     silent = "a silent scan leaves the prediction as it is"
-    np.testing.assert_allclose(got[1], [0.4960, 0.5040], atol=1e-4, err_msg=silent)
-    np.testing.assert_allclose(got[2], [0.8167, 0.1833], atol=1e-4)
+    np.testing.assert_allclose(got[1], [0.4636, 0.5364], atol=1e-4, err_msg=silent)
+    np.testing.assert_allclose(got[2], [0.8044, 0.1956], atol=1e-4)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import bayes
 
@@ -270,7 +271,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "follow-lag-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "follow-lag-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     belief, M = np.array([0.6, 0.4]), np.array([[0.9, 0.1], [0.3, 0.7]])  # FREE, OCCUPIED
     likelihoods = np.array([[0.2, 0.8], [0.7, 0.4], [0.9, 0.3], [0.1, 0.5]])
@@ -283,21 +284,22 @@ def _test():
     wrong = np.abs(sums - 1).argmax()
     assert np.allclose(sums, 1, atol=1e-5), f"the belief of scan {wrong} sums to {sums[wrong]:.2f}: normalise each row"
     slips = {  # P(FREE) of the first three rows
-        (0.3267, 0.6327, 0.8642): "that is the filter: with `lag=1` row t also uses scan t + 1",
-        (0.4061, 0.6464, 0.7010): "that uses all later scans: with `lag=1` only the next one",
-        (0.4613, 0.6464, 0.7010): "that waits for two scans: with `lag=1` only for the next one",
-        (0.6327, 0.8642, 0.4743): "that is the filter one scan later: row t is still about scan t",
-        (0.5098, 0.8379, 0.8093): "M is transposed: backward in time, sum over where the cell goes, M @ ...",
-        (0.4592, 0.8379, 0.5600): "the later scan speaks of a later state: bring it back by M",
-        (0.1978, 0.7524, 0.8710): "row t counts scan t twice: the message holds later scans only",
-        (0.4960, 0.6796, 0.8185): "that is a prediction: multiply by what the later scan says",
+        (0.2727, 0.6020, 0.8541): "that is the filter: with `lag=1` row t also uses scan t + 1",
+        (0.3457, 0.6162, 0.6833): "that uses all later scans: with `lag=1` only the next one",
+        (0.3982, 0.6162, 0.6833): "that waits for two scans: with `lag=1` only for the next one",
+        (0.6020, 0.8541, 0.4642): "that is the filter one scan later: row t is still about scan t",
+        (0.4455, 0.8194, 0.7961): "M is transposed: backward in time, sum over where the cell goes, M @ ...",
+        (0.3962, 0.8194, 0.5394): "the later scan is about a later state: bring it back by M",
+        (0.1136, 0.8225, 0.8662): "row t counts scan t twice: the message holds later scans only",
+        (0.4636, 0.6612, 0.8125): "that is a prediction: multiply by what the later scan says",
+        (0.3989, 0.7509, 0.7010): "`belief` is at the time of the first scan: no move before it",
     }
     _explain(got[:3, 0], slips)
-    by_hand = "row 0: the filter's 0.3267, 0.6733, times what the next scan says of each, 0.67 and 0.49"
-    np.testing.assert_allclose(got[0], [0.3989, 0.6011], atol=1e-4, err_msg=by_hand)
-    np.testing.assert_allclose(got[2], [0.7010, 0.2990], atol=1e-4)
+    by_hand = "row 0: the filter's 0.2727, 0.7273, times what the next scan says of each, 0.67 and 0.49"
+    np.testing.assert_allclose(got[0], [0.3390, 0.6610], atol=1e-4, err_msg=by_hand)
+    np.testing.assert_allclose(got[2], [0.6833, 0.3167], atol=1e-4)
     last = "after the last scan nothing follows: its row is the filter's"
-    np.testing.assert_allclose(got[3], [0.4743, 0.5257], atol=1e-4, err_msg=last)
+    np.testing.assert_allclose(got[3], [0.4642, 0.5358], atol=1e-4, err_msg=last)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import bayes
 
@@ -315,7 +317,7 @@ _test()
 # later. Your LIDAR has another time step. A cell may change more than once in a time step: that is what makes this more than a division.
 #
 # Complete `transition`: it returns the 2 x 2 matrix of a step of `new_dt` seconds; `M[i, j]` goes from i to j. Five digits must be right. `new_dt` may be shorter or longer than `dt`, and 0.
-# Each state was seen at least once; perhaps no change was ever seen. You may assume that a cell that was occupied is occupied at the next scan more often than one that was free.
+# Each state was seen at least once; perhaps no change was ever seen. You may assume that states last: `1 - M[0, 1] - M[1, 0]` of the counted step is greater than 0.
 #
 # For one more point complete `half_life`: whatever is believed of a cell, when nobody looks it tends to the same final belief. After how many seconds is
 # half of the difference left? Here at least one change has been seen.
@@ -343,7 +345,7 @@ def half_life(counts, dt):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "transition-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "transition-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     counts = np.array([[180, 20], [30, 70]])
     got = answer_array(transition(counts.copy(), dt=0.1, new_dt=0.05), "transition")
@@ -379,7 +381,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "half-life-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "half-life-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     got = answer_number(half_life(np.array([[180, 20], [30, 70]]), dt=0.1), "half_life")
     slips = {
@@ -403,63 +405,13 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: each witness once (2 points)
-#
-# A scan gives K returns: `likelihoods`, shape `(K, S)`, has one row per return. `beams`, shape `(K,)`, says which beam each came from. Different beams err
-# independently. Returns of one beam don't: what fools the first fools the second too. So of each beam count only its **first** return, in the order of the
-# rows; they need not be sorted by beam.
-#
-# Complete `fuse`: it returns the belief after the scan, shape `(S,)`. A scan may have thousands of beams: mind what lecture 01 says of long products.
-
-
-# %% nbgrader={"grade": false, "grade_id": "fuse", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def fuse(belief, likelihoods, beams):
-    """Return the belief (S,) after a scan, counting each beam once."""
-    ### BEGIN SOLUTION
-    _, first = np.unique(beams, return_index=True)
-    log_product = np.log(belief) + np.log(likelihoods[first]).sum(axis=0)
-    product = np.exp(log_product - log_product.max())
-    return product / product.sum()
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": true, "grade_id": "fuse-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    belief = np.array([0.6, 0.4])  # FREE, OCCUPIED
-    likelihoods = np.array([[0.2, 0.8], [0.1, 0.9], [0.7, 0.3]])
-    beams = np.array([4, 4, 9])
-    got = answer_array(fuse(belief.copy(), likelihoods.copy(), beams.copy()), "fuse")
-    assert got.shape == (2,), f"expected one number for each of the 2 states, shape (2,), got {got.shape}"
-    slips = {
-        (0.0886, 0.9114): "all three returns count: the second is the same beam's, and no new witness",
-        (0.28, 0.72): "you keep the last return of beam 4: keep its first",
-        (0.3818, 0.6182): "you average the returns of a beam: only the first counts",
-        (0.5676, 0.4324): "the prior is in it once for each beam: it counts once",
-        (0.3684, 0.6316): "the prior is missing: multiply it in, once",
-        (0.5510, 0.4490): "you average over beams: independent evidence is multiplied",
-        (0.2727, 0.7273): "only one beam counts: beams 4 and 9 are two witnesses",
-    }
-    _explain(got, slips)
-    assert np.isclose(got.sum(), 1), f"the belief sums to {got.sum():.2f}: normalise it"
-    np.testing.assert_allclose(got, np.array([84, 96]) / 180, err_msg="0.6 * 0.2 * 0.7 against 0.4 * 0.8 * 0.3")
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import bayes
-
-    complaint = bayes.check_fuse(fuse)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 6: put together (2 points)
+# ## Task 5: put together (2 points)
 #
 # Now a whole map, each cell filtered by itself. Scan t says P(z | OCCUPIED) of each cell in `occupied[t]` and P(z | FREE) in `free[t]`; both have shape `(T, H, W)`. Where a scan
 # says nothing, the two are equal. Scans come at any times, because a real sensor drops some. So `matrices`, shape `(T - 1, 2, 2)`, holds a transition matrix for each gap: `matrices[t]` leads
 # from scan t to scan t + 1. (In a moment your `transition` will make them.)
 #
-# Complete `build_map`: it returns P(OCCUPIED) of each cell after each scan, shape `(T, H, W)`. At the time of the first scan, before it, each cell is OCCUPIED with probability `first`.
+# Complete `build_map`: it returns P(OCCUPIED) of each cell after each scan, shape `(T, H, W)`. As in task 3 there is no move before the first scan: at its time each cell is OCCUPIED with probability `first`.
 # Leave your arguments as they are.
 
 
@@ -477,7 +429,7 @@ def build_map(occupied, free, matrices, first=0.5):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "build-map-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "build-map-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     matrices = np.array([[[0.9, 0.1], [0.3, 0.7]], [[0.804, 0.196], [0.588, 0.412]]])  # 0.1 s, then 0.3 s
     occupied = np.array(
@@ -547,7 +499,7 @@ _test()
 #
 # Then `semgrid-edu demo --stages my_stages.py` runs the system with your filter and with the package's, and shows both side by side. Where do they differ? Yours has no DYNAMIC yet.
 #
-# ## Task 7: in your own words (2 points)
+# ## Task 6: in your own words (2 points)
 #
 # A car has been parked in a cell for ten minutes: 6000 scans said *occupied*, and the filter's matrix is the identity (nothing ever changes). Now the car
 # drives off. What will the filter believe of the cell during the next minute, and why? Name one change to the filter that repairs it, and one thing that gets

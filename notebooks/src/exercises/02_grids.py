@@ -59,7 +59,7 @@ def beam_posterior(prior, reflect, seen):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "posterior-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "posterior-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     prior, reflect, seen = np.array([0.2, 0.5, 0.4]), np.array([0.1, 0.8]), np.array([0.2, 0.6, 0.3, 0.1])
     got = answer_array(beam_posterior(prior.copy(), reflect.copy(), seen.copy()), "beam_posterior")
@@ -93,7 +93,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "nothing-back-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "nothing-back-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     arguments = np.array([0.2, 0.5, 0.4]), np.array([0.1, 0.8]), np.array([0.0, 0.0, 0.0, 1.0])
     got = answer_array(beam_posterior(*arguments), "beam_posterior")
@@ -135,7 +135,7 @@ def price(posterior):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "price-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "price-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # "One of you two", about cells 1 and 2, prior 0.2 each: 4/9 only the first, 4/9 only the second, 1/9 both. Cell 3 stays at 0.2.
     two = np.array([[0, 4], [4, 1]]) / 9
@@ -187,7 +187,7 @@ def fuse(prior, posteriors):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "fuse-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "fuse-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # Three scans of two cells, prior 0.2. Cell (0, 0): none says anything. Cell (0, 1): two make it 0.5, the third says nothing.
     got = answer_array(fuse(0.2, np.array([[[0.2, 0.5]], [[0.2, 0.5]], [[0.2, 0.2]]])), "fuse")
@@ -224,7 +224,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "fuse-many-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "fuse-many-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # A thousand scans say 0.9, then a thousand say 0.1, and the last one 0.8. The prior is 0.5: all but the last cancel.
     posteriors = np.concatenate([np.full(1000, 0.9), np.full(1000, 0.1), [0.8]]).reshape(-1, 1, 1)
@@ -262,7 +262,7 @@ def highest_clamp(tail, speed, dt, occupied, free):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "clamp-for-tail-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "clamp-for-tail-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # A pass is worth log(0.6 / 0.3) = log 2. The car covers 1.2 m from pass to pass, so 4 m allow 3 survived passes; the fourth must free the cell.
     got = answer_number(highest_clamp(tail=4.0, speed=12.0, dt=0.1, occupied=0.3, free=0.6), "highest_clamp")
@@ -315,7 +315,7 @@ def beam_evidence(x, y, spec, L_hit, L_pass):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "beam-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "beam-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     spec = GridSpec(x_min=-0.5, x_max=5.5, y_min=-4.5, y_max=4.5, cell=1)  # draw it, with the beam from cell (5, 4)
     got = answer_array(beam_evidence(3.8, 1.8, spec, L_hit=2.0, L_pass=-1.0), "beam_evidence")
@@ -349,7 +349,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "outside-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "outside-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     spec = GridSpec(x_min=-0.5, x_max=5.5, y_min=-4.5, y_max=4.5, cell=1)
     got = answer_array(beam_evidence(9.5, 0.3, spec, L_hit=2.0, L_pass=-1.0), "beam_evidence")
@@ -397,7 +397,7 @@ def update(L, occupied, free, dt, tau, L_min, L_max):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "update-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "update-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _SIGN = "the sign is swapped: a hit makes a cell more occupied, so P(z | occupied) stands above"
 _UPDATE_SLIPS = {  # by hand, cell (1, 2): 0.5 + log(0.9 / 0.05) = 3.390; cell (0, 1): exp(-0.2) = 0.819
     ((1, 2), -2.0): _SIGN,
@@ -420,7 +420,7 @@ _UPDATE_SLIPS = {  # by hand, cell (1, 2): 0.5 + log(0.9 / 0.05) = 3.390; cell (
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     L = np.array([[0.0, 1.0, 0.9], [0.4, 0.0, 0.5]])
     occupied, free = np.full((2, 3), 0.6), np.full((2, 3), 0.6)  # the scan says nothing ...
@@ -446,7 +446,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "clamp-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "clamp-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     passed, hit = (0.3, 0.7), (0.9, 0.05)
     L = np.array([[3.0, -1.5, 0.0, 4.0]])  # the last cell got above the limit before there was one
@@ -491,7 +491,7 @@ def as_belief(L):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "as-belief-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "as-belief-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     L = np.array([[np.log(4), -np.log(9), 0.0]])  # P = 0.8, 0.1, 0.5
     got = answer_array(as_belief(L.copy()), "as_belief")

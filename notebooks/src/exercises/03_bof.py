@@ -1,20 +1,18 @@
 # %% [markdown]
 # # Exercise 03: occupancy with velocity
 #
-# Seven small functions. One of them follows a thing exactly and shows what BOF loses; five of the others, put together, are a Bayesian occupancy
-# filter, which you let run on a simulated and on a real street. And one question to answer in words. About 90 minutes. The lecture is
+# Five small functions. One of them follows a thing exactly and shows what BOF loses. The other four, put together, are a Bayesian occupancy filter,
+# which you let run on a simulated and on a real street. And one question to answer in words. About 90 minutes. The lecture is
 # [03: BOF](../03_bof.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | where it came from | 2 |
-# | 2 | one velocity flies | 2 |
-# | 3 | a scanner that measures velocities | 3 |
-# | 4 | how fast, and how sure | 2 + 1 + 2 |
-# | 5 | what arrives where something stands | 3 |
-# | 6 | one thing, followed exactly | 3 |
-# | 7 | put together: your filter on two streets | 2 |
-# | 8 | in your own words | 2 |
+# | 1 | one velocity flies | 2 |
+# | 2 | a scanner that measures velocities | 3 |
+# | 3 | how fast, and how sure | 2 + 1 + 2 |
+# | 4 | what arrives where something stands | 3 |
+# | 5 | one thing, followed exactly | 3 |
+# | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -30,57 +28,9 @@ warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number d
 # Names that begin with _ belong to the tests.
 
 # %% [markdown]
-# ## Task 1: where it came from (2 points)
+# ## Task 1: one velocity flies (2 points)
 #
-# The grid is a map seen from above, forward up: row 0 is the farthest ahead, column 0 the leftmost. Something is in cell (`row`, `col`) now. Its
-# `velocity` is (vx, vy) in metres a second, x forward and y **left**. In which cell was it `dt` seconds ago? Cells are squares with
-# a side of `cell` metres.
-#
-# Complete `antecedent`: it returns that cell as two integers. It may lie outside the grid, where indices are negative or large. The distance is a whole
-# number of cells, but for the last digits of floating-point numbers.
-
-
-# %% nbgrader={"grade": false, "grade_id": "antecedent", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def antecedent(row, col, velocity, dt, cell):
-    """Return the row and column where what is in (row, col) now was dt seconds ago."""
-    ### BEGIN SOLUTION
-    forward, left = (round(v * dt / cell) for v in velocity)
-    return row + forward, col + left
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": true, "grade_id": "antecedent-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    # 4 m/s forward and 2 m/s to the right for half a second, cells of 0.25 m. By hand: 8 cells up the map, 4 to the right.
-    got = antecedent(row=10, col=20, velocity=(4.0, -2.0), dt=0.5, cell=0.25)
-    assert answer_array(got, "antecedent").shape == (2,), f"return two numbers, row and column; got {got}"
-    got = tuple(np.asarray(got).tolist())
-    slips = {
-        (2, 24): "that is where it will be: you look for where it was",
-        (2, 16): "rows count down the map and x counts up it: what drives forward comes from a larger row",
-        (18, 24): "columns count to the right and y to the left: what drives to the right comes from a smaller column",
-        (6, 28): "x and y are swapped: vx, forward, goes over rows",
-        (14, 12): "x and y are swapped: vx, forward, goes over rows",
-        (26, 12): "the time got lost: the distance covered is velocity times dt",
-        (12, 19): "you count metres: how many cells of 0.25 m are 2 m?",
-    }
-    assert got not in slips, f"got {got}: {slips[got]}"
-    assert got == (18, 16), f"8 rows farther down and 4 columns to the left of (10, 20) is (18, 16), got {got}"
-    assert all(isinstance(i, int) for i in got), f"an index must be an integer, got {got}"
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import bof
-
-    complaint = bof.check_antecedent(antecedent)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 2: one velocity flies (2 points)
-#
-# `mass` (H, W) is what one velocity of the lattice holds in each cell: P(occupied, and moving with this velocity). All of it flies the same way:
+# The grid is a map seen from above: row 0 is the farthest ahead, column 0 the leftmost. `mass` (H, W) is what one velocity of the lattice holds in each cell: P(occupied, and moving with this velocity). All of it flies the same way:
 # from (r, c) to (r + `down`, c + `right`). Both are integers of any sign.
 #
 # Complete `shift`: it returns the mass after the flight. Nothing is known of what enters the map, so that is 0, and what leaves the map is lost.
@@ -101,7 +51,7 @@ def shift(mass, down, right):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "shift-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "shift-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     mass = np.array([[0.1, 0.2, 0.3, 0.4], [0.5, 0.6, 0.7, 0.8], [0.0, 0.9, 0.0, 1.0]])
     before = mass.copy()
@@ -133,14 +83,14 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: a scanner that measures velocities (3 points)
+# ## Task 2: a scanner that measures velocities (3 points)
 #
 # `joint` (V, H, W) holds P(occupied, velocity v) for each of V velocities in each cell. What the velocities leave of 1 is the probability that the
 # cell is free. The scanner of the lecture measures no velocity. A Doppler LIDAR does, roughly: what it says of a cell is the more probable the better a
 # velocity fits. So `if_occupied` (V, H, W) holds P(z | occupied with velocity v), a number for each velocity, and `if_free` (H, W) holds P(z | free).
 #
 # Complete `update`: it returns the joint (V, H, W) after the scan, by Bayes' rule in each cell. Leave the arguments as they are. (For a scanner without
-# Doppler all velocities have the same number. Task 7 uses your function so.)
+# Doppler all velocities have the same number. The filter at the end uses your function so.)
 
 
 # %% nbgrader={"grade": false, "grade_id": "update", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -153,7 +103,7 @@ def update(joint, if_occupied, if_free):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     joint = np.zeros((3, 1, 4))  # the last cell is free
     joint[:, 0, 0] = [0.1, 0.2, 0.1]  # of this cell the scan says nothing
@@ -194,7 +144,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: how fast, and how sure (2 + 1 + 2 points)
+# ## Task 3: how fast, and how sure (2 + 1 + 2 points)
 #
 # `joint` (V, H, W) as before; `velocities` (V, 2) names the velocity of each bin, x and y, in metres a second. This lattice isn't the lecture's: its bins
 # stand **in any order**, and a bush that sways in the wind fills some of them as well. So only what is faster than `slow`, in m/s, counts as moving.
@@ -216,7 +166,7 @@ def mean_and_covariance(joint, velocities, slow):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "mean-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "mean-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     velocities = np.array([[4.0, 2.0], [0.0, 0.0], [4.0, -6.0], [-4.0, 0.0], [0.5, -0.5]])
     joint = np.zeros((5, 1, 3))
@@ -253,7 +203,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "no-mass-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "no-mass-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     velocities = np.array([[4.0, 2.0], [0.0, 0.0], [4.0, -6.0], [-4.0, 0.0], [0.5, -0.5]])
     joint = np.zeros((5, 1, 4))
@@ -286,7 +236,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "covariance-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "covariance-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     velocities = np.array([[4.0, 2.0], [0.0, 0.0], [4.0, -6.0], [-4.0, 0.0], [0.5, -0.5]])
     joint = np.array([0.2, 0.2, 0.1, 0.1, 0.1]).reshape(5, 1, 1)
@@ -327,7 +277,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: what arrives where something stands (3 points)
+# ## Task 4: what arrives where something stands (3 points)
 #
 # Two opinions meet in a cell. Its own is `own` (4, H, W): FREE, STATIC, DYNAMIC, UNKNOWN, which sum to 1. Its neighbours say: with the probability
 # `arrives` (H, W) something moving arrives here. Take the two as independent, and write down the probability of each pair (own state; arrives or not).
@@ -349,7 +299,7 @@ def arrive(own, arrives):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "arrive-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "arrive-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     own = np.array([[[0.5, 0.35, 0.1]], [[0.5, 0.2, 0.6]], [[0.0, 0.3, 0.2]], [[0.0, 0.15, 0.1]]])
     arrives = np.array([[0.6, 0.4, 0.0]])
@@ -386,7 +336,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 6: one thing, followed exactly (3 points)
+# ## Task 5: one thing, followed exactly (3 points)
 #
 # BOF asks each cell by itself, and finds 1.24 things where there is one. What is the exact answer, if you follow the thing as a whole? There are K cells
 # on a line and exactly one thing. At scan 0 it is in cell `start`. It has one of V velocities and keeps it: `steps` (V,) says by how many cells it moves
@@ -411,7 +361,7 @@ def follow(start, steps, prior, if_occupied, if_free):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "follow-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "follow-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     # The lecture's line: six cells, the thing in cell 2, and a beam comes back from cell 3. It passes all others.
     occupied, free = np.full((1, 6), 0.3), np.full((1, 6), 0.7)
@@ -449,75 +399,20 @@ _test()
 # %% [markdown]
 # So the thing goes to the right with 0.949, where BOF says that cell 3 holds it with 0.889, and cells 1 and 2 with 0.18 each.
 #
-# ## Task 7: put together, your filter on two streets (2 points)
+# ## Put together: your filter on two streets
 #
-# One piece is missing between task 2 and task 5. `flown` (V, H, W) is the mass of each velocity after its flight; the first velocity is zero. `unknown` (H, W) is
-# P(UNKNOWN) of each cell. Where a thing has left a cell, it leaves FREE behind. Every velocity but zero leaves the cell in each step.
-#
-# Complete `collect`: it returns what `arrive` of task 5 takes: `own` (4, H, W), which is what each cell holds of FREE, STATIC, DYNAMIC and UNKNOWN before anything
-# arrives, and `arrives` (H, W). Arrivals from several cells add up, as in BOF, to at most 0.999. Leave the arguments as they are.
-
-
-# %% nbgrader={"grade": false, "grade_id": "collect", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def collect(flown, unknown):
-    """Return what each cell holds, (4, H, W), and the probability that something arrives in it, (H, W)."""
-    ### BEGIN SOLUTION
-    static = flown[0]
-    own = np.stack([1 - static - unknown, static, np.zeros_like(static), unknown])
-    return own, np.minimum(flown[1:].sum(axis=0), 0.999)
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": true, "grade_id": "collect-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    flown = np.zeros((3, 1, 3))
-    flown[:, 0, 0] = [0.5, 0.3, 0.1]
-    flown[:, 0, 1] = [0.0, 0.7, 0.6]
-    unknown = np.array([[0.2, 0.0, 1.0]])
-    before = flown.copy(), unknown.copy()
-    own, arrives = answer_arrays(collect(flown, unknown), 2, "collect")
-    assert np.array_equal(flown, before[0]), "collect changed its argument `flown`"
-    assert np.array_equal(unknown, before[1]), "collect changed its argument `unknown`"
-    shapes = own.shape, arrives.shape
-    assert shapes == ((4, 1, 3), (1, 3)), f"expected shapes (4, 1, 3) and (1, 3), got {shapes}"
-    assert not np.allclose(arrives[0, 0], 0.9), (
-        "what stands doesn't arrive: the zero velocity, the first, doesn't count"
-    )
-    assert not np.allclose(arrives[0, 0], 0.37), "BOF adds arrivals up: 0.3 and 0.1 are 0.4"
-    assert np.isclose(arrives[0, 0], 0.4), f"0.3 and 0.1 arrive in the first cell, got {arrives[0, 0]:.3f}"
-    assert not np.isclose(arrives[0, 1], 1.3), "0.7 and 0.6 are more than 1: let arrivals be at most 0.999"
-    assert np.isclose(arrives[0, 1], 0.999, atol=1e-5), f"0.7 and 0.6 are cut to 0.999, got {arrives[0, 1]:.4f}"
-    assert not np.isclose(own[2, 0, 0], 0.4), (
-        "what arrives isn't the cell's own: its DYNAMIC is 0, for all that moved has left"
-    )
-    assert not np.allclose(own.sum(axis=0)[0, 0], 0.7), (
-        "what has left a cell leaves FREE behind: the four states sum to 1"
-    )
-    np.testing.assert_allclose(
-        own[:, 0, 0], [0.3, 0.5, 0, 0.2], atol=1e-6, err_msg="the first cell: STATIC 0.5, UNKNOWN 0.2"
-    )
-    np.testing.assert_allclose(own[:, 0, 2], [0, 0, 0, 1], atol=1e-6, err_msg="the last cell is UNKNOWN")
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import bof
-
-    complaint = bof.check_collect(collect)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# Now let it run. `track` below calls your `shift`, `collect`, `arrive`, `update` and `mean_and_covariance`, and adds what the lecture's table of five things says: what a
+# `track` below calls your `shift`, `arrive`, `update` and `mean_and_covariance`, and adds what the lecture says of a street: what a
 # cell turns out to be at first sight, and now and then something that starts to move. Its lattice has velocities 5 m/s apart, so that everything moves by
-# whole cells of 0.5 m in a tenth of a second. First its four steps, on a map that is fixed to the ground:
+# whole cells of 0.5 m in a tenth of a second. First its steps, on a map that is fixed to the ground. Read `predicted`: all that moves leaves its cell, so what a
+# cell holds by itself before anything arrives is FREE, STATIC or UNKNOWN, and arrivals from several cells add up.
 
 
 # %% nbgrader={"grade": false, "grade_id": "steps", "locked": true, "schema_version": 3, "solution": false, "task": false}
 def predicted(joint, unknown, ways):
     """Return the states (4, H, W) and the mass of what moves (V - 1, H, W): fly, and meet what each cell holds."""
     flown = np.stack([np.asarray(shift(mass, down, right)) for mass, (down, right) in zip(joint, ways, strict=True)])
-    states = np.asarray(arrive(*map(np.asarray, collect(flown, unknown))))
+    own = np.stack([1 - flown[0] - unknown, flown[0], 0 * unknown, unknown])
+    states = np.asarray(arrive(own, np.minimum(flown[1:].sum(axis=0), 0.999)))
     return states, flown[1:] * (states[2] / np.maximum(flown[1:].sum(axis=0), 1e-12))
 
 
@@ -592,25 +487,23 @@ def light_up():
 # light_up()
 
 # %% [markdown]
-# It is a stage of the pipeline as well. Copy `import numpy as np`, your five functions and the two cells with `track` and its steps into a file `my_stages.py`, and run
+# It is a stage of the pipeline as well. Copy `import numpy as np`, your four functions and the two cells with `track` and its steps into a file `my_stages.py`, and run
 #
 #     semgrid-edu demo --stages my_stages.py
 #
-# Then the semantic grid of both streets is built upon your filter, beside that of the package. Where do they differ, and which of your five functions
-# makes the difference?
+# Then the semantic grid of both streets is built upon your filter, beside that of the package. Where do they differ, and which of your four functions makes the difference?
 #
-# ## Task 8: in your own words (2 points)
+# ## Task 6: in your own words (2 points)
 #
 # A train of small cars passes you on your left at 20 m/s. Each car carries one thin post, and the posts follow each other at a distance of exactly 2 m. Your
 # scanner turns ten times a second and sees the posts alone. The lattice has velocities 5 m/s apart, up to 20 m/s. Among the posts that have been in view from
 # the beginning, what will the filter say of their velocity? Which velocities of the lattice explain all scans of them alike, and what decides between these? The first
-# post of the train drives into free road, where the filter sees that it moves: which edge of the lecture's graph is cut, so that this doesn't help the posts behind it?
+# post of the train drives into free road, where the filter sees that it moves: what does BOF forget, so that this doesn't help the posts behind it?
 # And name one change to the scanner that would help. Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "posts", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # In a tenth of a second each post moves by 2 m, to where the next one was. So each scan looks like the one before, and the antecedents of a post's cell hold a post for 0 m/s,
 # for 20 m/s and for 20 m/s the other way. All three explain the scans alike, and the prior decides: most things stand, so the filter calls the posts STATIC.
 # (The others of the lattice, 5 to 15 m/s, lead from a gap to a post and are refuted.) The first post arrives in cells that were free, so it is DYNAMIC. (In a simulation
-# the first one or two posts are DYNAMIC and all others STATIC.) But the filter treats each cell by itself: the edge between the cells of one instant is cut, and no message goes back from a cell to its antecedents. So what is known of the
-# first post says nothing about those behind it. A scanner with another rate would help, 15 scans a second say: then standing and driving predict different places. So would one that measures velocity (Doppler).
-# One point for 0 and 20 m/s (either way) together with the prior, one for the cut edge and a change that helps.
+# the first one or two posts are DYNAMIC and all others STATIC.) But the filter keeps each cell by itself and forgets what ties it to the others. So what is known of the first post says nothing about those behind it. A scanner with another rate would help, 15 scans a second say: then standing and driving predict different places. So would one that measures velocity (Doppler).
+# One point for 0 and 20 m/s (either way) together with the prior, one for cells kept by themselves and a change that helps.

@@ -62,7 +62,7 @@ def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "in-cells-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "in-cells-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # 3 x 4 cells of one metre, 0..3 m ahead. We drove 1 m: particles 0 and 1 are in cell (0, 2), far ahead, now.
     position = np.array([[3.5, 0.5], [3.3, 0.2], [2.4, 1.2], [4.5, 1.5]])  # the last one is ahead of the grid
@@ -125,7 +125,7 @@ def two_arrivals(from_left, from_right, static):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "two-arrivals-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "two-arrivals-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     arguments = [np.array([[p, q]]) for p, q in ((0.5, 0.6), (0.4, 0.0), (0.2, 0.5))]  # the second cell: one arrival
     got = answer_array(two_arrivals(*(a.copy() for a in arguments)), "two_arrivals")
@@ -182,7 +182,7 @@ def update(belief, likelihood, first_sight):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     belief = np.array([0.2, 0.2, 0.1, 0.5]).reshape(4, 1, 1)  # a return comes back, from something that hardly moves
     before = belief.copy()
@@ -221,7 +221,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "update-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "update-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     belief = np.zeros((4, 1, 2))
     belief[:, 0, 0] = [0.2, 0.2, 0.1, 0.5]  # of this cell the scan says nothing ...
@@ -266,7 +266,7 @@ def stratified(weight, count, offsets):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "stratified-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "stratified-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     weight = np.array([1.0, 6.0, 3.0])  # a line 10 long, whose parts end at 1, 7 and 10; four parts, 2.5 long
     offsets = np.array([0.6, 0.2, 0.9, 0.1])  # teeth at 1.5, 3.0, 7.25, 7.75
@@ -324,7 +324,7 @@ def maps(frames, spec, draws=stratified):
     return np.array([belief.probability[DYNAMIC] for belief in track(frames, spec, draws)])
 
 
-# %% nbgrader={"grade": true, "grade_id": "track-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "track-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     def draws(weight, count, offsets):  # each index by itself, wherever its offset lies on the whole line
         ends = np.cumsum(weight)

@@ -48,7 +48,7 @@ def what_was_done(K, K_new):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "scales-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "scales-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     K = np.array([[100.0, 0, 40], [0, 120, 30], [0, 0, 1]])
     K_new = np.array([[50.0, 0, 15.75], [0, 30, 5.625], [0, 0, 1]])
@@ -77,7 +77,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "cut-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "cut-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # By hand, backwards: c_u = 15.75 is 16.25 from the image's edge, 32.5 before it was halved, 32 from the first centre; it was 40.
     K = np.array([[100.0, 0, 40], [0, 120, 30], [0, 0, 1]])
@@ -128,7 +128,7 @@ def now_from_before(T_world_from_now, T_world_from_before):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "now-from-before-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "now-from-before-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # Before, the car stands at (10, 2) and looks along the world's x. Now it stands at (12, 5) and looks along the world's y.
     # So its old place is 3 m behind it and, since left of it is the world's -x, 2 m to its left: x = -3, y = 2.
@@ -209,7 +209,7 @@ def _row():
     return np.array([5.0, 10.0, 20.0, 30.0, 40.0]), np.array([0.05, 0.9, 0.05, -0.5, 0.05])
 
 
-# %% nbgrader={"grade": true, "grade_id": "shown-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "shown-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     x, top = _row()
     got = answer_array(shown(x, top, z_cam=1.5, delta=0.0), "shown")
@@ -243,7 +243,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "best-plane-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "best-plane-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     heights = np.array([-0.8, -0.4, 0.0, 0.4])
     falling = np.array([10.0, 20.0, 40.0]), np.array([0.05, -0.35, -0.75])
@@ -292,7 +292,7 @@ def heights_of(x, x_drawn, z_cam, delta):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "heights-of-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "heights-of-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # The ray meets the plane at 0.2 m, 1.4 m below the camera, 25 m ahead: so 10 m ahead it has sunk by 0.56 m, to 1.04 m.
     x, x_drawn = np.array([10.0, 10.0, 10.0]), np.array([25.0, 10.0, 8.0])
@@ -321,7 +321,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "impossible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "impossible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     x, x_drawn = np.array([10.0, 12.0, 9.0, 10.0]), np.array([25.0, np.nan, -30.0, 0.0])
     got = answer_array(heights_of(x, x_drawn, 1.6, 0.2), "heights_of")
@@ -419,7 +419,7 @@ def _faulty():
     return given, ((SHIFT, 0.5), (PITCH, 0.5), (YAW, -1.0), (INVERSE, 0.0))
 
 
-# %% nbgrader={"grade": true, "grade_id": "fault-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "fault-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     names = ("SHIFT", "PITCH", "YAW", "INVERSE")
     for given, (fault, _) in zip(*_faulty(), strict=True):
@@ -441,7 +441,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "amount-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "amount-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     for given, (fault, amount) in zip(*_faulty(), strict=True):
         got = answer_array(find_fault(*(a.copy() for a in given)), "find_fault").ravel()
@@ -505,7 +505,7 @@ def _street(frame, fault, amount):
     return points[chosen], seen[chosen], K, T
 
 
-# %% nbgrader={"grade": true, "grade_id": "repaired-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "repaired-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     from semgrid_edu.datasets.samples import real_drive, sample_drive
 

@@ -58,7 +58,7 @@ def four_pixels(u, v, h, w):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "weight-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "weight-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _WEIGHT_SLIPS = {
     0.1: "the weights are crossed: the nearer pixel has the larger one",
     0.15: "the weights across are crossed: column 1 is nearer than column 2",
@@ -83,7 +83,7 @@ def _four(got):
     return rows, cols, weights
 
 
-# %% nbgrader={"grade": true, "grade_id": "weights-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "weights-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # By hand: across 0.75 and 0.25, down 0.6 and 0.4; so 0.45 and 0.15 in row 0, 0.30 and 0.10 in row 1.
     rows, cols, weights = _four(four_pixels(1.25, 0.4, h=3, w=4))
@@ -109,7 +109,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "border-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "border-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     for u, v, where in ((1.0, 1.0, "a pixel's centre"), (1.5, 3.0, "the last row"), (3.0, 0.5, "the last column")):
         rows, cols, weights = _four(four_pixels(u, v, h=4, w=4))
@@ -168,7 +168,7 @@ def _scores():
     return s, np.array([[[0.25, 1.0], [1.25, 0.5]], [[2.0, 2.0], [0.0, 1.5]], [[1.0, 0.0], [1.5, 1.5]]])
 
 
-# %% nbgrader={"grade": true, "grade_id": "cell-means-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "cell-means-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     got = answer_array(cell_means(*_scores(), np.ones((3, 2), bool)), "cell_means")
     assert got.shape == (2, 3), f"expected one value for each class and cell, shape (2, 3), got {got.shape}"
@@ -197,7 +197,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "invisible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "invisible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     s, inside = _scores()
     alone = answer_array(cell_means(s.copy(), inside[:, :1].copy(), np.ones((3, 1), bool)), "cell_means")
@@ -295,7 +295,7 @@ def which_kind(forward, backward, h, w, n):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "is-pair-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "is-pair-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     names = ("PAIR", "OVERWRITES", "MEAN", "NEAREST")
     ones = "with s or p_bar all ones NEAREST passes as well: take random numbers for both"
@@ -321,7 +321,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "which-kind-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "which-kind-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     names = ("PAIR", "OVERWRITES", "MEAN", "NEAREST")
     hint = "find out by unit images which point reads which pixel, and compare what the four kinds would return"
@@ -370,7 +370,7 @@ def yaw_slope(s, points, K, t):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "yaw-slope-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "yaw-slope-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # One point, by hand: X/Z = 0.1, Y/Z = 0.1, so u = 10 * 0.1 + 0.25 = 1.25 and v = 10 * 0.1 - 0.25 = 0.75.
     s, K = np.array([[0.0, 1, 5], [0, 3, 2]]), np.array([[10.0, 0, 0.25], [0, 10, -0.25], [0, 0, 1]])
@@ -468,7 +468,7 @@ def swaps(sampler, h, w):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "convention-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "convention-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     names = ("CENTRES", "CORNERS", "STRETCHED")
     hint = (
@@ -492,7 +492,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "swaps-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "swaps-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     for kind in range(3):
         for swapped in (False, True):
@@ -567,7 +567,7 @@ def _four_read(u, v, h, w):
     return [top, top, top + 1, top + 1], [left, left + 1, left, left + 1], weights
 
 
-# %% nbgrader={"grade": true, "grade_id": "cell-matrix-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "cell-matrix-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     from semgrid_edu.datasets.samples import real_drive, sample_drive
 

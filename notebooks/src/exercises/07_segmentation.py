@@ -78,7 +78,7 @@ def _seen(rates):
     return sorted(places)
 
 
-# %% nbgrader={"grade": true, "grade_id": "chain-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "chain-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     for field in (1, 7, 3, 13, 27, 61):
         rates = _rates(fewest_rates, field)
@@ -105,7 +105,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "fewest-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "fewest-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     for field, fewest in ((3, 1), (9, 2), (27, 3), (29, 4), (243, 5)):
         rates = _rates(fewest_rates, field)
@@ -180,7 +180,7 @@ def _maps():
 print(_maps().astype(int))
 
 
-# %% nbgrader={"grade": true, "grade_id": "pool-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "pool-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     got = max_pool(_maps(), kernel=3, stride=2)
     assert got is not None, "max_pool returned nothing: did you forget `return`?"
@@ -209,7 +209,7 @@ def _test():
 
 _test()
 
-# %% nbgrader={"grade": false, "grade_id": "index-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "index-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _INDEX_SLIPS = {
     7: "that is the index in the window: after unpooling nobody would know which window; count in the whole map",
     23: "you multiply the row by the height: a row of the map has w = 8 numbers",
@@ -223,7 +223,7 @@ _INDEX_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "indices-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "indices-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     got = max_pool(_maps(), kernel=3, stride=2)
     alone = not np.iterable(got) or (isinstance(got, np.ndarray) and got.ndim == 3)
@@ -250,7 +250,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "unpool-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "unpool-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     indices = np.array([[[10, 10, 6], [32, 35, 28]], [[0, 3, 4], [25, 18, 20]]])
     values = np.arange(12.0, 0, -1).reshape(2, 2, 3)  # 12 11 10 / 9 8 7 and 6 5 4 / 3 2 1
@@ -326,7 +326,7 @@ def _one_layer(answer, maps, kernel, stride, rate):
     return got.reshape(got.shape[-2:]) if got.size and got.shape[:-2].count(1) == got.ndim - 2 else got
 
 
-# %% nbgrader={"grade": false, "grade_id": "channel-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "channel-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _CHANNEL_SLIPS = {  # by hand 5 + 14 * 100 + 0.5
     1405: "the bias is missing",
     1406: "the bias is added for each input channel: once is enough",
@@ -340,7 +340,7 @@ _CHANNEL_SLIPS = {  # by hand 5 + 14 * 100 + 0.5
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "atrous-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "atrous-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     inputs = np.zeros((2, 5, 8))
     inputs[:, 2, 4] = 1, 100
@@ -366,7 +366,7 @@ def _test():
 
 _test()
 
-# %% nbgrader={"grade": false, "grade_id": "hole-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "hole-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _HOLE_SHAPES = {
     (3, 4): "you take the rate for a stride: it is the weights that lie apart, not the outputs",
     (3, 6): "with rate 2 the kernel reaches 2 pixels beyond the border: pad by rate, not by 1",
@@ -380,7 +380,7 @@ _HOLE_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "holes-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "holes-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # One map with a 1 at (2, 4), one kernel, 1 2 3 / 4 5 6 / 7 8 9, no bias.
     dot, kernel = np.zeros((5, 8)), _kernels()[0, 0]
@@ -414,7 +414,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "stride-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "stride-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # One map with a 1 at (2, 3), one kernel, 1 2 3 / 4 5 6 / 7 8 9, no bias. Your outputs with stride 1 tell what is right.
     dot = np.zeros((5, 8))
@@ -541,7 +541,7 @@ def name_mechanism(box, size):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "box-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "box-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _BOX_HINTS = {  # by the two kinds that are confused
     (0, 1): "both find a bright post; which of them leaves three of four pixels at zero, even in a bright image?",
     (2, 3): "a post in one column doesn't tell them apart: move it by one pixel, and see whether the answer moves",
@@ -562,7 +562,7 @@ def _named(answer, kind, size=16, **parts):
     assert got[0] == kind, f"this box is {_NAMES[kind]}, and you say {_NAMES[int(got[0])]}: {hint}"
 
 
-# %% nbgrader={"grade": true, "grade_id": "boxes-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "boxes-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     for kind in (3, 0, 2, 1):
         _named(name_mechanism, kind)
@@ -577,7 +577,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "strange-boxes-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "strange-boxes-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     for depth in (1, 3):
         for kernel in ((0.2, 0.7, 0.1), (0.0, 1.0, 0.5)):
@@ -654,7 +654,7 @@ _LOSS_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "loss-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "loss-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     scores, truth = _image()
     got = loss_and_gradient(scores, truth)
@@ -675,7 +675,7 @@ def _test():
 
 _test()
 
-# %% nbgrader={"grade": false, "grade_id": "gradient-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "gradient-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _GRADIENT_SLIPS = {
     -0.875: "that is the gradient of this pixel's loss: in a mean of three it counts a third",
     -0.219: "you divide by all four pixels: one isn't labelled, so divide by three",
@@ -687,7 +687,7 @@ _GRADIENT_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "gradient-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "gradient-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # By hand, the pixel in row 0, column 1: P is 1/8, 3/8, 4/8 and class 0 is true, so (1/8 - 1, 3/8, 4/8), and a third of it in the mean.
     got = loss_and_gradient(*_image())
@@ -724,7 +724,7 @@ def _one_pixel(answer, score_0, score_1, truth):
     return loss, answer_array(got[1], "for the gradient loss_and_gradient")
 
 
-# %% nbgrader={"grade": true, "grade_id": "large-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "large-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     loss, gradient = _one_pixel(loss_and_gradient, 1000, 1003, truth=1)
     small, gradient_small = _one_pixel(loss_and_gradient, 0, 3, truth=1)

@@ -86,7 +86,7 @@ _RETURNS = np.array(  # u, v, Z; by hand with a reach of 2 pixels and a gap of 0
     ]
 )
 
-# %% nbgrader={"grade": false, "grade_id": "open-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "open-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _OPEN_SLIPS = {  # number of the return: what is wrong when its answer is
     1: "return 1 is dropped, but what is near it is farther away: only a closer return hides",
     10: "return 10 shares its pixel with a closer one: such a return is hidden, as in the lecture",
@@ -101,7 +101,7 @@ _OPEN_SLIPS = {  # number of the return: what is wrong when its answer is
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "open-to-view-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "open-to-view-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     uv, Z = _RETURNS[:, :2].astype(int), _RETURNS[:, 2]
     got = answer_array(open_to_view(uv.copy(), Z.copy(), 2, 0.5), "open_to_view", dtype=bool)
@@ -148,7 +148,7 @@ def wrong_shares(n, outline, calibration, p_car):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "wrong-shares-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "wrong-shares-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _MAJORITY_SLIPS = {
     0.0280: "the calibration is ignored",
     0.1252: "when the camera is off, outlines err too: then a return is right with probability `outline`",
@@ -175,7 +175,7 @@ def _explain(what, got, slips):
         assert not np.isclose(got, slip, atol=1e-4), f"{what} {got:.4f}: {hint}"
 
 
-# %% nbgrader={"grade": true, "grade_id": "wrong-shares-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "wrong-shares-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # By hand: three returns. Wrong with 0.1 each: a majority with 0.028, a road cell 0.271, a car cell 0.001. Wrong with 0.9 each: 0.972, 0.999, 0.729.
     got = answer_array(wrong_shares(3, 0.1, 0.1, 0.2), "wrong_shares")
@@ -242,7 +242,7 @@ def _finished():
     return votes, unseen, np.array(made)
 
 
-# %% nbgrader={"grade": false, "grade_id": "audit-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "audit-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _AUDIT_SLIPS = (  # rule, count: hint
     {0: "the vote of cell (0, 5), CAR, has become ROAD", 16: "a cell without a vote can't break it: leave 255 out"},
     {
@@ -262,7 +262,7 @@ _AUDIT_SLIPS = (  # rule, count: hint
 )
 
 
-# %% nbgrader={"grade": true, "grade_id": "audit-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "audit-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     votes, unseen, made = _finished()
     got = answer_array(audit(votes, unseen, made, 1), "audit")
@@ -308,7 +308,7 @@ def between(left, right, o, same, table):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "between-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "between-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _TABLE = np.array([[0.85, 0.05, 0.05, 0.05], [0.05, 0.6, 0.25, 0.1]])
 _BETWEEN_SLIPS = {
     0.9878: "the occupancy is ignored",
@@ -318,15 +318,16 @@ _BETWEEN_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "between-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "between-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # By hand, as in the lecture: one vote for road, STATIC for sure: 0.9 * 0.05 = 0.045 against 0.1 * 0.6 = 0.06.
     static = np.array([0.0, 1.0, 0.0, 0.0])
     got = answer_array(between(ROAD, None, static, 0.9, _TABLE.copy()), "between")
     assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
     none = "the cell on the right has no vote: it says nothing"
+    zero = "the vote has no effect. ROAD is 0, which `if vote` takes for no vote; or do you take the missing vote for car?"
     assert not np.isclose(got, 0.0405 / 0.0465), f"one vote for road, {got:.3f}: {none}, not road"
-    assert not np.isclose(got, 0.05 / 0.65), f"one vote for road, {got:.3f}: {none}, not car"
+    assert not np.isclose(got, 0.05 / 0.65), f"one vote for road, {got:.3f}: {zero}"
     np.testing.assert_allclose(got, 0.045 / 0.105, atol=1e-6, err_msg="one vote for road, the middle cell STATIC")
     unsure = np.array(
         [0.1, 0.7, 0.1, 0.1]
@@ -371,7 +372,7 @@ def labels_and_wrong(frame, o, spec, reach, gap, rule=open_to_view):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "labels-and-wrong-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "labels-and-wrong-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     frame, spec = sample_drive()[10], GridSpec.compact()
     o = np.zeros((4, *spec.shape))

@@ -75,7 +75,7 @@ def tipping_prices(p, q):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "tipping-prices-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "tipping-prices-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _BEST_SLIPS = {
     2.1972: "that is the price at which cell 1 would give way: cell 2 is less sure, so it gives way first",
     -0.4055: "the sign is swapped: a price that keeps them from differing is positive",
@@ -95,7 +95,7 @@ _TIP_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "tipping-prices-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "tipping-prices-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # By hand: 0.9 * 0.4 = 0.9 * 0.6 e^-k at k = log 1.5; and 0.36 + 0.04 e^-k = 0.54 e^-k + 0.06 at e^-k = 0.6.
     got = answer_array(tipping_prices(0.9, 0.4), "tipping_prices")
@@ -135,7 +135,7 @@ def energy_change(labels, i, label, phi, k):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "energy-change-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "energy-change-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _CHANGE_SLIPS = {
     -2.2: "that is before minus after",
     3.0: "each pair is counted twice, as (i, j) and as (j, i)",
@@ -154,7 +154,7 @@ _CHANGE_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "energy-change-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "energy-change-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     phi = np.array([[0.1, 2.0, 0.3, 1.4], [1.9, 0.4, 1.5, 0.2], [1.2, 0.7, 0.6, 2.4], [0.8, 1.1, 1.7, 0.9]])
     k = np.array([[9, 0.5, 1.5, 0.3], [0.5, 9, 0.7, 0.2], [1.5, 0.7, 9, 1.1], [0.3, 0.2, 1.1, 9]])
@@ -199,7 +199,7 @@ def marginals(phi, k, known):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "marginals-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "marginals-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _MARGINAL_SLIPS = {
     (0.321, 0.178, 0.143): "the numbers of a cell don't sum to 1: divide by Z, the sum over all labellings",
     (0.238, 0.132, 0.106): "you divide by the sum over all cells as well: in each cell the classes sum to 1",
@@ -214,7 +214,7 @@ _MARGINAL_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": false, "grade_id": "known-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "known-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _KNOWN_SLIPS = {  # cell 2 is known to have class 0
     (0.716, 0.398, 0.319): "`known` is ignored",
     (0.716, 0.398, 1.000): "what is known must reach the other cells: leave out all labellings that contradict it",
@@ -232,7 +232,7 @@ _KNOWN_SLIPS = {  # cell 2 is known to have class 0
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "marginals-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "marginals-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     phi = np.array([[0.2, 0.9, 1.2], [1.6, 0.4, 0.3]])
     k = np.array([[0, 0.8, 0.3], [0.8, 0, 1.1], [0.3, 1.1, 0]])
@@ -279,7 +279,7 @@ def update(Q, phi, k, mu):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "update-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "update-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _UPDATE_SLIPS = {
     (0.885, 0.094, 0.108): "a cell counts itself: the diagonal of k must be left out",
     (0.655, 0.144, 0.319): "different labels are rewarded: they must cost; check the sign of the sum",
@@ -301,7 +301,7 @@ _UPDATE_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": false, "grade_id": "mu-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "mu-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _MU_SLIPS = {  # each border has its own price
     (0.571, 0.231, 0.297): "`mu` is ignored: each pair of classes has its own price",
     (0.815, 0.353, 0.424): "different labels are rewarded: they must cost",
@@ -319,7 +319,7 @@ _MU_SLIPS = {  # each border has its own price
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     Q = np.array([[0.6, 0.2, 0.3], [0.3, 0.5, 0.1], [0.1, 0.3, 0.6]])
     phi = np.array([[0.4, 1.6, 1.1], [1.3, 0.7, 2.0], [1.9, 1.0, 0.5]])
@@ -350,7 +350,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "update-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "update-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # Every class is dear, and class 1 of cell 1 is impossible; then the same with 2000 less for each.
     Q, k, less = np.full((3, 2), 1 / 3), np.zeros((2, 2)), np.array([[0.0, 3.0], [1.0, np.inf], [7000.0, 3.0]])
@@ -394,7 +394,7 @@ def free_energy(Q, phi, k, mu):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "free-energy-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "free-energy-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _FREE_SLIPS = {
     1.2547: "the pair is counted twice: sum over i < j only",
     2.9193: "the sign of the entropy is swapped: uncertainty makes F smaller, so add Q log Q, which is negative",
@@ -415,7 +415,7 @@ _FREE_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "free-energy-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "free-energy-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     Q, phi, k = np.array([[0.8, 0.3], [0.2, 0.7]]), np.array([[0.5, 1.2], [1.4, 0.3]]), np.array([[2, 0.9], [0.9, 2]])
     # By hand: prices 0.40 + 0.28 + 0.36 + 0.21 = 1.25; the pair agrees with 0.24 + 0.14 = 0.38, so 0.9 * 0.62 = 0.558; minus an entropy of 1.1113.
@@ -440,7 +440,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "free-energy-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "free-energy-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # Class 1 of cell 0 is impossible, and its Q is 0; then its Q is nearly 0, and its price 5.
     k = np.array([[2, 0.9], [0.9, 2]])
@@ -476,7 +476,7 @@ def weight_for(K, total):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "weight-for-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "weight-for-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _WEIGHT_SLIPS = {
     2.0588: "the diagonal is in your sums: a cell is no pair with itself",
     2.1000: "the diagonal is in your sums, and the mean isn't the median",
@@ -494,7 +494,7 @@ _WEIGHT_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "weight-for-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "weight-for-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # The three cells' sums without themselves are 0.7, 0.9 and 0.4, so the median is 0.7.
     K = np.array([[1, 0.6, 0.1], [0.6, 1, 0.3], [0.1, 0.3, 1]])
@@ -554,7 +554,7 @@ def refine(log_g, o):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "refine-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "refine-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _REFINE_SLIPS = {
     (0.9996, 0.9982, 0.9990): "a cell counts itself: the offset (0, 0) is no pair, it only counts in D",
     (0.9991, 0.9986, 0.9278): "the offset (0, 0) is missing in D",
@@ -580,7 +580,7 @@ _REFINE_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "refine-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "refine-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     g = np.array([[[0.7, 0.3, 0.5]], [[0.2, 0.6, 0.1]], [[0.1, 0.1, 0.4]]])  # three classes, one row of three cells
     o = np.array([[[0.8, 0.9, 0.1]], [[0.1, 0.0, 0.7]], [[0.0, 0.1, 0.1]], [[0.1, 0.0, 0.1]]])  # FREE, FREE, STATIC

@@ -1,17 +1,16 @@
 # %% [markdown]
 # # Exercise 11: the fast CRF
 #
-# Five functions that ask more of a filter than the lecture did and end in a CRF of your own, which refines the sample drive, and one question to answer in words. About 100 minutes.
+# Four functions that ask more of a filter than the lecture did and end in a CRF of your own, which refines the sample drive, and one question to answer in words. About 85 minutes.
 # The lecture is [11: the fast CRF](../11_fast_crf.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
 # | 1 | a blur over a map with gaps | 2 |
-# | 2 | the neighbours that a lattice lacks | 2 + 1 |
-# | 3 | a blur that loses nothing | 3 |
-# | 4 | what the *other* cells say, asked of many at once | 2 |
-# | 5 | a CRF of your own | 3 + 1 |
-# | 6 | in your own words | 2 |
+# | 2 | a blur that loses nothing | 3 |
+# | 3 | what the *other* cells say, asked of many at once | 2 |
+# | 4 | a CRF of your own | 3 + 1 |
+# | 5 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers and other sizes. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -24,7 +23,7 @@ import numpy as np
 
 from semgrid_edu.workshop.course.answers import answer_array
 from semgrid_edu.workshop.course.answers import peak_megabytes
-from semgrid_edu.crf import PermutohedralLattice, SeparableGaussian  # task 5 may use them
+from semgrid_edu.crf import PermutohedralLattice, SeparableGaussian  # task 4 may use them
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 
@@ -58,7 +57,7 @@ def blur_known(values, known, sigma):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "blur-known-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "blur-known-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     # This sigma gives 0.8 to a neighbour, so 0.8 ** 4 = 0.41 at distance 2 and 0.8 ** 9 = 0.13 at distance 3. Two cells are known.
     sigma = np.sqrt(-0.5 / np.log(0.8))
@@ -99,92 +98,13 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 2: the neighbours that a lattice lacks (2 + 1 points)
-#
-# What the blur moves to a vertex that doesn't exist is lost. How often does that happen? `vertices` is an integer array `(V, d + 1)`, one row per vertex of the permutohedral lattice that exists, in any order, none of them twice. A vertex has
-# $2(d + 1)$ neighbours: in each of the `d + 1` directions one a step ahead and one a step behind. A step ahead in direction `j` adds 1 to all coordinates but the `j`-th, from which it takes `d`.
-#
-# Complete `missing_share`: it returns which share of all neighbours, of all vertices together, doesn't exist. For one more point: 3125 vertices in five dimensions, without comparing each with each.
-
-
-# %% nbgrader={"grade": false, "grade_id": "missing-share", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def missing_share(vertices):
-    """Return the share of all neighbours that don't exist."""
-    ### BEGIN SOLUTION
-    there, size = {tuple(vertex) for vertex in vertices.tolist()}, vertices.shape[1]
-    found = 0
-    for j in range(size):
-        ahead = vertices + 1
-        ahead[:, j] -= size
-        found += 2 * sum(tuple(vertex) in there for vertex in ahead.tolist())  # whoever has one ahead is behind it
-    return 1 - found / (2 * size * len(vertices))
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": false, "grade_id": "missing-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_MISSING_SLIPS = {  # eight of 30 neighbours exist
-    0.2667: "that is the share that exists",
-    22.0: "that is the number of missing ones: divide by the number of all neighbours",
-    1.0: "no neighbour is found, or you count vertices that lack any: a step adds 1 to all coordinates but one, and takes d from that one",
-    0.9: "the last direction is left out: there are d + 1",
-    0.7: "the first direction is left out: there are d + 1",
-    0.8667: "each link counts once only: both ends have a neighbour",
-    4.4: "that is the number of missing ones for each vertex: a share is divided by 2 (d + 1) too",
-    1.4667: "you divide by d + 1: each direction has two neighbours, ahead and behind",
-    -0.3333: "you divide by d + 1: each direction has two neighbours, ahead and behind",
-}
-
-
-# %% nbgrader={"grade": true, "grade_id": "missing-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    # Four vertices in a row along direction 2, and one beside the first of them along direction 0: four links, so 8 of 5 * 6 neighbours exist.
-    vertices = np.array([[2, 2, -4], [0, 0, 0], [3, 3, -6], [1, 1, -2], [-2, 1, 1]])
-    before = vertices.copy()
-    got = answer_array(missing_share(vertices), "missing_share")
-    assert np.array_equal(vertices, before), "missing_share changed its argument `vertices`: work on a copy"
-    assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
-    _explain("the share is", got.item(), _MISSING_SLIPS)
-    np.testing.assert_allclose(got, 22 / 30, atol=1e-6, err_msg="8 of 30 neighbours exist")
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import fast_crf
-
-    complaint = fast_crf.check_missing_share(missing_share)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-
-# %% nbgrader={"grade": true, "grade_id": "missing-memory-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    steps = np.ones((5, 6), int) - 6 * np.eye(5, 6, dtype=int)
-    box = np.indices((5,) * 5).reshape(5, -1).T @ steps  # 0 to 4 steps in each of the first five directions
-    share, megabytes = peak_megabytes(missing_share, box)
-    # Links along one of the five: 4 * 5 ** 4. A step in the sixth goes back in all five: 4 ** 5 links.
-    wanted = 1 - 2 * (5 * 4 * 5**4 + 4**5) / (12 * 5**5)
-    np.testing.assert_allclose(
-        answer_array(share, "missing_share"), wanted, atol=1e-6, err_msg="a box of 3125 vertices"
-    )
-    assert megabytes < 40, f"3125 vertices took {megabytes:.0f} MB: look each neighbour up in a set or a dictionary"
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import fast_crf
-
-    complaint = fast_crf.check_missing_memory(missing_share)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 3: a blur that loses nothing (3 points)
+# ## Task 2: a blur that loses nothing (3 points)
 #
 # The lecture's blur loses what would go to a vertex that doesn't exist. Here is another one: a vertex **keeps** what it can't give away, so that the sum over all vertices stays the same. `simplices` is a list with one pair for each of N points: `corners`, an
 # integer array `(d + 1, d + 1)`, one row per corner, and `weights`, `(d + 1,)`. `values` is `(N, K)`. The filter
 #
 # 1. *splats*: a vertex gets the sum of `weight * value` of all points around it. Only vertices that are a corner of some point exist;
-# 2. *blurs* along direction 0, then 1, ... up to `d`: each vertex gives 1/4 of its value to the neighbour one step ahead, 1/4 to the one behind, and keeps the rest. Where a neighbour doesn't exist, it keeps that quarter, too. (Steps are those of task 2.)
+# 2. *blurs* along direction 0, then 1, ... up to `d`: each vertex gives 1/4 of its value to the neighbour one step ahead, 1/4 to the one behind, and keeps the rest. Where a neighbour doesn't exist, it keeps that quarter, too. (A step ahead in direction `j` adds 1 to all coordinates but the `j`-th, from which it takes `d`.)
 # 3. *slices*: a point gets the weighted mean of its corners, with the same weights.
 #
 # Complete `lattice_filter`: it returns `(N, K)`.
@@ -208,7 +128,7 @@ def lattice_filter(simplices, values):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "lattice-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "lattice-hints", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 _LATTICE_SLIPS = {  # what point 0 of the test gets by a common slip
     14.0000: "nothing is blurred between splat and slice, or no neighbour is found: a step adds 1 to all coordinates but one, and takes d from that one",
     14.7500: "you blur along one direction only: there are d + 1",
@@ -227,7 +147,7 @@ _LATTICE_SLIPS = {  # what point 0 of the test gets by a common slip
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "lattice-filter-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "lattice-filter-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     # One dimension: two points share the vertex in the middle of three. By hand: splat 12, 20, 16; blurred once 14, 17, 17; twice 14.75, 16.25, 17: the sum stays 48.
     left = np.array([[0, 0], [-1, 1]]), np.array([0.75, 0.25])
@@ -255,7 +175,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: what the other cells say (2 points)
+# ## Task 3: what the other cells say (2 points)
 #
 # `blur` is a filter: a function that takes `(N, K)` values and returns `(N, K)`, and that is linear: $\text{blur}(Q)_i = \sum_j k_{ij} Q_j$. You can call it, but you can't look inside. Mean field needs the sum without the cell itself,
 # $\sum_{j \ne i} k_{ij} Q_j$, so you need $k_{ii}$, which differs from cell to cell. One could ask for it cell by cell: put a 1 into one cell, and see what comes back. But on the paper's grid that takes 55,025 columns.
@@ -278,15 +198,15 @@ def others_say(blur, Q, shape, reach):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "counting-blur", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "counting-blur", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _counting(kernel, columns):
     """Return a filter with this kernel, (N, N), that stops when it gets more columns than it should in all."""
     left = [columns]
 
     def blur(values):
         values = np.asarray(values, float)
-        values = values if values.ndim == 2 else values[:, None]
-        left[0] -= values.shape[1]
+        values = values if values.ndim > 1 else values[:, None]
+        left[0] -= values.size // len(kernel)
         assert left[0] >= 0, (
             f"blur got more than the {columns} columns that it may get: ask several cells in one column"
         )
@@ -304,7 +224,7 @@ def _seen_from(reach):
     return kernel, np.stack([number / 20, 1 - number / 20], axis=1)
 
 
-# %% nbgrader={"grade": true, "grade_id": "others-say-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "others-say-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     kernel, Q = _seen_from(1)
     before, own = Q.copy(), np.diag(kernel)
@@ -339,7 +259,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: a CRF of your own (3 + 1 points)
+# ## Task 4: a CRF of your own (3 + 1 points)
 #
 # Now the stage `refine` of the pipeline. `log_g` is `(C, H, W)`: the logarithms of the network's probabilities. `o` is `(4, H, W)`: the occupancy grid. Complete
 # `refine`: it returns refined probabilities, `(C, H, W)`, by **10 iterations** of mean field on equation (4), with the package's defaults for cells of 0.5 m:
@@ -348,7 +268,7 @@ _test()
 # - spatial kernel: weight 3, width 1.2 cells;
 # - each kernel $K$ is normalised to $D^{-1/2} K D^{-1/2}$, where $D$ holds its row sums, that is, what it makes of a map of ones.
 #
-# You may use the package's filters, or your own of tasks 1 to 3:
+# You may use the package's filters, or your own of tasks 1 and 2:
 #
 # ```python
 # blur = PermutohedralLattice.build(features)               # features (N, d), in units of the widths
@@ -389,7 +309,7 @@ def refine(log_g, o):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "all-pairs", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "all-pairs", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _all_pairs(log_g, o, w=(4, 3), widths=(3.2, 0.2, 1.2), own=1, root=0.5, sign=1, rounds=10, keep=0, log=True):
     """Do the same with a matrix of all pairs; other keywords make mistakes."""
     place, flat, K = np.indices(o.shape[1:]).reshape(2, -1).T, log_g.reshape(len(log_g), -1), 0
@@ -416,9 +336,9 @@ def _street():
     return truth, log_g, (0.1 * rng.dirichlet(np.ones(4), (13, 10)) + 0.9 * np.eye(4)[state]).transpose(2, 0, 1)
 
 
-# %% nbgrader={"grade": false, "grade_id": "refine-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "refine-hints", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 _REFINE_SLIPS = {
-    "what a cell tells itself isn't subtracted: see task 4": {"own": 0},
+    "what a cell tells itself isn't subtracted: see task 3": {"own": 0},
     "the kernels aren't normalised: D^-1/2 K D^-1/2": {"root": 0},
     "you divide by the row sums twice: scale by 1 / sqrt(D) before and after the filter": {"root": 1},
     "the sign of the sum is wrong: agreeing neighbours raise log Q": {"sign": -1},
@@ -436,7 +356,7 @@ _REFINE_SLIPS = {
 }
 
 
-# %% nbgrader={"grade": true, "grade_id": "refine-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "refine-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     truth, log_g, o = _street()
     got = answer_array(refine(log_g.copy(), o.copy()), "refine")
@@ -470,7 +390,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "refine-memory-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": true, "grade_id": "refine-memory-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     _, log_g, o = _street()
     refine(log_g.copy(), o.copy())  # what is compiled on the first call isn't counted
@@ -504,15 +424,15 @@ _test()
 #
 # The page shows your stage beside the package's, frame by frame. Where do they differ, and why should they?
 #
-# ## Task 6: in your own words (2 points)
+# ## Task 5: in your own words (2 points)
 #
-# After the CRF most pedestrians are gone from your map. A colleague says: "That is the lattice's kernel, which isn't quite Gaussian. Let us use
-# `mean_field_accurate` and 50 iterations instead of 10." Which three errors must be told apart here? Which of them does the proposal remove, and what would you
-# measure to find out which one costs the pedestrians? Five sentences are enough.
+# After the CRF most poles are gone from your map. A colleague says: "That is the lattice's kernel, which isn't quite Gaussian. Let us run all pairs on a
+# crop, and 50 iterations instead of 10." Which three errors must be told apart here? Which of them does the proposal remove? And if the poles stay away:
+# which part of the model would you suspect, and how do you test it by switching it off? Five sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "three-errors", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # The kernel error (another kernel than equation (4)'s, at the same number of iterations), the convergence error (mean field stopped early), and the error of mean field itself against exact
-# inference, which no filter removes: those are the lecture's three. (An answer that names the error of the model instead of the third is right, too: even the exact minimum of equation (3) with these weights may be
-# wrong, because the pair terms pull a few cells towards their many neighbours.) `mean_field_accurate` removes the first and 50 iterations remove the second; neither touches mean field or the model. To find out: count the pedestrians' cells that are found by the network, by
-# `mean_field` and by `mean_field_accurate` with 10 and with 50 iterations. In the lecture the lattice and the window lose about as many, so the model costs them: then weights and widths must be
-# searched on labelled frames, with a metric that counts small classes. One point for the three errors, one for a measurement that separates them.
+# inference, which no filter removes. (An answer that names the error of the model instead of the third is right, too: even the exact minimum of equation (3) with these weights may be
+# wrong, because the pair terms pull a few cells towards their many neighbours.) All pairs remove the first and 50 iterations the second; neither touches mean field or the model. To find out: count the poles' true cells that are found by the network, by the
+# lattice, by all pairs, and by all pairs with 50 iterations. If the last three lose about as many, the model costs them. A pole is a cell or two wide, so even the spatial kernel outvotes it: set one weight or one width at a time to (nearly) nothing and count again,
+# on several frames, together with what else gets worse. One point for the three errors, one for a measurement that separates a cause.

@@ -61,7 +61,7 @@ def _test():
     got = answer_array(combine(np.array([[0.8, 0.2], [0.5, 0.5]]), np.array([1.0, 0.5])), "combine")
     assert got.shape == (2,), f"expected one number per class, shape (2,), got {got.shape}"
     assert np.isclose(got.sum(), 1), f"the belief sums to {got.sum():.3f}: divide by the sum"
-    assert np.allclose(got, [0.8, 0.2], atol=1e-3), f"expected 0.8 and 0.2, got {got.round(3)}"
+    assert np.allclose(got, [0.8, 0.2], atol=1e-3), f"the second frame says nothing, so 0.8 and 0.2 stay; got {got.round(3)}"
     # Odds of 4 with exponent 1 and of 4 with exponent 0.5: 4 * 2 = 8, so 8/9.
     got = answer_array(combine(np.array([[0.8, 0.2], [0.8, 0.2]]), np.array([1.0, 0.5])), "combine")
     slips = {
@@ -124,11 +124,11 @@ def _test():
         assert not np.isclose(r, value, atol=1e-3), f"r = {r:.3f}: {hint}"
     places = np.corrcoef(wrong[:-1].ravel(), wrong[1:].ravel())[0, 1]
     assert not np.isclose(r, places, atol=1e-3), "you pair neighbouring places: pair each frame with the next one"
-    assert np.isclose(r, 7 / 15, atol=1e-3), f"expected r = 7/15 = 0.467, got {r:.3f}"
+    assert np.isclose(r, 7 / 15, atol=1e-3), f"covariance 7/64 by variance 15/64 is r = 7/15 = 0.467, got {r:.3f}"
     expected = 1 + 2 * (1 - 7 / 15) / (1 + 7 / 15)
     assert not np.isclose(worth, 1 + 3 * (1 - 7 / 15) / (1 + 7 / 15), atol=1e-3), "T frames: T - 1 follow the first"
     assert not np.isclose(worth, expected / 3, atol=1e-3), "that is the exponent of each frame: don't divide by T"
-    assert np.isclose(worth, expected, atol=1e-3), f"three frames are worth {expected:.3f}, got {worth:.3f}"
+    assert np.isclose(worth, expected, atol=1e-3), f"r is right; by the formula three frames are worth {expected:.3f}, got {worth:.3f}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import memory
 
@@ -202,7 +202,7 @@ def _test():
         where = f"{ahead} ahead, {left} to the left"
         for hint, slip in _moved_slips(grid, ahead, left, [-1.0, -2.0]).items():
             assert np.array_equal(slip, expected) or not np.array_equal(got, slip), f"{where}: {hint}"
-        assert np.allclose(got, expected), f"{where}: expected\n{expected[0]} in the first class, got\n{got[0]}"
+        assert np.allclose(got, expected), f"{where}: the world stays, so the map moves back and right:\n{expected[0]} in the first class, got\n{got[0]}"
     gone = answer_array(moved(grid.copy(), 9, 0, np.array([-1.0, -2.0])), "moved")
     assert (gone[0] == -1).all(), "9 cells ahead: everything is new, so all cells take `fill`"
     ### BEGIN HIDDEN TESTS
@@ -345,7 +345,7 @@ def _right(called, truth, cells):
 # %% nbgrader={"grade": true, "grade_id": "remember-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     given, truth, seen, before = _street()
-    got = answer_array(maps(*given), "maps").astype(int)
+    got = answer_array(maps(*_copy(given)), "maps").astype(int)
     assert got.shape == truth.shape, f"expected one map for each of {len(truth)} frames, {truth.shape}; got {got.shape}"
     one = given[2].argmax(axis=1)
     assert (got != one).any(), "nothing is remembered: every map is that of one frame"

@@ -16,7 +16,7 @@ import pytest
 
 import semgrid_edu
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
-from semgrid_edu.workshop.course.sandbox import linux, resources
+from semgrid_edu.workshop.course.sandbox import limits, linux, resources
 from semgrid_edu.workshop.course.sandbox.limits import Limits, _all_but
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.resources import has_ended, namespace_of, processes_in
@@ -50,6 +50,14 @@ SECRETS = [
 def test_secrets_cannot_be_read(limited):
     for path in SECRETS:
         assert limited(f"open({path!r}).read()", "files")[0] == "error"
+
+
+def test_a_wheel_among_the_systems_programs_hides_its_solutions(monkeypatch):
+    hidden = Path("/usr/local/lib/semgrid_edu_notebooks")
+    monkeypatch.setattr(limits, "shipped_folder", lambda name: hidden if name == "notebooks" else Path("/nowhere"))
+    _, read = limits._readable()
+    assert Path("/usr/bin") in read
+    assert not {hidden, *hidden.parents}.intersection(read)
 
 
 def test_a_course_cannot_be_read_changed_or_listed(limited, tmp_path):

@@ -1,6 +1,8 @@
 """A student's process: calls look as if they were made here, and nothing that it does stops the next call."""
 
 import math
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -54,6 +56,13 @@ def test_only_the_students_own_time_counts(session, hostile_answer):
     session.left_in_all = 0.3
     assert session.run("while True: pass")["error"]["kind"] == "AnswerTimeoutError" or session.left_in_all <= 0
     assert "used up their time" in session.run("x = 1")["error"]["message"], "all cells together have a limit"
+
+
+def test_what_the_grader_does_for_an_answer_comes_to_an_end():
+    """Even where it is one call that Python can't interrupt: the process ends, as `test_pool` knows it."""
+    code = "from semgrid_edu.workshop.course.sandbox import session\nsession.GRADERS_TIME = 0\n"
+    code += "session.Session(None, 0.2)\n10**10**9"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 1
 
 
 def test_a_call_returns_values_and_changes_arguments(answer):
@@ -266,6 +275,13 @@ HIDES = {
     "in a child": "import numpy as np, os, time\ndef f(n):\n    read, write = os.pipe()\n    if os.fork() == 0:\n"
     "        kept = np.ones(n, 'f4'); time.sleep(0.3); os.write(write, str(kept.sum()).encode()); os._exit(0)\n"
     "    os.wait()\n    return float(os.read(read, 99))",
+    "in a file": "import numpy as np\ndef f(n):\n    with open('kept', 'wb') as file:\n        for k in range(8):\n"
+    "            file.write(np.ones(n // 8, 'f4').tobytes())\n    return float(sum(map(np.sum, read(n))))\n"
+    "def read(n):\n    with open('kept', 'rb') as file:\n        while part := file.read(n // 2 + 4):\n"
+    "            yield np.frombuffer(part[: len(part) // 4 * 4], 'f4')",
+    "in a deleted file": "import numpy as np, os, time\ndef f(n):\n    with open('kept', 'wb') as file:\n"
+    "        os.remove('kept')\n        for k in range(8):\n            file.write(np.ones(n // 8, 'f4').tobytes())\n"
+    "        file.flush()\n        time.sleep(0.1)\n    return n",
     "in numbers of Python": "def f(n):\n    return len([1.5] * (n // 2)) * 2",
 }
 

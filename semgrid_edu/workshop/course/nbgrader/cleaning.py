@@ -7,6 +7,7 @@ import bleach
 from nbconvert.filters import strip_files_prefix
 
 from semgrid_edu.storage.files import table_beside
+from semgrid_edu.workshop.course.sandbox.notebook import is_small_picture
 
 SHOWN_TAGS = (*bleach.ALLOWED_TAGS, *table_beside(__file__)["tags"])
 """The HTML tags that Markdown turns into; none of them runs anything."""
@@ -39,4 +40,5 @@ def without_scripts(html: str) -> str:
 def _is_shown(tag: str, name: str, value: str) -> bool:
     """Return whether an attribute stays: links, colours of code, pictures within the text, but not from elsewhere."""
     pattern = SHOWN_ATTRIBUTES.get(f"{tag} {name}", SHOWN_ATTRIBUTES.get(name, "(?!)"))
-    return re.fullmatch(pattern, value, re.IGNORECASE | re.DOTALL) is not None
+    fits = re.fullmatch(pattern, value, re.IGNORECASE | re.DOTALL) is not None
+    return fits and (name != "src" or is_small_picture(value.partition(",")[2]))

@@ -29,7 +29,7 @@ from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_grader
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.resources import delete_folder
 
-KILLED = "the file can't be graded: twice it ended the process that grades, perhaps for want of memory"
+KILLED = "the file can't be graded: twice it ended the process that grades, perhaps for want of memory or time"
 """The note on a submission that ended the grader twice: among others, and alone."""
 
 UNREADABLE = "unreadable"
@@ -104,7 +104,12 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor]:
         stack.callback(delete_folder, Path(folder))
         pool = ProcessPoolExecutor(workers, context, _begin, (folder,))
         stack.callback(pool.shutdown, cancel_futures=True)
-        yield pool
+        try:
+            yield pool
+        except BaseException:  # above all Ctrl-C: what is begun isn't waited for, and is graded again
+            for process in list((pool._processes or {}).values()):
+                process.terminate()
+            raise
 
 
 def _begin(folder: str) -> None:

@@ -1,5 +1,6 @@
 """Submissions: which there are, whether they can be or have been graded, and their results in the gradebook."""
 
+import codecs
 import csv
 import io
 import shutil
@@ -95,7 +96,7 @@ def misplaced(course: Path) -> list[Path]:
 
 
 def check_file(path: Path) -> None:
-    """Check that a submission can be graded, whatever its answers are.
+    """Check that a submission can be graded, whatever its answers are; a byte order mark is taken away.
 
     Parameters
     ----------
@@ -118,6 +119,8 @@ def check_file(path: Path) -> None:
         raise UnfitError(f"it comes with more than {MAX_PARTS} files and folders")
     if sum(one.lstat().st_size for one in files) > MAX_BYTES:
         raise UnfitError(f"it has more than {MAX_BYTES} bytes with all files beside it")
+    if (content := path.read_bytes()).startswith(codecs.BOM_UTF8):  # nbgrader reads the file itself
+        path.write_bytes(content.removeprefix(codecs.BOM_UTF8))
     try:
         notebook = nbformat.read(path, as_version=4)
         nbformat.validate(notebook)

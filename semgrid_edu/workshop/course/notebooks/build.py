@@ -34,7 +34,7 @@ LIVE = "application/vnd.jupyter.widget-view+json"
 
 
 def lecture_sources(folder: Path = NOTEBOOKS) -> list[Path]:
-    """Return the percent sources of all lectures, `src/NN_name.py`, in the order of the course.
+    """Return the percent sources of all lectures, `src/NN_name.py` or `src/NNx_name.py`, in the order of the course.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def lecture_sources(folder: Path = NOTEBOOKS) -> list[Path]:
     DataError
         When there are no lectures, as in an installed wheel.
     """
-    sources = sorted((folder / "src").glob("[0-9][0-9]_*.py"))
+    sources = sorted((folder / "src").glob("[0-9][0-9]*_*.py"))
     if not sources:
         raise DataError(folder / "src", "lectures named NN_name.py (run this in a checkout of the project)", "none")
     return sources
@@ -64,7 +64,7 @@ def companion_sources(folder: Path = NOTEBOOKS) -> list[Path]:
 
 
 def notebook_name(source: Path) -> str:
-    """Return the name of a source's notebook, such as "03_bof", "exercises/03_bof" or "deeper/graphical_models".
+    """Return the name of a source's notebook, such as "03_bof", "exercises/03_bof" or "deeper/time_beliefs".
 
     Parameters
     ----------
@@ -85,8 +85,8 @@ def built_path(source: Path) -> Path:
 
     Examples
     --------
-    >>> built_path(Path("notebooks/src/deeper/graphical_models.py")).as_posix()
-    'notebooks/deeper/graphical_models.ipynb'
+    >>> built_path(Path("notebooks/src/deeper/time_beliefs.py")).as_posix()
+    'notebooks/deeper/time_beliefs.ipynb'
     """
     return next(folder for folder in source.parents if folder.name == "src").parent / f"{notebook_name(source)}.ipynb"
 
@@ -99,7 +99,7 @@ def named(sources: list[Path], names: list[str] | None) -> list[Path]:
     sources : list of Path
         The sources to choose from. A lecture and its exercise have the same name, and are chosen together.
     names : list of str, optional
-        The names to keep, such as "03_bof" or "graphical_models".
+        The names to keep, such as "03_bof" or "time_beliefs".
 
     Raises
     ------

@@ -115,9 +115,9 @@ def _readable() -> tuple[list[Path], list[Path]]:
     It may read Python, libraries, and this package except for the sources of the exercises.
     """
     package, hidden = Path(semgrid_edu.__file__).parent, shipped_folder("notebooks")
-    look, read = [], [Path(path) for path in SYSTEM]
-    for place in (Path(sys.prefix), Path(sys.base_prefix), package, shipped_folder("data_samples")):
-        above, without = _all_but(place.resolve(), hidden.resolve())
+    look, read = [], []
+    for place in (*SYSTEM, sys.prefix, sys.base_prefix, package, shipped_folder("data_samples")):
+        above, without = _all_but(Path(place).resolve(), hidden.resolve())
         look += above
         read += without
     return look, read

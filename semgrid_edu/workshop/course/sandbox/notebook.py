@@ -8,6 +8,7 @@ import linecache
 import re
 import traceback
 import warnings
+from base64 import b64decode
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from types import CodeType
@@ -17,6 +18,7 @@ import numpy as np
 from nbformat import NotebookNode
 from nbformat.v4 import new_output
 from nbgrader.utils import is_grade, is_solution
+from PIL import Image
 
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.session import AnswerEndedError, AnswerTimeoutError, NoProcessError, Session
@@ -30,8 +32,14 @@ PRINTED = "your code printed:\n"
 MAX_OUTPUT_TEXT = 30_000_000
 """How many characters of outputs are kept in a notebook."""
 
+MAX_ERROR_TEXT = 20_000
+"""How many characters are kept of a line of an error: a test may quote what an answer returned."""
+
 PICTURES, BASE64 = ("image/png", "image/jpeg"), re.compile(r"[A-Za-z0-9+/=\s]*")
 """The kinds of pictures that are kept, and the form of their data."""
+
+MAX_PIXELS = 25_000_000
+"""How many pixels a picture may have: a few kilobytes can hold more than a browser's memory."""
 
 ENDS = (AnswerEndedError, AnswerTimeoutError)
 """The errors of an answer that ended its process, or had to be ended."""
@@ -260,7 +268,22 @@ def _as_outputs(reply: dict) -> list[NotebookNode]:
 
 def _harmless(shown: dict[str, str]) -> dict[str, str]:
     """Return text and pictures. HTML and SVG could contain scripts, which would run in the grader's browser."""
-    return {k: data for k, data in shown.items() if k == "text/plain" or (k in PICTURES and BASE64.fullmatch(data))}
+    return {k: data for k, data in shown.items() if k == "text/plain" or (k in PICTURES and is_small_picture(data))}
+
+
+def is_small_picture(data: str) -> bool:
+    """Return whether a text is a picture that a browser can show.
+
+    Parameters
+    ----------
+    data : str
+        A PNG, JPEG or GIF file in base64.
+    """
+    try:
+        width, height = Image.open(io.BytesIO(b64decode(data)), formats=("PNG", "JPEG", "GIF")).size
+    except Exception:
+        return False
+    return BASE64.fullmatch(data) is not None and width * height <= MAX_PIXELS
 
 
 def _shortened(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNode], int]:
@@ -274,4 +297,5 @@ def _shortened(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNod
 
 def _error(kind: str, message: str, lines: Sequence[str] = ()) -> NotebookNode:
     """Return an error as an output of a notebook."""
-    return new_output("error", ename=kind, evalue=message, traceback=[*lines] or [f"{kind}: {message}"])
+    texts = [text[:MAX_ERROR_TEXT] for text in (kind, message, *(lines or [f"{kind}: {message}"]))]
+    return new_output("error", ename=texts[0], evalue=texts[1], traceback=texts[2:])

@@ -222,12 +222,12 @@ class StudentProcess:
         """Return a block that measures the growth of the worker's memory."""
         outer = self.process.pid
         if not self.namespace:
-            return PeakMemory(outer)
+            return PeakMemory(outer, self.folder)
         try:
             # `unshare` has the worker as its only child.
-            return PeakMemory(int(Path(f"/proc/{outer}/task/{outer}/children").read_text()))
+            return PeakMemory(int(Path(f"/proc/{outer}/task/{outer}/children").read_text()), self.folder)
         except (OSError, ValueError):
-            return PeakMemory(0)  # it has ended, as the next call will tell
+            return PeakMemory(0, self.folder)  # it has ended, as the next call will tell
 
     def stop(self) -> None:
         """End the process with everything that it has started, and delete its folder."""

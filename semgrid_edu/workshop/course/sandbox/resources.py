@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Iterable
 from contextlib import suppress
+from math import inf
 from pathlib import Path
 
 MAX_FILES = 20_000
@@ -15,6 +16,9 @@ MAX_FILES = 20_000
 
 SAMPLE_INTERVAL, MAX_SAMPLING = 0.01, 600.0
 """Seconds between two measurements of the memory of child processes, and for how long they are repeated."""
+
+CLOCK_TICK = 0.02
+"""By how many seconds the system may date a file too early."""
 
 MEGABYTE = 1_000_000
 
@@ -158,6 +162,21 @@ def exceeds_disk_limits(folder: Path, max_bytes: int) -> bool:
     max_bytes : int
         Limit for all files together.
     """
+    return disk_use(folder, max_bytes) > max_bytes
+
+
+def disk_use(folder: Path, max_bytes: float = inf, since: float = -inf) -> float:
+    """Return the bytes on disk of the files in a folder: infinity when they are too many or can't be listed.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    max_bytes : float
+        Files beyond this sum aren't looked at.
+    since : float
+        Only files that were changed since then, seconds of `time.time`.
+    """
     size, count, waiting = 0, 0, [str(folder)]
     while waiting:
         try:
@@ -166,16 +185,17 @@ def exceeds_disk_limits(folder: Path, max_bytes: int) -> bool:
                     # A file that has just been deleted must not hide the others beside it.
                     with suppress(FileNotFoundError):
                         found = entry.stat(follow_symlinks=False)
-                        size, count = size + (getattr(found, "st_blocks", 0) * 512 or found.st_size), count + 1
+                        used = getattr(found, "st_blocks", 0) * 512 or found.st_size
+                        size, count = size + used * (found.st_mtime >= since), count + 1
                         if stat.S_ISDIR(found.st_mode):
                             waiting.append(entry.path)
                     if size > max_bytes or count > MAX_FILES:
-                        return True
+                        return inf
         except (FileNotFoundError, NotADirectoryError):
             continue
         except OSError:  # a closed folder, or a path that is too long for the system
-            return True
-    return False
+            return inf
+    return size
 
 
 def delete_folder(folder: Path) -> None:
@@ -196,16 +216,18 @@ def delete_folder(folder: Path) -> None:
 class PeakMemory:
     """The growth of a process's memory to its peak, measured from outside while a `with` block runs.
 
-    Mapped files and the memory of descendants count. Only Linux can measure this; elsewhere the growth is 0.
+    Written and mapped files count, and the memory of descendants. Only Linux can measure this; elsewhere it is 0.
 
     Parameters
     ----------
     pid : int
         The process.
+    folder : Path
+        The only folder to which it may write.
     """
 
-    def __init__(self, pid: int) -> None:
-        self.pid, self.ended = pid, threading.Event()
+    def __init__(self, pid: int, folder: Path) -> None:
+        self.pid, self.folder, self.ended = pid, folder, threading.Event()
         self.thread = threading.Thread(target=self._sample_family, daemon=True)
         try:
             Path(f"/proc/{pid}/clear_refs").write_text("5")  # resets the peak
@@ -215,7 +237,9 @@ class PeakMemory:
 
     def __enter__(self) -> "PeakMemory":
         """Begin."""
-        self.first = self.largest = memory_held([Path(f"/proc/{self.pid}")])
+        self.began = time.time() - CLOCK_TICK
+        self.first = memory_held([Path(f"/proc/{self.pid}")])
+        self.largest = 0.0
         if self.held is not None:
             self.thread.start()
         return self
@@ -231,15 +255,19 @@ class PeakMemory:
         self.ended.set()
         self.thread.join()
         alone = (memory_of(self.pid)["VmHWM"] - self.held) / 1000
-        return max(alone, (max(self.largest, self._family()) - self.first) / MEGABYTE)
+        self._sample()
+        return max(alone, (self.largest - self.first) / MEGABYTE)
 
     def _sample_family(self) -> None:
         """Measure again and again, because a child's memory has no peak that outlives it."""
         until = time.monotonic() + MAX_SAMPLING
         while not self.ended.wait(SAMPLE_INTERVAL) and time.monotonic() < until:
-            self.largest = max(self.largest, self._family())
+            self._sample()
 
-    def _family(self) -> int:
-        """Return the bytes that the process and its descendants hold together, 0 without descendants."""
+    def _sample(self) -> None:
+        """Measure files, and what the process and its descendants hold, unless its own peak tells everything."""
         below = processes_below(self.pid)
-        return memory_held([Path(f"/proc/{self.pid}"), *below]) if below else 0
+        family = [Path(f"/proc/{self.pid}"), *below]
+        written = disk_use(self.folder, since=self.began) + deleted_bytes(family, 0)
+        if written or below:
+            self.largest = max(self.largest, written + memory_held(family))

@@ -1,6 +1,8 @@
 """A student's notebook, whose cells run and whose functions are called; a crash in one leaves the others intact."""
 
 import builtins
+import faulthandler
+import os
 import time
 from collections.abc import Callable
 from functools import cache
@@ -16,6 +18,13 @@ TOTAL_TIME = 20
 
 MAX_LINE = 300
 """With secret inputs, errors name no line beyond this one: a longer cell could report any number by its line."""
+
+
+GRADERS_TIME = 300
+"""Seconds for the grader's own work on a cell, beyond the student's; then its process is ended, as by a crash."""
+
+NOWHERE = os.open(os.devnull, os.O_WRONLY)
+"""Where that is reported."""
 
 
 class AnswerTimeoutError(Exception):
@@ -73,6 +82,8 @@ class Session:
     def begin(self) -> None:
         """Start the time of a cell."""
         self.left, self.ended = self.timeout, ""
+        # Not even compiled code that a callback or a test runs here for an answer's sake goes on for ever.
+        faulthandler.dump_traceback_later(self.timeout + GRADERS_TIME, exit=True, file=NOWHERE)
 
     def run(self, code: str) -> dict[str, Any]:
         """Run a cell; one that ends the process, or doesn't end, isn't run again.
@@ -220,6 +231,7 @@ class Session:
     def stop(self) -> None:
         """End the process for good."""
         self.stopped = True
+        faulthandler.cancel_dump_traceback_later()
         if self.process is not None:
             self.process.stop()
             self.process = None

@@ -1,0 +1,597 @@
+# %% [markdown]
+# # 01b · Graphical models: what a missing edge promises
+#
+# **In one sentence.** A graphical model writes the probability of many things as a product of small tables and draws
+# it as a graph; in the graph you can read what tells something about what, and what an answer costs.
+#
+# **You will be able to**
+# - multiply, sum out and slice tables, and get every probability from that;
+# - read in a graph what is independent of what, before and after something has been seen;
+# - say what changes when a graph has no arrows;
+# - choose an order of summation, and say why the filter of lecture 01 is one half of message passing;
+# - read the three graphs on which this course is built.
+#
+# **Prerequisites.** Lecture [01](01_bayes.ipynb): predict, update, smoothing. Conditional probability; numpy.
+#
+# **Time.** 74 minutes, of which the computer needs a few seconds.
+#
+# **Paper.** Its parts as graphs: section 3.2 (a cell over time), section 3.5 (the CRF), figure 2 (the whole system).
+
+# %% jupyter={"source_hidden": true}
+from functools import reduce
+
+import matplotlib.pyplot as plt
+import numpy as np
+from ipywidgets import FloatSlider, interact
+
+from semgrid_edu import plotting
+from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, d_separated, draw, eliminate, enumerate_marginals
+from semgrid_edu.graphical import in_rows, min_fill_order, product, sum_product, why_dependent
+
+# %% jupyter={"source_hidden": true}
+plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
+FREE, OCCUPIED = 0, 1
+
+
+def any_model(parents):
+    """Return a model of a graph whose tables don't matter, because we only read the graph."""
+    names = list(dict.fromkeys([name for child, above in parents.items() for name in (*above, child)]))
+    tables = [np.full([2] * (1 + len(parents.get(name, ()))), 0.5) for name in names]
+    return GraphicalModel([Factor((*parents.get(n, ()), n), t) for n, t in zip(names, tables, strict=True)], parents)
+
+
+# %% [markdown]
+# ## Does one thing tell about another?
+#
+# A beam comes back from somewhere ahead. What does it tell about the cell behind, which it never reached? And about the
+# same cell a second later? We could answer all such questions if we knew how probable each map is. But the paper's grid
+# has 55,025 cells. If each is free or occupied, there are $2^{55025}$ maps, and nobody can store a number for each.
+#
+# So each stage of the system stores something smaller, for example one number per cell. It can do so only because it
+# assumes that some things tell nothing about others. In code such assumptions are hard to find. A graph shows them.
+# Each unknown or reading is a circle, and two circles are linked if they depend on each other *directly*:
+
+# %% jupyter={"source_hidden": true} alt="three graphs of three variables: a chain of arrows from before to now to after; arrows from two cells m1 and m2 to one shaded beam z; three cells in a row, linked by black squares and without arrows"
+CHAIN = {"now": ("before",), "after": ("now",)}
+COLLIDER = {"z": ("m1", "m2")}
+LINE = {"before": (0, 0), "now": (1.4, 0), "after": (2.8, 0)}
+AGREE = np.array([[3, 1], [1, 3]])
+row = GraphicalModel([Factor(("m1", "m2"), AGREE), Factor(("m2", "m3"), AGREE)])
+fig, axes = plt.subplots(1, 3, figsize=(9, 2), layout="constrained", width_ratios=(1.7, 1, 1.4))
+draw(any_model(CHAIN), axes[0], positions=LINE)
+draw(any_model(COLLIDER), axes[1], observed="z", positions=in_rows(["m1", "m2"], ["z"]))
+draw(row, axes[2], positions=in_rows(["m1", "m2", "m3"]))
+for ax, title in zip(axes, ("one cell, three times", "two cells, one beam", "three neighbours"), strict=True):
+    ax.set_title(title, fontsize=10)
+plt.show()
+
+# %% [markdown]
+# - **Left**: one cell at three times. There is no arrow from *before* to *after*, because all that the past can tell
+#   about the future, it tells through the present.
+# - **Middle**: two cells on the way of one beam $z$, which comes back or doesn't. It is shaded because we see it. No
+#   edge links the cells: before any beam, one tells nothing about the other.
+# - **Right**: three neighbours that tend to agree, because walls are long. None of them comes first, so there are no
+#   arrows. (The middle graph promises the contrary about neighbours. A graph is a model, and one may choose.)
+#
+# So an edge says that two things may depend on each other, and **an edge that isn't there is a promise**. This lecture
+# teaches you to read such promises.
+#
+# ## How do small tables make a large one?
+#
+# Begin with one cell $m$ and one beam $z$. The cell is occupied with probability 0.1. The beam comes back from an
+# occupied cell with probability 0.8, and from a free one with 0.05. Multiply, and you have a number for each
+# combination, the **joint distribution**:
+#
+# | | no return | return |
+# |---|---|---|
+# | **free** | 0.9 · 0.95 = 0.855 | 0.9 · 0.05 = 0.045 |
+# | **occupied** | 0.1 · 0.2 = 0.02 | 0.1 · 0.8 = 0.08 |
+#
+# How probable is a return? Add its column: 0.125. A return did come. How probable is *occupied* now? Keep this column
+# only, and divide by its sum: 0.08 / 0.125 = 0.64. That is Bayes' rule, and no formula was needed.
+#
+# You did three things with the table: you *multiplied*, you *summed out* a variable, and you *sliced* at what is known.
+# With the division at the end, these give every probability in this course. A table of non-negative numbers whose axes
+# have names is called a **factor**. It needn't sum to one.
+
+# %% tags=["factor"]
+cell = Factor("m", [0.9, 0.1])  # FREE, OCCUPIED
+beam = Factor(("z", "m"), [[0.95, 0.2], [0.05, 0.8]])  # rows: no return, return
+joint = cell * beam  # axes are matched by name, not by place
+np.testing.assert_allclose(joint.table, cell.table[:, None] * beam.table.T)
+print("P(z) =", joint.sum("m").table.round(3), "  P(m | return) =", joint.given(z=1).normalised().table.round(2))
+
+# %% [markdown]
+# For many variables nobody can invent such a table. It is easier to tell a story, one small table after the other.
+# First comes the world: two cells, each occupied with probability 0.2. Then comes the beam: it returns if at
+# least one of them is occupied, and this time it never errs. Each variable has one table, given the variables that come before it in the story, its
+# **parents**, and an arrow from each of them. The joint distribution is the product of the tables,
+# $P(m_1)\,P(m_2)\,P(z \mid m_1, m_2)$. Such a model is called **directed**, or a Bayesian network.
+#
+# **Predict before you run.** The beam returns. How probable is it now that $m_2$ is occupied? Then another sensor
+# reports that $m_1$ *is* occupied. Does the probability of $m_2$ go up, go down, or stay?
+#
+# <details><summary>Answer</summary>
+#
+# Before the beam: each of the two alone 0.2 · 0.8 = 0.16, both 0.04, none 0.64. The return rules out *none*, and 0.36
+# is left. So $m_2$ has (0.16 + 0.04) / 0.36 = 0.56. If $m_1$ is occupied, only *$m_1$ alone* and *both* are left, and
+# both has 0.04 / 0.20 = 0.2. So it goes down, to where it was before the beam, because $m_1$ already explains the
+# return.
+#
+# </details>
+
+# %% jupyter={"outputs_hidden": true}
+cells = [Factor("m1", [0.8, 0.2]), Factor("m2", [0.8, 0.2])]
+returns = Factor(("m1", "m2", "z"), [[[1, 0], [0, 1]], [[0, 1], [0, 1]]])  # no return only if both are free
+one_of_you = GraphicalModel([*cells, returns], parents={"z": ("m1", "m2")})
+for seen in ({}, {"z": 1}, {"z": 1, "m1": OCCUPIED}, {"z": 1, "m1": FREE}):
+    belief = enumerate_marginals(one_of_you, "m2", given=seen).normalised().table[OCCUPIED]
+    seen = ", ".join(f"{name} = {state}" for name, state in seen.items()) or "nothing"
+    print(f"given {seen:<13} P(m2 occupied) = {belief:.2f}")
+
+# %% [markdown]
+# This is called **explaining away**. `enumerate_marginals` does what we did by hand: it goes through all combinations
+# and adds up. Look at what happened. Before the beam, the cells told nothing about each other. *Seeing the beam has
+# coupled them*: if $m_1$ is free, $m_2$ must be occupied.
+#
+# So small tables, multiplied along a story, make a large one. And what is seen can couple what was independent.
+#
+# ## What is independent of what?
+#
+# We can't check the numbers of every pair in a large model. But the graph alone tells us. Three patterns of three
+# variables are enough, because every longer path is made of them. New is the **fork**: one cell, two beams.
+
+# %% jupyter={"source_hidden": true} alt="three patterns: a chain, before to now to after; a fork, one cell m with arrows to two beams z1 and z2; a collider, two cells m1 and m2 with arrows to one beam z"
+FORK = {"z1": ("m",), "z2": ("m",)}
+PATTERNS = {
+    "chain": (CHAIN, ("before", "now", "after"), LINE),
+    "fork": (FORK, ("z1", "m", "z2"), in_rows(["m"], ["z1", "z2"])),
+    "collider": (COLLIDER, ("m1", "z", "m2"), in_rows(["m1", "m2"], ["z"])),
+}
+fig, axes = plt.subplots(1, 3, figsize=(9, 2), layout="constrained", width_ratios=(1.7, 1, 1))
+for ax, (title, (parents, _, positions)) in zip(axes, PATTERNS.items(), strict=True):
+    draw(any_model(parents), ax, positions=positions).set_title(title, fontsize=10)
+plt.show()
+
+# %% [markdown]
+# **Predict before you run.** For each pattern: does one end tell something about the other end, as long as you don't
+# know the middle? And once you do know the middle?
+#
+# <details><summary>Answer</summary>
+#
+# Chain: yes; and no once *now* is known, because the past acts only through it. Fork: yes, since a first return makes
+# *occupied* more probable, and so a second return; and no once the cell is known, because the beams err separately.
+# Collider: no; and *yes* once the beam is known, by explaining away. It is the other way round.
+#
+# </details>
+
+# %% tags=["d-separation"] jupyter={"outputs_hidden": true}
+for title, (parents, (one, middle, other), _) in PATTERNS.items():
+    answers = [d_separated(any_model(parents), one, other, given=known) for known in ((), middle)]
+    print(f"{title:<9} independent: {answers[0]!s:<6} once {middle} is known: {answers[1]}")
+
+# %% [markdown]
+# `d_separated` looks at the graph and at no number. Its rule for large graphs: follow every path from one variable to
+# the other, with or against the arrows. A path is *blocked* if it has
+# - the middle of a chain or a fork that *is* known, or
+# - a collider that is *not* known, and nothing further down its arrows is known either.
+#
+# If every path is blocked, the two are **d-separated**, and then they are independent *whatever the numbers are*. If
+# one path is open, they may depend on each other. Here are two larger graphs. On the left a noisy scan sees the cell
+# at each time. On the right $r$ says which of the cells reflected, and we see a noisy range $z$.
+
+# %% jupyter={"source_hidden": true} alt="left, before, now and after in a row, each with an arrow down to its shaded scan z1, z2, z3, with now ringed; right, cells m1 and m2 point to r, and r points to the shaded z"
+CELL_IN_TIME = {"now": ("before",), "after": ("now",), "z1": ("before",), "z2": ("now",), "z3": ("after",)}
+NOISY_RANGE = {"r": ("m1", "m2"), "z": ("r",)}
+ROWS = in_rows(["before", None, "now", None, "after"], ["z1", None, "z2", None, "z3"])
+fig, axes = plt.subplots(1, 2, figsize=(8, 2.6), layout="constrained")
+draw(any_model(CELL_IN_TIME), axes[0], observed=("z1", "z2", "z3"), positions=ROWS, highlight=["now"])
+draw(any_model(NOISY_RANGE), axes[1], observed="z", positions=in_rows(["m1", "m2"], ["r"], ["z"]))
+plt.show()
+
+# %%
+in_time, noisy_range = any_model(CELL_IN_TIME), any_model(NOISY_RANGE)
+print("open path:", why_dependent(in_time, "before", "after", given=("z1", "z2", "z3")))
+print("open path:", why_dependent(in_time, "before", "after", given="now"))
+print("open path:", why_dependent(noisy_range, "m1", "m2", given="z"))
+blanket = ("before", "after", "z2")
+assert d_separated(in_time, "now", ("z1", "z3"), given=blanket)
+
+# %% [markdown]
+# - A scan of *now* isn't *now*. It may be wrong, so the chain stays open.
+# - Once *now* is known, nothing is open. This is why a Bayes filter may forget all old scans: its belief about *now* is
+#   all that they can still tell.
+# - The range $z$ is below the collider $r$ and tells something about it. So $r$ is open.
+#
+# And what must you know so that nothing else tells about *now* (ringed)? Its parent *before*, its child *after*, and
+# its scan. This set is called the **Markov blanket**: a variable's parents, its children, and its children's other
+# parents, because of explaining away.
+#
+# So the missing edges tell what is independent of what. Known middles block, and known colliders open.
+#
+# ## What if nothing comes first?
+#
+# Neighbouring cells tend to agree, because walls are long. Which of two neighbours should get the arrow? Neither. So give each
+# pair a factor $\psi$ that is 3 if they agree and 1 if they don't. These numbers are no probabilities. They only say
+# what is more plausible. Multiply them, and divide by whatever makes the sum one:
+#
+# $$ P(m_1, m_2, m_3) = \frac{\psi(m_1, m_2)\; \psi(m_2, m_3)}{Z}, \qquad
+#    Z = \sum_{\text{all maps}} \psi(m_1, m_2)\; \psi(m_2, m_3) $$
+#
+# Such a model is called **undirected**, or a Markov random field, and $Z$ is its **partition function**. The paper's
+# CRF (conditional random field) is one.
+#
+# **Predict before you run.** Three cells in a row have eight maps. What is $Z$? And how probable is it that the two
+# ends, which share no factor, agree?
+#
+# <details><summary>Answer</summary>
+#
+# All alike (2 maps): 3 · 3 = 9 each. One change (4 maps): 3 each. Two changes (2 maps): 1 each. So $Z$ = 18 + 12 + 2 =
+# 32. The ends agree if there is no change or two: (18 + 2) / 32 = 0.625.
+#
+# </details>
+
+# %% jupyter={"outputs_hidden": true}
+ends = enumerate_marginals(row, ("m1", "m3"))
+print(f"Z = {ends.table.sum():.0f}; the ends agree with probability {np.trace(ends.normalised().table):.3f}")
+for known in ((), ("m2",)):
+    print(f"m1 and m3 independent, given {known}: {d_separated(row, 'm1', 'm3', given=known)}")
+
+# %% [markdown]
+# Independence is simpler here. What is known always blocks, and there are no colliders. The cost is $Z$, a sum over
+# all maps.
+#
+# Can we forget the arrows of a directed model? Yes, its tables are factors like any others. Then it is drawn as a
+# **factor graph**, with a black square for each table, linked to the variables in it:
+
+# %% jupyter={"source_hidden": true} alt="left, arrows from m1 and m2 to z; right, the factor graph: one black square linked to m1, m2 and z, and one more square at each cell"
+without_arrows = GraphicalModel(one_of_you.factors)
+fig, axes = plt.subplots(1, 2, figsize=(7, 2.5), layout="constrained")
+PLACES = {"m1": (0, 0), "m2": (1.4, 0), "z": (0.7, -1.1)}
+draw(one_of_you, axes[0], positions=PLACES).set_title("with arrows", fontsize=10)
+draw(without_arrows, axes[1], positions=PLACES | {"f(m1, m2, z)": (0.7, -0.35)})
+axes[1].set_title("its factor graph", fontsize=10)
+plt.show()
+assert d_separated(one_of_you, "m1", "m2")
+assert not d_separated(without_arrows, "m1", "m2")
+
+# %% [markdown]
+# The numbers are the same, but the drawing promises less. Both cells are in one table now, so the right graph can't say
+# that they are independent before the beam is seen. So keep the arrows as long as you ask about independence, and
+# forget them when you compute.
+#
+# ## What does an answer cost?
+#
+# So far we summed over all combinations. Thirty cells have a billion. How can the same sum be cheaper? Take the chain,
+# with lecture 01's matrix $M$ of a free or occupied cell, and P(*before*) one half. To get $P(\text{after})$ we sum over
+# *before* and *now*. But one table doesn't contain *before*, and may move out of its sum, as in $ab + ac = a(b + c)$:
+#
+# $$ P(\text{after}) = \sum_{\text{now}} P(\text{after} \mid \text{now})
+#    \underbrace{\sum_{\text{before}} P(\text{before})\; P(\text{now} \mid \text{before})}_{\text{a table over now alone}} $$
+#
+# No table has more than two axes, however long the chain is. This is **variable elimination**: take a variable,
+# multiply only the factors that contain it, and sum it out. Then the next one.
+
+
+# %% tags=["elimination"]
+def sum_in_order(factors, order):
+    """Sum out one variable after the other; return what is left, and the size of each table on the way."""
+    sizes = []
+    for name in order:
+        together = reduce(Factor.__mul__, [f for f in factors if name in f.names])
+        sizes.append(together.table.size)
+        factors = [f for f in factors if name not in f.names] + [together.sum(name)]
+    return product(factors), sizes
+
+
+M = np.array([[0.9, 0.1], [0.2, 0.8]])  # from FREE, OCCUPIED to FREE, OCCUPIED
+START = Factor("before", [0.5, 0.5])
+chain = GraphicalModel([START, Factor(("before", "now"), M), Factor(("now", "after"), M)], CHAIN)
+after, sizes = sum_in_order(chain.factors, order=["before", "now"])
+np.testing.assert_allclose(after.table, eliminate(chain, "after").table)  # the package's
+np.testing.assert_allclose(after.table, START.table @ M @ M)  # lecture 01's prediction, twice
+
+# %% [markdown]
+# The last line says that elimination on a chain is lecture 01's prediction: a vector times a matrix, once per step.
+# Does the order matter? Let the kind of street decide how full six cells are (the star on the left, below).
+#
+# **Predict before you run.** We want $P(m_1)$. How many entries has the largest table if you sum out *street* first?
+# And if you sum out the other five cells first, and *street* last?
+#
+# <details><summary>Answer</summary>
+#
+# Street first: all seven tables contain it, so their product has seven axes, 2<sup>7</sup> = 128 entries. Cells first:
+# each cell is in one table only, which has two axes, so 4 entries each time.
+#
+# </details>
+
+# %% jupyter={"outputs_hidden": true}
+street = Factor("street", [0.5, 0.5])  # motorway, market place
+six = [Factor(("street", f"m{k}"), [[0.95, 0.05], [0.7, 0.3]]) for k in range(1, 7)]
+others = [f"m{k}" for k in range(2, 7)]
+for order in (["street", *others], [*others, "street"]):
+    m1, sizes = sum_in_order([street, *six], order)
+    print(f"{order[0]:<7}first: P(m1) = {m1.table.round(3)}, largest table {max(sizes)}")
+
+
+# %% jupyter={"source_hidden": true} alt="left, a circle named street with an arrow to each of six cells; right, the largest table on a logarithmic scale against the side of a square of cells: all maps rise to 10 to the 30, elimination to about 16,000"
+def square(n):
+    """Return n x n cells, each linked with its neighbours to the right and below."""
+    below = [((r, c), (r + 1, c)) for r in range(n - 1) for c in range(n)]
+    right = [((c, r), (c, r + 1)) for r in range(n - 1) for c in range(n)]
+    return GraphicalModel(Factor([f"m{r},{c}" for r, c in pair], AGREE) for pair in below + right)
+
+
+sides = np.arange(2, 11)
+largest = [max(sum_in_order(square(n).factors, min_fill_order(square(n)))[1]) for n in sides]
+star = GraphicalModel([street, *six], parents={f"m{k}": ("street",) for k in range(1, 7)})
+fig, axes = plt.subplots(1, 2, figsize=(9, 2.8), layout="constrained", width_ratios=(1.3, 1))
+draw(star, axes[0], positions=in_rows(["street"], [f"m{k}" for k in range(1, 7)]))
+axes[1].semilogy(sides, 2.0 ** (sides**2), "s--", color="0.4", label="all maps, $2^{n^2}$")
+axes[1].semilogy(sides, largest, "o-", color="#0072b2", label="elimination's largest table")
+axes[1].set(xlabel="side $n$ of a square of cells", ylabel="entries")
+axes[1].legend(frameon=False, fontsize=9)
+plt.show()
+assert largest[-1] == 2**14
+
+# %% [markdown]
+# The answer is the same, and the cost isn't. **To sum a variable out is to link all its neighbours**: each cell hints at
+# the street, and so at every other cell.
+#
+# Is there always a good order? Not in a square of neighbouring cells (right). Every order meets a table with more axes
+# than the square has cells on a side; this is a theorem. For ten by ten cells sixteen thousand entries are enough, in
+# place of $2^{100}$ maps. But the paper's grid has 155 cells on its shorter side, and its CRF links even every cell with
+# every other.
+#
+# So an answer costs as much as its largest table. On a chain that is little. On a grid it is too much, and **this is
+# why the course needs approximations**.
+#
+# ## How do we get all answers at once?
+#
+# Elimination answers one question. Now we want to know what the cell was *before*, *now* and *after*. Must we start
+# again for each? Our cell is scanned each time by the noisy beam of the first table: no return, a return, no return. A
+# scan that has happened is a slice of its table, so it is a factor of one variable.
+
+# %% jupyter={"source_hidden": true} alt="factor graph of the chain before, now, after, with squares for the prior, the matrix M between two times and the scan at each; blue arrows above it run to the right and say forward, orange arrows below run to the left and say backward"
+NOTHING, RETURN = np.array([0.95, 0.2]), np.array([0.05, 0.8])  # P(z | FREE), P(z | OCCUPIED)
+TIMES = ("before", "now", "after")
+scans = [Factor(name, seen) for name, seen in zip(TIMES, (NOTHING, RETURN, NOTHING), strict=True)]
+scanned = GraphicalModel([*chain.factors, *scans])
+fig, ax = plt.subplots(figsize=(7, 2.2), layout="constrained")
+PLACES = in_rows(["before", None, None, "now", None, None, "after"])
+PLACES |= {f"f({name})" + (" #2" if name == "before" else ""): (PLACES[name][0], -0.62) for name in TIMES}
+tables = {"f(before)": "prior", "f(before, now)": "$M$", "f(now, after)": "$M$"}
+draw(scanned, ax, positions=PLACES | {"f(before)": (-0.75, 0)}, equations=tables)
+for name in TIMES:
+    ax.text(PLACES[name][0] + 0.14, -0.62, "scan", va="center", fontsize=10)
+for x in (1.5, 4.5):
+    for y, shift, text, colour in ((0.4, 0.75, "forward", "#0072b2"), (-0.3, -0.75, "backward", "#d55e00")):
+        style = {"arrowstyle": "->", "color": colour, "lw": 1.8}
+        ax.annotate("", (x + shift, y), (x - shift, y), arrowprops=style)
+        ax.text(x, y + np.sign(shift) * 0.18, text, ha="center", va="center", color=colour, fontsize=10)
+ax.set_ylim(-0.9, 0.75)
+plt.show()
+
+# %% [markdown]
+# Sum out from the left (blue). What arrives at *now* is a table that holds all that the left side can tell. It is
+# called a **message**. Another message comes from the right (orange). With $\ell_1, \ell_2, \ell_3$ for the
+# likelihoods of the three scans, and products entry by entry:
+#
+# $$ P(\text{now} \mid \text{all scans}) \;\propto\; \underbrace{\bigl(P(\text{before})\, \ell_1\bigr)\, M}_{\text{from the left}}
+#    \;\cdot\; \underbrace{\ell_2}_{\text{own scan}} \;\cdot\; \underbrace{M\, \ell_3}_{\text{from the right}} $$
+#
+# **Predict before you run.** When the return arrives, the filter believes with 0.82 that the cell is occupied *now*.
+# The third scan speaks against it. In hindsight, does the 0.82 rise or fall? And the belief about *before*, which was
+# 0.17?
+#
+# <details><summary>Answer</summary>
+#
+# The 0.82 falls to 0.65: perhaps the return was an error. The 0.17 rises to 0.42: a return came right after, and what
+# is somewhere now was mostly there before.
+#
+# </details>
+
+# %% tags=["messages"] jupyter={"outputs_hidden": true}
+from_left = (START.table * NOTHING) @ M
+from_right = M @ NOTHING
+now = from_left * RETURN * from_right
+before = START.table * NOTHING * (M @ (RETURN * from_right))  # the message from the right, passed on
+filtered = from_left * RETURN
+all_answers = sum_product(scanned)  # the package: every message once in each direction
+np.testing.assert_allclose(all_answers.marginals["now"], now / now.sum())
+np.testing.assert_allclose(all_answers.marginals["before"], before / before.sum())
+print(f"now: filter {(filtered / filtered.sum())[OCCUPIED]:.2f}, all scans {(now / now.sum())[OCCUPIED]:.2f}")
+print(f"before: all scans {(before / before.sum())[OCCUPIED]:.2f}")
+
+# %% jupyter={"source_hidden": true}
+first = START.table * NOTHING
+assert np.isclose((first / first.sum())[OCCUPIED], 0.17, atol=0.005)
+np.testing.assert_allclose(all_answers.messages["now", "f(now, after)"], filtered / filtered.sum())
+
+# %% [markdown]
+# Each message serves several questions, so one sweep in each direction gives *all* answers. This is the
+# **forward-backward algorithm**. Compare it with lecture 01: **the Bayes filter is the forward half of message
+# passing.** The filter isn't wrong for lack of the other half. It answers another question: what is the cell now, from
+# what has been seen until now?
+#
+# On any graph without loops two sweeps are enough, because each message holds what is on one side of an edge, and the
+# two sides have nothing in common. With a maximum in place of each sum, messages find the most probable sequence as a
+# whole: the algorithm of **Viterbi**.
+#
+# ## Which graphs does this course use?
+#
+# Three of them, and each has one large question.
+
+# %% tags=["stages"] jupyter={"source_hidden": true} alt="left, a cell at three times in a row of arrows, each with an arrow to its shaded scan, all inside a box labelled each cell; right, four cells at the corners of a square, each pair linked through a black square, and one more square at each cell"
+fig, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained", width_ratios=(1.5, 1))
+draw(
+    any_model(CELL_IN_TIME),
+    axes[0],
+    observed=("z1", "z2", "z3"),
+    positions=ROWS,
+    plates={"each cell": ("before", "now", "after", "z1", "z2", "z3")},
+)
+CORNERS = {"x1": (0, 0), "x2": (1.8, 0), "x3": (1.8, -1.8), "x4": (0, -1.8)}
+pairs = [(one, other) for one in CORNERS for other in CORNERS if one < other]
+beside = {f"f({name})": (1.4 * x - 0.36, 1.3 * y + 0.3) for name, (x, y) in CORNERS.items()}
+diagonals = {"f(x1, x3)": (0.6, -0.6), "f(x2, x4)": (1.2, -0.6)}
+own = [Factor(name, [1, 2]) for name in CORNERS]
+crf = GraphicalModel([*own, *(Factor(pair, AGREE) for pair in pairs)])
+draw(crf, axes[1], positions=CORNERS | diagonals | beside)
+axes[0].set_title("one cell over time", fontsize=10)
+axes[1].set_title("the CRF, on four cells", fontsize=10)
+plt.show()
+
+# %% [markdown]
+# **One cell over time** (lectures 02 to 04). The box is a **plate**: all this is there once for each cell. No edge links
+# two plates, so each cell is filtered by itself. In lecture 03 things move from cell to cell, and this promise is
+# broken.
+#
+# **The CRF** (lectures 10 and 11). Each cell has a table of its own, what the network says of it, and one with every
+# other cell that rewards agreement. There are loops everywhere and no cheap order. Lecture 10 shows what one does then.
+#
+# **The whole system** (lecture 00). Above is the world, below is what the system computes. The world $w$ goes on from
+# one instant to the next. LIDAR $l$ and image $i$ see it. The occupancy $o$ comes from the scans. The network's scores
+# $s$ are sampled into planes $p$, and $o$ and $p$ are fused to the semantic grid $g$.
+
+# %% jupyter={"source_hidden": true} alt="two columns, t-1 and t: the world w with an arrow to the next, arrows from w to the shaded readings l and i; l to o, i to s to p, o and p to g; o has an arrow to the next o, and a dashed arrow leads from g to the next g"
+SYSTEM, WHERE, WORDS = {"w1": ("w0",), "o1": ("l1", "o0")}, {}, {}
+COLUMN = {"w": (1, 0), "l": (0, -1), "i": (2, -1), "o": (0, -2.3), "s": (2, -1.75), "p": (2, -2.85), "g": (1, -3.6)}
+for t in (0, 1):
+    own = {"l": "w", "i": "w", "s": "i", "p": "s"}
+    SYSTEM |= {f"{child}{t}": (f"{parent}{t}",) for child, parent in own.items()} | {f"g{t}": (f"o{t}", f"p{t}")}
+    WHERE |= {f"{name}{t}": (x + 4.6 * t, y) for name, (x, y) in COLUMN.items()}
+    WORDS |= {f"{name}{t}": f"${name}_{{{'t' if t else 't-1'}}}$" for name in COLUMN}
+SYSTEM["o0"] = ("l0",)
+system = any_model(SYSTEM)
+words = {
+    "w1": "world",
+    "l1": "LIDAR",
+    "i1": "image",
+    "o1": "occupancy",
+    "s1": "scores",
+    "p1": "planes",
+    "g1": "semantic grid",
+}
+draw(system, plt.subplots(figsize=(7.6, 4.4), layout="constrained")[1], observed=("l0", "l1", "i0", "i1"),
+     positions=WHERE, labels=WORDS, equations=words, dashed=[Dashed(("g0", "g1"))])  # fmt: skip
+plt.show()
+
+# %%
+print("the earlier image and the map, given o and p: ", why_dependent(system, "i0", "g1", given=("o1", "p1")))
+print("the earlier image and the world, given o and p:", why_dependent(system, "i0", "w1", given=("o1", "p1")))
+
+# %% [markdown]
+# An edge that the system deletes is dashed in this course. Here it is the one from $g$ to the next $g$. Does that
+# matter? Ask the graph. The map $g_t$ can't hear of the earlier image: once $o_t$ and $p_t$ are known, every path is
+# blocked. But about the *world* that image still has something to tell, because a path is open. So the system forgets
+# something that is worth knowing. Lecture 14 puts this edge back, and measures what it was worth.
+#
+# So ask three things of each stage: what are its unknowns, what tells about what, and is the answer exact?
+#
+# ## Where this breaks: an echo
+#
+# Messages are exact as long as there is no loop. Close the row of three neighbours to a triangle. Only $m_1$ has been
+# scanned, and the scan says: occupied with probability 0.8.
+#
+# **Predict before you run.** What is the exact probability of $m_1$: more than 0.8, less, or 0.8? And what do messages
+# say that go round the triangle?
+#
+# <details><summary>Answer</summary>
+#
+# Exactly 0.8. The neighbours have seen nothing, so they can't add anything. But $m_1$ hears from $m_3$ that it is
+# probably occupied, and takes for news what is the echo of its own opinion. It becomes too sure: 0.85.
+#
+# </details>
+
+
+# %% jupyter={"outputs_hidden": true}
+def neighbours(agreement, scan, closed=True):
+    """Return three cells that like to agree; the first is scanned. A row, or a triangle if `closed`."""
+    pairs = [("m1", "m2"), ("m2", "m3"), ("m1", "m3")][: 3 if closed else 2]
+    return GraphicalModel(
+        [Factor("m1", [1 - scan, scan]), *(Factor(pair, [[agreement, 1], [1, agreement]]) for pair in pairs)]
+    )
+
+
+for closed, name in ((False, "row"), (True, "triangle")):
+    model = neighbours(agreement=3, scan=0.8, closed=closed)
+    exact, passed = eliminate(model, "m1").normalised().table, sum_product(model).marginals["m1"]
+    print(f"{name:<9}P(m1 occupied): exact {exact[OCCUPIED]:.2f}, messages {passed[OCCUPIED]:.2f}")
+
+
+# %% jupyter={"source_hidden": true}
+def echo(scan, ax):
+    """Draw P(m1 occupied) against the agreement: exact, messages in the triangle and in the row."""
+    pulls = np.linspace(1, 8, 15)
+    for closed, style, colour, label in (
+        (True, "o-", "#d55e00", "messages, triangle"),
+        (False, "s--", "#0072b2", "messages, row"),
+    ):
+        found = [
+            sum_product(neighbours(pull, scan, closed), iterations=500).marginals["m1"][OCCUPIED] for pull in pulls
+        ]
+        ax.plot(pulls, found, style, color=colour, label=label)
+    ax.axhline(scan, color="black", linewidth=3, alpha=0.4, label="exact")
+    ax.set(xlabel="factor when two cells agree", ylim=(0.45, 1.02))
+    ax.set_title(f"a scan says {scan:g}", fontsize=10)
+
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, three cells in a triangle of squares with orange arrows running round it; middle and right, P(m1 occupied) against the factor for scans of 0.8 and 0.6: exact and messages in a row are flat, messages in a triangle rise with the factor"
+fig, axes = plt.subplots(1, 3, figsize=(10, 3), layout="constrained", width_ratios=(1, 1.2, 1.2))
+TRIANGLE = {"m1": (0, 0), "m2": (1.9, 0), "m3": (0.95, 1.45)}
+draw(neighbours(3, 0.8), axes[0], positions=TRIANGLE | {"f(m1)": (-0.6, 0)})
+axes[0].text(-0.6, 0.2, "scan", ha="center", fontsize=10)
+centre = np.mean(list(TRIANGLE.values()), axis=0)
+for one, other in (("m1", "m2"), ("m2", "m3"), ("m3", "m1")):
+    start, end = np.array([TRIANGLE[one], TRIANGLE[other]])
+    outwards = 0.6 * ((start + end) / 2 - centre)
+    ends = [start + share * (end - start) + outwards for share in (0.75, 0.25)]
+    axes[0].annotate("", *ends, arrowprops={"arrowstyle": "->", "color": "#d55e00", "lw": 1.8})
+axes[0].set(xlim=(-0.9, 2.5), ylim=(-0.6, 1.9))
+for ax, scan in zip(axes[1:], (0.8, 0.6), strict=True):
+    echo(scan, ax)
+axes[1].set_ylabel("P($m_1$ occupied)")
+axes[1].legend(fontsize=9, frameon=False, loc="lower right")
+plt.show()
+
+
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
+def show(scan):
+    """Draw one setting."""
+    echo(scan, plt.subplots(figsize=(4.5, 2.8), layout="constrained")[1])
+    plt.legend(fontsize=9, frameon=False, loc="lower right")
+    plt.show()
+
+
+_ = interact(show, scan=FloatSlider(value=0.8, min=0.5, max=0.99, step=0.01))
+
+# %% [markdown]
+# The loop is the cause: take one factor of the triangle away, and the messages are exact again (blue). With the loop, the
+# stronger the agreement, the louder the echo. (The dial works with a running kernel. Why is there no echo at 0.5?)
+#
+# And no method repairs a wrong graph. If two beams share an error, and the graph has no circle for it, even exact
+# inference is too sure. Lecture [02](02_grids.ipynb) shows that.
+#
+# ## In five lines
+#
+# 1. A factor is a table with named axes. Multiply, sum out, slice, divide: that gives every probability.
+# 2. Missing edges are promises. A known middle blocks a chain or a fork. A collider opens when it, or something below
+#    it, is known.
+# 3. Without arrows, factors say what is plausible, $Z$ makes the sum one, and what is known always blocks.
+# 4. An answer costs as much as its largest table, and the order decides. On a chain two sweeps of messages give all
+#    answers; the forward one is the filter.
+# 5. In a loop, messages hear their own echo and become too sure.
+#
+# ## Further reading and exercise
+#
+# - Bishop, *Pattern Recognition and Machine Learning*, Springer 2006, chapter 8: the same material, for continuous
+#   variables too.
+# - Koller, Friedman, *Probabilistic Graphical Models*, MIT Press 2009, the reference.
+# - Kschischang, Frey, Loeliger, *Factor graphs and the sum-product algorithm*, IEEE Transactions on Information
+#   Theory, 2001.
+# - Pearl, *Probabilistic Reasoning in Intelligent Systems*, Morgan Kaufmann 1988: d-separation, by its inventor.
+#
+# [Exercise 01b](exercises/01b_graphical_models.ipynb): tables with named axes, reports that aren't certain, independence
+# read off a graph, elimination with its cost, and a question. Next: lecture [02](02_grids.ipynb), thousands of cells
+# side by side.

@@ -1,0 +1,484 @@
+# %% [markdown]
+# # Exercise 01b: graphical models
+#
+# Four pieces of a small inference library: the quotient of two tables, Bayes' rule on a table, independence read off a graph, and elimination with its cost.
+# Then one question to answer in words. About 90 minutes. The lecture is [01b: graphical models](../01b_graphical_models.ipynb).
+#
+# | task | about | points |
+# |---|---|---|
+# | 1 | divide two tables with named axes | 1 + 1 |
+# | 2 | what is heard: multiply, sum out, normalise | 2 + 1 |
+# | 3 | independence read off a graph | 2 + 2 |
+# | 4 | eliminate what isn't seen, in a given order, and say what it costs | 2 + 1 |
+# | 5 | in your own words | 2 |
+#
+# Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
+# you are wrong. Your instructor's tests use other inputs. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
+
+# %% nbgrader={"grade": false, "grade_id": "setup", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# Names that begin with _ belong to the tests.
+import warnings
+
+import numpy as np
+
+from semgrid_edu.workshop.course.answers import answer_array
+from semgrid_edu.graphical import Factor
+
+warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
+
+
+def _explain(got, slips):
+    """Stop with a hint when `got` is what a common slip gives."""
+    for slip, hint in slips.items():
+        if np.shape(got) == np.shape(slip):
+            assert not np.allclose(got, slip, atol=5e-4), f"got {np.round(got, 3).tolist()}: {hint}"
+
+
+# %% [markdown]
+# ## Task 1: divide by name (1 + 1 points)
+#
+# The lecture multiplies factors: $P(z, m) = P(m)\, P(z \mid m)$. Sometimes one must go back, from $P(z, m)$ and $P(m)$ to $P(z \mid m)$, or take a message out of a belief
+# that it has been multiplied into. A factor is a pair `(names, table)`: a tuple of names, one for each axis, and a table of non-negative numbers. Complete `divide`: it
+# returns the quotient, again as a pair, over the variables of `f`. An entry is the entry of `f` divided by the entry of `g` at the same states. All variables of `g` are
+# among those of `f`, but their axes may stand at other places. You may choose the order of the result's axes, as long as `names` tells it.
+# The second point is for factors that share several variables, for `g` without any (then its `names` is `()` and its table one number), and for zeros: where `g` is 0, `f` is 0 too, and the quotient is 0.
+
+
+# %% nbgrader={"grade": false, "grade_id": "divide", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def divide(f, g):
+    """Return the quotient of two factors as (names, table)."""
+    ### BEGIN SOLUTION
+    names = tuple(f[0])
+    shared = [name for name in names if name in g[0]]
+    below = np.transpose(g[1], [g[0].index(name) for name in shared])
+    below = below[tuple(slice(None) if name in shared else None for name in names)]
+    return names, np.divide(f[1], below, out=np.zeros(np.shape(f[1])), where=below > 0)
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "quotient-hints", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+_QUOTIENT_SLIPS = {  # rows m, columns z
+    ((0.9, 7 / 30), (6 / 70, 0.8)): "the numbers of m divide along the axis of z: line the axes up by name",
+    ((0.441, 0.049), (0.018, 0.072)): "you multiplied: a quotient divides",
+    ((10 / 9, 10), (5, 1.25)): "upside down: divide f by g",
+    ((0.45, 0.05), (0.1, 0.4)): "you divided by the sum: a quotient isn't normalised",
+    ((0.9, 0.2), (0.1, 0.8)): "right numbers, wrong names: your names stand in another order than your axes",
+}
+
+
+# %% nbgrader={"grade": true, "grade_id": "divide-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+def _test():
+    joint, cell = (("m", "z"), np.array([[0.63, 0.07], [0.06, 0.24]])), (("m",), np.array([0.7, 0.3]))
+    before = joint[1].copy(), cell[1].copy()
+    got = divide(joint, cell)
+    assert got is not None, "divide returned nothing: did you forget `return`?"
+    assert np.array_equal(joint[1], before[0]), "divide changed the table of `f`: make a new one (no /=)"
+    assert np.array_equal(cell[1], before[1]), "divide changed the table of `g`: make a new one"
+    assert isinstance(got, tuple | list), f"return a pair, (names, table), got {type(got).__name__}"
+    assert len(got) == 2, f"return two things, the names and the table, got {len(got)}"
+    names, table = tuple(got[0]), answer_array(got[1], "for the table divide")
+    assert len(set(names)) == len(names), (
+        f"the names {names} hold m twice: a variable that both factors have is one axis"
+    )
+    assert sorted(names) == ["m", "z"], f"the quotient is over the variables of f, m and z, yours is over {names}"
+    assert table.shape == (2, 2), f"two variables of two states make a table of shape (2, 2), got {table.shape}"
+    table = table if names == ("m", "z") else table.T
+    _explain(table, _QUOTIENT_SLIPS)
+    np.testing.assert_allclose(table, [[0.9, 0.1], [0.2, 0.8]], err_msg="P(z | m): 0.63 / 0.7, 0.07 / 0.7 for m = 0")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_divide(divide)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+
+# %% nbgrader={"grade": true, "grade_id": "divide-shared-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+def _test():
+    f = ("m1", "m2"), np.array([[1.0, 200.0], [30.0, 0.0]])
+    got = divide(f, (("m2", "m1"), np.array([[1.0, 10.0], [100.0, 0.0]])))
+    assert isinstance(got, tuple | list), f"return a pair, (names, table), got {type(got).__name__}"
+    names, table = got[0], answer_array(got[1], "for the table divide")
+    assert sorted(names) == ["m1", "m2"], f"the quotient is over m1 and m2, yours is over {names}"
+    assert np.isfinite(table).all(), "0 / 0 where m1 = 1 and m2 = 1: the quotient is 0 there"
+    table = table if tuple(names) == ("m1", "m2") else table.T
+    swapped = "the axes of g stand the other way round: sort them by name, not by place"
+    _explain(table, {((1.0, 20.0), (0.3, 0.0)): swapped})
+    np.testing.assert_allclose(table, [[1, 2], [3, 0]], err_msg="at m1 = 0, m2 = 1: f says 200 and g says 100")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_divide_shared(divide)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 2: what is heard (2 + 1 points)
+#
+# The lecture slices a table at what is known for certain. A report is seldom certain. `factor` is again a pair `(names, table)`, a joint table of several variables. It need
+# not sum to 1. `heard` is a dictionary, and may be empty. For each variable of which a report has come it holds the report's likelihood: `{"z": [0.3, 0.9]}` says that the
+# report is three times as probable if z is 1 as if z is 0. So a likelihood needn't sum to 1, and `[0, 1]` is the report of a witness who is never wrong.
+# Reports are independent of each other once all variables are known. There may be one about `wanted` itself.
+#
+# Complete `posterior`: it returns P(wanted | all reports), an array with one probability for each state of the variable `wanted`. For one more point: what is heard may be
+# impossible, because every entry that agrees with it is 0. Then there is no answer, so raise a `ValueError`.
+
+
+# %% nbgrader={"grade": false, "grade_id": "posterior", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def posterior(factor, wanted, heard):
+    """Return P(wanted | all reports) as an array (K,)."""
+    ### BEGIN SOLUTION
+    names, weights = list(factor[0]), np.array(factor[1], float)
+    for name, likelihood in heard.items():
+        weights = np.moveaxis(np.moveaxis(weights, names.index(name), -1) * likelihood, -1, names.index(name))
+    weights = weights.sum(axis=tuple(axis for axis, name in enumerate(names) if name != wanted))
+    if weights.sum() == 0:
+        raise ValueError("these reports exclude each other")
+    return weights / weights.sum()
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "posterior-hints", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+_POSTERIOR_SLIPS = {  # P(m2 | z is surely 1) by a common slip
+    (19 / 41, 22 / 41): "you summed z out: something is heard of z, so its states don't count alike",
+    (11 / 13, 2 / 13): "that is for z = 0: the first number of a likelihood is that of state 0",
+    (6 / 28, 22 / 28): "that is the answer for m1: look where the axis of `wanted` is",
+    (6 / 22, 16 / 22): "you took the largest entry over m1: an unknown variable is summed out",
+    (8, 20): "these are weights: divide by their sum, 28",
+    (8 / 41, 20 / 41): "these are the weights divided by the sum of the table as it was: divide by what is left of it",
+    (2 / 6, 4 / 6): "you looked at m1 = 0 only: m1 isn't known, sum over its states",
+    (2, 5): "you took the mean over the others: sum, then divide by the sum",
+}
+_UNSURE_SLIPS = {  # P(m2 | a report of z that is three times as probable if z is 1)
+    (8 / 28, 20 / 28): "you take the report for certain: z may still be 0, with a smaller weight",
+    (0.4258, 0.5742): "you mix the answers for z = 0 and z = 1: a likelihood multiplies the joint table",
+    (8.75 / 41, 15.5 / 41): "divide by the sum of the weights, after the report has multiplied them",
+    (10.5, 18.6): "these are weights: divide by their sum",
+}
+
+
+# %% nbgrader={"grade": true, "grade_id": "posterior-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+def _test():
+    table = np.array([[[8.0, 2.0], [1.0, 4.0]], [[3.0, 6.0], [1.0, 16.0]]])  # axes m1, m2, z
+    joint = (("m1", "m2", "z"), table.copy())
+    got = answer_array(posterior(joint, "m2", {"z": [0, 1]}), "posterior")
+    assert np.array_equal(joint[1], table), "posterior changed the table it was given: make a new one"
+    assert got.shape == (2,), f"one probability for each of the 2 states of m2, shape (2,), got {got.shape}"
+    _explain(got, _POSTERIOR_SLIPS)
+    np.testing.assert_allclose(got, [8 / 28, 20 / 28], err_msg="m2 = 0: 2 + 6 = 8; m2 = 1: 4 + 16 = 20")
+    got = answer_array(posterior(joint, "m2", {"z": [0.3, 0.9]}), "posterior")
+    _explain(got, _UNSURE_SLIPS)
+    by_hand = "m2 = 0: 0.3 * (8 + 3) + 0.9 * (2 + 6) = 10.5; m2 = 1: 0.3 * (1 + 1) + 0.9 * (4 + 16) = 18.6"
+    np.testing.assert_allclose(got, [10.5 / 29.1, 18.6 / 29.1], err_msg=by_hand)
+    got = answer_array(posterior(joint, "z", {"m1": [1, 0], "z": [1, 0.5]}), "posterior")
+    _explain(got, {(9 / 15, 6 / 15): "there is a report of z itself: it counts like any other"})
+    np.testing.assert_allclose(got, [3 / 4, 1 / 4], err_msg="m1 is 0: 8 + 1 = 9 for z = 0, half of 2 + 4 for z = 1")
+    got = answer_array(posterior(joint, "z", {}), "posterior")
+    np.testing.assert_allclose(got, [13 / 41, 28 / 41], err_msg="nothing heard: sum the others out")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_posterior(posterior)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+
+# %% nbgrader={"grade": true, "grade_id": "impossible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+def _test():
+    silent = (("m", "z"), np.array([[0.5, 0.0], [0.5, 0.0]]))  # a sensor that never says 1
+    try:
+        got, raised = posterior(silent, "m", {"z": [0, 1]}), False
+    except ValueError:
+        got, raised = None, True
+    assert raised or got is not None, "z = 1 can't happen: raise ValueError instead of returning nothing"
+    spread = not raised and np.isnan(answer_array(got, "posterior")).any()
+    assert not spread, "0 / 0 gives NaN, which spreads silently: raise ValueError instead"
+    assert raised, f"z = 1 can't happen, so nothing follows from it, not even {got}: raise ValueError"
+    try:
+        posterior((("m", "z"), np.array([[0.5, 0.0], [0.5, 0.2]])), "m", {"z": [0, 1]})
+        can_happen = True
+    except ValueError:
+        can_happen = False
+    assert can_happen, "here z = 1 can happen: a zero in one entry is no reason to raise"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_impossible(posterior)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 3: independence read off a graph (2 + 2 points)
+#
+# `parents` describes a directed graph: for each variable the tuple of its parents, `()` for one without. Complete `separated`: it returns `True` when every path between
+# `a` and `b` is blocked once the variables in `given` are known, and `False` otherwise. Some variables may be **exact**: each of those in `exact` is a function of its parents, without noise,
+# as the pixel of a point is a function of the camera's pose. So as soon as all its parents are known, it is known as well. `a` and `b` are two different variables that aren't known.
+#
+# You may follow paths. But there is a shorter recipe with the same result: (0) add to `given` what is exact and has no unknown parent, again and again;
+# (1) keep only `a`, `b`, `given` and all their ancestors (parents, parents of parents, and so on); (2) link each variable with its parents, and the parents of each variable with each other (moralise); (3) take `given` out;
+# (4) is there still a way from `a` to `b`?
+#
+# Two points are for graphs of three or four variables, two for larger ones.
+
+
+# %% nbgrader={"grade": false, "grade_id": "separated", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def separated(parents, a, b, given=(), exact=()):
+    """Return whether the graph alone makes a and b independent once `given` is known."""
+    ### BEGIN SOLUTION
+    given = set(given)
+    for _ in exact:
+        given |= {name for name in exact if given.issuperset(parents[name])}
+    kept, queue = set(), [a, b, *given]
+    while queue:
+        name = queue.pop()
+        kept.add(name)
+        queue += parents[name]
+    linked = {name: set() for name in kept}
+    for child in kept:
+        family = {child, *parents[child]}
+        for name in family:
+            linked[name] |= family
+    reached, queue = set(given), [a]
+    while queue:
+        name = queue.pop()
+        if name not in reached:
+            reached.add(name)
+            queue += linked[name]
+    return b not in reached
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "graphs", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+_CHAIN = {"before": (), "now": ("before",), "after": ("now",)}
+_FORK = {"m": (), "z1": ("m",), "z2": ("m",)}
+_MEET = {"m1": (), "m2": (), "z": ("m1", "m2")}
+_THREE = (
+    (_CHAIN, "before", "after", (), False, "what acts on now acts on after: the chain is open while now isn't known"),
+    (_CHAIN, "before", "after", ("now",), True, "now is known, so it blocks the chain: before has no other way"),
+    (_FORK, "z1", "z2", (), False, "both beams hint at the same cell: the fork is open while m isn't known"),
+    (_FORK, "z1", "z2", ("m",), True, "m is known, so it blocks the fork: only the sensor's own errors are left"),
+    (_MEET, "m1", "m2", (), True, "z isn't known: arrows that meet block. Take z out in step (1)"),
+    (_MEET, "m1", "m2", ("z",), False, "explaining away: a known z opens the way. Link its parents, in step (2)"),
+    (_MEET, "m1", "z", ("m2",), False, "an arrow links them: neighbours are never separated"),
+)
+_PIXEL = {"pose": (), "pixel": ("pose",), "z1": ("pixel",), "z2": ("pixel",)}
+_EXACT_FOUR = (
+    (_PIXEL, "z1", "z2", ("pose",), ("pixel",), True, "pixel is exact and its parent known, so pixel is known too, and blocks"),
+    (_PIXEL, "z1", "z2", ("pose",), (), False, "pixel isn't exact here: pose alone doesn't say what it is"),
+    (_PIXEL, "z1", "z2", (), ("pixel",), False, "nothing is known: pixel is exact, but its parent isn't known"),
+)  # fmt: skip
+
+
+# %% nbgrader={"grade": true, "grade_id": "separated-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+def _test():
+    graphs = [dict(parents) for parents, *_ in _THREE]
+    got = [separated(graph, a, b, given) for graph, (_, a, b, given, _, _) in zip(graphs, _THREE, strict=True)]
+    untouched = graphs == [parents for parents, *_ in _THREE]
+    assert untouched, "separated changed its argument `parents`: make a new dictionary"
+    assert all(np.shape(answer) == () and answer in (True, False) for answer in got), f"return True or False, got {got}"
+    opposite = got == [not case[4] for case in _THREE]
+    assert not opposite, "all answers are the opposite: True means separated, no open path"
+    for answer, (_, a, b, given, right, hint) in zip(got, _THREE, strict=True):
+        assert answer == right, f"{a} and {b} given {given}: you say {bool(answer)}, but {hint}"
+    for parents, a, b, given, exact, right, hint in _EXACT_FOUR:
+        answer = separated(dict(parents), a, b, given, exact)
+        assert answer == right, f"{a} and {b} given {given}, exact {exact}: you say {bool(answer)}, but {hint}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_separated_three(separated)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% nbgrader={"grade": false, "grade_id": "large-graphs", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+_RANGE = {"m1": (), "m2": (), "r": ("m1", "m2"), "z": ("r",)}
+_SCANS = {"before": (), "now": ("before",), "after": ("now",), "z1": ("before",), "z2": ("now",), "z3": ("after",)}
+_DUST = {"m": (), "dust": (), "z1": ("m", "dust"), "z2": ("m", "dust")}
+_PITCH = {"m1": (), "m2": (), "pitch": (), "z1": ("m1", "pitch"), "z2": ("m2", "pitch")}
+_LARGE = (
+    (_RANGE, "m1", "m2", ("z",), False, "z lies below the collider r and tells something about it, so r is open"),
+    (_RANGE, "m1", "m2", (), True, "neither r nor anything below it is known"),
+    (_SCANS, "before", "after", ("z1", "z2", "z3"), False, "a scan of now is not now: the chain stays open"),
+    (_SCANS, "before", "z3", ("now",), True, "now blocks the only way, however long it is"),
+    (_DUST, "z1", "z2", ("m",), False, "m blocks one path, and the path through dust is open: all must be blocked"),
+    (_DUST, "z1", "z2", ("m", "dust"), True, "both paths are blocked"),
+    (_PITCH, "m1", "m2", ("z1",), True, "z2 isn't known and blocks: each collider on the path must be open"),
+    (_PITCH, "m1", "m2", ("z1", "z2"), False, "both colliders are known: the path through the pitch is open"),
+    (_PITCH, "m1", "m2", ("z1", "z2", "pitch"), True, "pitch is the middle of a fork, and known: it blocks"),
+)
+_LOOKUP = {"pose": (), "K": (), "ray": ("pose",), "pixel": ("ray", "K"), "z1": ("pixel",), "z2": ("pixel",)}
+_EXACT_LARGE = (
+    (("K", "pose"), True, "pose gives ray, and ray and K give pixel: look again whenever something has become known"),
+    (("pose",), False, "K isn't known, so pixel isn't either: *all* its parents must be known"),
+)
+
+
+# %% nbgrader={"grade": true, "grade_id": "separated-large-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+def _test():
+    for parents, a, b, given, right, hint in _LARGE:
+        answer = separated(dict(parents), a, b, given)
+        assert np.shape(answer) == (), f"return True or False, got {answer}"
+        assert answer == right, f"{a} and {b} given {given}: you say {answer}, but {hint}"
+    for given, right, hint in _EXACT_LARGE:
+        answer = separated(dict(_LOOKUP), "z1", "z2", given, ("pixel", "ray"))
+        assert answer == right, f"z1 and z2 given {given}, ray and pixel exact: you say {answer}, but {hint}"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_separated_large(separated)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 4: eliminate, and say what it costs (2 + 1 points)
+#
+# From here on factors are the package's: `f.names`, `f.table`, the product `f * g`, and `f.sum("x")`, the factor without x.
+#
+# Complete `eliminate`. `factors` is a list of `Factor`s; `seen` says what is known, such as `{"z": 1}`, or nothing, `{}`; `order` holds the names of variables to sum out,
+# one after the other in this order. First slice each factor at what is known (`f.given(z=1)` does it; it refuses a variable that `f` doesn't have). Then, for each name in `order`,
+# multiply only those factors that contain it, and sum it out; but a name that is in `best` as well is asked for its best state, so take the largest entry over it in place of the sum (`f.max("x")`
+# is the package's). Return two things: the product of all that is left in the end, as a `Factor`, not normalised; and the number of
+# entries of the largest table from which a variable was taken out. At least one variable is left in the end. Two points are for the factor, one for the size.
+
+
+# %% nbgrader={"grade": false, "grade_id": "eliminate", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def eliminate(factors, order, seen, best=()):
+    """Return the Factor over the variables that are neither seen nor in `order`, and the entries of the largest table."""
+    ### BEGIN SOLUTION
+    factors = [factor.given(**{name: seen[name] for name in factor.names if name in seen}) for factor in factors]
+    largest = 0
+    for name in order:
+        together = Factor((), 1.0)
+        for factor in factors:
+            if name in factor.names:
+                together = together * factor
+        largest = max(largest, together.table.size)
+        factors = [factor for factor in factors if name not in factor.names] + [
+            together.max(name) if name in best else together.sum(name)
+        ]
+    result = Factor((), 1.0)
+    for factor in factors:
+        result = result * factor
+    return result, largest
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "star", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+_AGREE = [[3.0, 1.0], [1.0, 3.0]]
+_ROW = (Factor(("m1", "m2"), _AGREE), Factor(("m2", "m3"), _AGREE))
+_SEEN = [[0.9, 0.1], [0.6, 0.4]]
+_STAR = (Factor("street", [0.5, 0.5]), *(Factor(("street", cell), _SEEN) for cell in ("m1", "m2", "m3", "m4")))
+_SEEN_SLIPS = {
+    (0.75, 0.25): "you summed m2 out: it is known, so slice at its state",
+    (0.585, 0.165): "that is for m2 = 0: slice at the state that was seen",
+    (0.66, 0.34): "you divided by the sum, P(m2 = 1) = 0.25: don't normalise",
+}
+_SEEN_BY_HAND = "P(m1, m2 = 1): 0.05 * 0.9 + 0.2 * 0.6 and 0.05 * 0.1 + 0.2 * 0.4"
+
+
+# %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+def _test():
+    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"], {})
+    assert got is not None, "eliminate returned nothing: did you forget `return`?"
+    result = got[0] if isinstance(got, tuple | list) else got
+    assert isinstance(result, Factor), f"the first thing must be a Factor, got {type(result).__name__}"
+    assert result.names, "nothing is left: put each sum back among the factors, it is multiplied later"
+    assert result.names == ("m1",), f"m1 alone must be left, not {result.names}: take used factors out of the list"
+    _explain(result.table, {(12, 4): "multiply first, then sum: a sum of products isn't the product of the sums"})
+    share = result.table[0] / (total := result.table.sum())
+    assert np.isclose(total, 1) or not np.isclose(share, 0.75), "right up to a factor: normalise nowhere"
+    mean = "P(m1): the mean of 0.9, 0.1 and 0.6, 0.4"
+    np.testing.assert_allclose(result.table, [0.75, 0.25], atol=1e-9, err_msg=mean)
+
+    got = eliminate(list(_STAR), ["m3", "m4", "street"], {"m2": 1})
+    result = got[0] if isinstance(got, tuple | list) else got
+    assert "m2" not in result.names, "m2 is seen: slice the factors at its state, then it has no axis any more"
+    _explain(result.table, _SEEN_SLIPS)
+    np.testing.assert_allclose(result.table, [0.165, 0.085], atol=1e-9, err_msg=_SEEN_BY_HAND)
+
+    got = eliminate(list(_ROW), ["m2"], {})
+    result = got[0] if isinstance(got, tuple | list) else got
+    assert sorted(result.names) == ["m1", "m3"], f"m1 and m3 are left, your result is over {result.names}"
+    assert np.isclose(total := result.table.sum(), 32), f"weights must sum to Z = 32, not {total:.3g}: don't normalise"
+    np.testing.assert_allclose(np.diag(result.table), [10, 10], err_msg="m1 = m3: 3 * 3 + 1 * 1")
+
+    got = eliminate(list(_ROW), ["m2"], {}, best=["m2"])
+    result = got[0] if isinstance(got, tuple | list) else got
+    assert not np.allclose(np.diag(result.table), 10), "m2 is in `best`: take the largest entry over it, don't sum"
+    np.testing.assert_allclose(result.table, [[9, 3], [3, 9]], err_msg="the best m2: 3 * 3 where m1 = m3, else 3 * 1")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_eliminate(eliminate)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+
+# %% nbgrader={"grade": true, "grade_id": "eliminate-cost-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+def _test():
+    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"], {})
+    assert isinstance(got, tuple | list), f"return two things, the factor and the size, got one {type(got).__name__}"
+    costs = {
+        32: "you multiplied all factors first: of each variable only those that contain it",
+        2: "count the product before the variable is summed out, and its entries, not its axes",
+        16: "that is the sum of all sizes: the largest counts",
+    }
+    assert got[1] == 4, f"largest {got[1]}: {costs.get(got[1], 'each product here has two axes of two states')}"
+    largest = eliminate(list(_STAR), ["street", "m2", "m3", "m4"], {})[1]
+    costs = {
+        16: "count before the variable is summed out: with the street the product still has five axes",
+        4: "street comes first in this order: keep to `order`, and keep the largest, not the last",
+        5: "five axes of two states are 32 entries: count entries, not axes",
+        60: "that is the sum of all sizes: the largest counts",
+    }
+    assert largest == 32, (
+        f"largest {largest}: {costs.get(largest, 'street links all four cells: five axes, 32 entries')}"
+    )
+    largest = eliminate(list(_STAR), ["street", "m3", "m4"], {"m2": 1})[1]
+    assert largest == 16, f"largest {largest}: m2 is seen, so it has no axis: the street, m1, m3, m4, 16 entries"
+    largest = eliminate(list(_ROW), ["m2"], {})[1]
+    assert largest == 8, f"largest {largest}: the product over m1, m2, m3 has 8 entries before m2 is summed out"
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import graphical_models
+
+    complaint = graphical_models.check_cost(eliminate)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 5: in your own words (2 points)
+#
+# Two cells are one behind the other on the way of a coarse beam. A return says "at least one of you is occupied", and not which. A second beam along the same way returns, too.
+# An occupancy grid keeps one probability per cell: after each beam it updates both cells separately, by Bayes' rule with that beam's likelihood for each cell. Which edges does the true graph of
+# two cells and two beams have, and which dependence does the grid forget after the first beam? Another sensor now reports for certain that the front cell is occupied.
+# What should happen to the probability of the rear cell, and what happens in the grid? Would it help the grid if ten more of the coarse beams returned along the same way, before this report? Six sentences are enough.
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "dropped-edge", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
+# Each return has arrows from both cells, so each is a collider, and once the returns are known the two cells depend on each other. The grid keeps only the two marginals after each beam, so it drops the coupling "at
+# least one of you". When the front cell turns out to be occupied it explains the returns, so the probability of the rear cell should fall back towards its prior (explaining away). In the grid nothing happens to it, because nothing links
+# it to the front cell. Ten more coarse beams make it worse: each raises the rear cell once more, as if it were a new witness, until the grid is sure of a wall as thick as two cells. Only something that ties the cells together helps, or a range fine enough to name its cell.
+# One point for the collider and the dropped coupling, one for what should happen to the rear cell and why more beams don't repair it.

@@ -1,0 +1,42 @@
+import matplotlib.pyplot as plt
+import numpy as np
+from worlds.lecture_12_claims import claim_picture, judged
+from worlds.lecture_12_intervals import held, some_drives
+from worlds.lecture_12_pictures import kept
+
+from semgrid_edu.metrics import class_accuracy
+from semgrid_edu.workshop.scoring.statistics import drive_interval
+
+
+def test_a_claims_picture_marks_each_statement_and_its_limit():
+    readings = kept("claims")["claims"]["5"]["readings"]
+    figure = claim_picture(readings)
+    assert len(figure.axes) == 4
+    for ax, reading in zip(figure.axes, readings, strict=True):
+        marks = [{"yes": True, "no": False, "?": None}[text.get_text()] for text in ax.texts]
+        assert marks == [one["holds"] for one in judged(reading)]
+        limits = [line for line in ax.get_lines() if line.get_label() == "limit"]
+        assert [line.get_xdata()[0] for line in limits] == [100 * one["limit"] for one in judged(reading)]
+    plt.close(figure)
+
+
+def test_what_all_statements_share_is_written_once():
+    figure = claim_picture(kept("claims")["claims"]["10"]["readings"])
+    names = [text.get_text() for text in figure.axes[0].get_yticklabels()]
+    assert names == ["pixel accuracy", "class accuracy", "FmIoU"]
+    assert "end to end minus two stages" in figure.axes[0].get_xlabel()
+    plt.close(figure)
+
+
+def test_few_drives_have_the_second_class():
+    matrices = some_drives(np.random.default_rng(0), 500, 0.2)
+    assert matrices.shape == (500, 2, 2)
+    assert (matrices[:, 0].sum(axis=1) == 2000).all()
+    assert 70 < (matrices[:, 1].sum(axis=1) > 0).sum() < 130
+
+
+def test_an_interval_that_holds_for_a_common_class_fails_for_a_rare_one():
+    def interval(matrices, metric):
+        return drive_interval(matrices[None], metric)
+
+    assert held(0.8, interval, class_accuracy, trials=60) > 0.85 > held(0.1, interval, class_accuracy, trials=60)
