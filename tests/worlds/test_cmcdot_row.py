@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 from pyagrum_oracle import assert_oracle_agrees
 from worlds.lecture_03_bof import AT_THE_EDGE, STANDING_OR_DRIVING, TOWARDS_A_FENCE, bof_beliefs
-from worlds.lecture_03_row import DT, HIT, NO_CHANGE, NOT_SEEN, Cell, CellsInARow, exact_beliefs
+from worlds.lecture_03_row import HIT, NO_CHANGE, NOT_SEEN, Cell, CellsInARow, exact_beliefs
 from worlds.lecture_04_cmcdot import FORGETTING, LEFT_OR_RIGHT, particle_beliefs, sampling_error
 from worlds.lecture_04_cmcdot_graph import FROM_BOTH_SIDES, cmcdot_stage
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import d_separated, eliminate, why_dependent
 from semgrid_edu.metrics import total_variation
-from semgrid_edu.occupancy import State, Walls
-from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 NUMBERS = [100, 400, 1600, 6400]
 
@@ -63,12 +61,11 @@ BESIDE_A_WALL = ({"static": 0.6, "right": 0.4}, UNSEEN, {"static": 0.7, "left": 
 
 
 @pytest.mark.parametrize("scan", [".x.", "...", ".?."])
-@pytest.mark.parametrize("clearing_time", [0.0, DT, Walls.clearing_time])
 @pytest.mark.parametrize(
     "cells", [FROM_BOTH_SIDES.cells, BESIDE_A_WALL, ({}, {"static": 0.5}, {"left": 0.9}), ({}, {}, {})]
 )
-def test_the_graph_computes_what_predict_and_update_do_in_one_cell(cells, clearing_time, scan):
-    world = CellsInARow(cells, (scan,), FORGETTING, clearing_time=clearing_time)
+def test_the_graph_computes_what_predict_and_update_do_in_one_cell(cells, scan):
+    world = CellsInARow(cells, (scan,), FORGETTING, clearing_time=0.0)
     bof, found = bof_beliefs(world)[0, 1], cell_2(world)
     moving = bof[[Cell.LEFT, Cell.RIGHT]].sum()
     np.testing.assert_allclose(found, [*bof[[Cell.FREE, Cell.STATIC]], moving, bof[Cell.UNKNOWN]], atol=1e-12)
@@ -78,27 +75,11 @@ def test_the_graph_computes_what_predict_and_update_do_in_one_cell(cells, cleari
 @pytest.mark.parametrize("own", [{"right": 0.5}, {"static": 0.3, "left": 0.2, "right": 0.3, "unknown": 0.1}])
 def test_the_graph_is_joint_inference_where_only_the_cell_itself_may_hold_what_moves(own, scan):
     """FREE cells stay free, so that nothing stands up in a neighbour and is in the way there."""
-    world = CellsInARow(({}, own, {}), (scan,), (NO_CHANGE[0], *FORGETTING[1:]))
+    world = CellsInARow(({}, own, {}), (scan,), (NO_CHANGE[0], *FORGETTING[1:]), clearing_time=0.0)
     found = cell_2(world)
     exact = exact_beliefs(world)[0, 1]
     moving = exact[[Cell.LEFT, Cell.RIGHT]].sum()
     np.testing.assert_allclose(found, [*exact[[Cell.FREE, Cell.STATIC]], moving, exact[Cell.UNKNOWN]], atol=1e-12)
-
-
-def test_what_comes_out_of_a_wall_claims_no_cell_that_nobody_has_seen():
-    """By hand: of 0.4 from the left 0.6 0.7 is doubtful, of 0.1 from the right 0.7 0.6, so 0.42 of both."""
-    looks_back, does_not = (
-        cell_2(CellsInARow(BESIDE_A_WALL, ("?" * 3,), clearing_time=seconds))[State.DYNAMIC] for seconds in (DT, 0.0)
-    )
-    assert does_not == pytest.approx(0.5)
-    assert looks_back == pytest.approx(0.5 * 0.58 / (1 - 0.5 * 0.42))
-
-
-def test_the_price_of_taking_the_origin_as_independent():
-    """The thing stands in cell 1 or drives into cell 2, never both: joint inference expects it there with 0.5."""
-    world = CellsInARow(({"static": 0.3, "right": 0.5}, UNSEEN, UNSEEN), ("???",), clearing_time=DT)
-    assert exact_beliefs(world)[0, 1, Cell.RIGHT] == pytest.approx(0.5)
-    assert cell_2(world)[State.DYNAMIC] == pytest.approx(0.5 * 0.7 / (1 - 0.5 * 0.3)) == pytest.approx(0.41, abs=5e-3)
 
 
 def test_inference_in_the_graph_is_pyagrums():
@@ -112,29 +93,8 @@ def test_the_graph_separates_the_scan_from_the_past():
     assert d_separated(stage.model, "z1", ["m0", "q0", "q1"], given="m1")
     assert d_separated(stage.model, "m0", "q1", given="q0")
     assert why_dependent(stage.model, "m0", "q1", given=["q0", "one1"]) == ("m0", "one1", "q1")
-    assert why_dependent(stage.model, "m0", "wall1", given=["q1", "one1"]) == ("m0", "one1", "wall1")
 
 
 def test_more_than_one_thing_on_the_move_is_refused():
     with pytest.raises(ArgumentError, match="at most one moving thing"):
         cmcdot_stage(CellsInARow(({"right": 0.8}, {}, {"left": 0.5}), ("...",)))
-
-
-def exercise_filter():
-    """The filter that exercise 04 hands out, from its locked cell."""
-    cells = read_percent(NOTEBOOKS / "src" / "exercises" / "04_cmcdot.py").cells
-    names = {}
-    exec(next(cell.source for cell in cells if "def package_filter" in cell.source), names)
-    return names["package_filter"]
-
-
-@pytest.mark.parametrize(
-    "cells",
-    [
-        *(({"right": 0.5}, {}, {"left": 0.5}), ({"right": 0.8}, {"static": 0.5}, {})),
-        *(({"static": 0.3, "right": 0.5}, UNSEEN, UNSEEN), BESIDE_A_WALL, ({}, {"unknown": 0.5}, {"left": 0.3})),
-    ],
-)
-def test_the_filter_of_exercise_04_is_the_limit_of_the_packages(cells):
-    bof = bof_beliefs(CellsInARow(cells, ("???",), clearing_time=DT))[0, 1, [Cell.LEFT, Cell.RIGHT]].sum()
-    assert exercise_filter()(*cells) == pytest.approx(bof, abs=1e-6)

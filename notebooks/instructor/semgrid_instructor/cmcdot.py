@@ -1,7 +1,6 @@
 """Hidden tests of exercise 04, CMCDOT: the package itself is the reference."""
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -124,38 +123,23 @@ def check_stratified(stratified: Callable) -> None:
     assert np.array_equal(got, [1, 1, 2, 2, 4, 4, 4, 4]), "wrong where a tooth lies on a border"
 
 
-def _middle(left: dict, own: dict, right: dict, cut: set[int]) -> float:
-    """Return P(something moves in the middle cell): all combinations, less those that can't be, but for cut edges."""
-    a, b, stands, unknown = left.get("right", 0), right.get("left", 0), own.get("static", 0), own.get("unknown", 0)
-    comes, none = a * (1 - b) + b * (1 - a), (1 - a) * (1 - b)
-    if 1 in cut:
-        comes, none = min(a + b, 0.999), 1 - min(a + b, 0.999)
-    moves = comes if 2 in cut else comes * (1 - stands)
-    if 3 in cut:
-        moves -= comes * left.get("static", 0) * (right.get("static", 0) + right.get("unknown", 0)) * unknown
-    return moves / (moves + none)
-
-
-PROBES = {
-    1: ({"right": 0.5}, {}, {"left": 0.5}),
-    2: ({"right": 0.8}, {"static": 0.5}, {}),
-    3: ({"static": 0.3, "right": 0.5}, {"unknown": 1.0}, {"unknown": 1.0}),
-}
-"""The worlds of the exercise, in which one edge matters each."""
-
-
 @hidden
-def check_cuts(cuts: Callable) -> None:
-    """Take filters that cut none, one and several of the edges; the package's own cuts the first and the third."""
-    exact = {edge: _middle(*cells, set()) for edge, cells in PROBES.items()}
-    filters = [partial(_middle, cut=cut) for cut in (set(), {2}, {3}, {1, 3}, {1, 2, 3})]
-    for predicts in filters:
-        prices = {edge: predicts(*cells) - exact[edge] for edge, cells in PROBES.items()}
-        expected = {edge: price for edge, price in prices.items() if abs(price) > 0.001}
-        got = cuts(predicts)
-        assert isinstance(got, dict), "it doesn't return a dictionary"
-        assert set(got) == set(expected), "other edges are cut than the answer names"
-        assert all(close(float(got[edge]), price, atol=1e-4) for edge, price in expected.items()), "a price is wrong"
+@keeping
+def check_two_arrivals(two_arrivals: Callable) -> None:
+    """Random cells, and cells in which something surely arrives, surely doesn't, or surely stands."""
+    rng = generator(5)
+    left, right, static = rng.uniform(0.05, 0.95, size=(3, 5, 4))
+    left[0], right[1, :2], static[2, :2], static[3, :2] = 0, 1, 0, 1
+    expected = np.empty((3, 5, 4))
+    for cell in np.ndindex(left.shape):
+        a, b, s = left[cell], right[cell], static[cell]
+        possible = np.array([(1 - a) * (1 - b) * (1 - s), (1 - a) * (1 - b) * s, (a + b - 2 * a * b) * (1 - s)])
+        expected[(slice(None), *cell)] = possible / possible.sum()
+    got = answer_array(two_arrivals(left.copy(), right.copy(), static.copy()))
+    assert got.shape == expected.shape, "another shape"
+    assert close(got.sum(axis=0), 1), "the states of some cells don't sum to 1"
+    assert close(got[:, 0], expected[:, 0], atol=1e-5), "wrong where nothing arrives from the left"
+    assert close(got, expected, atol=1e-5), "wrong where both may arrive"
 
 
 def _one_tooth_in_each_part(weight: np.ndarray, count: int, offsets: np.ndarray) -> np.ndarray:

@@ -7,9 +7,9 @@
 # | task | about | points |
 # |---|---|---|
 # | 1 | move, and sum in cells: dynamic mass and mean velocity | 2 |
-# | 2 | a scanner that also measures speed | 2 + 1 |
-# | 3 | resampling with an offset for each tooth | 3 |
-# | 4 | which edges did this filter cut? measure it | 3 |
+# | 2 | two arrivals in one cell, exactly | 3 |
+# | 3 | a scanner that also measures speed | 2 + 1 |
+# | 4 | resampling with an offset for each tooth | 3 |
 # | 5 | your filter on a simulated and on a real street | 2 |
 # | 6 | in your own words | 2 |
 #
@@ -62,7 +62,7 @@ def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "in-cells-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "in-cells-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     # 3 x 4 cells of one metre, 0..3 m ahead. We drove 1 m: particles 0 and 1 are in cell (0, 2), far ahead, now.
     position = np.array([[3.5, 0.5], [3.3, 0.2], [2.4, 1.2], [4.5, 1.5]])  # the last one is ahead of the grid
@@ -103,7 +103,58 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 2: a scanner that also measures speed (2 + 1 points)
+# ## Task 2: two arrivals (3 points)
+#
+# The lecture's formula knows one arrival, with probability $a$, and the package adds up what arrives from all sides. Now be exact for two. From the left
+# something arrives in the cell with probability `from_left`, from the right with `from_right`. The cell itself holds something STATIC with probability
+# `static`, else it is FREE. The three are independent, until you know that **two solid things can't share a cell**. So write down all combinations, strike
+# out each in which two things would be in the cell, and scale the rest to 1.
+#
+# Complete `two_arrivals`: its arguments are arrays (H, W), and it returns the belief of each cell, (3, H, W), in the order FREE, STATIC, DYNAMIC. At least
+# one combination is always possible.
+
+
+# %% nbgrader={"grade": false, "grade_id": "two-arrivals", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def two_arrivals(from_left, from_right, static):
+    """Return the belief of each cell, (3, H, W), in which one of two things may arrive."""
+    ### BEGIN SOLUTION
+    none = (1 - from_left) * (1 - from_right)
+    one = from_left * (1 - from_right) + from_right * (1 - from_left)
+    possible = np.stack([none * (1 - static), none * static, one * (1 - static)])
+    return possible / possible.sum(axis=0)
+    ### END SOLUTION
+
+
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "two-arrivals-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    arguments = [np.array([[p, q]]) for p, q in ((0.5, 0.6), (0.4, 0.0), (0.2, 0.5))]  # the second cell: one arrival
+    got = answer_array(two_arrivals(*(a.copy() for a in arguments)), "two_arrivals")
+    assert got.shape == (3, 1, 2), f"expected FREE, STATIC, DYNAMIC of 1 x 2 cells, shape (3, 1, 2), got {got.shape}"
+    both, single = np.round(got[:, 0].T, 3)
+    assert np.isclose(both.sum(), 1, atol=0.01), f"the first cell sums to {both.sum():.2f}: scale what is left to 1"
+    slips = {
+        (0.098, 0.024, 0.878): "you add up the two arrivals, as if at most one could come: they are independent",
+        (0.279, 0.07, 0.651): "both may arrive, and that counts as DYNAMIC here: two things in one cell, strike it out",
+        (0.3, 0.075, 0.625): "an arrival where something STATIC is can't be, either",
+        (0.24, 0.06, 0.7): "you strike out nothing: no two things share a cell",
+    }
+    for slip, hint in slips.items():
+        assert not np.allclose(both, slip, atol=0.002), f"the first cell is {both}: {hint}"
+    by_hand = "by hand: FREE 0.24, STATIC 0.06 and DYNAMIC 0.40, of what is left, 0.70"
+    np.testing.assert_allclose(both, [0.343, 0.086, 0.571], atol=0.002, err_msg=by_hand)
+    np.testing.assert_allclose(single, [2 / 7, 2 / 7, 3 / 7], atol=0.002, err_msg="one arrival: as in lecture 03")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import cmcdot
+
+    complaint = cmcdot.check_two_arrivals(two_arrivals)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# ## Task 3: a scanner that also measures speed (2 + 1 points)
 #
 # Newer scanners measure by the Doppler effect how fast a return comes nearer. So one scan *can* tell something that moves from something that stands:
 # STATIC and DYNAMIC have likelihoods of their own. `belief` is (4, H, W); `likelihood` is (3, H, W): P(z | FREE), P(z | STATIC), P(z | DYNAMIC).
@@ -131,7 +182,7 @@ def update(belief, likelihood, first_sight):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "update-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     belief = np.array([0.2, 0.2, 0.1, 0.5]).reshape(4, 1, 1)  # a return comes back, from something that hardly moves
     before = belief.copy()
@@ -170,7 +221,7 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "update-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "update-limits-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
     belief = np.zeros((4, 1, 2))
     belief[:, 0, 0] = [0.2, 0.2, 0.1, 0.5]  # of this cell the scan says nothing ...
@@ -196,7 +247,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: an offset for each tooth (3 points)
+# ## Task 4: an offset for each tooth (3 points)
 #
 # The lecture's comb has one random number for all its teeth. In **stratified resampling** the line of all weights, end to end, is divided into `count`
 # equal parts, and each part has one tooth, at a random place of its own: tooth i lies `offsets[i]` (between 0 and 1) of a part behind the beginning of
@@ -215,7 +266,7 @@ def stratified(weight, count, offsets):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": true, "grade_id": "stratified-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "stratified-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     weight = np.array([1.0, 6.0, 3.0])  # a line 10 long, whose parts end at 1, 7 and 10; four parts, 2.5 long
     offsets = np.array([0.6, 0.2, 0.9, 0.1])  # teeth at 1.5, 3.0, 7.25, 7.75
@@ -247,99 +298,6 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: which edges did this filter cut? (3 points)
-#
-# Three cells in a row. A filter is a function `predicts(left, own, right)`. Each argument is a dictionary with what is believed of one cell: "static",
-# "left" and "right" (moving to the left, to the right, by one cell per step) and "unknown"; the rest is free. It returns the probability that something
-# moves in the **middle** cell after one step, without any scan. A filter may cut any of three edges:
-#
-# | edge | what a filter does that cuts it |
-# |---|---|
-# | 1 | it adds up what arrives from the left and from the right, as if at most one of the two could come |
-# | 2 | it lets something arrive although the middle cell is STATIC |
-# | 3 | it takes "something stands where this comes from" as independent of "this has left from there" |
-#
-# For each edge, `PROBES` below holds a world in which that edge matters and the two others don't. At most one thing is in a cell.
-#
-# Complete `cuts`: it returns a dictionary with the number of each edge that the filter cuts, and its **price**: what the filter predicts in that world,
-# minus the exact answer. An edge counts as cut when the two differ by more than 0.001. Get the exact answers from all
-# combinations without the impossible ones: a combination in which two things share a cell can't be. By hand or by code, that is up to you.
-
-# %% nbgrader={"grade": false, "grade_id": "probes", "locked": true, "schema_version": 3, "solution": false, "task": false}
-PROBES = {
-    1: ({"right": 0.5}, {}, {"left": 0.5}),
-    2: ({"right": 0.8}, {"static": 0.5}, {}),
-    3: ({"static": 0.3, "right": 0.5}, {"unknown": 1.0}, {"unknown": 1.0}),
-}
-
-
-def package_filter(left, own, right):
-    """What CMCDOT's `predict` tends to, with ever more particles."""
-    total = left.get("right", 0) + right.get("left", 0)
-    moves = 0.0
-    for origin, moving, ahead in ((left, "right", right), (right, "left", left)):
-        # It may be only the next piece of a wall: STATIC behind it, STATIC or UNKNOWN ahead, and nobody has seen the middle cell.
-        wall = origin.get("static", 0) * (ahead.get("static", 0) + ahead.get("unknown", 0)) * own.get("unknown", 0)
-        moves += origin.get(moving, 0) * (1 - own.get("static", 0) - wall)
-    moves *= min(total, 0.999) / max(total, 1e-9)
-    return moves / (moves + 1 - min(total, 0.999))
-
-
-# %% nbgrader={"grade": false, "grade_id": "cuts", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def cuts(predicts):
-    """Return {number of a cut edge: its price}."""
-    ### BEGIN SOLUTION
-    prices = {}
-    for edge, cells in PROBES.items():
-        left, own, right = cells
-        a, b, stands = left.get("right", 0), right.get("left", 0), own.get("static", 0)
-        comes = (a * (1 - b) + b * (1 - a)) * (1 - stands)
-        exact = comes / (comes + (1 - a) * (1 - b))
-        prices[edge] = float(predicts(*cells) - exact)
-    return {edge: price for edge, price in prices.items() if abs(price) > 0.001}
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": true, "grade_id": "cuts-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    def adds(left, own, right):
-        """Adds up what arrives, and strikes out what can't be."""
-        a = min(left.get("right", 0) + right.get("left", 0), 1.0)
-        s = own.get("static", 0)
-        return a * (1 - s) / (1 - a * s)
-
-    def blind(left, own, right):
-        """Adds up, and doesn't ask whether the cell is STATIC."""
-        return min(left.get("right", 0) + right.get("left", 0), 1.0)
-
-    for predicts, expected in ((adds, {1: 1 / 3}), (blind, {1: 1 / 3, 2: 0.8 - 2 / 3})):
-        got = cuts(predicts)
-        assert isinstance(got, dict), f"return a dictionary, such as {{1: 0.25}}; got {type(got).__name__}"
-        assert set(got) <= {1, 2, 3}, f"its keys are numbers of edges, 1 to 3; got {list(got)}"
-        missed, wrong = sorted(set(expected) - set(got)), sorted(set(got) - set(expected))
-        assert not missed, f"this filter cuts edge {missed[0]}, which your answer doesn't name: {predicts.__doc__}"
-        assert not wrong, f"this filter doesn't cut edge {wrong[0]}; is your exact answer of that world right?"
-        for edge, price in expected.items():
-            found = float(got[edge])
-            assert not np.isclose(found, -price, atol=1e-6), (
-                f"edge {edge}: the price is the filter's answer minus the exact one"
-            )
-            whole = np.isclose(found, price + 2 / 3, atol=1e-6)
-            assert not whole, f"edge {edge}: {found:.3f} is what the filter predicts; subtract the exact answer"
-            assert np.isclose(found, price, atol=1e-4), f"edge {edge}: a price of {price:.3f} is right, got {found:.3f}"
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import cmcdot
-
-    complaint = cmcdot.check_cuts(cuts)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# When the test has passed, try `cuts(package_filter)`. Which edges does the package cut, and do the prices fit the ledgers of lectures 03 and 04?
-#
 # ## Task 5: your filter on two streets (2 points)
 #
 # Now your resampling drives. Complete `track`: it runs the package's `track_drive(frames, spec, params, seed=0)` with 20,000 particles and a resampling that
@@ -366,7 +324,7 @@ def maps(frames, spec, draws=stratified):
     return np.array([belief.probability[DYNAMIC] for belief in track(frames, spec, draws)])
 
 
-# %% nbgrader={"grade": true, "grade_id": "track-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "track-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
     def draws(weight, count, offsets):  # each index by itself, wherever its offset lies on the whole line
         ends = np.cumsum(weight)
