@@ -325,7 +325,9 @@ def _test():
     got = answer_array(between(ROAD, None, static, 0.9, _TABLE.copy()), "between")
     assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
     none = "the cell on the right has no vote: it says nothing"
-    zero = "the vote has no effect. ROAD is 0, which `if vote` takes for no vote; or do you take the missing vote for car?"
+    zero = (
+        "the vote has no effect. ROAD is 0, which `if vote` takes for no vote; or do you take the missing vote for car?"
+    )
     assert not np.isclose(got, 0.0405 / 0.0465), f"one vote for road, {got:.3f}: {none}, not road"
     assert not np.isclose(got, 0.05 / 0.65), f"one vote for road, {got:.3f}: {zero}"
     np.testing.assert_allclose(got, 0.045 / 0.105, atol=1e-6, err_msg="one vote for road, the middle cell STATIC")

@@ -291,7 +291,9 @@ def _test():
         share, slips = _held_out_slips(margin)
         for hint, slip in slips.items():
             assert np.isclose(slip, share) or not np.isclose(got, slip), f"margin {margin}, {got:.3f}: {hint}"
-        assert np.isclose(got, share), f"margin {margin}, {got:.4f}: of the labelled cells that are far enough, {share:.4f} are right"
+        assert np.isclose(got, share), (
+            f"margin {margin}, {got:.4f}: of the labelled cells that are far enough, {share:.4f} are right"
+        )
     none = answer_number(held_out_score(truths, called, np.ones((4, 6), bool), 0), "held_out_score")
     assert np.isnan(none), f"where every cell was learned from, the score is NaN; got {none}"
     ### BEGIN HIDDEN TESTS
