@@ -595,7 +595,7 @@ for axis, curve in curves.items():
 #    the shipped one, with 142 frames, gets 90 %.
 # 4. End to end, the loss of the map reaches the pixels: their labels get worse (80 to 68 %), and here the map gets no
 #    better.
-# 5. With cameras that it hasn't seen, the network gets 75 % on a real street, a table of $o$ 81 %, a rule on heights
+# 5. With cameras that it hasn't seen, the network gets 75 % on a real street, a table of $o$ 80 %, a rule on heights
 #    84 %. $o$ forgets height, so the table takes buildings for cars.
 #
 # ## Further reading and exercise
