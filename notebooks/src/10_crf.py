@@ -320,7 +320,7 @@ assert list(by_cell) == [0, 1, 0, 1]
 #
 # ## Mean field: ask how the others are on average
 #
-# Mean field looks for a distribution $Q$ in which all cells are independent, $Q(x) = \prod_i Q_i(x_i)$, and which is
+# **Mean field** looks for a distribution $Q$ in which all cells are independent, $Q(x) = \prod_i Q_i(x_i)$, and which is
 # as close as possible to $P$. In the graph above this deletes the six squares between cells. Each cell keeps its own
 # distribution $Q_i$.
 #
