@@ -225,7 +225,7 @@ class TestWithoutTruth:
         page = write_demo(KittiRawDrive(tmp_path, DATE, "0001"), tmp_path / "net.safetensors", tmp_path / "out")
         html = page.read_text(encoding="utf-8")
         assert "Expect poor semantics" not in html
-        assert "<b>What is known of &lt;other&gt; streets.</b> Half of it." in html
+        assert "<b>What is known of &lt;other&gt; streets.</b></summary><p>Half of it." in html
         assert "can lose the ground" in html
         assert "can lose the ground" in blank
 
