@@ -581,7 +581,7 @@ _ = interact(show, scan=FloatSlider(value=0.8, min=0.5, max=0.99, step=0.01))
 # 3. Without arrows, factors say what is plausible, $Z$ makes the sum one, and what is known always blocks.
 # 4. An answer costs as much as its largest table, and the order decides. On a chain two sweeps of messages give all
 #    answers; the forward one is the filter.
-# 5. In a loop, messages hear their own echo and become too sure.
+# 5. In a loop of cells that like to agree, messages hear their own echo and become too sure.
 #
 # ## Further reading and exercise
 #
