@@ -15,16 +15,18 @@ RESULTS = shipped_folder("docs") / "results"
 UNSEEN = "each pair of cameras left out"
 """The scores of cameras that a method hasn't learned from."""
 
-BASELINES = {
+METHODS = {
     "always road": "always road",
     "table of occupancy states": "table of o",
     "height rule": "height rule",
-    "forest on heights and o": "forest of heights and o",
+    "fusion of o, unknown forbidden": "network: o",
+    "fusion of image and o, unknown forbidden": "network: o, image",
+    "fusion of o and heights, unknown forbidden": "network: o, heights",
+    "fusion of image, o and heights, unknown forbidden": "network: o, heights, image",
+    "forest on heights and o": "forest: o, heights",
+    "forest on heights, o and image scores": "forest: o, heights, image",
 }
-"""Methods without a camera: their names in the results, and here."""
-
-NETWORKS = {"real only, without occupancy": "network, camera alone", "real only": "network, camera and o"}
-"""Networks that learned from the same cameras."""
+"""Methods by their names in the results, and here; each calls every scored cell by a semantic class."""
 
 
 def _read(name: str) -> dict:
@@ -33,18 +35,13 @@ def _read(name: str) -> dict:
 
 def by_method() -> dict[str, tuple[float, float, float]]:
     """Return each method's pixel accuracy, per cent: lower end of its interval, mean, upper end."""
-    baselines = _read("camera_worth.json")["scores"][UNSEEN]
-    networks = _read("real_streets.json")["scores"][UNSEEN]
-    found = {}
-    for scores, names in ((baselines, BASELINES), (networks, NETWORKS)):
-        for name, short in names.items():
-            score = scores[name]["pixel accuracy"]
-            found[short] = tuple(100 * score[key] for key in ("low", "mean", "high"))
-    return dict(sorted(found.items(), key=lambda item: item[1][1]))
+    scores = _read("camera_worth.json")["scores"][UNSEEN]
+    accuracies = {short: scores[name]["pixel accuracy"] for name, short in METHODS.items()}
+    return {name: tuple(100 * score[key] for key in ("low", "mean", "high")) for name, score in accuracies.items()}
 
 
 def calls_of(name: str) -> dict[str, dict[str, float]]:
-    """Return, for three methods without a camera, the shares of a class's cells that are called building, car, road.
+    """Return, for four methods without a camera, the shares of a class's cells that are called building, car, road.
 
     Parameters
     ----------
@@ -53,10 +50,11 @@ def calls_of(name: str) -> dict[str, dict[str, float]]:
     """
     counts = _read("camera_worth.json")["counts"][UNSEEN]
     found = {}
-    for method in list(BASELINES)[1:]:
-        row = _matrix(counts[method])[KITTI_14.index(name)]
-        shares = {other: float(row[KITTI_14.index(other)] / row.sum()) for other in ("building", "car", "road")}
-        found[BASELINES[method]] = shares | {"other": 1 - sum(shares.values())}
+    for method, short in METHODS.items():
+        if short in ("table of o", "network: o", "height rule", "network: o, heights"):
+            row = _matrix(counts[method])[KITTI_14.index(name)]
+            shares = {other: float(row[KITTI_14.index(other)] / row.sum()) for other in ("building", "car", "road")}
+            found[short] = shares | {"other": 1 - sum(shares.values())}
     return found
 
 

@@ -521,12 +521,12 @@ _test()
 # %% [markdown]
 # ## Task 6: in your own words (2 points)
 #
-# On the lecture's real street, a network with camera and $o$ gets 75 % of the cells that cameras see which it hasn't learned from, and a table of $o$ alone gets 81 %. A colleague concludes: "Then the camera is
-# worth nothing. Leave it out." What does the measurement say, and what doesn't it say? Name one experiment that would tell. Five sentences are enough.
+# On the lecture's real street, a network with $o$ and heights gets 84 % of the cells in the view of cameras that it hasn't learned from. If it sees the image, too, it gets 83 %. A colleague concludes: "Then the
+# camera is worth nothing. Leave it out." What does the measurement say, and what doesn't it say? Name one experiment that would tell. Five sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "what-it-says", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
-# It says that this network, which learned from four cameras at one street corner, uses what it sees worse than a table uses four states, when it is shown another side of the corner. Most labelled cells are
-# road, cars and walls, which $o$ and above all height already tell apart. It doesn't say that the image holds nothing more: sidewalk, vegetation and pedestrians look different and have the height of
-# something else, but they are few among the cells. Nor does it say what a camera would be worth with more streets to learn from. The experiment: give the same learner $o$ and heights, once with and once without the image's
-# scores, on streets that it hasn't seen, and compare all cells and each class. One point for what was measured (few views of one corner, mostly classes that height tells), one for a comparison in which only the
-# image is switched off.
+# It says that this network, which learned from four cameras at one street corner, finds no more cells with the image than without it when it is shown another side of the corner. Most labelled cells are
+# road, cars and walls, which height already tells apart. It doesn't say that the image holds nothing more: sidewalk, vegetation and pedestrians look different and have the height of
+# something else, but they are few among the cells. Nor does it say what a camera would be worth with more streets to learn from; one point is less than the intervals are wide, and it is one seed. The experiment: give the same learner $o$ and heights, once
+# with and once without the image's scores, on many streets that it hasn't seen, with several seeds, and compare all cells and each class. One point for what was measured (few views of one corner, mostly classes that height tells), one for
+# a comparison in which only the image is switched off.
