@@ -480,9 +480,9 @@ assert -0.6 < error.slope < -0.4
 print(f"bias {error.bias:.2f}; sampling error with 10 particles {error.to_bof[0]:.2f}, with 640 {error.to_bof[-1]:.3f}")
 
 # %% [markdown]
-# With ten particles most of the error comes from more than the bias: the squares sit on the solid curve, the root of
-# the sum. From 160 on they sit on the bias, and more particles change nothing. So no: they bring CMCDOT to BOF, not to
-# the truth.
+# With ten particles the sampling error is more than half of the bias, and the error is visibly above it, on the solid
+# curve: the root of the sum. With 640 only the bias is left. So no: more particles bring CMCDOT to BOF, not to the
+# truth.
 #
 # To sample only the motion and to sum the cells' states exactly is the idea of the **Rao-Blackwellised particle
 # filter**, and the "conditional Monte Carlo" in the filter's name. One thing is missing altogether: no variable says
@@ -517,16 +517,18 @@ for number, found in luck.items():
     car, person = zip(found.mean(axis=0), found.std(axis=0, ddof=1), strict=True)
     print("{:6,} particles: car {:.0f} % ± {:2.0f}, person {:.0f} % ± {:2.0f}".format(number, *car, *person))
 running = lecture_04_crossing.luck_of_who_runs()
-print(f" 3,000 particles: a person who runs {running.mean():.0f} %")
+broad = lecture_04_crossing.luck_of_who_is_wide()
+print(f" 3,000 particles: a person who runs {running.mean():.0f} %, a walker four times as wide {broad.mean():.0f} %")
+assert broad.mean() < luck[3000][:, 1].mean()
 assert running.mean() > luck[3000][:, 1].mean() + 25
 
 # %% [markdown]
 # The mean rises for both, and the scatter shrinks. With 3,000 particles most of the car is DYNAMIC in every run, but of
 # the person it may be nearly all or nearly nothing. With 30,000 luck is over.
 #
-# Why the person? You would say, because it is small. Switch off another cause: let the same small person run at 3 m/s
-# instead of 1.4. Now 3,000 particles find 88 % of it. So it is rather that a walker is slow. It stays in a cell for
-# several scans, and there STATIC predicts the hits as well as its particles do.
+# Why the person? You would say, because it is small. Switch that off: a walker four times as wide isn't found better.
+# Switch off the other cause, and let the same small person run at 3 m/s instead of 1.4. Now 3,000 particles find 88 %
+# of it. So it is rather that a walker is slow. It seldom arrives anywhere, and a scan by itself keeps the ratio.
 #
 # So the slowest thing that you must not miss sets the number. (The default is 200,000, for a larger map.)
 
@@ -554,7 +556,7 @@ _ = interact(
 # Now a real street: ten scans of a real LIDAR, while we wait in a queue. In lane E two cars come towards us. F, the car
 # ahead of us, rolls off. (At 1.8 s one of the two has passed us.)
 
-# %% jupyter={"source_hidden": true} alt="two maps of a real street from above, with dashed frames: in lane E the cars are dark at 0.2 s and yellow, coming towards us, at 1.8 s; in frame F the car ahead of us is dark in both; in the frame to the right of us trees, walls and parked cars are dark in both"
+# %% jupyter={"source_hidden": true} alt="two maps of a real street from above, with three frames: in lane E the cars are dark at 0.2 s and yellow, coming towards us, at 1.8 s; in frame F the car ahead of us is dark in both; in the frame to the right of us trees, walls and parked cars are dark in both"
 real = [samples.real_drive()[k] for k in range(10)]
 wide = lecture_04_crossing.WIDE
 on_street = list(fast.track_drive(real, wide, params))
@@ -572,7 +574,7 @@ assert abs(lecture_04_crossing.speed_ahead(real) - 2.4) < 0.1
 
 # %% [markdown]
 # At first the cars in lane E are STATIC. After about a second particles have arrived with them in cells that were seen
-# FREE, and they are DYNAMIC. On the right hardly a cell ever is. But F, which rolls at 2.4 m/s, stays dark. Why?
+# FREE, and they are DYNAMIC. On the right hardly a cell ever is. (The streak between the frames isn't counted.) But F, which rolls at 2.4 m/s, stays dark. Why?
 #
 # We see only F's rear. As it moves on, it arrives in cells that its own body has hidden, and that nobody has seen FREE.
 # In such cells two parts of the filter speak against motion:

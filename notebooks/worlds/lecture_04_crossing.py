@@ -80,6 +80,11 @@ def hurrying(t: float) -> list[Box]:
     return [*crossing(t)[:PERSON], Box.around(11, -6 + 3 * t, 0.5, 0.5, 1.75)]
 
 
+def wide(t: float) -> list[Box]:
+    """Return `crossing` with a walker four times as wide."""
+    return [*crossing(t)[:PERSON], Box.around(11, -4 + 1.4 * t, 2.0, 2.0, 1.75)]
+
+
 def watch(
     scene: Callable[[float], list[Box]],
     seconds: float,
@@ -219,6 +224,11 @@ def luck() -> dict[int, NDArray[np.float64]]:
 def luck_of_who_runs() -> NDArray[np.float64]:
     """Return the measured shares of the person of `hurrying` with 3,000 particles, (24 seeds,) per cent."""
     return np.array(_measured()["3000"]["running"])
+
+
+def luck_of_who_is_wide() -> NDArray[np.float64]:
+    """Return the measured shares of the person of `wide` with 3,000 particles, (8 seeds,) per cent."""
+    return np.array(_measured()["3000"]["wide"])
 
 
 def _measured() -> dict:

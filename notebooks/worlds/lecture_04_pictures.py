@@ -140,7 +140,7 @@ def draw_street(ax: Axes, spec: GridSpec, belief: Belief, title: str, legend: bo
     frames = (("E", (6.5, 0.3), 4.5, 32.4), ("F", (-1.5, 9), 3.0, 11), ("right of us", (-11.8, 0.3), 9.8, 32.4))
     outline = [withStroke(linewidth=2.5, foreground="w")]
     for name, corner, width, height in frames:
-        frame = Rectangle(corner, width, height, fill=False, ls="--", lw=1.2, zorder=3, path_effects=outline)
+        frame = Rectangle(corner, width, height, fill=False, color=VIOLET, lw=1.8, zorder=3)
         ax.add_patch(frame)
         place = (corner[0] + width - 0.4, corner[1] + height - 0.5)
         ax.text(*place, name, weight="bold", va="top", zorder=4, path_effects=outline)
