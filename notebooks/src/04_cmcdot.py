@@ -14,7 +14,7 @@
 # **Prerequisites.** Lectures [01](01_bayes.ipynb) to [03](03_bof.ipynb): Bayes' rule on a line, what a scan says about
 # a cell, occupancy with velocity.
 #
-# **Time.** 70 minutes, of which the computer needs less than one.
+# **Time.** 72 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.2, its four numbered steps. The filter is that of Rummelhard, Nègre, Laugier, *Conditional
 # Monte Carlo Dense Occupancy Tracker*, ITSC 2015. The paper tells the steps in words; the formulas here are this
@@ -190,8 +190,7 @@ for step in range(1, 6):
     print(f"{0.4 * step:.1f} m driven: the post is in cell {post.argmax()}, remainder {remainder:+.1f} m")
 
 # %% [markdown]
-# The remainder is the vehicle's place *within* the map, and scans are entered at that place. Particles need no
-# rounding, because their places are metres.
+# The remainder is the vehicle's place *within* the map, and scans are entered there. Particles need no rounding.
 #
 # So a round is: move the map, let time pass, look, and spend the particles anew. The next three sections do the
 # paper's steps by hand.
@@ -285,6 +284,7 @@ def predict_line(b, x, v, w, M, dt):
     return b, x_new, w * np.where(there != here, arrives[there], stays[there])
 
 
+# %% jupyter={"outputs_hidden": true}
 x, v, w = np.array([1.2, 1.5, 1.5, 3.4]), np.array([10, 10, 2, 10]), np.array([0.2, 0.2, 0.2, 0.5])
 line, calm, before = lecture_04_crossing.on_a_line(x, v, w, fence=4)
 after, x_new, w_new = predict_line(before.probability[:, ::-1, 0], x, v, w, M=np.eye(4), dt=0.1)
@@ -387,8 +387,8 @@ for name, shares in lecture_04_crossing.arrivals().items():
 
 # %% [markdown]
 # Whatever the odds of first sight, the wall is STATIC and the car DYNAMIC. Without particles the car is missed, and
-# with particles that don't fly it is missed as well. So a scan keeps the ratio, and on this street it is the *arrivals*
-# that change it. But here the car comes through cells that we have seen FREE. Remember that for the last section.
+# with particles that don't fly as well. So a scan keeps the ratio, and here the *arrivals* change it. But this car comes
+# through cells that we have seen FREE. Remember that for the last section.
 #
 # ## Which particles go on?
 #
@@ -548,8 +548,8 @@ _ = interact(
 )
 
 # %% [markdown]
-# (The dials work with a running kernel. `stop_speed` is the speed in m/s below which particles soon count as standing. At
-# which value does the person stand?)
+# (The dials work with a running kernel. Below `stop_speed`, in m/s, particles soon count as standing. At which value does
+# the person stand?)
 #
 # ## Where this breaks: a car that drives away
 #

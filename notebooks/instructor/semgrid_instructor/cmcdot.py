@@ -170,7 +170,7 @@ class _Stratified:
 
 @hidden
 def check_track(maps: Callable) -> None:
-    """A few frames of both drives, drawn at random like the grid, against the same filter with the right resampling.
+    """Compare frames of both drives, drawn like the grid, with the same filter under the right resampling.
 
     What is right is worked out first, from frames of its own. The answer gets others, in any order.
     """
