@@ -212,8 +212,7 @@ for step in range(1, 6):
 # ```
 #
 # From cell 1, 0.4 flies on to the next cell and leaves FREE behind, because nothing stands where something has moved.
-# The slow particle stays for now.
-# But at the fence two opinions meet: "I stand here" and "I arrive". The graph shows how the two are tied:
+# The slow particle stays for now. But at the fence two opinions meet: "I stand here" and "I arrive". The graph shows how the two are tied:
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a graph of two time slices: a particle q before points to q now; the cell m before points to m now; both q point to their m; m before and q now point to an observed node, fits; m now points to the scan z"
 stage = lecture_04_cmcdot_graph.cmcdot_stage()
@@ -574,7 +573,8 @@ assert abs(lecture_04_crossing.speed_ahead(real) - 2.4) < 0.1
 
 # %% [markdown]
 # At first the cars in lane E are STATIC. After about a second particles have arrived with them in cells that were seen
-# FREE, and they are DYNAMIC. On the right hardly a cell ever is. (The streak between the frames isn't counted.) But F, which rolls at 2.4 m/s, stays dark. Why?
+# FREE, and they are DYNAMIC. On the right hardly a cell ever is. (The streak between the frames isn't counted.) But F,
+# which rolls at 2.4 m/s, stays dark. Why?
 #
 # We see only F's rear. As it moves on, it arrives in cells that its own body has hidden, and that nobody has seen FREE.
 # In such cells two parts of the filter speak against motion:
@@ -590,11 +590,11 @@ assert abs(lecture_04_crossing.speed_ahead(real) - 2.4) < 0.1
 # told at the beginning that F's way is free. The right column counts what the switches do to fences, walls and hedges,
 # which stand, on six simulated drives.
 #
-# **Predict before you run.** Which of the two is the larger cause? And will F be found in the control?
+# **Predict before you run.** Will F be found in the control, although both are at work?
 #
 # <details><summary>Answer</summary>
 #
-# The rule is the larger. And yes: both causes act only in cells that weren't seen FREE.
+# Yes: both act only where UNKNOWN is left, or where something has just left the cell. There they find little to do.
 #
 # </details>
 
@@ -619,7 +619,7 @@ assert stands["as it is"] < 1 < 4 < stands["even odds at first sight"] < 5.5 < 9
 # Then why not switch off both for good? Look at the right column: fences and hedges would move. An earlier table said
 # that even odds are harmless. That holds for its one smooth wall, and not for these borders. How they were found out is
 # the story of [phantoms on real streets](deeper/04_real_streets.ipynb). So the filter trades one error for another: what
-# stands is left standing, and a car that starts ahead of us is found late.
+# stands is left standing, and the car that starts ahead of us seems to stand, too.
 #
 # ## In five lines
 #
