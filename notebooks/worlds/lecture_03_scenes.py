@@ -1,17 +1,30 @@
 """The scenes of lecture 03: a belief that is sheared, boxes that move, a bus; and how they are drawn."""
 
 from collections.abc import Callable, Iterator
+from functools import cache, cached_property
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from semgrid_edu import fast, plotting
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import BofParams, BofState, Evidence, VelocityLattice, WorldModel, bof_predict, bof_update
-from worlds.lecture_02_boxes import Box, scan_boxes
+from semgrid_edu.occupancy import (
+    BofParams,
+    BofState,
+    Evidence,
+    State,
+    VelocityLattice,
+    WorldModel,
+    bof_predict,
+    bof_update,
+)
+from semgrid_edu.occupancy.bof_state import whole_cells
+from semgrid_edu.occupancy.planar_motion import shift
+from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 STEADY = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=0, walls=None)
 """A world in which things move, and that is all."""
@@ -78,6 +91,113 @@ def pass_by(
     return times, np.stack([state.probability[:, ::-1, col] for state in states], axis=1)
 
 
+class OnlyTheBus(VelocityLattice):
+    """A lattice on which everything that moves has the velocity of the bus, so that nothing is spread over others."""
+
+    @cached_property
+    def prior(self) -> NDArray[np.float64]:
+        """(V,): all mass on the velocity of the bus."""
+        return (self.velocities == (-8, 0)).all(axis=1).astype(float)
+
+
+@cache
+def _late_scans() -> list[Evidence]:
+    """Return eleven scans of the bus, of 1000 columns, from the instant when it is beside us."""
+    rng, sensor = np.random.default_rng(0), STEADY.sensor
+    scans = [scan_boxes(bus_at(t), columns=1000, rings=16, noise=0.02, rng=rng) for t in LATE]
+    return [fast.scan_evidence(points, BUS, sensor) for points in scans]
+
+
+LATE = np.arange(16, 27) / 10
+"""Times of the scans of `late`, seconds."""
+
+
+def late(odds: float, spread: bool, strike_out: bool) -> NDArray[np.float64]:
+    """Return P(DYNAMIC | occupied) after each scan, (11,), in the middle of a bus that was in view from the start.
+
+    It is the mean over the cells that the bus has covered since the first scan, but for its last two metres. In this
+    world nothing starts, stops, is forgotten or changes its velocity.
+
+    Parameters
+    ----------
+    odds : float
+        P(STATIC) : P(DYNAMIC) at first sight.
+    spread : bool
+        Whether moving mass is spread over all velocities of a lattice, or has that of the bus.
+    strike_out : bool
+        Whether what stands and what arrives are struck out as a pair. If not, each antecedent keeps its mass.
+    """
+    static = 0.048 * odds / (1 + odds)
+    world = WorldModel(STEADY.rates, 0, STEADY.stop_speed, 0, (0.952, static, 0.048 - static), None)
+    params = BofParams(VelocityLattice(8, spacing=2) if spread else OnlyTheBus(8, spacing=8), world)
+    predict = bof_predict if strike_out else _fly_alone
+    state, told = BofState.nothing_known(BUS, params.lattice), []
+    (_,), (col,), _ = BUS.cells(np.array([[1.0, FLANK]]))
+    x = BUS.centers()[:, col, 0]
+    for t, scan in zip(LATE, _late_scans(), strict=True):
+        state = bof_update(predict(state, BUS, params, dt=0.1), BUS, scan, params)
+        here = (x > 30 - 8 * LATE[0] - 6) & (x < 30 - 8 * t + 6 - 2)
+        probability = state.probability[:, here, col]
+        told.append(probability[State.DYNAMIC].sum() / probability[[State.STATIC, State.DYNAMIC]].sum())
+    return np.array(told)
+
+
+def _fly_alone(state: BofState, spec: GridSpec, params: BofParams, dt: float) -> BofState:
+    """Predict for `STEADY` without the strike-out: each velocity shifts its mass, sums above 1 are scaled down."""
+    cells, remainder = whole_cells(state, spec, dt)
+    occupied = np.stack([shift(mass, way) for mass, way in zip(state.occupied, cells, strict=True)])
+    occupied /= np.maximum(occupied.sum(axis=0) / 0.999, 1)
+    unknown = np.minimum(state.unknown, 1 - occupied.sum(axis=0))
+    return BofState(1 - occupied.sum(axis=0) - unknown, unknown, occupied, state.velocity, remainder)
+
+
+def walker(speed: float, spacing: float, leaks: bool, times: NDArray, start: float = 15.2) -> NDArray[np.float64]:
+    """Return P(DYNAMIC) of a person who walks towards us, after each scan, (T,).
+
+    Parameters
+    ----------
+    speed : float
+        Speed of the person, m/s.
+    spacing : float
+        Spacing of the velocities of the lattice, which ends at 2 m/s.
+    leaks : bool
+        Whether what moves may stop or be forgotten.
+    times : sequence of float
+        Times of the scans, seconds.
+    start : float
+        Where the person is at first, metres ahead.
+    """
+    lane = GridSpec(x_min=4, x_max=18, y_min=-2, y_max=2, cell=0.5)
+    rates = WorldModel.rates
+    world = WorldModel() if leaks else WorldModel(rates=(*rates[:2], (0.0,) * 4, rates[3]), stop_rate=0)
+    told = []
+
+    def person(t: float) -> list[Box]:
+        return [Box.around(start - speed * t, 0, 0.6, 0.6, 1.7)]
+
+    params = BofParams(VelocityLattice(2, spacing), world)
+    for t, state in zip(times, watch(person, lane, params, times, columns=100, field=60), strict=True):
+        here = cells_in(person(t)[0], lane, margin=0.5) & (state.occupied.sum(axis=0) > 0.5)
+        told.append(state.probability[State.DYNAMIC, here].mean())
+    return np.array(told)
+
+
+def outline(ax: Axes, boxes: list[Box]) -> list[Line2D]:
+    """Draw the outlines of boxes on a map whose axes are y and x, and return them."""
+    lines = [ax.plot([], [], color="#d00000", linewidth=1.8)[0] for _ in boxes]
+    move_outline(lines, boxes)
+    return lines
+
+
+def move_outline(lines: list[Line2D], boxes: list[Box]) -> None:
+    """Move the outlines of `outline` to where the boxes are now."""
+    for line, box in zip(lines, boxes, strict=True):
+        line.set_data(
+            [box.y_min, box.y_max, box.y_max, box.y_min, box.y_min],
+            [box.x_min, box.x_min, box.x_max, box.x_max, box.x_min],
+        )
+
+
 def draw_flank(ax: Axes, times: NDArray, states: NDArray, title: str) -> None:
     """Draw the cells along the flank over time: a row per scan, and the front and rear of the bus as lines."""
     picture = plotting.occupancy_colours(states)
@@ -85,9 +205,20 @@ def draw_flank(ax: Axes, times: NDArray, states: NDArray, title: str) -> None:
     ax.imshow(picture, extent=extent, origin="lower", aspect="auto", interpolation="nearest")
     span = np.array([0, 3])
     for end, style in ((24, "-"), (36, "--")):
-        ax.plot(end - 8 * span, span, style, color="tab:red", linewidth=1.5)
-    ax.set(xlim=(0, 18), ylim=(0, 2.85), xlabel="x, forward [m]", facecolor="white")
+        ax.plot(end - 8 * span, span, style, color="#c000c0", linewidth=2)
+    ax.set(xlim=(0, 18), ylim=(0, 2.85), xticks=range(0, 19, 3), xlabel="x, forward [m]", facecolor="white")
     ax.set_title(title, fontsize=10)
+
+
+def draw_flanks(passed: dict[str, tuple[NDArray, NDArray]]) -> None:
+    """Draw what `pass_by` returned, by title: panels side by side, with the legend below."""
+    from matplotlib import pyplot as plt
+
+    fig, axes = plt.subplots(1, len(passed), figsize=(8.6, 3.5), layout="constrained", sharex=True, sharey=True)
+    for ax, (name, run) in zip(axes, passed.items(), strict=True):
+        draw_flank(ax, *run, name)
+    axes[0].set_ylabel("time [s]")
+    flank_legend(fig)
 
 
 def sheared() -> list[tuple[str, NDArray, int | None]]:
@@ -132,11 +263,10 @@ def sheared_frames(story: list[tuple[str, NDArray, int | None]]) -> Iterator[Fig
 
 def flank_legend(fig: Figure) -> None:
     """Add the states' colours and the lines of `draw_flank` below a figure."""
-    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     names = ("free", "STATIC", "DYNAMIC", "unknown")
     colours = plotting.occupancy_colours(np.eye(4)[:, None])[0] / 255
     states = [Patch(facecolor=c, edgecolor="0.6", label=name) for c, name in zip(colours, names, strict=True)]
-    ends = [Line2D([], [], linestyle=s, color="tab:red", label=n) for s, n in (("-", "front"), ("--", "rear"))]
+    ends = [Line2D([], [], linestyle=s, color="#c000c0", linewidth=2, label=n) for s, n in (("-", "front"), ("--", "rear"))]
     fig.legend(handles=states + ends, loc="outside lower center", ncols=6, fontsize=9, frameon=False)
