@@ -15,7 +15,7 @@
 # **Prerequisites.** Lectures [01](01_bayes.ipynb) (Bayes' rule, transition matrix) and [02](02_grids.ipynb) (what a
 # beam says, ghosts behind moving cars).
 #
-# **Time.** 73 minutes, of which the computer needs less than one.
+# **Time.** 75 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.2: the ancestor of its filter, the Bayesian occupancy filter (**BOF**) of Coué and others.
 # The paper prints no equation for it.
@@ -256,16 +256,6 @@ np.testing.assert_allclose(covariance[0, 0, -1, 0], 0.75, atol=1e-6)
 #
 # Two boxes move before a wall: one comes towards us at 6 m/s, one crosses to the left. In lecture 02's map both leave a
 # smear.
-#
-# **Predict before you run.** A box that moves for sure has just left a cell. What does BOF believe of this cell,
-# *before* it looks?
-#
-# <details><summary>Answer</summary>
-#
-# It is free. The mass has flown away with its velocity, and leaves FREE behind. The map of lecture 02 must first see
-# the cell free five times.
-#
-# </details>
 
 # %%
 spec = grid.GridSpec(x_min=0, x_max=30, y_min=-12, y_max=12, cell=0.5)
@@ -286,6 +276,7 @@ for k in range(21):
     belief = occupancy.bof_update(belief, spec, fast.scan_evidence(points, spec, params.world.sensor), params)
     maps.append(binary.step(points, occupancy.PlanarMotion(), dt=0.1).copy())
     beliefs.append(belief)
+
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true}
 def smear(k):
@@ -312,6 +303,8 @@ fig, axes = plt.subplots(1, 2, figsize=(8.2, 4.2), layout="compressed")
 plotting.occupancy(spec, plotting.binary_states(maps[0]), ax=axes[0], legend=False)
 plotting.velocity_wheel(spec, beliefs[0].probability, occupancy.bof_velocity(beliefs[0])[0], ax=axes[1])
 axes[1].set_ylabel("")
+for ax in axes:
+    ax.text(9, 14, "wall", rotation=90, color="white", ha="center", va="center", fontsize=9)
 outlines = [lecture_03_scenes.outline(ax, world(0)[1:]) for ax in axes]
 
 
@@ -332,10 +325,10 @@ def crossing():
 plotting.animate(crossing(), 0.6, alt="two boxes cross; lecture 02's map smears them, BOF colours them by heading")
 
 # %% [markdown]
-# The red outlines are the two boxes, and the wall is on the left edge. (What is outside an outline and still dark, is
-# smear.) In BOF the boxes are dark at first, because the first scans tell little. Then they take the colour of their
-# heading, and the wall stays dark. The smear is nearly gone, because mass that moves takes itself away. And the front
-# of the oncoming box has its true speed, nearly for sure.
+# The red outlines are the two boxes. What stays dark where they have been is smear. In BOF the boxes are dark at first,
+# because the first scans tell little. Then they take the colour of their heading, and the wall stays dark. The smear is
+# nearly gone, because mass that moves takes itself away. And the front of the oncoming box has its true speed, nearly
+# for sure.
 #
 # And the real street of lecture 02, with its three lanes of ghosts? `Bof` is the two functions, and a map that scrolls
 # with the vehicle. (It also looks back half a second: where would this thing have been, and was that place occupied?
@@ -398,8 +391,8 @@ assert (p[DYNAMIC, cars] > 0.5).mean() < 0.25  # few cells of the cars in lane B
 #
 # ## Can one thing be in two places?
 #
-# One thing is in cell 1. It stands, or it drives one cell to the right, with one half each. Then a beam passes cell 1,
-# and another one comes back from cell 2.
+# One thing is in the first cell of a row. It stands, or it drives one cell to the right, with one half each. Then a beam
+# passes the first cell, and another one comes back from the second.
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a graph: what was in cell 1 before points to what cells 1 and 2 hold now, to cell 2 by a dashed arrow marked 1 to 1.24; each cell points to its shaded beam"
 graph = lecture_03_bof.stands_or_drives()
@@ -407,10 +400,10 @@ graph.draw(plt.subplots(figsize=(5, 3.4), layout="constrained")[1])
 plt.show()
 
 # %% [markdown]
-# (Shaded: what the beams tell. Dashed: the arrow that BOF will delete, and how many things are believed in with it and
-# without.) Both cells ask the *same* past. If the thing drove, the second cell is occupied **and** the first one is free. BOF
-# gives each cell its own copy of the past, so that a step is just a shift of maps and a formula for each cell. It
-# deletes the dashed arrow: the second cell still gets a half, but the two cells don't know of each other any more.
+# (Shaded: what the beams tell. Beside the dashed arrow: how many things are believed in with it and without.) Both
+# cells ask the *same* past. If the thing drove, the second cell is occupied **and** the first one is free. BOF gives
+# each cell its own copy of the past, so that a step is just a shift of maps and a formula for each cell. It deletes the
+# dashed arrow: the second cell still gets a half, but the two cells don't know of each other any more.
 #
 # **Predict before you run.** How surely is the first cell free, after both beams, if you compare the two stories as
 # wholes? And cell by cell?
@@ -439,16 +432,15 @@ np.testing.assert_allclose(1 - package[:2, lecture_03_row.Cell.FREE], alone, ato
 #
 # ## Why does a walker stand?
 #
-# A person, 0.6 m wide, comes towards us at 1.4 m/s, as people walk. The lattice has 0 and 2 m/s, but nothing between.
+# A person comes towards us at 1.4 m/s, as people walk. The lattice has 0 and 2 m/s, but nothing between.
 #
 # **Predict before you run.** Will the person be STATIC or DYNAMIC after four seconds? And if velocities are 1 m/s
 # apart? And a slower person, at 1.0 m/s, which this finer lattice has exactly?
 #
 # <details><summary>Answer</summary>
 #
-# STATIC on the first lattice: neither 0 nor 2 m/s predicts the way, and the prior says that most things stand. On the
-# finer lattice DYNAMIC, but it takes more than two seconds. The slower person stays STATIC on both. So the gap in the
-# lattice isn't the whole cause.
+# STATIC on the first lattice, since no velocity of it predicts the way. DYNAMIC on the finer one, but that takes more
+# than two seconds. The slower person stays STATIC on both. So the gap in the lattice isn't the whole cause.
 #
 # </details>
 
@@ -466,21 +458,26 @@ for ax, speed in zip(axes, (1.4, 1.0), strict=True):
             assert np.mean(told[-10:]) > 0.7 or np.mean(told[-10:]) < 0.3
     ax.set_title(f"walker at {speed} m/s", fontsize=10)
     ax.set(xlabel="time [s]", ylim=(0, 1.02))
+leak = sum(defaults.rates[DYNAMIC]) + defaults.stop_rate * np.exp(-((1.0 / defaults.stop_speed) ** 2) / 2)
+assert 0.08 < 1 - np.exp(-0.1 * leak) < 0.1  # of DYNAMIC at 1 m/s, from scan to scan
 axes[0].set_ylabel("P(DYNAMIC) of the walker")
 fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=9, frameon=False)
 plt.show()
 
 # %% [markdown]
-# Look at the solid lines first. At 1.4 m/s the finer lattice is enough. At 1.0 m/s it isn't. A scan speaks for motion
-# only when the person steps into another cell, at 1.0 m/s in one scan of five. Meanwhile DYNAMIC **leaks**: by the
-# transition matrix things stop or are forgotten, and the slow ones stop most. That takes nearly a tenth of it at each
-# scan. **Switch this cause off**, so that nothing stops and nothing is forgotten: the dashed lines. Now the finer lattice
+# Look at the solid lines first. For the faster person the finer lattice is enough, for the slower one it isn't. A scan
+# speaks for motion only when the person steps into another cell, here about once in five scans. Meanwhile DYNAMIC
+# **leaks**: by the transition matrix things stop or are forgotten, and slow things stop most. Each scan costs nearly a
+# tenth of it.
+#
+# **Switch this cause off**, so that nothing stops and nothing is forgotten: the dashed lines. Now the finer lattice
 # finds the slower person, and even the coarse one finds the faster. Only the slower person on the coarse lattice stays
-# STATIC.
+# STATIC: there the gap is enough. (Cells half as wide, in which steps come twice as often, find the slower person in
+# spite of the leak.)
 #
-# So a walker seems to stand because of a gap in the lattice, and because DYNAMIC leaks between two steps.
+# So a walker seems to stand because of the gap in the lattice, and because DYNAMIC leaks between two steps.
 #
-# A finer lattice closes the gap. Then why not always take a fine one? Because each velocity is a whole map, and their number grows with the
+# Then why not always take a fine lattice? Because each velocity is a whole map, and their number grows with the
 # *area* of the disc: half the spacing takes four times the memory, and nearly all of it would hold nothing. Lecture 04
 # puts the memory where the mass is: into particles.
 #
@@ -511,16 +508,13 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# About 0.5 m, which is one cell. A beam in the direction $\varphi$ hits the flank at $x = y / \tan\varphi$. The
-# derivative has the size $(x^2 + y^2)/y$, here 47 m per radian; times 0.0105 rad, that is 0.5 m. Farther away the gap
-# grows with the square of the distance.
+# About half a metre, which is one cell. A beam in the direction $\varphi$ hits the flank at $x = y / \tan\varphi$,
+# where $x$ is the distance ahead and $y$ the one to the side. Its derivative has the size $(x^2 + y^2)/y$, here 47 m
+# per radian.
 #
 # </details>
 #
-# With $x$ for the distance ahead and $y$ for the one to the side, the gap between two columns on the flank is
-#
-# $$ \text{gap} = \frac{x^2 + y^2}{y}\, \Delta\varphi. $$
-#
+# The gap on the flank is $\Delta\varphi\,(x^2 + y^2)/y$: it grows with the square of the distance.
 # Beyond 10 m the gap is wider than a cell. So some cells of the flank are never hit. Beams to the cells beyond pass
 # through them, and they look free. Mass that moves must cross such cells, and is wiped out there. Mass that stands, in
 # a cell that is hit, need not cross anything. So only standing survives.
@@ -544,7 +538,7 @@ for name in ("C   as B, switched on late", "D   as C, even odds at first sight")
 # %% [markdown]
 # ## What decides where scans can't?
 #
-# With those 1000 columns, switch the filter on late, when the bus is already beside us. Panel C: every cell that the
+# With KITTI's scanner, switch the filter on late, when the bus is already beside us. Panel C: every cell that the
 # bus covers at this instant stays dark, as long as the bus covers it. In B the same cells, at the same time, are orange.
 #
 # What is different? In C nobody has seen these cells empty. Standing and driving both have an antecedent inside the
@@ -571,10 +565,11 @@ plt.show()
 # The second suspect is the **spread**. STATIC is one velocity. DYNAMIC shares its half among 48, most of which lead
 # sideways, out of the flank. After a few scans about a fifth of it is left there.
 #
-# The third suspect is the **strike-out**. In a cell that is surely occupied $1 - a = s$ and $1 - s = a$. So our formula
-# turns the odds $s : a$ into $(1 - a)\,s : (1 - s)\,a = s^2 : a^2$. It squares them at every scan: 0.7 to 0.3 becomes
-# 0.84 to 0.16, and then 0.97 to 0.03. For it takes "it stands here" and "it comes from next door" as two independent
-# reports, but they tell of one bus. The same report is counted again and again.
+# The third suspect is the **strike-out**. In a cell that is surely occupied, what doesn't stand moves. So $1 - a$ is
+# $s$, and $1 - s$ is $a$: our formula turns the odds $s : a$ into $s \cdot s : a \cdot a$. It squares them at every
+# scan, and after two scans 0.7 to 0.3 has become 0.97 to 0.03. Why? It takes "it stands here" and "it comes from next
+# door" for two independent reports, but both tell of one bus. It is this lecture's price again: cells that don't know
+# of each other count one report twice.
 #
 # **Switch each off.** To switch off the spread, let the filter know only zero and the velocity of the bus. To switch off
 # the strike-out, use `fly` alone. Start from several odds.
@@ -588,12 +583,13 @@ for ax, spread in zip(axes, (False, True), strict=True):
             told = lecture_03_scenes.late(odds, spread, strikes)
             share[odds, spread, strikes] = told
             first = "2 : 3" if odds < 1 else f"{odds} : 1"
-            name = f"first sight {first}, " + ("strike-out" if strikes else "fly alone")
+            name = f"{first}, " + ("strike-out" if strikes else "fly alone")
             ax.plot(np.arange(len(told)), told, line, marker=marker, color=colour, markersize=5, label=name)
     ax.set_title("48 velocities: spread" if spread else "only the bus's velocity: no spread", fontsize=10)
     ax.set(xlabel="scans since it was switched on", ylim=(-0.02, 1.02))
 axes[0].set_ylabel("P(DYNAMIC | occupied)")
-fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=9, frameon=False)
+fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=9, frameon=False,
+           title="first sight, STATIC : DYNAMIC", title_fontsize=9)  # fmt: skip
 plt.show()
 for (odds, spread, strikes), told in share.items():
     if not spread:  # fly alone keeps the odds, the strike-out lets the leader win
@@ -610,8 +606,8 @@ for (odds, spread, strikes), told in share.items():
 # In B one scan could tell, the one before the front arrived, when the cell was free. (In C the dark even spreads forward
 # by some metres, because a cell that is taken for standing sends nothing ahead.)
 #
-# Could *any* filter see it? Ask exact inference. Each of three cells in a row, a small bus, stands (0.7) or drives
-# (0.3). Two scans follow, and each finds it one cell further:
+# Could *any* filter see it? Ask exact inference. Three cells in a row, a small bus, stand or drive, seven to three. Two
+# scans follow, and each finds the bus one cell further:
 
 # %%
 bus = lecture_03_row.CellsInARow(

@@ -268,5 +268,7 @@ def flank_legend(fig: Figure) -> None:
     names = ("free", "STATIC", "DYNAMIC", "unknown")
     colours = plotting.occupancy_colours(np.eye(4)[:, None])[0] / 255
     states = [Patch(facecolor=c, edgecolor="0.6", label=name) for c, name in zip(colours, names, strict=True)]
-    ends = [Line2D([], [], linestyle=s, color="#c000c0", linewidth=2, label=n) for s, n in (("-", "front"), ("--", "rear"))]
+    ends = [
+        Line2D([], [], linestyle=s, color="#c000c0", linewidth=2, label=n) for s, n in (("-", "front"), ("--", "rear"))
+    ]
     fig.legend(handles=states + ends, loc="outside lower center", ncols=6, fontsize=9, frameon=False)
