@@ -7,7 +7,7 @@ from filterpy.discrete_bayes import update as discrete_update
 from scipy import ndimage
 
 from semgrid_edu.workshop.course.answers import answer_array, answer_arrays
-from semgrid_instructor import close, generator, hidden, keeping
+from semgrid_instructor import close, generator, hidden, in_any_order, keeping
 
 
 @hidden
@@ -16,7 +16,8 @@ def check_shift(shift: Callable) -> None:
     """Every direction, no way at all, and ways that leave the map."""
     rng = generator(2)
     mass = rng.uniform(0.1, 1, size=(5, 4))
-    for down, right in ((0, 0), (0, 1), (2, 0), (1, -2), (-4, -1), (3, 3), (7, 0), (0, -9)):
+    ways = ((0, 0), (0, 1), (2, 0), (1, -2), (-4, -1), (3, 3), (7, 0), (0, -9))
+    for down, right in in_any_order(ways):
         got = answer_array(shift(mass.copy(), down, right))
         how = "a way of 0" if 0 in (down, right) else "another direction"
         how = "a way longer than the map" if max(abs(down), abs(right)) > 4 else how
@@ -150,7 +151,7 @@ def _pairs(own: np.ndarray, a: float) -> np.ndarray:
 def check_follow(follow: Callable) -> None:
     """Several scans, uneven priors, velocities that leave the line on either side; by summing over the places."""
     rng = generator(6)
-    for start, scans, cells in ((0, 2, 6), (4, 4, 6), (3, 1, 7)):
+    for start, scans, cells in in_any_order(((0, 2, 6), (4, 4, 6), (3, 1, 7))):
         steps, prior = np.array([-2, -1, 0, 1, 3]), rng.dirichlet(np.ones(5))
         occupied, free = rng.uniform(0.2, 1, size=(2, scans, cells))
         got = answer_array(follow(start, steps.copy(), prior.copy(), occupied.copy(), free.copy()))
