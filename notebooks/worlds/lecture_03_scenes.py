@@ -151,7 +151,9 @@ def _fly_alone(state: BofState, spec: GridSpec, params: BofParams, dt: float) ->
     return BofState(1 - occupied.sum(axis=0) - unknown, unknown, occupied, state.velocity, remainder)
 
 
-def walker(speed: float, spacing: float, leaks: bool, times: NDArray, start: float = 15.2) -> NDArray[np.float64]:
+def walker(
+    speed: float, spacing: float, leaks: bool, times: NDArray, start: float = 15.2, cell: float = 0.5
+) -> NDArray[np.float64]:
     """Return P(DYNAMIC) of a person who walks towards us, after each scan, (T,).
 
     Parameters
@@ -166,8 +168,10 @@ def walker(speed: float, spacing: float, leaks: bool, times: NDArray, start: flo
         Times of the scans, seconds.
     start : float
         Where the person is at first, metres ahead.
+    cell : float
+        Side of a cell, metres.
     """
-    lane = GridSpec(x_min=4, x_max=18, y_min=-2, y_max=2, cell=0.5)
+    lane = GridSpec(x_min=4, x_max=18, y_min=-2, y_max=2, cell=cell)
     rates = WorldModel.rates
     world = WorldModel() if leaks else WorldModel(rates=(*rates[:2], (0.0,) * 4, rates[3]), stop_rate=0)
     told = []
