@@ -9,7 +9,7 @@ import numpy as np
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, enumerate_marginals
 from semgrid_edu.graphical import eliminate as eliminate_exactly
 from semgrid_edu.workshop.course.answers import answer_array
-from semgrid_instructor import close, generator, hidden, in_any_order
+from semgrid_instructor import asked_in_any_order, close, generator, hidden, in_any_order
 
 
 def _named(shapes: dict[str, int], names: tuple[str, ...], rng: np.random.Generator) -> tuple:
@@ -19,8 +19,9 @@ def _named(shapes: dict[str, int], names: tuple[str, ...], rng: np.random.Genera
 
 def _check_quotients(divide: Callable, pairs: tuple[tuple[str, str], ...], seed: int, zeros: bool = False) -> None:
     """Divide products by one of their factors, two to four states each; with `zeros`, a state of it is impossible."""
-    rng, shapes = generator(seed), {"a": 2, "b": 3, "c": 4, "d": 2}
-    for one, other in in_any_order(pairs):
+    shapes = {"a": 2, "b": 3, "c": 4, "d": 2}
+    for k, (one, other) in in_any_order(enumerate(pairs)):
+        rng = generator(100 * seed + k)
         quotient, g = _named(shapes, tuple(one), rng), _named(shapes, tuple(other), rng)
         if zeros and other:
             g[1][(0,) * len(other)] = 0
@@ -57,12 +58,19 @@ def check_posterior(posterior: Callable) -> None:
     """Four variables with other numbers of states, asked in every place, with none to three reports."""
     rng, shapes = generator(22), {"a": 3, "b": 2, "c": 4, "d": 2}
     joint = _named(shapes, tuple("abcd"), rng)
-    for wanted, about in in_any_order((("c", "ad"), ("a", "b"), ("d", "cab"), ("b", ""), ("d", "dc"))):
+    questions = []
+    for wanted, about in (("c", "ad"), ("a", "b"), ("d", "cab"), ("b", ""), ("d", "dc")):
         heard = {name: rng.uniform(0.05, 1, shapes[name]) for name in about}
         if len(heard) > 1:
             heard[about[1]] = np.eye(shapes[about[1]])[-1]
+        questions.append((wanted, heard))
+
+    def ask(question: tuple[str, dict]) -> np.ndarray:
+        wanted, heard = question
+        return answer_array(posterior(joint, wanted, {name: row.copy() for name, row in heard.items()}))
+
+    for (wanted, heard), got in asked_in_any_order(ask, questions):
         expected = enumerate_marginals(GraphicalModel([Factor(*joint), *map(Factor, heard, heard.values())]), wanted)
-        got = answer_array(posterior(joint, wanted, {name: row.copy() for name, row in heard.items()}))
         assert got.shape == expected.table.shape, "another shape"
         right = close(got, expected.normalised().table)
         assert right, "wrong with " + ("reports of some variables" if heard else "nothing heard")
@@ -203,8 +211,10 @@ def check_eliminate(eliminate: Callable) -> None:
         (["e", "a"], {"d": 3, "c": 0}, ""),
         (["a", "c"], {"e": 1}, "ac"),
     )
-    for order, seen, best in in_any_order(cases):
-        result = eliminate(list(factors), list(order), dict(seen), list(best))
+    asked = asked_in_any_order(
+        lambda case: eliminate(list(factors), list(case[0]), dict(case[1]), list(case[2])), cases
+    )
+    for (order, seen, best), result in asked:
         result = result[0] if isinstance(result, tuple | list) else result
         left = [name for name in STATES if name not in order and name not in seen]
         assert sorted(result.names) == sorted(left), "wrong variables are left"
