@@ -325,7 +325,8 @@ def crossing():
 plotting.animate(crossing(), 0.6, alt="two boxes cross; lecture 02's map smears them, BOF colours them by heading")
 
 # %% [markdown]
-# The red outlines are the two boxes. What stays dark where they have been is smear. In BOF the boxes are dark at first,
+# The red outlines are the two boxes. What stays dark where they have been is smear. (Free ground is grey on the left as
+# long as lecture 02's map isn't sure of it.) In BOF the boxes are dark at first,
 # because the first scans tell little. Then they take the colour of their heading, and the wall stays dark. The smear is
 # nearly gone, because mass that moves takes itself away. And the front of the oncoming box has its true speed, nearly
 # for sure.
@@ -439,20 +440,21 @@ np.testing.assert_allclose(1 - package[:2, lecture_03_row.Cell.FREE], alone, ato
 #
 # <details><summary>Answer</summary>
 #
-# STATIC on the first lattice, since no velocity of it predicts the way. DYNAMIC on the finer one, but that takes more
-# than two seconds. The slower person stays STATIC on both. So the gap in the lattice isn't the whole cause.
+# STATIC on the first lattice. DYNAMIC on the finer one, but that takes more than two seconds. The slower person stays
+# STATIC on both. So the gap in the lattice isn't the whole cause.
 #
 # </details>
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="P(DYNAMIC) of two walkers over four seconds. At 1.4 m/s it stays low only with velocities 2 m/s apart and the leak. At 1.0 m/s it becomes high only with velocities 1 m/s apart and without the leak"
-times = np.arange(41) / 10
 fig, axes = plt.subplots(1, 2, figsize=(8.6, 3.1), layout="constrained", sharey=True)
 for ax, speed in zip(axes, (1.4, 1.0), strict=True):
     for spacing, colour, marker in ((2, "0.15", "o"), (1, "#c04000", "s")):
         for leaks, line in ((True, "-"), (False, "--")):
-            told = lecture_03_scenes.walker(speed, spacing, leaks, times)
+            told = lecture_03_scenes.walker(speed, spacing, leaks)
             label = f"{spacing} m/s apart" + ("" if leaks else ", no leak")
-            ax.plot(times, told, line, color=colour, marker=marker, markevery=5, markersize=5, label=label)
+            ax.plot(
+                lecture_03_scenes.WALK, told, line, color=colour, marker=marker, markevery=5, markersize=5, label=label
+            )
             causes = leaks + (spacing == 2)
             assert (np.mean(told[-10:]) > 0.7) == (causes == 0 or (causes == 1 and speed == 1.4))
             assert np.mean(told[-10:]) > 0.7 or np.mean(told[-10:]) < 0.3
@@ -606,8 +608,8 @@ for (odds, spread, strikes), told in share.items():
 # In B one scan could tell, the one before the front arrived, when the cell was free. (In C the dark even spreads forward
 # by some metres, because a cell that is taken for standing sends nothing ahead.)
 #
-# Could *any* filter see it? Ask exact inference. Three cells in a row, a small bus, stand or drive, seven to three. Two
-# scans follow, and each finds the bus one cell further:
+# Could *any* filter see it? Ask exact inference. Each of three cells in a row, a small bus, stands or drives, seven to
+# three. Two scans follow, and each finds the bus one cell further:
 
 # %%
 bus = lecture_03_row.CellsInARow(

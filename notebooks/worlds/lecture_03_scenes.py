@@ -41,11 +41,10 @@ def bus_at(t: float) -> list[Box]:
     return [Box.around(30 - 8 * t, FLANK + 1.25, 12, 2.5, 3)]
 
 
-def watch(
-    boxes_at: Callable[[float], list[Box]], spec: GridSpec, params: BofParams, times: NDArray,
-    columns: int = 300, field: float = 180,
-) -> list[BofState]:  # fmt: skip
-    """Return what BOF believes after each scan of a vehicle that doesn't move.
+def scans_of(
+    boxes_at: Callable[[float], list[Box]], spec: GridSpec, times: NDArray, columns: int, field: float = 180
+) -> list[Evidence]:
+    """Return what each scan of a vehicle that doesn't move tells about the cells.
 
     Parameters
     ----------
@@ -53,19 +52,28 @@ def watch(
         Returns the boxes of the world at a time, seconds.
     spec : GridSpec
         The cells.
-    params : BofParams
-        The lattice, and how the world changes.
     times : sequence of float
-        Times of the scans, seconds, evenly spaced.
+        Times of the scans, seconds.
     columns, field
         The scanner, as in `scan_boxes`.
     """
-    rng, dt = np.random.default_rng(0), times[1] - times[0]
+    rng, sensor = np.random.default_rng(0), WorldModel().sensor
+    scans = [scan_boxes(boxes_at(t), columns=columns, rings=16, field=field, noise=0.02, rng=rng) for t in times]
+    return [fast.scan_evidence(points, spec, sensor) for points in scans]
+
+
+@cache
+def _bus_scans(columns: int, first: float) -> tuple[NDArray, list[Evidence]]:
+    """Return the times of the scans of the bus, from the first one on, and what they tell."""
+    times = np.arange(round(10 * first), 29) / 10
+    return times, scans_of(bus_at, BUS, times, columns)
+
+
+def watch(scans: list[Evidence], spec: GridSpec, params: BofParams, predict: Callable = bof_predict) -> list[BofState]:
+    """Return what BOF believes after each of some scans, a tenth of a second apart."""
     state, states = BofState.nothing_known(spec, params.lattice), []
-    for t in times:
-        points = scan_boxes(boxes_at(t), columns=columns, rings=16, field=field, noise=0.02, rng=rng)
-        state = bof_predict(state, spec, params, dt)
-        state = bof_update(state, spec, fast.scan_evidence(points, spec, params.world.sensor), params)
+    for scan in scans:
+        state = bof_update(predict(state, spec, params, 0.1), spec, scan, params)
         states.append(state)
     return states
 
@@ -84,9 +92,8 @@ def pass_by(
     first_sight : (float, float, float)
         Probabilities of FREE, STATIC and DYNAMIC when a cell is first seen.
     """
-    times = np.arange(round(10 * first), 29) / 10
-    params = BofParams(VelocityLattice(8, spacing=2), WorldModel(first_sight=first_sight))
-    states = watch(bus_at, BUS, params, times, columns)
+    times, scans = _bus_scans(columns, first)
+    states = watch(scans, BUS, BofParams(VelocityLattice(8, spacing=2), WorldModel(first_sight=first_sight)))
     _, (col,), _ = BUS.cells(np.array([[1.0, FLANK]]))
     return times, np.stack([state.probability[:, ::-1, col] for state in states], axis=1)
 
@@ -98,18 +105,6 @@ class OnlyTheBus(VelocityLattice):
     def prior(self) -> NDArray[np.float64]:
         """(V,): all mass on the velocity of the bus."""
         return (self.velocities == (-8, 0)).all(axis=1).astype(float)
-
-
-@cache
-def _late_scans() -> list[Evidence]:
-    """Return eleven scans of the bus, of 1000 columns, from the instant when it is beside us."""
-    rng, sensor = np.random.default_rng(0), STEADY.sensor
-    scans = [scan_boxes(bus_at(t), columns=1000, rings=16, noise=0.02, rng=rng) for t in LATE]
-    return [fast.scan_evidence(points, BUS, sensor) for points in scans]
-
-
-LATE = np.arange(16, 27) / 10
-"""Times of the scans of `late`, seconds."""
 
 
 def late(odds: float, spread: bool, strike_out: bool) -> NDArray[np.float64]:
@@ -130,13 +125,12 @@ def late(odds: float, spread: bool, strike_out: bool) -> NDArray[np.float64]:
     static = 0.048 * odds / (1 + odds)
     world = WorldModel(STEADY.rates, 0, STEADY.stop_speed, 0, (0.952, static, 0.048 - static), None)
     params = BofParams(VelocityLattice(8, spacing=2) if spread else OnlyTheBus(8, spacing=8), world)
-    predict = bof_predict if strike_out else _fly_alone
-    state, told = BofState.nothing_known(BUS, params.lattice), []
+    times, scans = _bus_scans(1000, 1.6)
+    states = watch(scans[:11], BUS, params, bof_predict if strike_out else _fly_alone)
     (_,), (col,), _ = BUS.cells(np.array([[1.0, FLANK]]))
-    x = BUS.centers()[:, col, 0]
-    for t, scan in zip(LATE, _late_scans(), strict=True):
-        state = bof_update(predict(state, BUS, params, dt=0.1), BUS, scan, params)
-        here = (x > 30 - 8 * LATE[0] - 6) & (x < 30 - 8 * t + 6 - 2)
+    x, told = BUS.centers()[:, col, 0], []
+    for t, state in zip(times, states, strict=False):
+        here = (x > 30 - 8 * times[0] - 6) & (x < 30 - 8 * t + 6 - 2)
         probability = state.probability[:, here, col]
         told.append(probability[State.DYNAMIC].sum() / probability[[State.STATIC, State.DYNAMIC]].sum())
     return np.array(told)
@@ -151,10 +145,23 @@ def _fly_alone(state: BofState, spec: GridSpec, params: BofParams, dt: float) ->
     return BofState(1 - occupied.sum(axis=0) - unknown, unknown, occupied, state.velocity, remainder)
 
 
-def walker(
-    speed: float, spacing: float, leaks: bool, times: NDArray, start: float = 15.2, cell: float = 0.5
-) -> NDArray[np.float64]:
-    """Return P(DYNAMIC) of a person who walks towards us, after each scan, (T,).
+WALK = np.arange(41) / 10
+"""Times of the scans of a walker, seconds."""
+
+
+def _person(t: float, speed: float, start: float) -> list[Box]:
+    """Return a person who walks towards us."""
+    return [Box.around(start - speed * t, 0, 0.6, 0.6, 1.7)]
+
+
+@cache
+def _walk_scans(speed: float, start: float, spec: GridSpec) -> list[Evidence]:
+    """Return what the scans of a walker tell."""
+    return scans_of(lambda t: _person(t, speed, start), spec, WALK, columns=100, field=60)
+
+
+def walker(speed: float, spacing: float, leaks: bool, start: float = 15.2, cell: float = 0.5) -> NDArray[np.float64]:
+    """Return P(DYNAMIC) of a person who walks towards us, after each scan of `WALK`, (41,).
 
     Parameters
     ----------
@@ -164,8 +171,6 @@ def walker(
         Spacing of the velocities of the lattice, which ends at 2 m/s.
     leaks : bool
         Whether what moves may stop or be forgotten.
-    times : sequence of float
-        Times of the scans, seconds.
     start : float
         Where the person is at first, metres ahead.
     cell : float
@@ -174,14 +179,10 @@ def walker(
     lane = GridSpec(x_min=4, x_max=18, y_min=-2, y_max=2, cell=cell)
     rates = WorldModel.rates
     world = WorldModel() if leaks else WorldModel(rates=(*rates[:2], (0.0,) * 4, rates[3]), stop_rate=0)
+    states = watch(_walk_scans(speed, start, lane), lane, BofParams(VelocityLattice(2, spacing), world))
     told = []
-
-    def person(t: float) -> list[Box]:
-        return [Box.around(start - speed * t, 0, 0.6, 0.6, 1.7)]
-
-    params = BofParams(VelocityLattice(2, spacing), world)
-    for t, state in zip(times, watch(person, lane, params, times, columns=100, field=60), strict=True):
-        here = cells_in(person(t)[0], lane, margin=0.5) & (state.occupied.sum(axis=0) > 0.5)
+    for t, state in zip(WALK, states, strict=True):
+        here = cells_in(_person(t, speed, start)[0], lane, margin=0.5) & (state.occupied.sum(axis=0) > 0.5)
         told.append(state.probability[State.DYNAMIC, here].mean())
     return np.array(told)
 

@@ -16,8 +16,6 @@ from semgrid_edu.occupancy import (
     bof_update,
 )
 
-TIMES = np.arange(41) / 10
-
 
 @pytest.mark.parametrize(
     ("speed", "spacing", "leaks", "found"),
@@ -27,12 +25,12 @@ TIMES = np.arange(41) / 10
     ],
 )  # fmt: skip
 def test_a_walker_who_starts_elsewhere_is_found_or_missed_for_the_same_causes(speed, spacing, leaks, found):
-    told = walker(speed, spacing, leaks, TIMES, start=15.0)[-10:].mean()
+    told = walker(speed, spacing, leaks, start=15.0)[-10:].mean()
     assert told > 0.6 if found else told < 0.45
 
 
 def test_the_slower_walker_is_found_in_cells_half_as_wide():
-    assert walker(1.0, 1, True, TIMES, cell=0.25)[-10:].mean() > 0.7
+    assert walker(1.0, 1, True, cell=0.25)[-10:].mean() > 0.7
 
 
 def test_strike_out_squares_the_odds_where_nothing_is_spread():
