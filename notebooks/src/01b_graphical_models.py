@@ -331,7 +331,7 @@ for order in (["street", *others], [*others, "street"]):
 # row (left, below):
 
 
-# %% jupyter={"source_hidden": true} alt="left, a square of four by four cells linked through black squares; five cells are gone, the sixth has a thick outline, and it and the four cells after it are grey: they are the axes of the next table; right, entries on a logarithmic scale against the side of the square: all maps rise to 10 to the 30, the largest table of the row-by-row order to about 2,000"
+# %% jupyter={"source_hidden": true} alt="left, a square of four by four cells linked through black squares; five cells are gone and have left a square that is linked to the four cells after them; these and the fifth have thick outlines, and the first is called next; right, entries on a logarithmic scale against the side of the square: all maps rise to 10 to the 30, the largest table of the row-by-row order to about 2,000"
 def square(n):
     """Return n x n cells, each linked with its neighbours to the right and below."""
     below = [((r, c), (r + 1, c)) for r in range(n - 1) for c in range(n)]
@@ -342,12 +342,14 @@ def square(n):
 sides = np.arange(2, 11)
 by_row = {n: [f"m{r},{c}" for r in range(n) for c in range(n)] for n in sides}
 largest = np.array([max(sum_in_order(square(n).factors, by_row[n])[1]) for n in sides])
-fig, axes = plt.subplots(1, 2, figsize=(8.4, 3), layout="constrained", width_ratios=(1, 1.5))
+fig, axes = plt.subplots(1, 2, figsize=(8.8, 3.3), layout="constrained", width_ratios=(1.25, 1.4))
 left = [name for name in by_row[4] if name not in by_row[4][:5]]
-rest = GraphicalModel(f for f in square(4).factors if set(f.names) <= set(left))
-PLACES = {name: (int(name[3]), -int(name[1])) for name in left}
-draw(rest, axes[0], positions=PLACES, labels=dict.fromkeys(left, ""), observed=left[:5], highlight=left[:1])
-axes[0].set_title("summed out: the first five cells", fontsize=10)
+untouched = [f for f in square(4).factors if set(f.names) <= set(left)]
+rest = GraphicalModel([Factor(left[:4], np.ones([2] * 4)), *untouched])  # what the five cells leave behind links four
+PLACES = {name: (int(name[3]), -int(name[1])) for name in left} | {f"f({', '.join(left[:4])})": (0.9, -0.05)}
+words = dict.fromkeys(left, "") | {left[0]: "next"}
+draw(rest, axes[0], positions=PLACES, labels=words, highlight=left[:5])
+axes[0].set_title("five cells are summed out", fontsize=10)
 axes[1].semilogy(sides, 2.0 ** (sides**2), "s--", color="0.4", label="all maps, $2^{n^2}$")
 axes[1].semilogy(sides, largest, "o-", color="#0072b2", label="row by row: the largest table")
 axes[1].set(xlabel="side $n$ of a square of cells", ylabel="entries")
@@ -356,8 +358,9 @@ plt.show()
 np.testing.assert_array_equal(largest, 2 ** (sides + 1))
 
 # %% [markdown]
-# Left: the cell with the thick outline is next. Its table has as axes this cell and the four after it (all grey), one
-# axis more than the square has cells on a side. So ten by ten cells need tables of 2<sup>11</sup> = 2,048 entries, in
+# Left: five cells are summed out, and have left one table that links the next four (the black square above them). Now
+# the cell *next* is summed out. The table for this has five axes, the cells with thick outlines: one more than the
+# square has cells on a side. So ten by ten cells need tables of 2<sup>11</sup> = 2,048 entries, in
 # place of 2<sup>100</sup> maps. That is as good as it gets: in an $n$ by $n$ square *every* order meets a table with at
 # least $n$ + 1 axes. (A theorem: the square's *treewidth* is $n$, Diestel, chapter 12.) The paper's grid has 155 cells
 # on its shorter side, and its CRF links even every cell with every other.
@@ -444,7 +447,7 @@ np.testing.assert_allclose(all_answers.messages["now", "f(now, after)"], filtere
 # cell of the grid, and no edge links two cells, so each is filtered by itself. Here are the other two:
 
 # %% tags=["stages"] jupyter={"source_hidden": true} alt="left, four cells at the corners of a square, each pair linked through a black square, and one more square at each cell; right, two columns, t-1 and t: the world w with an arrow to the next w, arrows from w to the grey readings l and i; l to o, o and i to g; o has an arrow to the next o, and a dashed arrow leads from g to the next g"
-fig, axes = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained", width_ratios=(1, 1.9))
+fig, axes = plt.subplots(1, 2, figsize=(9.4, 3.2), layout="constrained", width_ratios=(1, 2.2))
 CORNERS = {"x1": (0, 0), "x2": (1.8, 0), "x3": (1.8, -1.8), "x4": (0, -1.8)}
 pairs = [(one, other) for one in CORNERS for other in CORNERS if one < other]
 beside = {f"f({name})": (1.4 * x - 0.36, 1.3 * y + 0.3) for name, (x, y) in CORNERS.items()}
@@ -453,11 +456,11 @@ own = [Factor(name, [1, 2]) for name in CORNERS]
 crf = GraphicalModel([*own, *(Factor(pair, AGREE) for pair in pairs)])
 draw(crf, axes[0], positions=CORNERS | diagonals | beside).set_title("the CRF, on four cells", fontsize=10)
 
-COLUMN = {"w": (0.9, 0), "l": (0, -1), "i": (1.8, -1), "o": (0, -2.1), "g": (0.9, -2.9)}
+COLUMN = {"w": (1.2, 0), "l": (0, -1), "i": (2.4, -1), "o": (0, -2.1), "g": (1.2, -2.9)}
 SYSTEM, WHERE = {"w1": ("w0",), "o0": ("l0",), "o1": ("l1", "o0")}, {}
 for t in (0, 1):
     SYSTEM |= {f"l{t}": (f"w{t}",), f"i{t}": (f"w{t}",), f"g{t}": (f"o{t}", f"i{t}")}
-    WHERE |= {f"{name}{t}": (x + 3.6 * t, y) for name, (x, y) in COLUMN.items()}
+    WHERE |= {f"{name}{t}": (x + 4.4 * t, y) for name, (x, y) in COLUMN.items()}
 system = any_model(SYSTEM)
 draw(
     system,
