@@ -162,7 +162,7 @@ small = resize_image(part, (48, 160))[..., 0].astype(float)
 middle = np.array([small.sum(axis=0) @ np.arange(160), small.sum(axis=1) @ np.arange(48)]) / small.sum()
 np.testing.assert_allclose(middle, pixel(place, resize(0.5, 0.5) @ crop(1, 0) @ K), atol=0.02)
 careless = pixel(place, np.diag([0.5, 0.5, 1]) @ crop(1, 0) @ K)
-print("with the half pixel the rule finds the dot; without it misses by {:.2f} pixels".format(careless[0] - middle[0]))
+print(f"with the half pixel the rule finds the dot; without it misses by {careless[0] - middle[0]:.2f} pixels")
 
 # %% [markdown]
 # A quarter of a pixel, and no error message. So scale distances from the image's *edge*, half a pixel before the first
@@ -296,7 +296,7 @@ instances, _ = ndimage.label(frame.labels.image == CAR)
 is_front_car = (instances == instances[140, 120]) & (frame.labels.depth < 13)
 car = places_of(*np.nonzero(is_front_car))
 pale.image[is_front_car] = (pale.image[is_front_car] // 2 + 100 * BLUE).astype(np.uint8)
-HEIGHTS = (-0.5, 0, 0.4, 0.8, 1.2, z_cam, 2, 2.5)
+HEIGHTS = (0, 0.4, 0.8, z_cam, 2, 2.5)
 LEGEND = [c for c in range(len(KITTI_14.names)) if any((read_at(height) == c).sum() > 20 for height in HEIGHTS)]
 
 # %% jupyter={"source_hidden": true} alt="animation: A, a sheet of dots rises through the camera image of a street with one car marked in blue, and becomes a line at the camera's height; B, seen from the side, it cuts through the car; C, the map of classes that the sheet reads, with the car's true place in black: on the ground plane a long blue smear from there outwards, at 0.8 m a shorter one on both sides of it"
