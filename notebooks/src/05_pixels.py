@@ -21,7 +21,6 @@
 
 # %% jupyter={"source_hidden": true}
 from dataclasses import replace
-from itertools import product
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -37,29 +36,29 @@ from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.planes import plane_pixels
-from worlds.lecture_05_pixel_ray import pixel_ray
+from worlds.lecture_05_pixel_ray import cell_by_cell, exact_ray, pixel_ray
 
 # %% jupyter={"source_hidden": true}
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 plt.rcParams["image.interpolation"] = "nearest"
 ROAD, SIDEWALK, CAR = (KITTI_14.index(name) for name in ("road", "sidewalk", "car"))
-BLUE = KITTI_14.colours(np.array([CAR]))[0] / 255
+PURPLE, BLUE = KITTI_14.colours(np.array([ROAD, CAR])) / 255
 
 # %% [markdown]
 # ## Where does a point appear in the image?
 #
 # To bring a class from a pixel to a cell of the map we need to know which pixel belongs to which cell. Begin with the
 # simplest camera: a box with a tiny hole in front, and a film 200 pixels behind the hole (its *focal length*, measured
-# in the film's own pixels). Ten metres ahead stands a pole, 2 m tall. Light runs straight through the hole. So the pole
-# and its picture are two triangles of the same shape: 200 · 2 / 10 = 40 pixels.
+# in the film's own pixels). Ten metres ahead stands a pole of two metres. Light runs straight through the hole. So the
+# pole and its picture are two triangles of the same shape: 200 · 2 / 10 = 40 pixels.
 #
-# **Predict before you run.** How tall is the picture when the pole is 20 m away? And that of a pole of 20 cm, 1 m
-# away?
+# **Predict before you run.** How tall is the picture when the pole is twice as far away? And that of a pole a tenth as
+# tall, at a tenth of the distance?
 #
 # <details><summary>Answer</summary>
 #
-# 20 pixels: twice as far, half as tall. The small one: 200 · 0.2 / 1 = 40 pixels, the same as the real pole at 10 m. A
-# picture cannot tell a small thing nearby from a big one far away.
+# Half as tall, 20 pixels. The small one: 40 pixels again, like the first pole. A picture cannot tell a small thing
+# nearby from a big one far away.
 #
 # </details>
 #
@@ -96,8 +95,8 @@ plt.show()
 # ## How does one matrix do it?
 #
 # A camera scales by $f$, shifts by $c$ and divides by $Z$. The division isn't linear, so do it last, and carry a third
-# number along. $K$, the **intrinsic matrix**, makes of the point (1.5, 1, 10) the triple (200 · 1.5 + 160 · 10, 200 · 1
-# + 48 · 10, 10) = (1900, 680, 10). Divide by its last number: the pixel (190, 68).
+# number along. $K$, the **intrinsic matrix**, makes of the point $(X, Y, Z)$ the triple $(f_u X + c_u Z,\; f_v Y + c_v
+# Z,\; Z)$. Divide by its last number, and you have the pixel.
 
 
 # %%
@@ -108,14 +107,15 @@ def pixel(point, K):
 
 
 K = np.array([[200.0, 0, 160], [0, 200, 48], [0, 0, 1]])
+print(K @ [1.5, 1, 10], "= 200 * 1.5 + 160 * 10, 200 * 1 + 48 * 10, 10")
 for point in ([1.5, 1, 10], [3, 2, 20], [0.15, 0.1, 1]):
     np.testing.assert_allclose(pixel(np.array(point), K), pinhole(*point))
     print(f"{point!s:<14} -> {pixel(np.array(point), K).round(6).tolist()}")
 
 # %% [markdown]
 # All three points are multiples of one triple. They are on one ray, and have one pixel. And where do lines end? Two
-# rails straight ahead are at $X/Z = \pm 1.5 / Z$. Far away this is 0, so both end at the principal point. Lines of one
-# direction meet in one pixel, their **vanishing point**.
+# rails run straight ahead, one to the left of the camera and one to the right. Far away $X/Z$ and $Y/Z$ vanish for
+# both, so both end at the principal point. Lines of one direction meet in one pixel, their **vanishing point**.
 #
 # So $K$ holds all that the camera itself does, and the division is left to the end.
 #
@@ -128,9 +128,9 @@ for point in ([1.5, 1, 10], [3, 2, 20], [0.15, 0.1, 1]):
 #
 # <details><summary>Answer</summary>
 #
-# The middle of 4 pixels, at 0, 1, 2, 3, is 1.5. Not 3.5 / 2 = 1.75! The image begins half a pixel *before* the centre
-# of its first pixel, and that edge is what stays in place: 3.5 + 0.5 = 4 pixels from the edge, half of them is 2,
-# less 0.5. The focal length is only scaled: 5. A cut shifts: $c_u$ = 1.5, and $f_u$ is still 10.
+# The middle of four pixels is 1.5, and not half of 3.5! The image begins half a pixel *before* the centre of its first
+# pixel, and that edge is what stays in place: the axis is 4 pixels from the edge, then 2, so 1.5 from the first centre.
+# The focal length is only halved. A cut shifts: $c_u$ = 1.5, and $f_u$ stays.
 #
 # </details>
 
@@ -170,16 +170,16 @@ print(f"with the half pixel the rule finds the dot; without it misses by {carele
 #
 # ## Where is the camera?
 #
-# Until now points were given in the camera's frame, but the map has its own. In a toy car the LIDAR is 2 m above the
+# Until now points were given in the camera's frame, but the map has its own. In a toy car the LIDAR is two metres above the
 # ground. The camera is half a metre below the LIDAR and looks ahead. Here is the top of a post in three frames:
 #
 # | frame | axes | origin | top of the post |
 # |---|---|---|---|
 # | grid | x forward, y left, z up | on the ground below the LIDAR | (10, -2, 0.5) |
-# | LIDAR | the same | 2 m higher | (10, -2, -1.5) |
+# | LIDAR | the same | two metres higher | (10, -2, -1.5) |
 # | camera | X right, Y down, Z ahead | half a metre below the LIDAR | (2, 1, 10) |
 #
-# Each step turns and shifts. A 4 x 4 matrix on $(x, y, z, 1)$ does both: a rotation $R$, and a shift $t$ in its last
+# Each step turns and shifts. One matrix on $(x, y, z, 1)$ does both: a rotation $R$, and a shift $t$ in its last
 # column. The names tell the order. **Neighbours that are equal cancel**: *camera from lidar* times *lidar from grid* is
 # *camera from grid*. And the way back? From $Rp + t$, first take off $t$, then turn back by $R^\top$.
 
@@ -246,12 +246,12 @@ for some_camera in (toy, camera):
     package, visible = plane_pixels(block, [0.0, 1.5, 2.0], some_camera)
     np.testing.assert_allclose(literal, package)
     np.testing.assert_array_equal(seen, visible)
-np.testing.assert_allclose(pinhole(-2, 1.5, -10), (200, 18))  # behind the camera
+assert pinhole(-2, 1.5, -10) == (200, 18)  # ten metres behind the camera: above the horizon, row 48
 
 # %% [markdown]
-# Why `if Z > 0`? A place on the ground 10 m *behind* the toy camera has $Z$ = -10. The formula alone gives it the pixel
-# (200, 18), in the sky on the right, since two minus signs cancel. There is no error and no NaN. So a point is **in
-# view** only if it is in front of the camera *and* its pixel is within the image.
+# Why `if Z > 0`? A place on the ground *behind* the toy camera has a negative $Z$. The formula alone gives it a pixel
+# in the sky, since minus signs cancel. There is no error and no NaN. So a point is **in view** only if it is in front
+# of the camera *and* its pixel is within the image.
 #
 # **Predict before you run.** Straight ahead of the toy car a point of a plane is $1.5 - \delta$ metres below the camera,
 # so it is in row $v = 48 + 200\,(1.5 - \delta) / Z$. Which row is the plane at 1.5 m? And to which row does *every*
@@ -260,7 +260,7 @@ np.testing.assert_allclose(pinhole(-2, 1.5, -10), (200, 18))  # behind the camer
 # <details><summary>Answer</summary>
 #
 # Row 48, twice. The plane at the camera's own height is seen edge-on, as a line. And far ahead $Z$ is so large that the
-# height doesn't matter: all planes meet at row 48, the horizon.
+# height doesn't matter: all planes meet in this row, the horizon.
 #
 # </details>
 #
@@ -329,10 +329,11 @@ plotting.animate(
 )
 
 # %% [markdown]
-# A: each dot is the centre of a square of 1 m; nearer ones are lighter. One car is marked in blue. B: the same from the
-# side, with the camera as a black square. C: the map that the plane reads from the image's true labels. At 0 m the car
-# is thrown over the map like a shadow. At 0.8 m, half-way up its body, the smear lies on both sides of the true place.
-# Above the camera's height the map shows what is high, as trees and houses. (With a running kernel, drag the plane yourself.)
+# A: each dot is the centre of a square of a metre; nearer ones are lighter. One car is marked in blue. B: the same from the
+# side, with the camera as a black square. C: the map that the plane reads from the image's true labels. On the ground plane
+# the car is thrown over the map like a shadow. At 0.8 m, half-way up its body, the smear lies on both sides of the true
+# place. Above the camera's height the map shows what is high, as trees and houses. (With a running kernel, drag the
+# plane yourself.)
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="the grid lifted to a height, drawn over the image"
 
@@ -354,13 +355,14 @@ _ = interact(show, height=FloatSlider(value=0.0, min=-1.0, max=3.8, step=0.05, d
 #
 # How far off is a thing that isn't at the plane's height?
 #
-# **Predict before you run.** The top of a post, 1 m high, 10 m ahead of the toy car. Draw the ray from the camera, 1.5
-# m up, over the top of the post, to the ground. How far ahead does it land? And over a sign at 2 m?
+# **Predict before you run.** A post, 1 m high, stands 10 m ahead of the toy camera. Draw the ray from the camera, 1.5
+# m up, over the top of the post, to the ground. How far ahead does it land? And over a sign that is higher than the
+# camera?
 #
 # <details><summary>Answer</summary>
 #
-# The ray sinks by 0.5 m in 10 m, so it has come 1.5 m down after 30 m: 20 m behind the post. Over the sign it rises:
-# never.
+# The ray sinks by half a metre on its way to the post, so it has come all the way down after 30 m: far behind it. Over
+# the sign it rises: never.
 #
 # </details>
 #
@@ -386,11 +388,11 @@ for name, y, side in (("foot of the kerb", -2.1, 0), ("far edge", -4.45, -1)):
     column = np.flatnonzero(frame.labels.image[row] == SIDEWALK)[side]
     edges[name] = there = places_of(np.array([row]), np.array([column]))
     print(f"{name}: truly at ({there[0, 0]:.2f}, {there[0, 1]:.2f}), {there[0, 2]:+.2f} m high", end="; drawn ")
-    off = [np.linalg.norm(drawn(there, delta) - there, axis=1)[0] for delta in (0, there[0, 2])]
+    np.testing.assert_allclose(drawn(there, there[0, 2]), there)  # in place on the plane of its own height
     ground = drawn(there, 0)[0]
     print(f"at ({ground[0]:.2f}, {ground[1]:.2f}) on the ground plane; {np.hypot(*(ground - there[0])[:2]):.2f} m off")
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, the map from above: black dots where the edges of the sidewalk truly are, orange crosses where the ground plane draws them; at the foot of the kerb they nearly coincide, at the far edge the cross lies farther away and farther out; right, from above, a car of which the ground plane makes a long smear outwards, and the plane at 0.8 m a shorter one around its true place"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="A, from above: the camera, and in front of it black dots where the edges of the sidewalk truly are and orange crosses where the ground plane draws them; at the foot of the kerb they nearly coincide, at the far edge the cross is farther away on the same ray; B and C, from above, a car of which the ground plane makes a long smear outwards, and the plane at 0.8 m a shorter one around its true place"
 off = {name: np.hypot(*(drawn(there, 0) - there)[0, :2]) for name, there in edges.items()}
 np.testing.assert_allclose(list(off.values()), (0.16, 0.88), atol=0.006)
 np.testing.assert_allclose(edges["far edge"][0], (7.26, -4.48, 0.16), atol=0.006)
@@ -400,8 +402,11 @@ for k, (name, there) in enumerate(edges.items()):
     axes[0].plot(*both[:, 1::-1].T, color="0.6")
     axes[0].plot(*both[0, 1::-1], "ko", label=None if k else "true place")
     axes[0].plot(*both[1, 1::-1], "x", color="#d55e00", markersize=9, label=None if k else "drawn at 0 m")
-    axes[0].text(both[0, 1], 6.85, name, ha="center", fontsize=9)
-axes[0].set(xlim=(-1.2, -6), ylim=(6.6, 8.6), aspect="equal", title="A: the sidewalk's two edges")
+    axes[0].text(both[0, 1], both[0, 0] - 0.35, name, ha="center", va="top", fontsize=9)
+axes[0].plot(eye[1], eye[0], "ks")
+axes[0].plot([eye[1], ground[1]], [eye[0], ground[0]], ":", color="0.5", zorder=0)
+axes[0].text(eye[1] + 0.6, eye[0] + 0.4, "camera", ha="left", fontsize=9)
+axes[0].set(xlim=(2.6, -6.4), ylim=(-0.5, 9), aspect="equal", title="A: the sidewalk's two edges")
 axes[0].legend(fontsize=8, loc="upper left")
 for ax, delta, title in ((axes[1], 0.0, "B: a car, on 0 m"), (axes[2], 0.8, "C: on 0.8 m")):
     ax.scatter(*drawn(car, delta)[::3, 1::-1].T, s=1, color="#d55e00", label="drawn")
@@ -415,8 +420,9 @@ plt.show()
 
 # %% [markdown]
 # The far edge is drawn .88 m from its true place (A), though calibration and code are right. What is wrong is the height: the
-# sidewalk is 16 cm higher than the plane. By hand: the ray meets the ground 1.66 / (1.66 - 0.16) = 1.11 times as far
-# from the camera as the edge is, and the edge is 8.3 m away. The control misses by less, .16 m, because it is only 3 cm off the plane.
+# sidewalk is 16 cm higher than the plane. By hand: the ray meets the ground 1.66 / 1.50 = 1.11 times as far from
+# the camera as the edge is, and the edge is 8.3 m away. On a plane of the edge's own height the miss is gone. The
+# control misses by less, because it is only 3 cm off the plane.
 #
 # A car is worse, because it reaches up nearly to the camera's height, where rays are almost level (B). On the plane at
 # 0.8 m, what is lower is drawn too near and what is higher too far (C).
@@ -436,17 +442,9 @@ fig, (side, ax) = plt.subplots(1, 2, figsize=(9, 2.9), layout="constrained", wid
 side.add_patch(plt.Rectangle((5.1, 0), 1.8, 1.3, color=BLUE, alpha=0.4))
 for j, x in enumerate((4, 6, 8, 10), start=1):
     stop = np.array([0, x if j == 1 else max(5.1, x - 1.3 * x / 3), x])  # camera, first thing, ground
-    side.plot(stop[:2], 3 - 3 * stop[:2] / x, color=BLUE if j > 1 else "tab:purple", linewidth=1.5)
+    side.plot(stop[:2], 3 - 3 * stop[:2] / x, color=BLUE if j > 1 else PURPLE, linewidth=1.5)
     side.plot(stop[1:], 3 - 3 * stop[1:] / x, ":", color="0.4", linewidth=1.2)
-    side.text(
-        1.5,
-        3 - 4.5 / x,
-        f"$a_{j}$",
-        ha="center",
-        va="center",
-        fontsize=9,
-        bbox={"fc": "white", "ec": "none", "pad": 0.5},
-    )
+    side.text(x / 3, 2, f"$a_{j}$", ha="center", va="center", fontsize=9, bbox={"fc": "white", "ec": "none", "pad": 1})
     side.plot([x - 0.9, x + 0.9], [0, 0], color="black", linewidth=3, solid_capstyle="butt")
     side.text(x, -0.15, f"$m_{j}$", ha="center", va="top")
 side.plot(0, 3, "ks")
@@ -465,32 +463,33 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# Where is the *first* car? The weights of all cases, prior times labels:
-#
-# - in cell 2, all labels right: 0.8 · 0.2 · 0.95<sup>4</sup> = 0.130;
-# - in cell 1, the first label wrong: 0.2 · 0.05 · 0.95<sup>3</sup> = 0.009; in cell 3, the second wrong: 0.005;
-# - in cell 4 or nowhere, two or three labels wrong: nearly nothing.
-#
-# Divided by their sum: 0.90, 0.06 and 0.04. Behind the first car nothing is known, so a cell there keeps its 0.2. Cell
-# 2: 0.90 + 0.06 · 0.2 = 0.91. Cell 3: 0.04 + 0.96 · 0.2 = 0.23. Cell 4: 0.20. And no: $a_3$ is a known collider, so
-# $m_1$ and $m_3$ compete to explain it.
+# One car explains all labels, the one in cell 2. Behind it nothing is known, so a cell there nearly keeps its 0.2. And
+# no: $a_3$ is a known collider, so $m_1$ and $m_3$ compete to explain it. The code does it by hand: it asks where the
+# *first* car is.
 #
 # </details>
 
 # %% jupyter={"outputs_hidden": true}
-labels, weights = (0, 1, 1, 1), {}
-for street in product((0, 1), repeat=4):  # 1 is a car, the nearest cell first
-    shows = np.maximum.accumulate(street)  # a pixel shows a car if one stands at its cell or before it
-    weights[street] = np.prod(np.where(street, 0.2, 0.8)) * np.prod(np.where(shows == labels, 0.95, 0.05))
-cars = sum(weight * np.array(street) for street, weight in weights.items()) / sum(weights.values())
-print("P(car), with occlusion:", cars.round(2))
-print("P(car), own pixel only:", [round(0.2 * a / (0.2 * a + 0.8 * (1 - a)), 2) for a in (0.05, 0.95, 0.95, 0.95)])
+first_in_2 = 0.8 * 0.2 * 0.95**4  # no car in cell 1, one in cell 2, and all four labels are right
+first_in_1 = 0.2 * 0.05 * 0.95**3  # the first label is wrong
+first_in_3 = 0.8**2 * 0.2 * 0.05 * 0.95**3  # the second label is wrong
+later = 0.8**3 * (0.2 * 0.05**2 * 0.95**2 + 0.8 * 0.05**3 * 0.95)  # in cell 4, or nowhere: nearly nothing
+total = first_in_1 + first_in_2 + first_in_3 + later
+print(f"cell 2: {(first_in_2 + 0.2 * first_in_1) / total:.2f}")  # behind a first car in cell 1 it keeps its 0.2
+print(f"cell 3: {(first_in_3 + 0.2 * (first_in_1 + first_in_2)) / total:.2f}")
+print(f"its own pixel only: {0.2 * 0.95 / (0.2 * 0.95 + 0.8 * 0.05):.2f}")
+
+# %% jupyter={"source_hidden": true}
+exact, own = exact_ray([0, 1, 1, 1]), cell_by_cell([0, 1, 1, 1])
+np.testing.assert_allclose(exact[1], (first_in_2 + 0.2 * first_in_1) / total)
+np.testing.assert_allclose(exact[2], (first_in_3 + 0.2 * (first_in_1 + first_in_2)) / total)
+print("P(car) of the four cells, exact:", exact.round(2), " own pixel only:", own.round(2))
 assert d_separated(stage.model, "m1", "m3")
 assert not d_separated(stage.model, "m1", "m3", given=("a3",))
 
 # %% [markdown]
 # A reader that gives each cell its own pixel, as equation (1) does, believes in three cars with 0.83 each. In the
-# image there is evidence for one. Behind the first car the image says nothing.
+# image there is evidence for one: 0.91, and 0.23 behind it. Behind the first car the image says nothing.
 #
 # How much of a street is that? In the last frame, look up all cells in view on the ground plane. Compare how far away
 # the cell is with how far away the thing is that its pixel shows. Then do it again with each cell at the road's *own*
@@ -517,7 +516,7 @@ for name, height in (("at 0 m", np.zeros(len(centres))), ("at the road's height"
 np.testing.assert_allclose(np.polyval(profile, 40), -0.7, atol=0.03)
 
 # %% jupyter={"source_hidden": true} alt="two maps: the classes that the ground plane reads, with cars drawn out into long streaks, hatched where something nearer is read; and the true classes"
-maps = {"read on the ground plane (hatched: something nearer)": read_at(0.0), "truth": frame.labels.birdseye_on(spec)}
+maps = {"read on the ground plane": read_at(0.0), "truth": frame.labels.birdseye_on(spec)}
 fig = plotting.label_maps(spec, maps, KITTI_14)
 plt.rcParams["hatch.color"] = "white"
 fig.axes[0].contourf(
@@ -526,9 +525,9 @@ fig.axes[0].contourf(
 plt.show()
 
 # %% [markdown]
-# On the ground plane more than half of the pixels show something nearer, which is drawn out into long streaks. Another
-# third show something *farther*: forty metres ahead the road is 0.7 m lower, and the ray passes over it. At the
-# road's own height these are nearly gone, so the crest was the cause. The hidden cells stay, and no plane repairs them.
+# On the ground plane more than half of the pixels show something nearer (hatched), which is drawn out into long streaks.
+# Another third show something *farther*, because the road falls away and the ray passes over it. At the road's own
+# height these are nearly gone, so the crest was the cause. The hidden cells stay, and no plane repairs them.
 #
 # So *in view* isn't yet *seen*. The LIDAR knows which cells are hidden: one reason to use both sensors.
 #
@@ -566,13 +565,13 @@ plt.show()
 # Equation (1) is exact about a camera that is where you think it is. Let the camera be turned by $\psi$ = 1°, and
 # nobody has told the calibration.
 #
-# **Predict before you run.** The toy car brakes, and the camera nods by one degree. Where the calibration expects the
-# ground at 30 m, in row 48 + 300 / 30 = 58, it really sees what belongs to row 61.5. Which ground is that? And if the
-# nose goes up, so that it sees what belongs to row 54.5?
+# **Predict before you run.** The toy camera sees the ground at $Z$ in the row that is $300 / Z$ below the horizon, so
+# that at 30 m is 10 rows below. The car brakes, and the camera nods by a degree, 3.5 rows. Which ground does it see
+# there now? And if the nose goes up instead?
 #
 # <details><summary>Answer</summary>
 #
-# Rows 13.5 and 6.5 below the horizon are 300 / 13.5 = 22 m and 300 / 6.5 = 46 m: 8 m too near, or 16 m too far.
+# What belongs to 13.5 rows below the horizon, or to 6.5: the ground at 22 m, or at 46 m.
 #
 # </details>
 #
@@ -617,7 +616,9 @@ plt.show()
 
 # %% [markdown]
 # The figure shows it for the drive's camera. Near the car the error is small. Far ahead it explodes, because there the
-# camera looks at the road at a very flat angle. A degree to the *side* would move a cell at 30 m by half a metre only.
+# camera looks at the road at a very flat angle.
+#
+# So a calibration must be right to a fraction of a degree, above all in pitch.
 #
 # ## In five lines
 #
