@@ -452,10 +452,8 @@ CORNERS = {"x1": (0, 0), "x2": (1.8, 0), "x3": (1.8, -1.8), "x4": (0, -1.8)}
 pairs = [(one, other) for one in CORNERS for other in CORNERS if one < other]
 beside = {f"f({name})": (1.4 * x - 0.36, 1.3 * y + 0.3) for name, (x, y) in CORNERS.items()}
 diagonals = {"f(x1, x3)": (0.6, -0.6), "f(x2, x4)": (1.2, -0.6)}
-own = [Factor(name, [1, 2]) for name in CORNERS]
-crf = GraphicalModel([*own, *(Factor(pair, AGREE) for pair in pairs)])
+crf = GraphicalModel([*(Factor(name, [1, 2]) for name in CORNERS), *(Factor(pair, AGREE) for pair in pairs)])
 draw(crf, axes[0], positions=CORNERS | diagonals | beside).set_title("the CRF, on four cells", fontsize=10)
-
 COLUMN = {"w": (1.2, 0), "l": (0, -1), "i": (2.4, -1), "o": (0, -2.1), "g": (1.2, -2.9)}
 SYSTEM, WHERE = {"w1": ("w0",), "o0": ("l0",), "o1": ("l1", "o0")}, {}
 for t in (0, 1):

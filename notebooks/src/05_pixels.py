@@ -15,7 +15,7 @@
 # **Prerequisites.** Lecture [00](00_tour.ipynb): the grid. Lecture [01b](01b_graphical_models.ipynb), for one graph. A
 # matrix times a vector; a rotation as a matrix.
 #
-# **Time.** 75 minutes; the computer needs less than one.
+# **Time.** 74 minutes; the computer needs less than one.
 #
 # **Paper.** Section 3.3, equation (1).
 
@@ -264,6 +264,12 @@ assert pinhole(-2, 1.5, -10) == (200, 18)  # ten metres behind the camera: above
 #
 # </details>
 #
+# %% jupyter={"outputs_hidden": true}
+for Z in (5, 20, 80, 1000):
+    rows = ", ".join(f"{48 + 200 * (1.5 - delta) / Z:.1f}" for delta in (0, 1, 1.5, 2))
+    print(f"{Z:>4} m ahead, planes at 0, 1, 1.5, 2 m: rows {rows}")
+
+# %% [markdown]
 # Watch it on the drive, whose camera is 1.66 m above the ground:
 
 
@@ -290,6 +296,7 @@ def read_at(height):
     return read
 
 
+# %% jupyter={"source_hidden": true}
 pale = paled(frame)
 coarse = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, cell=1.0)  # to draw, so that dots stay apart
 instances, _ = ndimage.label(frame.labels.image == CAR)
@@ -299,13 +306,24 @@ pale.image[is_front_car] = (pale.image[is_front_car] // 2 + 100 * BLUE).astype(n
 HEIGHTS = (0, 0.4, 0.8, z_cam, 2, 2.5)
 LEGEND = [c for c in range(len(KITTI_14.names)) if any((read_at(height) == c).sum() > 20 for height in HEIGHTS)]
 
+
+def draw_map(ax, height):
+    """Draw the map that a plane reads, with the true place of the blue car and all classes in the legend."""
+    plotting.grid_labels(spec, read_at(height), KITTI_14, ax=ax)
+    dots = ax.plot(*car[::60, 1::-1].T, "ko", markersize=2.5, markeredgecolor="white", markeredgewidth=0.4)
+    squares = [plt.Rectangle((0, 0), 1, 1, color=KITTI_14.colours(np.array([c]))[0] / 255) for c in LEGEND]
+    names = [*(KITTI_14.names[c] for c in LEGEND), "true place of the blue car"]
+    style = {"fontsize": 8, "frameon": False, "handlelength": 1}
+    ax.legend([*squares, *dots], names, loc="upper left", bbox_to_anchor=(1.02, 1), **style)
+    ax.set_ylim(0, 45)
+
+
 # %% jupyter={"source_hidden": true} alt="animation: A, a sheet of dots rises through the camera image of a street with one car marked in blue, and becomes a line at the camera's height; B, seen from the side, it cuts through the car; C, the map of classes that the sheet reads, with the car's true place in black: on the ground plane a long blue smear from there outwards, at 0.8 m a shorter one on both sides of it"
 
 
 def raised():
     """Yield the figure with the plane at each height."""
     fig = plt.figure(figsize=(8.4, 4.3), layout="constrained")
-    squares = [plt.Rectangle((0, 0), 1, 1, color=KITTI_14.colours(np.array([c]))[0] / 255) for c in LEGEND]
     for height in HEIGHTS:
         fig.clear()
         axes = fig.subplot_mosaic([["A", "C"], ["B", "C"]], width_ratios=(2.7, 1), height_ratios=(1.6, 1))
@@ -313,12 +331,7 @@ def raised():
         axes["B"].scatter(*car[::7, [0, 2]].T, s=1, color=BLUE)
         axes["B"].plot([0, 40], [height] * 2, "tab:orange", eye[0], z_cam, "ks")
         axes["B"].set(xlim=(-1, 41), ylim=(-1.2, 3.2), xlabel="x, forward [m]", ylabel="height [m]")
-        plotting.grid_labels(spec, read_at(height), KITTI_14, ax=axes["C"])
-        dots = axes["C"].plot(*car[::60, 1::-1].T, "ko", markersize=2.5, markeredgecolor="white", markeredgewidth=0.4)
-        axes["C"].set_ylim(0, 45)
-        names = [*(KITTI_14.names[c] for c in LEGEND), "true place of the blue car"]
-        style = {"fontsize": 8, "frameon": False, "handlelength": 1}
-        axes["C"].legend([*squares, *dots], names, loc="upper left", bbox_to_anchor=(1.02, 1), **style)
+        draw_map(axes["C"], height)
         for letter, text in {"A": f"A: plane at {height:.1f} m", "B": "B: from the side", "C": "C: the map"}.items():
             axes[letter].set_title(text, fontsize="medium")
         yield fig
@@ -366,6 +379,10 @@ _ = interact(show, height=FloatSlider(value=0.0, min=-1.0, max=3.8, step=0.05, d
 #
 # </details>
 #
+# %% jupyter={"outputs_hidden": true}
+print("the post's top, on the ground:", 10 * 1.5 / (1.5 - 1), "m ahead")
+
+# %% [markdown]
 # Two similar triangles once more. Seen from the camera, $z_\text{cam}$ above the ground, one goes down to the thing, $x$
 # ahead and $z$ high. The other goes on to the plane at $\delta$, which it meets at $x_\delta$ ahead:
 #
@@ -402,11 +419,11 @@ for k, (name, there) in enumerate(edges.items()):
     axes[0].plot(*both[:, 1::-1].T, color="0.6")
     axes[0].plot(*both[0, 1::-1], "ko", label=None if k else "true place")
     axes[0].plot(*both[1, 1::-1], "x", color="#d55e00", markersize=9, label=None if k else "drawn at 0 m")
-    axes[0].text(both[0, 1], both[0, 0] - 0.35, name, ha="center", va="top", fontsize=9)
+    axes[0].text(both[0, 1] - 0.35, both[0, 0] - 0.5 * k, name, ha="left", va="center", fontsize=9)
 axes[0].plot(eye[1], eye[0], "ks")
 axes[0].plot([eye[1], ground[1]], [eye[0], ground[0]], ":", color="0.5", zorder=0)
 axes[0].text(eye[1] + 0.6, eye[0] + 0.4, "camera", ha="left", fontsize=9)
-axes[0].set(xlim=(2.6, -6.4), ylim=(-0.5, 9), aspect="equal", title="A: the sidewalk's two edges")
+axes[0].set(xlim=(2.6, -8), ylim=(-0.5, 11.5), aspect="equal", title="A: the sidewalk's two edges")
 axes[0].legend(fontsize=8, loc="upper left")
 for ax, delta, title in ((axes[1], 0.0, "B: a car, on 0 m"), (axes[2], 0.8, "C: on 0.8 m")):
     ax.scatter(*drawn(car, delta)[::3, 1::-1].T, s=1, color="#d55e00", label="drawn")
