@@ -419,7 +419,7 @@ for k, (name, there) in enumerate(edges.items()):
     axes[0].plot(*both[:, 1::-1].T, color="0.6")
     axes[0].plot(*both[0, 1::-1], "ko", label=None if k else "true place")
     axes[0].plot(*both[1, 1::-1], "x", color="#d55e00", markersize=9, label=None if k else "drawn at 0 m")
-    axes[0].text(both[0, 1] - 0.35, both[0, 0] - 0.5 * k, name, ha="left", va="center", fontsize=9)
+    axes[0].text(both[0, 1] - 0.35 * k, both[0, 0] - 0.9 + 0.4 * k, name, ha=("center", "left")[k], fontsize=9)
 axes[0].plot(eye[1], eye[0], "ks")
 axes[0].plot([eye[1], ground[1]], [eye[0], ground[0]], ":", color="0.5", zorder=0)
 axes[0].text(eye[1] + 0.6, eye[0] + 0.4, "camera", ha="left", fontsize=9)
@@ -656,5 +656,5 @@ plt.show()
 # slope needs.
 #
 # [Exercise 05](exercises/05_pixels.ipynb): undo a crop, transforms by name, what a cell's pixel really shows, a height
-# from a miss on the map, and a calibration with a fault that you find and repair. Next: lecture [06](06_planes.ipynb),
+# from a miss on the map, and a calibration with a fault that you find. Next: lecture [06](06_planes.ipynb),
 # reading between pixels.
