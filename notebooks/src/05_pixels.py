@@ -170,8 +170,8 @@ print(f"with the half pixel the rule finds the dot; without it misses by {carele
 #
 # ## Where is the camera?
 #
-# Until now points were given in the camera's frame, but the map has its own. In a toy car the LIDAR is two metres above the
-# ground. The camera is half a metre below the LIDAR and looks ahead. Here is the top of a post in three frames:
+# Until now points were given in the camera's frame, but the map has its own. In a toy car the LIDAR is two metres above
+# the ground. The camera is half a metre below the LIDAR and looks ahead. Here is the top of a post in three frames:
 #
 # | frame | axes | origin | top of the post |
 # |---|---|---|---|
@@ -304,12 +304,13 @@ is_front_car = (instances == instances[140, 120]) & (frame.labels.depth < 13)
 car = places_of(*np.nonzero(is_front_car))
 pale.image[is_front_car] = (pale.image[is_front_car] // 2 + 100 * BLUE).astype(np.uint8)
 HEIGHTS = (0, 0.4, 0.8, z_cam, 2, 2.5)
-LEGEND = [c for c in range(len(KITTI_14.names)) if any((read_at(height) == c).sum() > 20 for height in HEIGHTS)]
+MAPS = {height: read_at(height) for height in HEIGHTS}
+LEGEND = [c for c in range(len(KITTI_14.names)) if max((read == c).sum() for read in MAPS.values()) > 20]
 
 
 def draw_map(ax, height):
     """Draw the map that a plane reads, with the true place of the blue car and all classes in the legend."""
-    plotting.grid_labels(spec, read_at(height), KITTI_14, ax=ax)
+    plotting.grid_labels(spec, MAPS[height], KITTI_14, ax=ax)
     dots = ax.plot(*car[::60, 1::-1].T, "ko", markersize=2.5, markeredgecolor="white", markeredgewidth=0.4)
     squares = [plt.Rectangle((0, 0), 1, 1, color=KITTI_14.colours(np.array([c]))[0] / 255) for c in LEGEND]
     names = [*(KITTI_14.names[c] for c in LEGEND), "true place of the blue car"]
@@ -409,10 +410,13 @@ for name, y, side in (("foot of the kerb", -2.1, 0), ("far edge", -4.45, -1)):
     ground = drawn(there, 0)[0]
     print(f"at ({ground[0]:.2f}, {ground[1]:.2f}) on the ground plane; {np.hypot(*(ground - there[0])[:2]):.2f} m off")
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="A, from above: the camera, and in front of it black dots where the edges of the sidewalk truly are and orange crosses where the ground plane draws them; at the foot of the kerb they nearly coincide, at the far edge the cross is farther away on the same ray; B and C, from above, a car of which the ground plane makes a long smear outwards, and the plane at 0.8 m a shorter one around its true place"
+# %% jupyter={"source_hidden": true} alt="A, from above: the camera, and in front of it black dots where the edges of the sidewalk truly are and orange crosses where the ground plane draws them; at the foot of the kerb they nearly coincide, at the far edge the cross is farther away on the same ray; B and C, from above, a car of which the ground plane makes a long smear outwards, and the plane at 0.8 m a shorter one around its true place"
 off = {name: np.hypot(*(drawn(there, 0) - there)[0, :2]) for name, there in edges.items()}
 np.testing.assert_allclose(list(off.values()), (0.16, 0.88), atol=0.006)
 np.testing.assert_allclose(edges["far edge"][0], (7.26, -4.48, 0.16), atol=0.006)
+missed = np.linalg.norm(drawn(car, 0) - car, axis=1)
+for name, part in (("below 0.4 m", car[:, 2] < 0.4), ("above 1.2 m", car[:, 2] > 1.2)):
+    print(f"pixels of the car {name}: half of them are drawn more than {np.median(missed[part]):.1f} m off")
 fig, axes = plt.subplots(1, 3, figsize=(8.8, 3.4), layout="constrained", width_ratios=(1.5, 1, 1))
 for k, (name, there) in enumerate(edges.items()):
     both = np.concatenate([there, drawn(there, 0)])
@@ -436,17 +440,18 @@ axes[2].legend(markerscale=6, fontsize=8)
 plt.show()
 
 # %% [markdown]
-# The far edge is drawn .88 m from its true place (A), though calibration and code are right. What is wrong is the height: the
-# sidewalk is 16 cm higher than the plane. By hand: the ray meets the ground 1.66 / 1.50 = 1.11 times as far from
+# The far edge is drawn 0.88 m from its true place (A), though calibration and code are right. What is wrong is the
+# height: the sidewalk is 16 cm higher than the plane. By hand: the ray meets the ground 1.66 / 1.50 = 1.11 times as far from
 # the camera as the edge is, and the edge is 8.3 m away. On a plane of the edge's own height the miss is gone. The
 # control misses by less, because it is only 3 cm off the plane.
 #
-# A car is worse, because it reaches up nearly to the camera's height, where rays are almost level (B). On the plane at
-# 0.8 m, what is lower is drawn too near and what is higher too far (C).
+# A car is worse, because it reaches up nearly to the camera's height, where rays are almost level (B). Half of its
+# pixels below 0.4 m are drawn more than 1.4 m off, half of those above 1.2 m more than 27.9 m. On the plane at 0.8 m, what is lower is drawn too near and what is
+# higher too far (C).
 #
-# So a thing is drawn in its place only on the plane of its own height. Several planes make sure that the right place is
-# *among those offered*. Nobody says which it is. Whether a network profits from them must be measured, and lecture
-# [08](08_fusion.ipynb) finds that twenty planes are hardly better than one.
+# So a thing is drawn in its place only on the plane of its own height. Several planes *offer* several places, and one
+# of them may be nearly right. Nobody says which. Whether a network profits must be measured: in lecture
+# [08](08_fusion.ipynb) twenty planes are hardly better than one.
 #
 # ## What does the image say of hidden cells?
 #
@@ -573,7 +578,8 @@ plt.show()
 
 # %% [markdown]
 # A: nearer returns are lighter. Their colour changes at the outlines of cars and trees, as it must if the calibration is
-# right. B: a carpet on the road. It also lies over the cars, because equation (1) knows nothing of cars.
+# right. B: a carpet on the road. It also lies over the cars, because equation (1) knows nothing of cars. The
+# street is nearly flat; still its road 40 m ahead, 8 cm lower than the plane, is drawn 1.5 m too near.
 #
 # So it works, and it shows the same limits.
 #
@@ -619,7 +625,7 @@ for sign, name in ((1, "down"), (-1, "up")):
     np.testing.assert_allclose(1 / x, 1 / 30 + sign * np.radians(1) / 1.5, rtol=0.01)
     print(f"nose {name}: the cell 30 m ahead reads the ground {x:.0f} m ahead")
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="which ground a cell reads, against the cell's distance, for half a degree and one degree: nose up bends far above the diagonal, nose down below it"
+# %% jupyter={"source_hidden": true} alt="which ground a cell reads, against the cell's distance, for half a degree and one degree: nose up bends far above the diagonal, nose down below it"
 fig, ax = plt.subplots(figsize=(6, 3), layout="constrained")
 x = np.linspace(6.5, 60, 60)
 ax.plot([0, 60], [0, 60], color="0.6", linewidth=1, label="as calibrated")
@@ -635,14 +641,14 @@ plt.show()
 # The figure shows it for the drive's camera. Near the car the error is small. Far ahead it explodes, because there the
 # camera looks at the road at a very flat angle.
 #
-# So a calibration must be right to a fraction of a degree, above all in pitch.
+# So a calibration must be right to a fraction of a degree.
 #
 # ## In five lines
 #
 # 1. A point has one pixel: scale by the focal length, divide by the depth, shift. A pixel has a whole ray of points.
 # 2. Resizing scales from the image's edge, half a pixel before the first centre; cropping shifts.
 # 3. Transforms are read by names. The inverse undoes the shift first, then the turn.
-# 4. A plane draws things in place only at its own height: 16 cm of sidewalk are .88 m on the map.
+# 4. A plane draws things in place only at its own height: 16 cm of sidewalk are 0.88 m on the map.
 # 5. In view isn't yet seen: behind the first thing on its ray a pixel says nothing.
 #
 # ## Further reading and exercise
