@@ -401,7 +401,7 @@ def drawn(places, delta):
 
 
 edges = {}
-for name, y, side in (("foot of the kerb", -2.1, 0), ("far edge", -4.45, -1)):
+for name, y, side in (("kerb's foot", -2.1, 0), ("far edge", -4.45, -1)):
     row = round(project(transform_points(camera.T_camera_from_grid, np.array([8, y, 0])), camera)[0][1])
     column = np.flatnonzero(frame.labels.image[row] == SIDEWALK)[side]
     edges[name] = there = places_of(np.array([row]), np.array([column]))
@@ -410,20 +410,23 @@ for name, y, side in (("foot of the kerb", -2.1, 0), ("far edge", -4.45, -1)):
     ground = drawn(there, 0)[0]
     print(f"at ({ground[0]:.2f}, {ground[1]:.2f}) on the ground plane; {np.hypot(*(ground - there[0])[:2]):.2f} m off")
 
-# %% jupyter={"source_hidden": true} alt="A, from above: the camera, and in front of it black dots where the edges of the sidewalk truly are and orange crosses where the ground plane draws them; at the foot of the kerb they nearly coincide, at the far edge the cross is farther away on the same ray; B and C, from above, a car of which the ground plane makes a long smear outwards, and the plane at 0.8 m a shorter one around its true place"
+# %% jupyter={"source_hidden": true}
 off = {name: np.hypot(*(drawn(there, 0) - there)[0, :2]) for name, there in edges.items()}
 np.testing.assert_allclose(list(off.values()), (0.16, 0.88), atol=0.006)
 np.testing.assert_allclose(edges["far edge"][0], (7.26, -4.48, 0.16), atol=0.006)
 missed = np.linalg.norm(drawn(car, 0) - car, axis=1)
 for name, part in (("below 0.4 m", car[:, 2] < 0.4), ("above 1.2 m", car[:, 2] > 1.2)):
     print(f"pixels of the car {name}: half of them are drawn more than {np.median(missed[part]):.1f} m off")
+
+# %% jupyter={"source_hidden": true} alt="A, from above: the camera, and in front of it black dots where the edges of the sidewalk truly are and orange crosses where the ground plane draws them; at the foot of the kerb they nearly coincide, at the far edge the cross is farther away on the same ray; B and C, from above, a car of which the ground plane makes a long smear outwards, and the plane at 0.8 m a shorter one around its true place"
 fig, axes = plt.subplots(1, 3, figsize=(8.8, 3.4), layout="constrained", width_ratios=(1.5, 1, 1))
 for k, (name, there) in enumerate(edges.items()):
     both = np.concatenate([there, drawn(there, 0)])
     axes[0].plot(*both[:, 1::-1].T, color="0.6")
     axes[0].plot(*both[0, 1::-1], "ko", label=None if k else "true place")
     axes[0].plot(*both[1, 1::-1], "x", color="#d55e00", markersize=9, label=None if k else "drawn at 0 m")
-    axes[0].text(both[0, 1] - 0.35 * k, both[0, 0] - 0.9 + 0.4 * k, name, ha=("center", "left")[k], fontsize=9)
+    side = 1 if k else -1  # the kerb's name to the left of its dot
+    axes[0].text(both[0, 1] - 0.4 * side, both[0, 0], name, ha="left" if k else "right", va="center", fontsize=9)
 axes[0].plot(eye[1], eye[0], "ks")
 axes[0].plot([eye[1], ground[1]], [eye[0], ground[0]], ":", color="0.5", zorder=0)
 axes[0].text(eye[1] + 0.6, eye[0] + 0.4, "camera", ha="left", fontsize=9)
