@@ -444,13 +444,13 @@ plt.show()
 
 # %% [markdown]
 # The far edge is drawn 0.88 m from its true place (A), though calibration and code are right. What is wrong is the
-# height: the sidewalk is 16 cm higher than the plane. By hand: the ray meets the ground 1.66 / 1.50 = 1.11 times as far from
-# the camera as the edge is, and the edge is 8.3 m away. On a plane of the edge's own height the miss is gone. The
+# height: the sidewalk is 16 cm higher than the plane. By hand: the ray meets the ground 1.66 / 1.50 = 1.11 times as far
+# from the camera as the edge is, and the edge is 8.3 m away. On a plane of the edge's own height the miss is gone. The
 # control misses by less, because it is only 3 cm off the plane.
 #
 # A car is worse, because it reaches up nearly to the camera's height, where rays are almost level (B). Half of its
-# pixels below 0.4 m are drawn more than 1.4 m off, half of those above 1.2 m more than 27.9 m. On the plane at 0.8 m, what is lower is drawn too near and what is
-# higher too far (C).
+# pixels below 0.4 m are drawn more than 1.4 m off, half of those above 1.2 m more than 27.9 m. On the plane at 0.8 m,
+# what is lower is drawn too near and what is higher too far (C).
 #
 # So a thing is drawn in its place only on the plane of its own height. Several planes *offer* several places, and one
 # of them may be nearly right. Nobody says which. Whether a network profits must be measured: in lecture
