@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from itertools import combinations, permutations
+from itertools import combinations, pairwise, permutations
 
 import numpy as np
 
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, enumerate_marginals
 from semgrid_edu.graphical import eliminate as eliminate_exactly
 from semgrid_edu.workshop.course.answers import answer_array
-from semgrid_instructor import asked_in_any_order, close, generator, hidden, in_any_order
+from semgrid_instructor import asked_in_any_order, close, generator, hidden, in_any_order, keeping
 
 
 def _named(shapes: dict[str, int], names: tuple[str, ...], rng: np.random.Generator) -> tuple:
@@ -188,60 +188,72 @@ def check_separated_large(separated: Callable) -> None:
 BELOW = {"a": ("b",), "b": ("d",), "c": ("b",), "d": ()}
 """A fork whose middle has a parent."""
 
-STATES = {"a": 2, "b": 3, "c": 2, "d": 4, "e": 3}
+
+def _chain(rng: np.random.Generator, K: int, T: int) -> tuple[np.ndarray, ...]:
+    """Return the prior, the matrix and the scans of a chain; some scans are missing, and some steps impossible."""
+    M = rng.uniform(0.05, 1, (K, K)) * (rng.random((K, K)) < 0.8) + np.eye(K)
+    scans = rng.uniform(0.05, 0.95, (T, K))
+    scans[rng.random(T) < 0.2] = 1
+    return rng.dirichlet(np.ones(K)), M / M.sum(axis=1, keepdims=True), scans
 
 
-def _ring() -> list[Factor]:
-    """Return a ring of four variables, a factor of one of them, and a variable without neighbours."""
-    rng = generator(25)
-    families = (("a", "b"), ("b", "c"), ("c", "d"), ("d", "a"), ("e",), ("b",))
-    return [Factor(names, rng.uniform(0.1, 1, size=[STATES[name] for name in names])) for names in families]
+def _all_tables(prior: np.ndarray, M: np.ndarray, scans: np.ndarray, left_out: set[int]) -> GraphicalModel:
+    """Return the chain as a model of one factor for each table, without the scans that are left out."""
+    names = [f"x{t}" for t in range(len(scans))]
+    steps = [Factor(pair, M) for pair in pairwise(names)]
+    return GraphicalModel(
+        [
+            Factor(names[0], prior),
+            *steps,
+            *(Factor(names[t], np.ones_like(prior) if t in left_out else scans[t]) for t in range(len(scans))),
+        ]
+    )
+
+
+CHAINS = (2, 1), (2, 3), (3, 5), (4, 2), (5, 6), (2, 7)
+"""States and times of the chains that are asked for."""
 
 
 @hidden
-def check_eliminate(eliminate: Callable) -> None:
-    """Several variables left, several orders, none to two variables seen, and none to three asked for their best."""
-    factors = _ring()
-    cases = (
-        (["c", "e", "b"], {}, ""),
-        (["b", "e", "d"], {}, "d"),
-        (["a", "b", "c", "e"], {}, "ac"),
-        (["e"], {}, ""),
-        (["c", "e"], {"b": 2}, "c"),
-        (["e", "a"], {"d": 3, "c": 0}, ""),
-        (["a", "c"], {"e": 1}, "ac"),
-    )
-    asked = asked_in_any_order(
-        lambda case: eliminate(list(factors), list(case[0]), dict(case[1]), list(case[2])), cases
-    )
-    for (order, seen, best), result in asked:
-        result = result[0] if isinstance(result, tuple | list) else result
-        left = [name for name in STATES if name not in order and name not in seen]
-        assert sorted(result.names) == sorted(left), "wrong variables are left"
-        joint = eliminate_exactly(GraphicalModel(factors), [*left, *order], seen)
-        for name in order:
-            joint = joint.max(name) if name in best else joint.sum(name)
-        got, expected = result.ordered(*left).table, joint.ordered(*left).table
-        same_shares = close(got / got.sum(), expected / expected.sum())
-        assert close(got.sum(), expected.sum()) or not same_shares, (
-            "right up to a factor: don't normalise, and keep the number that a variable without neighbours leaves"
-        )
-        assert close(got, expected), "wrong result"
+@keeping
+def check_messages(messages: Callable) -> None:
+    """Two to five states, one to seven times; what is left of time t and what is right of it, by elimination."""
+    rng, cases = generator(25), []
+    for K, T in CHAINS:
+        chain = _chain(rng, K, T)
+        left = [
+            _all_tables(*(part[: t + 1] if k == 2 else part for k, part in enumerate(chain)), {t}) for t in range(T)
+        ]
+        from_left = np.array([eliminate_exactly(model, f"x{t}").table for t, model in enumerate(left)])
+        together = np.array([eliminate_exactly(_all_tables(*chain, {t}), f"x{t}").table for t in range(T)])
+        possible = from_left > 0
+        from_right = np.divide(together, from_left, out=np.ones_like(together), where=possible)
+        cases.append((chain, from_left, from_right, possible))
+    for chain, from_left, from_right, possible in in_any_order(cases):
+        got = messages(*chain)
+        assert isinstance(got, tuple | list), "not two tables"
+        assert len(got) == 2, "not two tables"
+        left, right = (answer_array(one) for one in got)
+        assert left.shape == right.shape == from_left.shape, "another shape (K may be two to five, T may be 1)"
+        scaled = left / left.sum(axis=1, keepdims=True)
+        if close(scaled, from_left / from_left.sum(axis=1, keepdims=True)):
+            assert close(left, from_left), "from_left is right up to a factor: don't normalise"
+        assert close(left, from_left), "wrong messages from the left"
+        assert close(right[possible], from_right[possible]), "wrong messages from the right"
 
 
 @hidden
-def check_cost(eliminate: Callable) -> None:
-    """Two to four states, several orders, and what is seen."""
-    cases = (
-        (["c", "e", "b"], {}, 24),
-        (["b", "e", "d"], {}, 16),
-        (["e"], {}, 3),
-        (["a", "b", "c", "e"], {}, 24),
-        (["b", "e", "c"], {"a": 1}, 8),
-    )
-    for order, seen, right in in_any_order(cases):
-        largest = eliminate(_ring(), list(order), dict(seen))[1]
-        assert largest == right, (
-            "wrong size of the largest table, for variables of two to four states: count the entries of the tables "
-            "from which a variable is taken out, not of what is left"
-        )
+@keeping
+def check_credible(credible: Callable) -> None:
+    """How probable each scan is, by two eliminations of the whole chain: with it and without it."""
+    rng, cases = generator(26), []
+    for K, T in CHAINS:
+        chain = _chain(rng, K, T)
+        names = tuple(f"x{t}" for t in range(T))
+        with_all = eliminate_exactly(_all_tables(*chain, set()), names[0]).table.sum()
+        without = [eliminate_exactly(_all_tables(*chain, {t}), names[t]).table.sum() for t in range(T)]
+        cases.append((chain, with_all / np.array(without)))
+    for chain, right in in_any_order(cases):
+        got = answer_array(credible(*chain))
+        assert got.shape == right.shape, "another shape"
+        assert close(got, right), "wrong probability of a scan, given all the others"
