@@ -98,15 +98,16 @@ def test_the_card_of_the_real_street_and_of_one_with_a_turned_camera():
     assert {check for check in sound if sound[check] != turned[check]} == {"borders"}
 
 
-def test_a_map_that_is_right_beats_the_table_and_one_that_is_wrong_does_not():
+def test_a_map_that_is_right_beats_trivial_ones_and_one_that_is_wrong_does_not():
     rng = np.random.default_rng(2)
     truths, beliefs = rng.integers(0, 3, (1, 12, 12)), rng.random((1, 4, 12, 12))
     pieces = np.arange(144).reshape(1, 12, 12) // 12
-    table, right = best_table(truths, beliefs), np.eye(14)[truths].transpose(0, 3, 1, 2)
-    lines = map_lines("map", truths, right, table, pieces)
-    assert [line.verdict for line in lines] == [True, True]
-    lines = map_lines("map", truths, right[:, ::-1], table, pieces)
-    assert [line.verdict for line in lines] == [False, False]
+    rivals = {"the table": best_table(truths, beliefs), "road": np.zeros_like(truths)}
+    right = np.eye(14)[truths].transpose(0, 3, 1, 2)
+    lines = map_lines("map", truths, right, rivals, pieces)
+    assert [line.verdict for line in lines] == [True] * 3
+    lines = map_lines("map", truths, right[:, ::-1], rivals, pieces)
+    assert [line.verdict for line in lines] == [False] * 3
 
 
 def test_the_drawing_says_each_verdict_in_words():
