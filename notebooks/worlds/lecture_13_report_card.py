@@ -142,7 +142,8 @@ def map_lines(name: str, truths: NDArray, grids: NDArray, rivals: Mapping[str, N
     right = 100 * drive_interval(ours, accuracy).mean
     for rival, called in rivals.items():
         low, gain, high = paired_interval(ours, piece_confusions(truths, called, pieces), accuracy)
-        reading = f"{right:.0f} % right, {100 * gain:+.0f} points ({100 * low:+.0f} to {100 * high:+.0f})"
+        points = [f"{round(100 * value) + 0:+d}" for value in (low, gain, high)]  # no -0
+        reading = f"{right:.0f} % right, {points[1]} points ({points[0]} to {points[2]})"
         lines.append(Line(f"{name} against {rival}", reading, None if low <= 0 <= high else bool(gain > 0)))
     error = expected_calibration_error(reliability(np.moveaxis(grids, 1, 0), truths, BINS))
     return [*lines, Line(f"{name}: how sure", f"off by {100 * error:.0f} points", bool(error <= OVERSURE))]

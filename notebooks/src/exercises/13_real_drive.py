@@ -309,7 +309,7 @@ _test()
 # %% [markdown]
 # ## Task 5: a better map of a real street (2 + 2 points)
 #
-# The open end. The network from simulated streets has 54 % of the labelled cells of the real street right, and you have seen how its map fails: road below the image's edge is called
+# The open end. The network from simulated streets has about 55 % of the labelled cells of the real street right, and you have seen how its map fails: road below the image's edge is called
 # vegetation or sidewalk, and six wrong cells in ten have one of the four unknown classes. Exchange one stage: write a `refine` that makes this map better. It gets `log_g` (14, H, W), natural logarithms of the network's probabilities, and `o` (4, H, W), the
 # probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, and returns probabilities (14, H, W) that sum to 1 in each cell. It doesn't see the labels, must work on grids of any size, and leaves its arguments as they are.
 #
@@ -446,5 +446,5 @@ def my_street(folder=None, scene=("2011_09_26", "0013")):
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "believe-the-map", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # What holds: the network can repeat what it was taught about this very view. The last two seconds show the same street again, so 93 % is the score of a memory, and says nothing of other streets. With her own drive one can hold
-# back a *part of the street*, one side say, with a margin, and score there; in the lecture the share fell from 92 to 57 % that way. Then a second drive, elsewhere, on which nothing was learned, with an interval over pieces of street or, better, over several drives. The
+# back a *part of the street*, one side say, with a margin, and score there; in the lecture the share fell from 91 to 46 % that way. Then a second drive, elsewhere, on which nothing was learned, with an interval over pieces of street or, better, over several drives. The
 # check of the motion can't tell while the car stands (nor can late images be noticed): the next drive must move, and go round a bend, or mirrored poses stay unseen. One point for what the score doesn't say and the measurement that would, one for the check and its drive.
