@@ -593,9 +593,13 @@ for ax, (name, (_, camera)) in zip(axes, street_maps.items(), strict=True):
     ax.set_ylabel("x, forward [m]" if ax is axes[0] else "")
 plotting.class_legend(axes[-1], KITTI_14, np.stack([one[-60:] for one in shown.values()]))
 plt.show()
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 x, y = np.moveaxis(spec.centers(), -1, 0)
 lane = (x > 7) & (x < 13) & (y > -1) & (y < 5)
 green = {name: int((one[lane] == KITTI_14.index("vegetation")).sum()) for name, one in shown.items()}
+seen_from = begins, ground_begins(sim[-1].camera, spec)
+print("the ground comes into view at {:.0f} m here, at {:.0f} m in simulated images".format(*seen_from))
 print("cells called vegetation, of", lane.sum(), "on the road just ahead:", green)
 if ours:
     assert (
@@ -669,6 +673,8 @@ if ours:
     np.testing.assert_allclose(shares["taught here"], [93, 91, 46], atol=1.5)
     np.testing.assert_allclose(shares["height rule"], [88, 89, 48], atol=0.6)
     assert shares["both halves"][2] > shares["taught here"][2] + 20
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 for k in map(KITTI_14.index, ("road", "car", "building", "vegetation")) if labelled else ():
     there = where["right"] & (truths == k)
     before, now = ([(one[there] == k).mean() for one in judged[name]] for name in ("network", "taught here"))
