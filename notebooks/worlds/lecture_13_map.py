@@ -123,19 +123,24 @@ def trivial_maps(
     }
 
 
-def with_rows(frame: Frame, rows: int) -> Frame:
-    """Return a frame whose image ends lower or higher, with a calibration that knows.
+def with_rows(frame: Frame, rows: int, above: bool = False) -> Frame:
+    """Return a frame whose image is taller or less tall, with a calibration that knows.
 
     Parameters
     ----------
     frame : Frame
         A frame with an image.
     rows : int
-        How many copies of the lowest row are added below; a negative number cuts rows off.
+        How many copies of the outermost row are added below; a negative number cuts rows off.
+    above : bool
+        Whether this is done above the image, not below.
     """
-    image = frame.need_image()
-    taller = image[:rows] if rows < 0 else np.concatenate([image, np.repeat(image[-1:], rows, axis=0)])
-    return replace(frame, image=taller, camera=replace(frame.camera, size=taller.shape[:2]))
+    image, K = frame.need_image(), frame.camera.K.copy()
+    if above:
+        image, K[1, 2] = image[::-1], K[1, 2] + rows
+    image = image[:rows] if rows < 0 else np.concatenate([image, np.repeat(image[-1:], rows, axis=0)])
+    image = np.ascontiguousarray(image[::-1]) if above else image
+    return replace(frame, image=image, camera=replace(frame.camera, K=K, size=image.shape[:2]))
 
 
 def brighter(frame: Frame, by: int) -> Frame:

@@ -40,6 +40,15 @@ def test_rows_below_bring_nearer_ground_into_view_and_rows_cut_off_lose_it(net):
     np.testing.assert_array_equal(with_rows(frame, -3).image, frame.image[:-3])
 
 
+def test_rows_above_move_no_ground(net):
+    frame, spec = sample_drive()[0], net.architecture.grid
+    for rows in (-40, 40):
+        other = with_rows(frame, rows, above=True)
+        assert ground_begins(other.camera, spec) == ground_begins(frame.camera, spec)
+        np.testing.assert_array_equal(other.image[-100:], frame.image[-100:])
+        assert other.camera.size == other.image.shape[:2] == (frame.image.shape[0] + rows, frame.image.shape[1])
+
+
 def test_a_brighter_image_does_not_wrap_around():
     frame = sample_drive()[0]
     assert (brighter(frame, 200).image.astype(int) >= frame.image).all()
