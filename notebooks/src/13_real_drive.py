@@ -426,7 +426,7 @@ if ours:
 LIMITS = {"gaps": 0.5, "yaw": 0.5, "tilt": 1.0, "motion": 0.05}
 faults = {name: make for name, make in FAULTS.items() if name != "red and blue swapped"}
 readings = {
-    title: {name: geometry_readings(make(of), thin=4) for name, make in faults.items()}
+    title: {name: geometry_readings(make(of), thin=4, turns=YAWS[::2]) for name, make in faults.items()}
     for title, of in (("this drive", frames[:10]), ("simulated", sample_drive()[:10]))
 }
 fig, axes = plt.subplots(1, 2, figsize=(9.6, 2.9), layout="constrained", sharey=True)

@@ -80,7 +80,9 @@ FAULTS: dict[str, Fault] = {
 """Every fault by name."""
 
 
-def geometry_readings(frames: Sequence[Frame], every: int = 4, thin: int = 1) -> dict[str, float]:
+def geometry_readings(
+    frames: Sequence[Frame], every: int = 4, thin: int = 1, turns: NDArray = YAWS
+) -> dict[str, float]:
     """Return the readings of the checks that don't judge colours.
 
     Parameters
@@ -91,6 +93,8 @@ def geometry_readings(frames: Sequence[Frame], every: int = 4, thin: int = 1) ->
         Images and ground are checked in each frame of this number.
     thin : int
         As `axes_errors` takes it.
+    turns : (n,) float
+        Turns of the camera that are tried, degrees.
 
     Returns
     -------
@@ -98,11 +102,11 @@ def geometry_readings(frames: Sequence[Frame], every: int = 4, thin: int = 1) ->
         "gaps", "yaw", "tilt" and "motion", as `drive_readings` returns them.
     """
     some = frames[::every]
-    contrast = np.mean([edge_contrast(frame, YAWS) for frame in some], axis=0)
+    contrast = np.mean([edge_contrast(frame, turns) for frame in some], axis=0)
     errors = checks.axes_errors(frames, thin=thin)
     return {
         "gaps": float(len(checks.time_gaps([frame.time for frame in frames]))),
-        "yaw": float(YAWS[contrast.argmax()]),
+        "yaw": float(turns[contrast.argmax()]),
         "tilt": float(np.mean([checks.ground_plane(frame.points, frame.camera.lidar_height).pitch for frame in some])),
         "motion": errors["as the poses say"] - min(errors.values()),
     }
