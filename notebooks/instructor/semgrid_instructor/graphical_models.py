@@ -9,7 +9,7 @@ import numpy as np
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, enumerate_marginals
 from semgrid_edu.graphical import eliminate as eliminate_exactly
 from semgrid_edu.workshop.course.answers import answer_array
-from semgrid_instructor import close, generator, hidden
+from semgrid_instructor import asked_in_any_order, close, generator, hidden, in_any_order
 
 
 def _named(shapes: dict[str, int], names: tuple[str, ...], rng: np.random.Generator) -> tuple:
@@ -19,8 +19,9 @@ def _named(shapes: dict[str, int], names: tuple[str, ...], rng: np.random.Genera
 
 def _check_quotients(divide: Callable, pairs: tuple[tuple[str, str], ...], seed: int, zeros: bool = False) -> None:
     """Divide products by one of their factors, two to four states each; with `zeros`, a state of it is impossible."""
-    rng, shapes = generator(seed), {"a": 2, "b": 3, "c": 4, "d": 2}
-    for one, other in pairs:
+    shapes = {"a": 2, "b": 3, "c": 4, "d": 2}
+    for k, (one, other) in in_any_order(enumerate(pairs)):
+        rng = generator(100 * seed + k)
         quotient, g = _named(shapes, tuple(one), rng), _named(shapes, tuple(other), rng)
         if zeros and other:
             g[1][(0,) * len(other)] = 0
@@ -57,12 +58,19 @@ def check_posterior(posterior: Callable) -> None:
     """Four variables with other numbers of states, asked in every place, with none to three reports."""
     rng, shapes = generator(22), {"a": 3, "b": 2, "c": 4, "d": 2}
     joint = _named(shapes, tuple("abcd"), rng)
+    questions = []
     for wanted, about in (("c", "ad"), ("a", "b"), ("d", "cab"), ("b", ""), ("d", "dc")):
         heard = {name: rng.uniform(0.05, 1, shapes[name]) for name in about}
         if len(heard) > 1:
             heard[about[1]] = np.eye(shapes[about[1]])[-1]
+        questions.append((wanted, heard))
+
+    def ask(question: tuple[str, dict]) -> np.ndarray:
+        wanted, heard = question
+        return answer_array(posterior(joint, wanted, {name: row.copy() for name, row in heard.items()}))
+
+    for (wanted, heard), got in asked_in_any_order(ask, questions):
         expected = enumerate_marginals(GraphicalModel([Factor(*joint), *map(Factor, heard, heard.values())]), wanted)
-        got = answer_array(posterior(joint, wanted, {name: row.copy() for name, row in heard.items()}))
         assert got.shape == expected.table.shape, "another shape"
         right = close(got, expected.normalised().table)
         assert right, "wrong with " + ("reports of some variables" if heard else "nothing heard")
@@ -143,33 +151,38 @@ def _linked(parents: dict, a: str, b: str) -> bool:
 def check_separated_three(separated: Callable) -> None:
     """Chains, forks and colliders of three variables, named differently; in none are there two paths."""
     rng = generator(23)
-    for given, exact in ((("d",), ("b",)), (("d",), ()), ((), ("b",))):
-        _check_question(separated, _shuffled(rng, BELOW), *rng.permutation(["a", "c"]).tolist(), given, exact)
+    questions = [
+        (_shuffled(rng, BELOW), *rng.permutation(["a", "c"]).tolist(), given, exact)
+        for given, exact in ((("d",), ("b",)), (("d",), ()), ((), ("b",)))
+    ]
     for _ in range(150):
         parents = _random_graph(rng, 3)
         a, b, *others = rng.permutation(list(parents)).tolist()
         given = tuple(others[: rng.integers(0, 2)])
         if sum(map(len, parents.values())) < 3:
-            _check_question(separated, parents, a, b, given)
+            questions.append((parents, a, b, given))
+    for question in in_any_order(questions):
+        _check_question(separated, *question)
 
 
 @hidden
 def check_separated_large(separated: Callable) -> None:
     """Random graphs of six variables, one with what is known far below a collider, one with two ways to a collider."""
     rng = generator(24)
-    for _ in range(40):
-        _check_question(separated, _shuffled(rng, TWO_WAYS), *rng.permutation(["b", "d"]).tolist(), ("c",))
+    questions = [(_shuffled(rng, TWO_WAYS), *rng.permutation(["b", "d"]).tolist(), ("c",)) for _ in range(40)]
     for _ in range(300):
         parents = _random_graph(rng, 6)
         a, b, *others = rng.permutation(list(parents)).tolist()
         exact = tuple(name for name in parents if parents[name] and rng.random() < 0.5)
         if not _linked(parents, a, b):
-            _check_question(separated, parents, a, b, tuple(others[: rng.integers(0, len(others) + 1)]), exact)
+            questions.append((parents, a, b, tuple(others[: rng.integers(0, len(others) + 1)]), exact))
     for a, b in permutations(DEEP, 2):
         others = [name for name in DEEP if name not in (a, b)]
         for given in ((), *combinations(others, 1), *combinations(others, 2)):
             if not _linked(DEEP, a, b):
-                _check_question(separated, DEEP, a, b, given)
+                questions.append((DEEP, a, b, given))
+    for question in in_any_order(questions):
+        _check_question(separated, *question)
 
 
 BELOW = {"a": ("b",), "b": ("d",), "c": ("b",), "d": ()}
@@ -189,7 +202,7 @@ def _ring() -> list[Factor]:
 def check_eliminate(eliminate: Callable) -> None:
     """Several variables left, several orders, none to two variables seen, and none to three asked for their best."""
     factors = _ring()
-    for order, seen, best in (
+    cases = (
         (["c", "e", "b"], {}, ""),
         (["b", "e", "d"], {}, "d"),
         (["a", "b", "c", "e"], {}, "ac"),
@@ -197,8 +210,11 @@ def check_eliminate(eliminate: Callable) -> None:
         (["c", "e"], {"b": 2}, "c"),
         (["e", "a"], {"d": 3, "c": 0}, ""),
         (["a", "c"], {"e": 1}, "ac"),
-    ):
-        result = eliminate(list(factors), list(order), dict(seen), list(best))
+    )
+    asked = asked_in_any_order(
+        lambda case: eliminate(list(factors), list(case[0]), dict(case[1]), list(case[2])), cases
+    )
+    for (order, seen, best), result in asked:
         result = result[0] if isinstance(result, tuple | list) else result
         left = [name for name in STATES if name not in order and name not in seen]
         assert sorted(result.names) == sorted(left), "wrong variables are left"
@@ -216,13 +232,14 @@ def check_eliminate(eliminate: Callable) -> None:
 @hidden
 def check_cost(eliminate: Callable) -> None:
     """Two to four states, several orders, and what is seen."""
-    for order, seen, right in (
+    cases = (
         (["c", "e", "b"], {}, 24),
         (["b", "e", "d"], {}, 16),
         (["e"], {}, 3),
         (["a", "b", "c", "e"], {}, 24),
         (["b", "e", "c"], {"a": 1}, 8),
-    ):
+    )
+    for order, seen, right in in_any_order(cases):
         largest = eliminate(_ring(), list(order), dict(seen))[1]
         assert largest == right, (
             "wrong size of the largest table, for variables of two to four states: count the entries of the tables "
