@@ -479,7 +479,7 @@ fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", nco
 plt.show()
 
 # %% [markdown]
-# Painting the people out changes nothing. Painting the trees or the cars out removes the crowd: nearly all points above
+# Painting the people out changes almost nothing. Painting the trees or the cars out removes the crowd: nearly all points above
 # its cells show trees or cars, almost none shows a person. (Buildings, which these points hardly show, can go.) That
 # nobody looked matters, too: if the crowd's cells are STATIC, it leaves its old places, and most of the 59 cells now
 # called pedestrian are new ones. Equally many cells elsewhere matter much less. But the crowd's own cells aren't all: if
