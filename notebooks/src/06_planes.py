@@ -14,7 +14,7 @@
 # **Prerequisites.** Lecture [05](05_pixels.ipynb): equation (1) gives a pixel (u, v) to each point of each plane.
 # Derivatives and the chain rule; a matrix times a vector.
 #
-# **Time.** 75 minutes, of which the computer needs less than one.
+# **Time.** 77 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.3, equation (2), after Jaderberg et al. (2015).
 
@@ -50,17 +50,18 @@ x_cells = spec.centers()[..., 0]
 # cell, seen from above. Nobody labels the pixels. How can an error on the map correct a pixel?
 #
 # First we need to say what *wrong* means, and in which direction *better* is. Take one pixel and one class. Its score $s$
-# is 4, and somebody who knows says that it should be 6. A **loss** is one number that is 0 when all is right and grows with
+# is 4, and somebody who knows says that it should be 6. A **loss** is one number that is zero when all is right and grows with
 # the error. Here it is half the squared difference, $\ell = \tfrac12 (s - 6)^2$, which is 2.
 #
 # Which way is better? The derivative of this loss is $s - 6$, which is -2. So if we raise $s$ by a little, the loss
 # falls by twice as much. **Gradient descent** goes *against* the derivative, by a fixed fraction of it, the **step size**
-# $\eta$:
+# $\eta$: $\;s \leftarrow s - \eta\, \partial \ell / \partial s$.
 #
-# $$ s \;\leftarrow\; s - \eta\, \frac{\partial \ell}{\partial s} $$
-#
-# With $\eta = 0.25$ the first step goes to 4 + 0.25 · 2 = 4.5. There the derivative is smaller, -1.5, so the next step is
-# shorter, to 4.875. With $\eta = 2.5$ the first step goes to 4 + 5 = 9. That is farther from 6 than before.
+# ```
+# step size 0.25:   4 -> 4 + 0.25 · 2 = 4.5    there the derivative is -1.5
+#                        4.5 + 0.25 · 1.5 = 4.875, a shorter step
+# step size 2.5:    4 -> 4 + 2.5 · 2 = 9       farther from 6 than before
+# ```
 
 
 # %% jupyter={"source_hidden": true} alt="two parabolas of the loss over the score with its minimum at 6: on the left, with a step size of 0.25, dots go down from 4 towards 6 in shorter and shorter steps; on the right, with a step size of 2.5, they jump from 4 to 9 and then to 1.5, higher each time"
@@ -94,28 +95,34 @@ plt.show()
 #
 # ## What does a point read between four pixels?
 #
-# Take an image of 3 x 3 pixels and one class. Its scores:
+# Take an image of nine pixels and one class. Its scores:
 #
-# | | u = 0 | u = 1 | u = 2 |
-# |---|---|---|---|
-# | **v = 0** | 0 | 4 | 8 |
-# | **v = 1** | 2 | 6 | 0 |
-# | **v = 2** | 4 | 0 | 2 |
+# ```
+#          u = 0   u = 1   u = 2
+# v = 0      0       4       8
+# v = 1      2       6       0
+# v = 2      4       0       2
+# ```
 #
-# Equation (1) sends a point of a plane to u = 1.25, v = 0.5. That is a quarter of the way from column 1 to column 2, and
-# half-way from row 0 to row 1.
+# Equation (1) sends a point of a plane to (u, v) = (1.25, 0.5). That is a quarter of the way from the middle column to the
+# right one, and half-way between the two upper rows.
 #
-# **Predict before you run.** Interpolate: first along row 0, then along row 1, then between the two. What does the
-# point read, and how much of it comes from each pixel?
+# **Predict before you run.** Interpolate: first along the top row, then along the row below, then between the two. What
+# does the point read, and how much of it comes from each pixel?
 #
 # <details><summary>Answer</summary>
 #
-# Row 0: 3/4 · 4 + 1/4 · 8 = 5. Row 1: 3/4 · 6 + 1/4 · 0 = 4.5. Half-way between: 4.75. Multiply the fractions and
-# each pixel has a weight: 3/8 for the 4 and for the 6, 1/8 for the 8 and for the 0. The weights sum to 1.
+# ```
+# row v = 0:         3/4 · 4 + 1/4 · 8 = 5
+# row v = 1:         3/4 · 6 + 1/4 · 0 = 4.5
+# half-way between:                      4.75
+# ```
+#
+# Multiply the fractions and each pixel has a weight: 3/8 in the middle column, 1/8 in the right one. They sum to one.
 #
 # </details>
 #
-# One rule holds for all nine pixels: a weight falls from 1 to 0 as the point moves away by one pixel, across and down
+# One rule holds for all nine pixels: a weight falls from one to zero as the point moves away by one pixel, across and down
 # alike. That is a **kernel**, $k(a) = \max(0, 1 - |a|)$. With $n$ for rows and $m$ for columns, the interpolation is the
 # paper's equation:
 #
@@ -172,7 +179,7 @@ plt.show()
 
 # %% [markdown]
 # On the left the cross is the point, and the red numbers are the weights. On the right is the part that comes from
-# going across: column 1 is a quarter of a pixel away, column 2 three quarters, and column 0 too far.
+# going across: the nearer a column, the larger its weight.
 #
 # On the drive, equation (1) has found the pixels. Here are three small pieces of one image, magnified, with the points
 # of the ground plane on them.
@@ -194,21 +201,26 @@ plt.show()
 #
 # ## How does an error on the map reach a pixel?
 #
-# The point at (1.25, 0.5) reads 4.75, and suppose that the map says 5.75. A second point, at (1, 1.5), reads 3, and the
-# map says 1. The loss is again half the squared difference, added up over points. Its derivative in $p$ is
-# what is read minus what is wanted; a bar marks it: $\bar p = \partial \ell / \partial p = (-1, +2)$.
+# Suppose that the map says 5.75 at our point, which reads 4.75. A second point, at (1, 1.5), half-way between the 6 and the 0
+# below it, reads 3, and the map says 1. The loss is again half the squared difference, added up over points. Its
+# derivative in $p$ is what is read minus what is wanted. A bar marks it: $\bar p = \partial \ell / \partial p$.
 #
-# Now nudge the pixel with the 6 by a small amount $\varepsilon$. The first point reads it with weight 3/8 and the second
-# with 1/2. So the loss changes by $-1 \cdot 3/8\,\varepsilon + 2 \cdot 1/2\,\varepsilon$, and the derivative in this
-# pixel, its $\bar s$, is 0.625.
+# ```
+#                       reads   wanted   derivative   weight of the 6
+# first point           4.75    5.75        -1             3/8
+# second point          3       1           +2             1/2
+# derivative in the 6:         -1 · 3/8 + 2 · 1/2 = 0.625
+# ```
 #
-# **Predict before you run.** What is the $\bar s$ of its neighbour, the 8? Of the 2 in the lower right corner? Which pixels don't
-# learn?
+# If we nudge the pixel with the 6, each point feels it by its weight. So the derivative in this pixel, its $\bar s$, is
+# the last line.
+#
+# **Predict before you run.** What is the $\bar s$ of the 8, its neighbour above to the right? Which pixels don't learn?
 #
 # <details><summary>Answer</summary>
 #
-# The 8 is read by the first point alone, with 1/8: -0.125. No point reads the lower right corner or column 0. These four
-# pixels get 0.
+# The first point alone reads the 8, with 1/8, so it gets -0.125. No point reads the left column or the lower right corner. These four
+# pixels get nothing.
 #
 # </details>
 #
@@ -265,8 +277,8 @@ np.testing.assert_allclose(leaf.grad[0, 0], s_bar)
 # ## Why is the way back a transpose?
 #
 # For one camera the weights never change. Write the nine scores below each other as a vector, and write down which point
-# reads which pixel: one row for each point, one column for each pixel. A row has at most four weights. The *column* of the
-# pixel with the 6 says who reads it: 3/8 and 1/2. The gradient above was this column, times the derivatives of the readers.
+# reads which pixel: one row for each point, one column for each pixel. A row has at most four weights. The *column* of a
+# pixel says who reads it. The gradient above was this column, times the derivatives of the readers.
 #
 # So if $A$ is the matrix, forward is $A$ and backward is its transpose. The transpose is also called the **adjoint**,
 # because it moves $A$ to the other side of a scalar product:
@@ -278,17 +290,7 @@ np.testing.assert_allclose(leaf.grad[0, 0], s_bar)
 
 
 # %%
-def matrix_of(points, shape):
-    """Return equation (2) as a matrix, (points, pixels)."""
-    rows = []
-    for u, v in points:
-        across = [kernel(u - m) for m in range(shape[1])]
-        down = [kernel(v - n) for n in range(shape[0])]
-        rows.append(np.outer(down, across).ravel())
-    return np.array(rows)
-
-
-A = matrix_of(points, s.shape)
+A = np.array([[kernel(u - m) * kernel(v - n) for n, m in np.ndindex(s.shape)] for u, v in points])
 np.testing.assert_allclose(A.T @ p_bar, s_bar.ravel())
 
 rng = np.random.default_rng(0)
@@ -308,8 +310,8 @@ torch.testing.assert_close((p_some * planes).double().sum(), (s_some.grad * s_so
 one = np.s_[:, ::20, ::20]  # point by point takes its time
 literal = sample_planes_naive(s_some[0].detach().numpy(), pixels[one], visible[one])
 np.testing.assert_allclose(planes[0].detach().numpy()[:, *one], literal, atol=1e-4)
-print(f"all planes of the drive: {sampler.operator.nbytes / 1e6:.0f} MB with the transpose")
-print(f"as a full matrix: {4 * visible.size * np.prod(camera.size) / 1e9:.0f} GB")
+print(f"all planes of the drive: {sampler.operator.nbytes / 1e6:.0f} MB with the transpose, ", end="")
+print(f"instead of {4 * visible.size * np.prod(camera.size) / 1e9:.0f} GB for a full matrix")
 
 # %% [markdown]
 # The package's `fast.PlaneSampler` is this matrix and its transpose for the whole drive, and passes the same test.
@@ -317,11 +319,11 @@ print(f"as a full matrix: {4 * visible.size * np.prod(camera.size) / 1e9:.0f} GB
 #
 # ## Can pixels learn from the map alone?
 #
-# Forget the network for now: let every score of the image be a free number, 0 at first. No pixel has a label. You get
-# the *map*: the class of each ground cell that the camera sees. Each cell should read 1 for its true class and 0 for the
-# others. The loss is half the squared difference, as before. Sample, compare, send back, take a step, twenty times.
+# Forget the network for now: let every score of the image be a free number, zero at first. No pixel has a label. You get
+# the *map*: the class of each ground cell that the camera sees. A cell should read 1 for its true class and 0 for the
+# others, and the loss is half the squared difference, as before.
 #
-# **Predict before you run.** Which pixels of the image get a class? Think of the pieces at 8, 20 and 45 m. And what
+# **Predict before you run.** Which pixels of the image get a class? Think of the three magnified pieces. And what
 # will the pixels of a picket fence learn, when the cell *behind* the fence is lawn?
 #
 # <details><summary>Answer</summary>
@@ -413,8 +415,8 @@ assert fence_turned_lawn["without occluded"] < 0.2 * fence_turned_lawn["as many 
 #
 # ## What does half a pixel cost?
 #
-# All this needs one convention: here **the centre of the first pixel is (0, 0)**. Others put (0, 0) on the *corner* of
-# the first pixel. Both are fine, but mixing them isn't. PyTorch's `F.grid_sample` wants places scaled to -1 .. 1. With
+# All this needs one convention: here **the centre of the first pixel is (0, 0)**. Others put the zero on the *corner* of
+# the first pixel. Both are fine, but mixing them isn't. PyTorch's `grid_sample` wants places scaled to `-1 .. 1`. With
 # `align_corners=True` these are the centres of the first and the last pixel. With `False`, the default, they are the
 # outer edges of the image.
 #
@@ -422,74 +424,80 @@ assert fence_turned_lawn["without occluded"] < 0.2 * fence_turned_lawn["as many 
 # little to see in a picture. Use a **ramp**: let each pixel's score be its own v. Then the value that is read *is* the
 # place that was read.
 
-# %% jupyter={"outputs_hidden": true}
+# %%
 ramp = torch.arange(96.0)[:, None].expand(camera.size)[None, None]
-asked = torch.linspace(0, 95, 191)
-
-
-def place_read(align_corners):
-    """Return the v that grid_sample reads when it is asked for `asked`, scaled for centres."""
-    where = torch.stack([torch.zeros(191), 2 * asked / 95 - 1], dim=-1)[None, None]
-    return torch.nn.functional.grid_sample(ramp, where, align_corners=align_corners, padding_mode="border")[0, 0, 0]
-
-
+asked = torch.linspace(0.5, 94.5, 189)
+where = torch.stack([torch.zeros(189), 2 * asked / 95 - 1], dim=-1)[None, None]  # scaled for centres
+off = {}
 for align_corners in (True, False):
-    off = place_read(align_corners) - asked
-    print(f"align_corners={align_corners}: off by {off.min() + 0.0:.2f} to {off.max() + 0.0:.2f} pixels")
-in_view = visible[0]
-assert np.abs(ground(ramp)[0, 0, 0].numpy() - pixels[0, ..., 1])[in_view].max() < 1e-3  # the package's sampler
+    was_read = torch.nn.functional.grid_sample(ramp, where, align_corners=align_corners)[0, 0, 0]
+    off[align_corners] = was_read - asked
+    print(f"align_corners={align_corners}: off by up to {off[align_corners].abs().max():.2f} pixels")
+
+# %% jupyter={"source_hidden": true}
+in_view = visible[0]  # the package's sampler reads the ramp right
+assert np.abs(ground(ramp)[0, 0, 0].numpy() - pixels[0, ..., 1])[in_view].max() < 1e-3
 
 # %% [markdown]
-# The ramp has found it. Is it worth the trouble? Take a toy camera 1.5 m above the ground, $z_\text{cam}$, with a focal length $f_v$ of 200
+# The ramp has found it. Is it worth the trouble? Take a toy camera at $z_\text{cam}$ = 1.5 m, with a focal length $f_v$ of 200
 # pixels. A point of the ground $Z$ metres ahead is $f_v\, z_\text{cam} / Z$ pixels below the horizon, by similar triangles.
 #
-# **Predict before you run.** How many pixels below the horizon is the ground at 10, 30 and 60 m? Now read half a pixel
+# **Predict before you run.** How many pixels below the horizon is the ground at 10 and at 60 m? Now read half a pixel
 # too low. Which ground do you get instead?
 #
 # <details><summary>Answer</summary>
 #
-# 30, 10 and 5 pixels. Half a pixel lower: 300 / 30.5 = 9.8 m, 300 / 10.5 = 28.6 m, 300 / 5.5 = 54.5 m.
+# ```
+# 10 m:  300 / 10 = 30 pixels;  300 / 30.5 =  9.8 m
+# 60 m:  300 / 60 =  5 pixels;  300 / 5.5  = 54.5 m
+# ```
 #
 # </details>
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="A, the error on the ramp over the image's rows: none with matching conventions, with mixed ones a line from minus half a pixel at the top to plus half a pixel at the bottom; B, metres of ground over the distance for an error of half a pixel: a curve from 0.2 m at 10 m over 1.4 m at 30 m to 5.5 m at 60 m"
 fig, axes = plt.subplots(1, 2, figsize=(7.8, 2.9), layout="constrained")
 for align_corners, style, name in ((True, "-", "matching"), (False, "--", "mixed")):
-    axes[0].plot(asked, place_read(align_corners) - asked, style, color="black", label=name)
+    axes[0].plot(asked, off[align_corners], style, color="black", label=name)
 axes[0].set(xlabel="row that was asked for, v [pixels]", ylabel="read too low by [pixels]", title="A: two conventions")
 axes[0].legend(fontsize=9)
 far = np.linspace(5, 65, 200)
 axes[1].plot(far, far - 300 / (300 / far + 0.5), color="black")
 for Z in (10, 30, 60):
-    off = Z - 300 / (300 / Z + 0.5)
-    axes[1].plot(Z, off, "o", color="tab:red")
-    axes[1].annotate(f"{off:.1f} m", (Z, off), xytext=(-34, 6), textcoords="offset points", fontsize=9)
+    short = Z - 300 / (300 / Z + 0.5)
+    axes[1].plot(Z, short, "o", color="tab:red")
+    axes[1].annotate(f"{short:.1f} m", (Z, short), xytext=(-34, 6), textcoords="offset points", fontsize=9)
 axes[1].set(xlabel="distance Z [m]", ylabel="error on the ground [m]", title="B: half a pixel too low")
 plt.show()
 
 # %% [markdown]
-# In A the error changes its sign in the middle of the image. B shows what it can cost: the error grows with the *square* of the distance, because
-# $\partial Z / \partial v = -Z^2 / (f_v\, z_\text{cam})$. So half a pixel is a hand's breadth near by, and eleven cells at
-# 60 m. Nothing crashes. State your convention, and test it with a ramp.
+# In A the mixed program errs in opposite directions at the top and at the bottom, and not at all in the middle. B shows what half a pixel
+# costs: the error grows with the *square* of the distance, because $\partial Z / \partial v = -Z^2 / (f_v\,
+# z_\text{cam})$. So half a pixel is a hand's breadth near by, and eleven cells at 60 m. Nothing crashes. State your
+# convention, and test it with a ramp.
 #
 # ## What changes if the point moves?
 #
 # So far the scores learnt, and the points stood still. But what if the camera's angle should learn? Then the points move, and
 # the question is how $p$ changes with $u$ and $v$.
 #
-# **Predict before you run.** Move the point of (1.25, 0.5) by a tiny step to the right. How much does $p$ change, per
+# **Predict before you run.** Move our first point by a tiny step to the right. How much does $p$ change, per
 # pixel of the step? And down? And to the right, if it reads only its nearest pixel instead of four?
 #
 # <details><summary>Answer</summary>
 #
-# To the right the value rises along row 0, by 8 - 4 per pixel, and falls along row 1, by 6. The point is half in
-# each: 1/2 · 4 - 1/2 · 6 = -1. Down: 3/4 · (6 - 4) + 1/4 · (0 - 8) = -0.5. With the nearest pixel a tiny step changes
-# nothing.
+# Along the top row the value rises, along the row below it falls, and the point is half in each:
+#
+# ```
+# right:  1/2 · (8 - 4) + 1/2 · (0 - 6) = -1
+# down:   3/4 · (6 - 4) + 1/4 · (0 - 8) = -0.5
+# ```
+#
+# With the nearest pixel a tiny step changes nothing.
 #
 # </details>
 #
-# The slope of the kernel is -1 on the right of its pixel and +1 on the left. So between pixels the derivative is a
-# difference of neighbours.
+# The kernel falls on the right of its pixel and rises on the left, by one per pixel. So the derivative is a difference of
+# neighbours.
 
 
 # %% jupyter={"outputs_hidden": true}
@@ -545,20 +553,24 @@ _ = interact(
 )
 
 # %% [markdown]
-# The nearest pixel gives stairs, whose slope is 0 between the jumps, so there is nothing to learn from. Bilinear reading gives connected
-# lines with a slope nearly everywhere. (The dials work with a running kernel. Cross a column: the value doesn't jump, but
-# its slope does.) So the derivative in $u$ is the difference between the pixels left and right of the point.
+# The nearest pixel gives stairs, flat between the jumps, so there is nothing to learn from. Bilinear reading gives connected
+# lines. (The dials work with a running kernel. Cross a column: the value doesn't jump, but its slope does.) So the
+# derivative in $u$ is the difference between the pixels right and left of the point, and likewise in $v$.
 #
 # ## Can a map turn a camera right?
 #
-# First by hand. A point at (1.25, 1) reads 4.5, and the map says 6. So $\bar p$ = -1.5, the slope in u is -6, and by the
-# chain rule the loss has the slope $-1.5 \cdot -6 = 9$ in u. A step of size 0.02 goes to 1.25 - 0.02 · 9 = 1.07: towards the
-# pixel with the 6.
+# First by hand. A point at (1.25, 1) is a quarter pixel right of the 6, and the map says that it should read 6:
 #
-# Now suppose we believe that the drive's camera looks two degrees lower than it does. The **pitch**, the angle by which it looks down,
-# moves all points at once. So its derivative is a sum over all points: $\bar p$, times the slope in u and v, times what
-# the pitch does to u and v. PyTorch's `autograd.grad` applies this chain rule for us. The map has road and sidewalk, and the
-# scores are the true labels of five images, so that only the angle is wrong.
+# ```
+# it reads 3/4 · 6 + 1/4 · 0 = 4.5        derivative in p:   4.5 - 6 = -1.5
+# slope of p in u:  0 - 6 = -6            derivative in u:  -1.5 · -6 = 9   (chain rule)
+# one step of size 0.02:                  u = 1.25 - 0.02 · 9 = 1.07
+# ```
+#
+# The point moves towards the 6. Now suppose we believe that the drive's camera looks two degrees lower than it does. The **pitch**, the
+# angle by which it looks down, moves all points at once. So its derivative is a sum over points: $\bar p$, times the
+# slopes in u and v, times what the pitch does to u and v. PyTorch's `autograd.grad` applies this chain rule for us. The
+# map has road and sidewalk. The scores are the true labels of five images, so that only the angle is wrong.
 
 
 # %%
@@ -594,7 +606,7 @@ def converging():
     left.imshow(130 + image.mean(axis=2) // 16 * 7, cmap="gray", vmin=0, vmax=255)
     left.set(ylim=(95.5, 30), xlim=(60, 319.5), xlabel="u [pixels]", ylabel="v [pixels]")
     right.axhline(0, color="0.6", linewidth=1)
-    right.set(xlim=(-0.5, 9.5), ylim=(-0.7, 2.2), xlabel="step", ylabel="pitch [degrees]", title="B")
+    right.set(xlim=(-0.5, 9.5), xticks=(0, 4, 8), ylim=(-0.7, 2.2), xlabel="step", ylabel="pitch [degrees]", title="B")
     dots = []
     for c, (colour, marker) in enumerate(zip(KITTI_14.colours(np.array(calibration.FLAT)) / 255, ".+", strict=True)):
         name = KITTI_14.names[calibration.FLAT[c]]
@@ -615,18 +627,18 @@ plotting.animate(converging(), period=0.6, alt="the map's cells slide onto road 
 
 # %% [markdown]
 # In A each dot is a cell of the map, at the pixel that the pitch of this step gives it. After four steps the border between
-# road and sidewalk is on the kerb. But B goes on, past the truth, and stops at -0.3 degrees. **0.9 pixels remain.** That sounds little.
-# On the map it means that a cell 60 m ahead reads the ground at 51 m, and one 25 m ahead reads that at 23 m.
+# road and sidewalk is on the kerb. But B goes on, past the truth, and stops at -0.3 degrees. **0.9 pixels remain.** That
+# sounds little. On the map it means that a cell 60 m ahead reads the ground at 51 m.
 #
 # Why does it stop there? A suspect: cells beside things. A point that is a little too high reads the car behind it. One
-# that is a little too low still reads road. So it is safer to look too low.
+# that is a little too low still reads road. So it is safer to read too low.
 #
 # **Predict before you run.** How would you test this suspicion? And what is the control?
 #
 # <details><summary>Answer</summary>
 #
 # Leave out all cells that have anything but road and sidewalk within two pixels, which is about a quarter of them. As a
-# control, leave out as many at random. If the suspect is guilty, the first ends at 0, and the second still at -0.3.
+# control, leave out as many at random. If the suspect is guilty, only the first ends near the truth.
 #
 # </details>
 
@@ -644,12 +656,11 @@ kept = sum(len(lesson[2]) for lesson in clear) / sum(len(lesson[2]) for lesson i
 assert 0.75 < kept < 0.8
 end = torch.tensor(np.radians(path[-1]))
 height = camera.T_camera_from_grid[1, 3]
-ahead = torch.tensor([[0.0, height, 60.0], [0.0, height, 25.0]], dtype=torch.float64)
+ahead = torch.tensor([[0.0, height, 60.0]], dtype=torch.float64)
 below_horizon = calibration.pixels_at(ahead, end, camera.K)[1].numpy() - camera.K[1, 2]
 pixels_off = below_horizon - camera.K[1, 1] * height / ahead[:, 2].numpy()
 read_instead = camera.K[1, 1] * height / below_horizon
 print(f"60 m ahead, {pixels_off[0]:.1f} pixels remain: read is the ground at {read_instead[0]:.0f} m")
-print(f"25 m ahead: read is the ground at {read_instead[1]:.0f} m")
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="loss over pitch: A, from minus 15 to 12 degrees, a valley near zero with flat ends below minus 12 and above 9.5 degrees, where a descent from 10 stays while those from 6 and minus 6 reach the valley; B, near zero: with all cells the lowest point is at minus 0.3, with the cells clear of things at minus 0.1"
 fig, (wide, near) = plt.subplots(1, 2, figsize=(8, 3.1), layout="constrained")
@@ -670,25 +681,27 @@ for name, style in (("all cells", "-"), ("clear of things", "--")):
     near.plot(at[losses.argmin()], losses.min(), "v", color="black")
 near.axvline(0, color="0.6", linewidth=1)
 wide.set(xlabel="pitch [degrees]", ylabel="loss", title="A: where a descent starts")
-near.set(xlabel="pitch [degrees]", title="B: where it ends", ylim=(0, 0.03))
-near.legend(fontsize=9)
+near.set(xlabel="pitch [degrees]", title="B: where it ends", ylim=(0, 0.045))
+near.legend(fontsize=9, loc="upper left")
 plt.show()
 assert starts[10.0] == 10
 assert max(abs(starts[6.0]), abs(starts[-6.0])) < 0.6
 
 # %% [markdown]
-# The suspect is guilty: without cells beside things both descents end within 0.15 degrees of the truth (B), and the control stays at
-# -0.3. So a map can turn a camera right. But **a gradient changes whatever may move**. If something else is wrong, here
-# what a cell beside a car reads, the angle bends to make up for it. A small loss doesn't mean a right angle.
+# The suspect is guilty. Without cells beside things both descents end a tenth of a degree from the truth (B). The control
+# stays where it was. So a map can turn a camera right. But **a gradient changes whatever may move**: if something else is
+# wrong, here what a cell beside a car reads, the angle bends to make up for it.
 #
 # ## Where this breaks
 #
-# **A slope needs scores that change.** In A above, a red dot is a start and its arrow shows where thirty steps lead. From six degrees on either side the
-# descent arrives. From ten it never moves. There no cell reads road or sidewalk, all scores around are 0, and so is the slope. That is why
-# aligning images starts with small, blurred ones, where a slope reaches farther, and refines.
+# **A slope needs scores that change.** In A above, a red dot is a start and its arrow shows where thirty steps lead. From six
+# degrees on either side the descent arrives. From ten it never moves, because no cell reads road or sidewalk. All scores
+# around are zero, and so is the slope. That is why aligning images starts with small, blurred ones, where a slope reaches
+# farther, and refines.
 #
 # **Four pixels are the right number at one distance only.** Seven metres ahead a cell covers about forty pixels and reads four of
-# them. Let each pixel have an error of its own. How much of it does a cell keep, and how much would the mean over its whole area keep?
+# them. Let each pixel have an error of its own. How much of it does a cell keep, and how much would the mean over its
+# whole area keep?
 
 # %% jupyter={"source_hidden": true} alt="how much of a pixel's error a cell keeps, over the distance: with four pixels about two thirds everywhere; with the mean over the cell from 0.16 at 7 m, rising slowly to 0.55 at 60 m"
 kept_error = {"four pixels, equation (2)": calibration.noise_left(spec, camera, 1),
@@ -706,18 +719,19 @@ assert 0.64 < means[0] < 0.7
 assert means[1] < means[0] / 4
 
 # %% [markdown]
-# Near by the mean would keep a quarter of what four pixels keep. Far ahead they meet. This needs errors that are independent. A network that
-# takes a shadow for a car is wrong on all forty pixels. The same holds far ahead, where
-# about eight cells read one pixel: they are one witness, not eight.
+# Near by the mean would keep a quarter of what four pixels keep. Far ahead the two come close. (The waves: a point on a
+# pixel's row reads two pixels, not four.) But this needs errors that are independent. A network that takes a shadow for
+# a car is wrong on all forty pixels. And far ahead several cells read one pixel. They share its error, so they are one
+# witness.
 #
 # ## In five lines
 #
 # 1. A loss says how wrong, its gradient where to go, the step size how far.
 # 2. A point reads the four pixels around it. The way back is the transpose: the same weights, added up over readers.
 # 3. Check a gradient with a nudge, a pair of passes with random numbers, a convention with a ramp.
-# 4. Half a pixel is 5 m of ground at 60 m.
-# 5. In u and v the gradient is a difference of neighbours. It can turn a camera right, but it bends to whatever else is
-#    wrong: 0.9 pixels, because of cells beside things.
+# 4. What a pixel is worth grows with the square of the distance: half a pixel is five metres of ground at sixty.
+# 5. In u and v the gradient is a difference of neighbours. It can turn a camera right, but the angle bends to whatever
+#    else is wrong.
 #
 # ## Further reading and exercise
 #

@@ -147,7 +147,7 @@ for near, far in ((6, 20), (20, 40), (40, 71)):
     print(f"{near:>2} to {far} m ahead: {band.sum()} cells look into {len(different)} different pixels")
 
 # %% [markdown]
-# Lecture [06](../06_planes.ipynb) says what it costs when cells that share a pixel count as independent.
+# Cells that read one pixel share its error, so they are one witness (lecture [06](../06_planes.ipynb)).
 #
 # ## The best of several planes
 #
