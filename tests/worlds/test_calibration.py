@@ -10,8 +10,8 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.planes import sample_planes_naive
 
 K = np.array([[60.0, 0, 39.5], [0, 60, 23.5], [0, 0, 1]])
-T_CAMERA_FROM_GRID = np.array([[0.0, -1, 0, 0], [0, 0, -1, 1.5], [1, 0, 0, 0], [0, 0, 0, 1]])
-CAMERA = Camera(K, (48, 80), T_CAMERA_FROM_GRID)
+T_CAMERA_FROM_LIDAR = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+CAMERA = Camera(K, T_CAMERA_FROM_LIDAR, (48, 80), lidar_height=1.5)
 
 
 def points_ahead(count=30):
