@@ -54,7 +54,7 @@ x_cells = spec.centers()[..., 0]
 # the error. Here it is half the squared difference, $\ell = \tfrac12 (s - 6)^2$, which is 2.
 #
 # Which way is better? The derivative of this loss is $s - 6$, which is -2. So if we raise $s$ by a little, the loss
-# falls by twice as much. **Gradient descent** goes *against* the derivative, by a fixed fraction of it, the **step size**
+# falls by twice as much. So **gradient descent** goes *against* the derivative, by a fixed fraction of it, the **step size**
 # $\eta$: $\;s \leftarrow s - \eta\, \partial \ell / \partial s$.
 #
 # ```

@@ -431,8 +431,8 @@ _test()
 #
 # `weights_of` tells which four pixels a point reads, as your `four_pixels` does, which it is unless the tests hand something else over. The pixel in row n and
 # column m has the number n * w + m. Collect the numbers of the points, those of the pixels, and the weights in three lists, and give them to
-# `csr_matrix((weights, (points, numbers)), shape=(N, h * w))`, which adds up entries that meet. The tests use your matrix on points of the two
-# streets, and its transpose for the way back.
+# `csr_matrix((weights, (points, numbers)), shape=(N, h * w))`, which adds up entries that meet. The tests call `there_and_back`, with points of the two
+# streets, which uses your matrix and its transpose; leave it as it is.
 
 
 # %% nbgrader={"grade": false, "grade_id": "sampling-matrix", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -450,6 +450,12 @@ def sampling_matrix(pixels, visible, h, w, weights_of=four_pixels):
         weights += list(four)
     return csr_matrix((weights, (points, numbers)), shape=(len(pixels), h * w))
     ### END SOLUTION
+
+
+def there_and_back(s, p_bar, pixels, visible, weights_of=four_pixels):
+    """Return what points read of s (C, h, w), (C, N), and what their gradient p_bar (C, N) sends back, (C, h, w)."""
+    A = sampling_matrix(pixels, visible, *s.shape[1:], weights_of)
+    return (A @ s.reshape(len(s), -1).T).T, (A.T @ p_bar.T).T.reshape(s.shape)
 
 
 # %% nbgrader={"grade": false, "grade_id": "streets", "locked": true, "schema_version": 3, "solution": false, "task": false}
@@ -471,12 +477,6 @@ def _four_read(u, v, h, w):
     return [top, top, top + 1, top + 1], [left, left + 1, left, left + 1], weights
 
 
-def _there_and_back(s, p_bar, pixels, visible, weights_of):
-    """Return what points read of s (C, h, w), (C, N), and what their gradient p_bar (C, N) sends back, (C, h, w)."""
-    A = sampling_matrix(pixels, visible, *s.shape[1:], weights_of)
-    return (A @ s.reshape(len(s), -1).T).T, (A.T @ p_bar.T).T.reshape(s.shape)
-
-
 # %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "sampling-matrix-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     from semgrid_edu.datasets.samples import real_drive, sample_drive
@@ -485,10 +485,8 @@ def _test():
         s = np.random.default_rng(0).normal(size=(2, 24, 80))
         pixels, visible = _points(frame, s.shape[1:])
         p_bar = np.random.default_rng(1).normal(size=(2, len(pixels)))
-        shape = np.shape(sampling_matrix(pixels, visible, 24, 80, _four_read))
-        assert shape == (len(pixels), 24 * 80), f"one row for each point, visible or not, so not {shape}"
-        got = _there_and_back(s, p_bar, pixels, visible, _four_read)
-        p, s_bar = (answer_array(one, "sampling_matrix") for one in got)
+        got = there_and_back(s, p_bar, pixels, visible, _four_read)
+        p, s_bar = (answer_array(one, "there_and_back") for one in got)
         assert p.shape == p_bar.shape, f"{len(pixels)} points of the {street} street, got the shape {p.shape}"
         assert not np.isnan(p).any(), "NaN: leave points that aren't visible out"
         assert not p[:, ~visible].any(), "a point that isn't visible reads something: its row must be empty"
@@ -501,7 +499,7 @@ def _test():
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import planes
 
-    complaint = planes.check_sampling_matrix(_there_and_back)
+    complaint = planes.check_sampling_matrix(there_and_back)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
