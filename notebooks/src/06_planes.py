@@ -2,7 +2,7 @@
 # # 06 · Sampling that learns: equation (2) and its gradient
 #
 # **In one sentence.** A point on the map reads four pixels with four weights, and an error on the map goes back to the
-# same four pixels by the same weights; so a map can teach an image, and even turn the camera right.
+# same four pixels by the same weights; so a map can teach an image, and even correct a camera's angle.
 #
 # **You will be able to**
 # - say what a loss is, and take one step of gradient descent by hand;
@@ -54,7 +54,7 @@ x_cells = spec.centers()[..., 0]
 # the error. Here it is half the squared difference, $\ell = \tfrac12 (s - 6)^2$, which is 2.
 #
 # Which way is better? The derivative of this loss is $s - 6$, which is -2. So if we raise $s$ by a little, the loss
-# falls by twice as much. So **gradient descent** goes *against* the derivative, by a fixed fraction of it, the **step size**
+# falls by twice as much. The rule of **gradient descent** is to go *against* the derivative, by a fixed fraction of it, the **step size**
 # $\eta$: $\;s \leftarrow s - \eta\, \partial \ell / \partial s$.
 #
 # ```
@@ -315,13 +315,14 @@ print(f"instead of {4 * visible.size * np.prod(camera.size) / 1e9:.0f} GB for a 
 
 # %% [markdown]
 # The package's `fast.PlaneSampler` is this matrix and its transpose for the whole drive, and passes the same test.
-# Only the weights that aren't zero are kept. So the way back costs as much as the way there, and needs no new mathematics.
+# Only the weights that aren't zero are kept. So the way back costs about as much as the way there, and needs no new mathematics.
 #
 # ## Can pixels learn from the map alone?
 #
 # Forget the network for now: let every score of the image be a free number, zero at first. No pixel has a label. You get
 # the *map*: the class of each ground cell that the camera sees. A cell should read 1 for its true class and 0 for the
-# others, and the loss is half the squared difference, as before.
+# others, and the loss is half the squared difference, as before. From now on PyTorch goes the way back for us:
+# `torch.autograd.grad` returns the gradient that we have computed by hand.
 #
 # **Predict before you run.** Which pixels of the image get a class? Think of the three magnified pieces. And what
 # will the pixels of a picket fence learn, when the cell *behind* the fence is lawn?
@@ -472,7 +473,7 @@ plt.show()
 # %% [markdown]
 # In A the mixed program errs in opposite directions at the top and at the bottom, and not at all in the middle. B shows what half a pixel
 # costs: the error grows with the *square* of the distance, because $\partial Z / \partial v = -Z^2 / (f_v\,
-# z_\text{cam})$. So half a pixel is a hand's breadth near by, and eleven cells at 60 m. Nothing crashes. State your
+# z_\text{cam})$. So half a pixel is a hand's breadth near by, and eleven cells of half a metre at 60 m. Nothing crashes. State your
 # convention, and test it with a ramp.
 #
 # ## What changes if the point moves?
@@ -557,7 +558,7 @@ _ = interact(
 # lines. (The dials work with a running kernel. Cross a column: the value doesn't jump, but its slope does.) So the
 # derivative in $u$ is the difference between the pixels right and left of the point, and likewise in $v$.
 #
-# ## Can a map turn a camera right?
+# ## Can a map correct a camera's angle?
 #
 # First by hand. A point at (1.25, 1) is a quarter pixel right of the 6, and the map says that it should read 6:
 #
@@ -569,8 +570,8 @@ _ = interact(
 #
 # The point moves towards the 6. Now suppose we believe that the drive's camera looks two degrees lower than it does. The **pitch**, the
 # angle by which it looks down, moves all points at once. So its derivative is a sum over points: $\bar p$, times the
-# slopes in u and v, times what the pitch does to u and v. PyTorch's `autograd.grad` applies this chain rule for us. The
-# map has road and sidewalk. The scores are the true labels of five images, so that only the angle is wrong.
+# slopes in u and v, times what the pitch does to u and v. The map has road and sidewalk, with the ground's height from the
+# LIDAR. The scores are the true labels of five images, so that hardly anything but the angle is wrong.
 
 
 # %%
@@ -689,8 +690,9 @@ assert max(abs(starts[6.0]), abs(starts[-6.0])) < 0.6
 
 # %% [markdown]
 # The suspect is guilty. Without cells beside things both descents end a tenth of a degree from the truth (B). The control
-# stays where it was. So a map can turn a camera right. But **a gradient changes whatever may move**: if something else is
-# wrong, here what a cell beside a car reads, the angle bends to make up for it.
+# stays where it was. (We chose these cells with the true angle, so this is a diagnosis, not yet a remedy.) So a map can correct a
+# camera's angle, to a pixel. But **a gradient changes whatever may move**: if something else is wrong, here what a cell beside a
+# car reads, the angle bends to make up for it.
 #
 # ## Where this breaks
 #
@@ -730,8 +732,8 @@ assert means[1] < means[0] / 4
 # 2. A point reads the four pixels around it. The way back is the transpose: the same weights, added up over readers.
 # 3. Check a gradient with a nudge, a pair of passes with random numbers, a convention with a ramp.
 # 4. What a pixel is worth grows with the square of the distance: half a pixel is five metres of ground at sixty.
-# 5. In u and v the gradient is a difference of neighbours. It can turn a camera right, but the angle bends to whatever
-#    else is wrong.
+# 5. In u and v the gradient is a difference of neighbours. It can correct a camera's angle, but the angle bends to
+#    whatever else is wrong.
 #
 # ## Further reading and exercise
 #
