@@ -122,12 +122,19 @@ print(convolve(np.array([[0.0, 0, 1, 0, 0, 1, 1, 0]]), thin)[0])
 #
 # ## How does a network learn its weights?
 #
-# A network gives each pixel a **score** per class. One pixel, three classes: road 1, post 3, sky 0. To make
-# probabilities of the scores, exponentiate and divide by the sum; that is the *soft-max*. By hand: $e^1 = 2.72$,
-# $e^3 = 20.09$, $e^0 = 1$, the sum is 23.8, so 0.11, 0.84 and 0.04.
+# A network gives each pixel a **score** per class. To make probabilities of the scores, exponentiate and divide by the
+# sum; that is the *soft-max*. By hand, for one pixel and three classes:
 #
-# Lecture 06 needed a loss, one number that says how wrong we are. Here it is the **cross-entropy**, minus the logarithm
-# of the true class's probability. If the pixel is a post, it is $-\log 0.84 = 0.17$. If it is road, 2.17.
+# ```
+#              road     post     sky
+# score          1        3        0
+# exp(score)   2.72    20.09       1       sum 23.8
+# P            0.11     0.84     0.04
+# ```
+#
+# Lecture 06 went down a loss step by step: a number that says how wrong we are. Here it is the **cross-entropy**, minus
+# the logarithm of the true class's probability. If the pixel is a post, it is $-\log 0.84 = 0.17$. If it is road, it is
+# $-\log 0.11 = 2.17$.
 #
 # $$ P(c) = \frac{e^{s_c}}{\sum_{c'} e^{s_{c'}}}, \qquad \text{loss} = -\log P(c^*), \qquad
 #    \frac{\partial\,\text{loss}}{\partial s_c} = P(c) - [c = c^*] $$
@@ -196,16 +203,16 @@ assert (learned[:, [0, 2]] < -0.5).all()
 assert 25 < one_layer < 40
 
 # %% [markdown]
-# Nobody told it, and yet each row of the learned kernel is our -1, 2, -1, only larger. Its score is poor, though. By
-# *intersection over union* (pixels that are pole and called pole, over those that are one or the other) it gets about a third.
-# The trivial rule "never a pole" gets 0 there, and 97 % in pixel accuracy, so don't judge thin things by that.
-# The reason for the poor score: a pixel of a two-pixel pole has one bright and one dark neighbour, and so has the edge
-# of a wall. Nine pixels can't tell them apart.
+# Nobody told it, and yet each row of the learned kernel is our own, only larger. Its score is poor, though. By
+# *intersection over union* (pixels that are pole and called pole, over those that are one or the other) it gets about a
+# third. The trivial rule "never a pole" gets nothing there, but 97 % in pixel accuracy, so don't judge thin things by that.
+# One thing this layer can never do: a pixel of a two-pixel pole has one bright and one dark neighbour, and so has the
+# edge of a wall. Nine pixels can't tell them apart.
 #
-# The paper hands the *scores* to the planes of lectures 05 and 06, not the probabilities. Say that *post* leads by 6 in
+# The paper hands the *scores* to the planes of lecture 06, not the probabilities. Say that *post* leads by 6 in
 # one pixel and trails by 1 in the next. A point halfway between them gets a lead of 2.5, which is P = 0.92. If you
-# interpolate probabilities, you get (0.998 + 0.269) / 2 = 0.63: with scores the pixel that knows more counts more. And a point that
-# no pixel shows gets zeros, so on the planes a score of zero means *nobody looked*.
+# interpolate the probabilities instead, you get 0.63. With scores the pixel that knows more counts more. And a point
+# that no pixel shows gets zeros, so on the planes a score of zero means *nobody looked*.
 
 # %% jupyter={"source_hidden": true}
 leads = np.array([6.0, -1.0])
@@ -217,15 +224,17 @@ assert np.round((1 / (1 + np.exp(-leads))).mean(), 2) == 0.63
 #
 # ## How can a pixel see far?
 #
-# One 3x3 convolution sees 3 pixels a side, its *receptive field*. A second one on top sees 5, a third 7. Now halve the
-# map after the first. Neighbours in the map are then 2 image pixels apart (the *jump*), so each later layer adds twice as much:
+# One 3x3 convolution sees three pixels a side, its **receptive field**. A second one on top sees five. Now halve the map after
+# the first. Its neighbours are then two image pixels apart, the *jump*, so each later layer adds twice as much. A layer
+# adds (kernel - 1) · rate · jump:
 #
-# | layer | kernel | stride | rate | adds (kernel - 1) · rate · jump | field | jump after |
-# |---|---|---|---|---|---|---|
-# | convolution | 3 | 1 | 1 | 2 | 3 | 1 |
-# | halving, 2x2 | 2 | 2 | 1 | 1 | 4 | 2 |
-# | convolution | 3 | 1 | 1 | 4 | 8 | 2 |
-# | convolution of rate 2 | 3 | 1 | 2 | 8 | 16 | 2 |
+# ```
+# layer                     adds    field    jump after
+# convolution                 2       3          1
+# halving, 2x2                1       4          2
+# convolution                 4       8          2
+# convolution of rate 2       8      16          2
+# ```
 
 
 # %% tags=["receptive-field"]
@@ -250,13 +259,13 @@ assert receptive_field([CONV, HALVE, CONV, (3, 1, 2)]) == (16, 2)
 # cheap. So networks halve because it is the cheap way to see far. What does it cost? Take a row with a post of 1, and halve it twice: by the largest of
 # two (*max-pooling*), by the mean of two, or by every second value (stride 2).
 #
-# **Predict before you run.** The post is in column 8 of 16. Which four numbers are left, for each of the three ways?
-# And with the post in column 9, 10 or 11?
+# **Predict before you run.** The row has sixteen columns, the post is in column 8. Which four numbers are left, for
+# each of the three ways? And with the post in one of the next three columns?
 #
 # <details><summary>Answer</summary>
 #
-# Max: 0 0 1 0 in all four cases, so the place within the four is lost. Mean: 0 0 ¼ 0, so the strength is lost, too.
-# Stride: 0 0 1 0 for column 8, and for the others nothing at all.
+# Max: zeros with a 1 in third place, in all four cases, so the place within the four is lost. Mean: a quarter in third
+# place, so the strength is lost, too. Stride: the 1 for column 8, and for the others nothing at all.
 #
 # </details>
 
@@ -340,8 +349,8 @@ plt.show()
 # sum                            -5   -1   -5  -3.5 -0.5  3.5 -3.5  -5     one post, one pixel wide
 # ```
 #
-# A coarse value belongs to the middle of its two pixels, at columns 0.5, 2.5, 4.5, 6.5. Column 3 is a quarter of the
-# way from -3 to 3, so it gets -1.5.
+# A coarse value belongs to the middle of its two pixels. So column 3 is a quarter of the way from the second to the
+# third value, from -3 to 3, and gets -1.5.
 
 
 # %% tags=["skips"]
@@ -374,14 +383,15 @@ plt.show()
 # kernel 1 2 3, rate 2  0    3    0    2    0    1    0    0       sees 5, with the same three weights
 # ```
 #
-# **Predict before you run.** Halve a row by stride 2 (keep columns 0, 2, 4, 6), then convolve it with rate 1. Which
-# numbers of a convolution with rate 2 on the *whole* row are those? And put three layers of rate 2 on top of each other. Their field
+# **Predict before you run.** Keep every second column of the row, then convolve with rate 1. Which numbers of a
+# convolution with rate 2 on the *whole* row are those? And put three layers of rate 2 on top of each other. Their field
 # has 13 columns: how many of them count?
 #
 # <details><summary>Answer</summary>
 #
-# Exactly those of columns 0, 2, 4, 6, because the kernel of rate 2 reads every second pixel. The numbers in between are
-# new. Seven of 13 count: an even column reads even columns, which read even columns. With rates 1, 2, 4 all count.
+# Exactly those of the columns that you kept, because the kernel of rate 2 reads every second pixel. The numbers in
+# between are new. Seven of 13 count: an even column reads even columns, which read even columns. With growing rates, 1,
+# 2, 4, all count.
 #
 # </details>
 
@@ -442,7 +452,13 @@ for way, overlaps in lecture_07_thin_pole.REACHED.items():
     print(f"{way.down:<8} {way.up:<8} {np.mean(overlaps):3.0f} %   five seeds: {overlaps}")
 
 # %% [markdown]
-# TEXT-STRIDES
+# Scored at once, both are poor. With equal decoders the strided networks are no worse than the pooled ones. So the
+# stride wasn't to blame: what looked like its fault was a missing decoder. Our row by hand only dropped values, whereas a
+# 3x3 kernel with stride 2 still reads every pixel.
+#
+# The bars on the right show what does help. A decoder that gets indices or skips is told *where*, and with skips the
+# network is equally good whether it pools or strides. The atrous network, which never halves, is as good. So it matters
+# less how you halve than what you hand over on the way up.
 #
 # ## What have the three learned?
 #
