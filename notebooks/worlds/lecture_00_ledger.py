@@ -13,7 +13,6 @@ from worlds import (
     lecture_04_cmcdot_graph,
     lecture_05_pixel_ray,
     lecture_06_shared_pixel,
-    lecture_07_post,
     lecture_09_label,
     lecture_10_crf,
     lecture_14_class_memory,
@@ -129,14 +128,6 @@ STAGES = (
         lecture_06_shared_pixel.CUT,
         "tests/worlds/test_pixels.py::test_cells_that_share_a_pixel_know_no_more_than_one",
         "06_planes#graph",
-    ),
-    Stage(
-        "network",
-        "Labels of pixels along a post",
-        lecture_07_post.post_pixels,
-        lecture_07_post.CUT,
-        "tests/worlds/test_pixels.py::test_a_post_is_the_sum_over_all_its_labels",
-        "07_segmentation#graph",
     ),
     Stage(
         "label",
