@@ -203,8 +203,8 @@ assert (learned[:, [0, 2]] < -0.5).all()
 assert 25 < one_layer < 40
 
 # %% [markdown]
-# Nobody told it, and yet each row of the learned kernel is our own, only larger. Its score is poor, though. By
-# *intersection over union* (pixels that are pole and called pole, over those that are one or the other) it gets about a
+# Nobody told it, and yet each row of the learned kernel is our own, only larger. The layer is poor, though. Its
+# *intersection over union* (pixels that are pole and called pole, over those that are one or the other) is about a
 # third. The trivial rule "never a pole" gets nothing there, but 97 % in pixel accuracy, so don't judge thin things by that.
 # One thing this layer can never do: a pixel of a two-pixel pole has one bright and one dark neighbour, and so has the
 # edge of a wall. Nine pixels can't tell them apart.
@@ -453,8 +453,7 @@ for way, overlaps in lecture_07_thin_pole.REACHED.items():
 
 # %% [markdown]
 # Scored at once, both are poor. With equal decoders the strided networks are no worse than the pooled ones. So the
-# stride wasn't to blame: what looked like its fault was a missing decoder. Our row by hand only dropped values, whereas a
-# 3x3 kernel with stride 2 still reads every pixel.
+# stride isn't to blame. Our row by hand only dropped values, whereas a 3x3 kernel with stride 2 still reads every pixel.
 #
 # The bars on the right show what does help. A decoder that gets indices or skips is told *where*, and with skips the
 # network is equally good whether it pools or strides. The atrous network, which never halves, is as good. So it matters
@@ -464,7 +463,7 @@ for way, overlaps in lecture_07_thin_pole.REACHED.items():
 #
 # The three shipped networks learned from labelled images of other simulated streets. Here they are on the sign of our drive:
 
-# %% jupyter={"source_hidden": true} alt="SIGN-ALT"
+# %% jupyter={"source_hidden": true} alt="four pictures of the sign and the lamp post: A truth, a yellow sign on a thin yellow post and a yellow lamp post beside a small pedestrian; B SegNet, a ragged yellow patch on the sign, none on the lamp post, much red for pedestrian; C FCN, yellow blobs on half of the sign and on the lower lamp post; D DeepLab, smaller yellow patches; no network draws the thin post"
 with torch.inference_mode():
     scores = {name: net(x) for name, net in nets.items()}
 classes = {name: found.argmax(dim=1).numpy() for name, found in scores.items()}
@@ -546,9 +545,10 @@ assert labels_that_move(nets["deeplab"], 1) < 0.95
 
 # %% [markdown]
 # One label in eight doesn't move along. The cause is the halving: after a shift of one pixel the windows hold other
-# pixels. Switch it off. After a shift of 16 pixels, the size of SegNet's coarsest cell, all windows hold the same pixels
-# as before, and every label moves along. Indices don't cure this, and DeepLab, which has none, isn't free of it either, because it halves three times.
-# So on a real drive labels flicker while the car moves, and a map that believes each frame anew flickers, too.
+# pixels. Switch it off: after 16 pixels, the side of SegNet's coarsest cell, all windows hold the same pixels as before,
+# and every label moves along. It isn't the indices, because DeepLab has none and halves, too.
+#
+# So a label may change although nothing in the street has. That is a reason to believe no single frame, and to filter.
 #
 # ## In five lines
 #

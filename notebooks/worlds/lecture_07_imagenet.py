@@ -29,8 +29,9 @@ from semgrid_edu.networks.imagenet import INSTALLED, PACKAGE_SHA256
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training.batches import draw_batch
-from semgrid_edu.workshop.scoring.score_with_interval import compared, on_cells, score_with_interval
-from worlds.lecture_08_counts import as_text
+from semgrid_edu.workshop.scoring.score_with_interval import on_cells
+from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
+from worlds.lecture_08_counts import as_text, named
 
 SIZE = (96, 320)
 """Height and width of the images, pixels: what the compact networks see."""
@@ -65,25 +66,32 @@ class Run(NamedTuple):
         Number of labelled frames.
     steps : int
         Number of steps of gradient descent.
+    normalised : bool
+        Whether each map of the encoder is normalised (batch normalisation) before the pyramid adds it.
+    seeds : int
+        Number of networks of each round.
     """
 
     start: str
     frames: int
     steps: int
+    normalised: bool = False
+    seeds: int = 2
 
     @property
     def name(self) -> str:
         """What the run is called in the results."""
-        return f"{self.start}, {self.frames} frames, {self.steps} steps"
+        return f"{self.start}, {self.frames} frames, {self.steps} steps" + ", normalised" * self.normalised
 
 
 RUNS = (
     *(Run(start, frames, 100) for frames in (2, 8, 24) for start in (IMAGENET, FRESH)),
     Run(SHUFFLED, 24, 100),
     Run(FRESH, 24, 300),
+    *(Run(start, 24, 100, normalised=True, seeds=1) for start in (IMAGENET, FRESH, SHUFFLED)),
 )
-"""What is compared; the last two are controls: the same sizes of weights without the knowledge, and three times the
-steps."""
+"""What is compared. Controls: the same sizes of weights without the knowledge, three times the steps, and maps of equal
+size. ImageNet's maps are four to seven times as large as fresh ones, and the pyramid adds them as they are."""
 
 
 class Images(NamedTuple):
@@ -136,7 +144,7 @@ def draw_frames(cameras: list[Images], n: int, seed: int) -> list[Sample]:
     return [Sample(images.image[k], images.labels[k], nothing, nothing) for images, k in pairs]
 
 
-def start_from(start: str, seed: int) -> Segmenter:
+def start_from(start: str, seed: int, normalised: bool = False) -> Segmenter:
     """Return the network before it learns.
 
     Parameters
@@ -145,8 +153,13 @@ def start_from(start: str, seed: int) -> Segmenter:
         `FRESH`, `IMAGENET` or `SHUFFLED`.
     seed : int
         Seed for fresh weights, and for the order of shuffled ones.
+    normalised : bool
+        Whether each map is normalised before the pyramid adds it.
     """
     net = build_segmenter("efficientnet", len(KITTI_14), "compact", seed)
+    if normalised:
+        pairs = (nn.Sequential(layer, nn.BatchNorm2d(layer.out_channels)) for layer in net.lateral)
+        net.lateral = nn.ModuleList(pairs)
     for layer in net.modules():
         if isinstance(layer, nn.BatchNorm2d):
             layer.momentum = 0.1  # the published 0.01 would need hundreds of steps to forget its first statistics
@@ -171,7 +184,7 @@ def learn(run: Run, frames: list[Sample], seed: int) -> Segmenter:
     seed : int
         Seed for everything that is drawn.
     """
-    net = start_from(run.start, seed).train()
+    net = start_from(run.start, seed, run.normalised).train()
     taught = {tensor.data_ptr() for tensor in net.imagenet_tensors().values()}
     encoder = [weight for weight in net.parameters() if weight.data_ptr() in taught]
     others = [weight for weight in net.parameters() if weight.data_ptr() not in taught]
@@ -226,7 +239,7 @@ def _most_frequent(labels: NDArray) -> int:
     return int(np.bincount(labels[labels != IGNORE], minlength=1).argmax())
 
 
-def imagenet_worth(root: str | Path, scene: str, runs: str | Path, seeds: int = 2) -> dict[str, object]:
+def imagenet_worth(root: str | Path, scene: str, runs: str | Path) -> dict[str, object]:
     """Train in all ways of `RUNS` and score the cameras that were left out.
 
     Parameters
@@ -235,8 +248,6 @@ def imagenet_worth(root: str | Path, scene: str, runs: str | Path, seeds: int = 
         As `PandasetScene` takes them.
     runs : path-like
         Takes a file of counts for each training run. A run that has ended isn't repeated.
-    seeds : int
-        Number of networks of each way and round.
 
     Returns
     -------
@@ -247,7 +258,8 @@ def imagenet_worth(root: str | Path, scene: str, runs: str | Path, seeds: int = 
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)  # the bits depend on the number of threads
     cameras = {camera: read_images(root, scene, camera) for camera in CAMERAS}
-    wanted = [(seed, run, pair) for seed in range(seeds) for run in RUNS for pair in LEFT_OUT]
+    most = max(run.seeds for run in RUNS)
+    wanted = [(seed, run, pair) for seed in range(most) for run in RUNS for pair in LEFT_OUT if seed < run.seeds]
     counts: dict[str, dict[str, list[NDArray]]] = {}
     own: dict[str, list[NDArray]] = {}
     seconds = 0.0
@@ -270,12 +282,12 @@ def imagenet_worth(root: str | Path, scene: str, runs: str | Path, seeds: int = 
         for camera in pair:
             for name, matrix in baselines(learned, cameras[camera]).items():
                 counts.setdefault(name, {})[camera] = [matrix]
-    command = f"python -m worlds.lecture_07_imagenet PANDASET RUNS OUT --scene {scene} --seeds {seeds}"
+    command = f"python -m worlds.lecture_07_imagenet PANDASET RUNS OUT --scene {scene}"
     return {
         "scores": scores_of(counts),
         OWN: {name: float(METRICS["pixel accuracy"](sum(matrices))) for name, matrices in own.items()},
         "counts": {name: as_text({c: np.stack(m) for c, m in one.items()}) for name, one in counts.items()},
-        "seeds": seeds,
+        "seeds": {run.name: run.seeds for run in RUNS},
         "CPU minutes": round(seconds / 60, 1),
         "ImageNet weights": PACKAGE_SHA256,
         **made_by(command, "numpy", "torch"),
@@ -306,29 +318,30 @@ def scores_of(counts: dict[str, dict[str, list[NDArray]]]) -> dict[str, dict]:
         name: on_cells(np.stack([np.stack(one[camera]) for camera in CAMERAS], axis=1), "semantic", KITTI_14)
         for name, one in counts.items()
     }
-    found = {}
+    found: dict[str, dict] = {}
     for name, matrices in ours.items():
         fresh = name.replace(IMAGENET, FRESH)
         metrics = {metric: METRICS[metric] for metric in ("pixel accuracy", "class accuracy")}
-        found[name] = {metric: score_with_interval(matrices, of) for metric, of in metrics.items()}
+        found[name] = {metric: named(drive_interval(matrices, of)) for metric, of in metrics.items()}
         if fresh != name and fresh in ours:
-            found[name]["above fresh weights"] = {m: compared(matrices, ours[fresh], of) for m, of in metrics.items()}
+            pairs = {metric: named(paired_interval(matrices, ours[fresh], of)) for metric, of in metrics.items()}
+            found[name]["above fresh weights"] = pairs
     return found
 
 
-def main(pandaset: Path, runs: Path, out: Path, scene: str = "002", seeds: int = 2) -> None:
+def main(pandaset: Path, runs: Path, out: Path, scene: str = "002") -> None:
     """Train and score everything, write the result and print its scores.
 
     Parameters
     ----------
     pandaset : Path
         The folder of PandaSet's scenes.
-    runs, scene, seeds
+    runs, scene
         As `imagenet_worth` takes them.
     out : Path
         A JSON file.
     """
-    result = imagenet_worth(pandaset, scene, runs, seeds)
+    result = imagenet_worth(pandaset, scene, runs)
     write_json(out, result)
     for name, scores in result["scores"].items():
         print(f"{name:<40}", json.dumps(scores))
