@@ -91,7 +91,7 @@ RUNS = (
     *(Run(start, 24, 100, normalised=True, seeds=1) for start in (IMAGENET, FRESH, SHUFFLED)),
 )
 """What is compared. Controls: the same sizes of weights without the knowledge, three times the steps, and maps of equal
-size. ImageNet's maps are four to seven times as large as fresh ones, and the pyramid adds them as they are."""
+size. ImageNet's maps are three to seven times as large as fresh ones, and the pyramid adds them as they are."""
 
 
 class Images(NamedTuple):

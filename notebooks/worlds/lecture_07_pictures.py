@@ -96,7 +96,7 @@ def draw_reached(reached: Mapping[Way, tuple[int, ...]], one_layer: float) -> Fi
             k, 3, f"{mean:.0f}", ha="center", fontsize=10, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1}
         )
     ax.axhline(one_layer, color="tab:red", linestyle="--", linewidth=1.2)
-    ax.text(len(reached) - 0.45, one_layer + 2, "one convolution", ha="right", fontsize=9, color="tab:red",
+    ax.text(-0.48, one_layer - 8, "one convolution", ha="left", fontsize=9, color="tab:red",
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})  # fmt: skip
     ax.set_xticks(range(len(reached)), [f"{way.down}\n{way.up}" for way in reached], fontsize=9)
     ax.set(ylabel="overlap (IoU) [%]", ylim=(0, 100))
@@ -126,21 +126,17 @@ def draw_signs(truth: NDArray[np.uint8], classes: Mapping[str, NDArray[np.uint8]
 
 
 def draw_pretrained() -> Figure:
-    """Draw pixel accuracy over labelled frames, from ImageNet and from fresh weights, with controls and a baseline."""
-    fig, axes = plt.subplots(1, 2, figsize=(8.6, 3.5), layout="constrained", sharey=True)
-    looks = {"ImageNet": ("#0072b2", "o", "-"), "fresh": ("#d55e00", "s", "--")}
-    panels = ("A: cameras that it hasn't seen", pretrained.UNSEEN), ("B: the frames that it learned", pretrained.OWN)
-    for ax, (title, reached) in zip(axes, panels, strict=True):
-        for name, (colour, marker, line) in looks.items():
-            ax.plot(pretrained.FRAMES, reached[name], line, marker=marker, color=colour, label=f"{name} weights")
+    """Draw pixel accuracy by what the encoder starts from, for maps as they are and for normalised maps."""
+    fig, axes = plt.subplots(1, 2, figsize=(8.2, 3.3), layout="constrained", sharey=True)
+    names, colours = ("ImageNet", "ImageNet,\nshuffled", "fresh"), ("#9ecae1", "#d9d9d9", "#fdae6b")
+    panels = {"A: maps as they are": pretrained.AS_IT_IS, "B: each map normalised": pretrained.NORMALISED}
+    for ax, (title, reached) in zip(axes, panels.items(), strict=True):
+        bars = ax.bar(names, reached, color=colours, hatch=("", "..", "//"), edgecolor="0.3", width=0.6)
+        ax.bar_label(bars, fmt="%.0f", fontsize=10)
+        ax.axhline(pretrained.ROWS, color="tab:red", linestyle="--", linewidth=1.2)
         ax.set_title(title, fontsize=10)
-        ax.set(xscale="log", xlabel="labelled frames", ylim=(0, 100))
-        ax.set_xticks(pretrained.FRAMES, [str(frames) for frames in pretrained.FRAMES])
-        ax.minorticks_off()
-    controls = zip("^v", pretrained.CONTROLS.items(), strict=True)
-    for marker, (name, share) in controls:
-        axes[0].plot(pretrained.FRAMES[-1], share, marker, color="0.35", markersize=8, label=name)
-    axes[0].axhline(pretrained.ROWS, color="0.5", linestyle=":", label="class of each row")
-    axes[0].set_ylabel("pixel accuracy [%]")
-    axes[0].legend(fontsize=8, loc="lower right")
+        ax.set(ylim=(0, 100))
+    axes[0].text(-0.45, pretrained.ROWS - 7, "class of each row", fontsize=9, color="tab:red",
+                 bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})  # fmt: skip
+    axes[0].set_ylabel("pixel accuracy on other cameras [%]")
     return fig
