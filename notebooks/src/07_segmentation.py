@@ -477,7 +477,7 @@ plt.show()
 # pixels that are called signage (*recall*), *right* the share of those called so that are (*precision*). The baseline
 # looks at no image: it knows the most frequent class of each row, even from these very frames.
 
-# %%
+# %% jupyter={"source_hidden": true}
 matrices = {NAMES[name]: metrics.confusion_matrix(truths, found, 14) for name, found in classes.items()}
 rows = lecture_07_pictures.class_of_each_row(truths)
 matrices["baseline"] = metrics.confusion_matrix(truths, np.broadcast_to(rows[:, None], truths.shape), 14)
@@ -513,12 +513,12 @@ for name, found in scores.items():
 #
 # The paper doesn't start from random weights. **Pretraining** means: learn another task first, for which labels are
 # plenty, and go on from there. Here the first task is to name what is on each of 1.3 million photographs (*ImageNet*).
-# Then the last layer is replaced by a decoder, and the network learns our labels. Edges, textures and wheels are known by then.
+# Then the last layer is replaced by a decoder, and the network learns our labels.
 #
-# We took a pretrained encoder, EfficientNet-Lite0, and a decoder that adds maps of five sizes, as FCN adds skips. The street is real (PandaSet, six
-# cameras). The network learned from 24 labelled images of four cameras, in 100 short steps. It is scored on the two other
-# cameras, three times with other pairs. A control has ImageNet's weights *shuffled* within each layer. It has weights of the same size, but
-# knows nothing.
+# We took a pretrained encoder, EfficientNet-Lite0, and a decoder that adds maps of five sizes, as FCN adds skips. The
+# street is real (PandaSet, six cameras). The network learned from 24 labelled images of four cameras, in 100 steps, and
+# is scored on the two other cameras; three rounds leave out each camera once. A control has ImageNet's weights
+# *shuffled* within each layer: the same numbers in another order, so it knows nothing.
 #
 # **Predict before you run.** "From ImageNet 46 % of the pixels are right, from fresh weights 68 %. So pretraining harms."
 # The shuffled weights reach 40 %. Which suspect does the control leave?
@@ -529,9 +529,10 @@ for name, found in scores.items():
 #
 # </details>
 #
-# Indeed the pretrained encoder's maps are three to seven times as large as those of fresh weights. The decoder adds its
-# maps as they are, so the one with the largest numbers, the finest, drowns the others. If this is the
-# cause, then dividing each map by its own spread before it is added (*batch normalisation*) must change the picture:
+# Indeed the pretrained encoder's maps are three to seven times as large as fresh ones. The decoder normalises what comes
+# up from the coarser maps, but adds the next finer map as it is. So the finest map, which has seen least, drowns the
+# others. If this is the cause, then normalising each map before it is added (subtract its mean, divide by its spread:
+# *batch normalisation*) must change the picture:
 
 # %% jupyter={"source_hidden": true} alt="IMAGENET-ALT"
 lecture_07_pictures.draw_pretrained()
@@ -548,8 +549,8 @@ plt.show()
 # right on other cameras [%]          OTH2    OTH8    OTH24
 # ```
 #
-# The gap is **overfitting**: the network fits the images that it has seen better than the street. It shrinks with more labelled images.
-# If you judge a network on what it learned from, you measure its memory. So pretraining brings knowledge, if the decoder can
+# The gap is **overfitting**: the network fits the images that it learned from better than the street. It shrinks with
+# more images. If you judge a network on what it learned from, you measure its memory. So pretraining brings knowledge, if the decoder can
 # use it, and only images that nobody learned from can tell.
 #
 # ## Where this breaks
