@@ -20,20 +20,20 @@ class Reached(NamedTuple):
     fresh: float
 
 
-AS_IT_IS = Reached(0, 0, 0)
+AS_IT_IS = Reached(imagenet=46, shuffled=48, fresh=65)
 """Where the decoder adds the encoder's maps as they are; means of two seeds."""
 
-NORMALISED = Reached(0, 0, 0)
+NORMALISED = Reached(imagenet=82, shuffled=45, fresh=65)
 """Where each map is normalised before it is added; one seed."""
 
-LONGER = 0
+LONGER = 74
 """Fresh weights as they are, three times the steps."""
 
-ROWS = 0
+ROWS = 41
 """The most frequent class of each row: a baseline without an image."""
 
-ADDED = (0, 0, 0)
+ADDED = (17, 9, 25)
 """What ImageNet's weights add to fresh ones where maps are normalised: mean, and ends of the interval over cameras."""
 
-OWN, OTHERS = {2: 0, 8: 0, 24: 0}, {2: 0, 8: 0, 24: 0}
+OWN, OTHERS = {2: 92, 8: 87, 24: 86}, {2: 58, 8: 64, 24: 65}
 """By number of labelled frames: on these very frames, and on other cameras; fresh weights, maps as they are."""
