@@ -109,17 +109,9 @@ STAGES = (
         "pixel",
         "Pixels and the cells along their rays",
         lecture_05_pixel_ray.pixel_ray,
-        lecture_05_pixel_ray.CUT_RAY,
+        (),
         "tests/worlds/test_pixels.py::test_the_posterior_is_the_sum_over_all_streets",
         "05_pixels#graph",
-    ),
-    Stage(
-        "height",
-        "The height of what a pixel shows",
-        lecture_05_pixel_ray.pixel_height,
-        lecture_05_pixel_ray.CUT_HEIGHT,
-        "tests/worlds/test_pixels.py::test_the_height_of_a_car_tells_where_along_the_ray_it_is",
-        "05_pixels#graph-height",
     ),
     Stage(
         "planes",

@@ -4,10 +4,10 @@ from itertools import product
 
 import numpy as np
 import pytest
-from worlds.lecture_05_pixel_ray import RayWorld, cell_by_cell, exact_ray, occlusion_cost, pixel_height, pixel_ray
+from worlds.lecture_05_pixel_ray import RayWorld, cell_by_cell, exact_ray, pixel_ray
 from worlds.lecture_06_shared_pixel import believed_by_readers, shared_pixel
 
-from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals
+from semgrid_edu.graphical import d_separated, enumerate_marginals
 
 
 def test_the_posterior_is_the_sum_over_all_streets():
@@ -32,11 +32,6 @@ def test_without_occlusion_there_is_one_cell_and_both_agree():
     for label in (0, 1):
         world = RayWorld(1, prior=0.3, right=0.8)
         np.testing.assert_allclose(exact_ray([label], world), cell_by_cell([label], world), atol=1e-12)
-    assert occlusion_cost(RayWorld(1))[0] == pytest.approx(0, abs=1e-12)
-
-
-def test_occlusion_costs_more_the_farther_a_cell_is():
-    assert (np.diff(occlusion_cost()) > 0).all()
 
 
 def test_a_pixel_makes_the_cells_on_its_ray_depend_on_each_other():
@@ -44,13 +39,6 @@ def test_a_pixel_makes_the_cells_on_its_ray_depend_on_each_other():
     assert d_separated(model, "m1", "m3")
     assert not d_separated(model, "m1", "m3", given=("a3",))
     assert d_separated(model, "m4", "a3")
-
-
-def test_the_height_of_a_car_tells_where_along_the_ray_it_is():
-    model = pixel_height((0.2, 0.3, 0.5)).model
-    np.testing.assert_allclose(eliminate(model, ("x",), {"a": 1}).normalised().table, [0.2, 0.3, 0.5])
-    np.testing.assert_allclose(eliminate(model, ("x",), {"a": 0}).normalised().table, [1, 0, 0])
-    assert d_separated(model, "a", "x", given=("h",))
 
 
 @pytest.mark.parametrize("readers", [1, 2, 5])
