@@ -136,7 +136,7 @@ def draw_pretrained() -> Figure:
         ax.axhline(pretrained.ROWS, color="tab:red", linestyle="--", linewidth=1.2)
         ax.set_title(title, fontsize=10)
         ax.set(ylim=(0, 100))
-    axes[0].text(-0.45, pretrained.ROWS - 7, "class of each row", fontsize=9, color="tab:red",
+    axes[0].text(-0.40, pretrained.ROWS - 7, "class of each row", fontsize=9, color="tab:red",
                  bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})  # fmt: skip
     axes[0].set_ylabel("pixel accuracy on other cameras [%]")
     return fig
