@@ -12,7 +12,6 @@ from worlds import (
     lecture_03_bof,
     lecture_04_cmcdot_graph,
     lecture_05_pixel_ray,
-    lecture_07_post,
     lecture_09_label,
     lecture_10_crf,
     lecture_14_class_memory,
@@ -112,14 +111,6 @@ STAGES = (
         (),
         "tests/worlds/test_pixels.py::test_the_posterior_is_the_sum_over_all_streets",
         "05_pixels#graph",
-    ),
-    Stage(
-        "network",
-        "Labels of pixels along a post",
-        lecture_07_post.post_pixels,
-        lecture_07_post.CUT,
-        "tests/worlds/test_pixels.py::test_a_post_is_the_sum_over_all_its_labels",
-        "07_segmentation#graph",
     ),
     Stage(
         "label",
