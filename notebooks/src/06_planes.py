@@ -608,10 +608,10 @@ def converging():
     left.set(ylim=(95.5, 30), xlim=(60, 319.5), xlabel="u [pixels]", ylabel="v [pixels]")
     right.axhline(0, color="0.6", linewidth=1)
     right.set(xlim=(-0.5, 9.5), xticks=(0, 4, 8), ylim=(-0.7, 2.2), xlabel="step", ylabel="pitch [degrees]", title="B")
-    dots = []
-    for c, (colour, marker) in enumerate(zip(KITTI_14.colours(np.array(calibration.FLAT)) / 255, ".+", strict=True)):
-        name = KITTI_14.names[calibration.FLAT[c]]
-        dots += left.plot([], [], marker, color=colour, markersize=3, linestyle="", label=name)
+    looks = zip(calibration.FLAT, KITTI_14.colours(np.array(calibration.FLAT)) / 255, ".+", strict=True)
+    dots = [
+        left.plot([], [], mark, color=colour, markersize=3, label=KITTI_14.names[c])[0] for c, colour, mark in looks
+    ]
     left.legend(loc="upper left", fontsize=8, markerscale=2)
     (line,) = right.plot([], [], ".-", color="black")
     for step in (0, 1, 2, 3, 4, 6, 9):
