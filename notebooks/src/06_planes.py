@@ -592,6 +592,8 @@ path = descend(2.0, lessons, steps=10)
 print("pitch in degrees:", *(f"{degrees:.1f}" for degrees in path))
 
 # %% jupyter={"source_hidden": true}
+colours = KITTI_14.colours(np.array(calibration.FLAT)) / 255
+LOOKS = list(zip(("road", "sidewalk"), ".+", colours, strict=True))
 angle = torch.tensor(0.02, dtype=torch.float64, requires_grad=True)
 (derivative,) = torch.autograd.grad(calibration.loss_at(angle, lessons, camera.K), angle)
 nudged = [calibration.loss_at(torch.tensor(0.02 + a, dtype=torch.float64), lessons, camera.K) for a in (-1e-7, 1e-7)]
@@ -608,10 +610,7 @@ def converging():
     left.set(ylim=(95.5, 30), xlim=(60, 319.5), xlabel="u [pixels]", ylabel="v [pixels]")
     right.axhline(0, color="0.6", linewidth=1)
     right.set(xlim=(-0.5, 9.5), xticks=(0, 4, 8), ylim=(-0.7, 2.2), xlabel="step", ylabel="pitch [degrees]", title="B")
-    looks = zip(calibration.FLAT, KITTI_14.colours(np.array(calibration.FLAT)) / 255, ".+", strict=True)
-    dots = [
-        left.plot([], [], mark, color=colour, markersize=3, label=KITTI_14.names[c])[0] for c, colour, mark in looks
-    ]
+    dots = [left.plot([], [], mark, markersize=3, label=name, color=colour)[0] for name, mark, colour in LOOKS]
     left.legend(loc="upper left", fontsize=8, markerscale=2)
     (line,) = right.plot([], [], ".-", color="black")
     for step in (0, 1, 2, 3, 4, 6, 9):
