@@ -597,9 +597,8 @@ angle = torch.tensor(0.02, dtype=torch.float64, requires_grad=True)
 nudged = [calibration.loss_at(torch.tensor(0.02 + a, dtype=torch.float64), lessons, camera.K) for a in (-1e-7, 1e-7)]
 np.testing.assert_allclose(derivative.item(), (nudged[1] - nudged[0]).item() / 2e-7, rtol=1e-3)
 
-# %% jupyter={"source_hidden": true} alt="animation: A, dots of road and sidewalk are too high in the image and slide down within four steps until the border between them is on the kerb; B, the pitch over the steps falls from two degrees to minus 0.3"
 
-
+# %% jupyter={"source_hidden": true}
 def converging():
     """Yield the figure with the points at each step."""
     fig, (left, right) = plt.subplots(1, 2, figsize=(8.2, 2.7), layout="constrained", width_ratios=(3, 1))
@@ -624,6 +623,7 @@ def converging():
         fig.set_layout_engine("none")  # only the first frame is laid out
 
 
+# %% jupyter={"source_hidden": true} alt="animation: A, dots of road and sidewalk are too high in the image and slide down within four steps until the border between them is on the kerb; B, the pitch over the steps falls from two degrees to minus 0.3"
 plotting.animate(converging(), period=0.6, alt="the map's cells slide onto road and sidewalk as the pitch is learnt")
 
 # %% [markdown]
