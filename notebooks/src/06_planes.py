@@ -592,16 +592,13 @@ path = descend(2.0, lessons, steps=10)
 print("pitch in degrees:", *(f"{degrees:.1f}" for degrees in path))
 
 # %% jupyter={"source_hidden": true}
-colours = KITTI_14.colours(np.array(calibration.FLAT)) / 255
-LOOKS = list(zip(("road", "sidewalk"), ".+", colours, strict=True))
 angle = torch.tensor(0.02, dtype=torch.float64, requires_grad=True)
 (derivative,) = torch.autograd.grad(calibration.loss_at(angle, lessons, camera.K), angle)
 nudged = [calibration.loss_at(torch.tensor(0.02 + a, dtype=torch.float64), lessons, camera.K) for a in (-1e-7, 1e-7)]
 np.testing.assert_allclose(derivative.item(), (nudged[1] - nudged[0]).item() / 2e-7, rtol=1e-3)
 
-# %% jupyter={"source_hidden": true} alt="animation: A, dots of road and sidewalk are too high in the image and slide down within four steps until the border between them is on the kerb; B, the pitch over the steps falls from two degrees to minus 0.3"
 
-
+# %% jupyter={"source_hidden": true}
 def converging():
     """Yield the figure with the points at each step."""
     fig, (left, right) = plt.subplots(1, 2, figsize=(8.2, 2.7), layout="constrained", width_ratios=(3, 1))
@@ -610,7 +607,10 @@ def converging():
     left.set(ylim=(95.5, 30), xlim=(60, 319.5), xlabel="u [pixels]", ylabel="v [pixels]")
     right.axhline(0, color="0.6", linewidth=1)
     right.set(xlim=(-0.5, 9.5), xticks=(0, 4, 8), ylim=(-0.7, 2.2), xlabel="step", ylabel="pitch [degrees]", title="B")
-    dots = [left.plot([], [], mark, markersize=3, label=name, color=colour)[0] for name, mark, colour in LOOKS]
+    dots = []
+    for c, (colour, marker) in enumerate(zip(KITTI_14.colours(np.array(calibration.FLAT)) / 255, ".+", strict=True)):
+        name = KITTI_14.names[calibration.FLAT[c]]
+        dots += left.plot([], [], marker, color=colour, markersize=3, linestyle="", label=name)
     left.legend(loc="upper left", fontsize=8, markerscale=2)
     (line,) = right.plot([], [], ".-", color="black")
     for step in (0, 1, 2, 3, 4, 6, 9):
@@ -623,6 +623,7 @@ def converging():
         fig.set_layout_engine("none")  # only the first frame is laid out
 
 
+# %% jupyter={"source_hidden": true} alt="animation: A, dots of road and sidewalk are too high in the image and slide down within four steps until the border between them is on the kerb; B, the pitch over the steps falls from two degrees to minus 0.3"
 plotting.animate(converging(), period=0.6, alt="the map's cells slide onto road and sidewalk as the pitch is learnt")
 
 # %% [markdown]

@@ -14,7 +14,7 @@
 # **Prerequisites.** Lecture [06](06_planes.ipynb): a loss, one step of descent, bilinear sampling. You need no deep
 # learning.
 #
-# **Time.** 70 minutes, of which the computer needs less than one.
+# **Time.** 71 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.1, which names the three networks, and 4.1 for ImageNet.
 
