@@ -65,7 +65,7 @@ def test_shuffled_weights_have_the_same_values_in_another_order():
 
 def test_maps_of_pretrained_weights_are_three_to_seven_times_as_large():
     frame = sample_drive()[0]
-    image = torch.from_numpy(resize_image(frame.image, imagenet.SIZE)).permute(2, 0, 1)[None] / 255
+    image = torch.tensor(resize_image(frame.image, imagenet.SIZE)).permute(2, 0, 1)[None] / 255
     sizes = []
     for start in (IMAGENET, FRESH):
         net = imagenet.start_from(start, 0).train()
