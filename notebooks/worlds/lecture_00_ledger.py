@@ -12,7 +12,6 @@ from worlds import (
     lecture_03_bof,
     lecture_04_cmcdot_graph,
     lecture_05_pixel_ray,
-    lecture_06_shared_pixel,
     lecture_09_label,
     lecture_10_crf,
     lecture_14_class_memory,
@@ -112,14 +111,6 @@ STAGES = (
         (),
         "tests/worlds/test_pixels.py::test_the_posterior_is_the_sum_over_all_streets",
         "05_pixels#graph",
-    ),
-    Stage(
-        "planes",
-        "Cells that read one pixel",
-        lecture_06_shared_pixel.shared_pixel,
-        lecture_06_shared_pixel.CUT,
-        "tests/worlds/test_pixels.py::test_cells_that_share_a_pixel_know_no_more_than_one",
-        "06_planes#graph",
     ),
     Stage(
         "label",

@@ -1,13 +1,11 @@
-"""Pixels along a ray: occlusion by hand, what cell by cell makes of it, heights, and errors that cells share."""
+"""Pixels along a ray: occlusion by hand, what cell by cell makes of it, and heights."""
 
 from itertools import product
 
 import numpy as np
-import pytest
 from worlds.lecture_05_pixel_ray import RayWorld, cell_by_cell, exact_ray, pixel_ray
-from worlds.lecture_06_shared_pixel import believed_by_readers, shared_pixel
 
-from semgrid_edu.graphical import d_separated, enumerate_marginals
+from semgrid_edu.graphical import d_separated
 
 
 def test_the_posterior_is_the_sum_over_all_streets():
@@ -39,14 +37,3 @@ def test_a_pixel_makes_the_cells_on_its_ray_depend_on_each_other():
     assert d_separated(model, "m1", "m3")
     assert not d_separated(model, "m1", "m3", given=("a3",))
     assert d_separated(model, "m4", "a3")
-
-
-@pytest.mark.parametrize("readers", [1, 2, 5])
-def test_cells_that_share_a_pixel_know_no_more_than_one(readers):
-    exact, alone = believed_by_readers(readers, right=0.8, prior=0.5)
-    assert exact == pytest.approx(0.8)
-    assert alone == pytest.approx(0.8**readers / (0.8**readers + 0.2**readers))
-    model = shared_pixel(readers).model
-    assert enumerate_marginals(model, ("m",), {"x1": 1}).normalised().table[1] == pytest.approx(0.8)
-    assert readers == 1 or d_separated(model, "x1", "x2", given=("a",))
-    assert readers == 1 or not d_separated(model, "x1", "x2", given=("m",))

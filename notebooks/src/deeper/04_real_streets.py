@@ -13,7 +13,7 @@
 # **Prerequisites.** Lecture [04](../04_cmcdot.ipynb); factors and elimination, lecture
 # [01b](../01b_graphical_models.ipynb).
 #
-# **Time.** 48 minutes, of which the computer needs less than one.
+# **Time.** 49 minutes, of which the computer needs less than one.
 
 # %% jupyter={"source_hidden": true}
 import json
