@@ -207,7 +207,7 @@ assert 25 < one_layer < 40
 # *intersection over union* (pixels that are pole and called pole, over those that are one or the other) is about a
 # third. The trivial rule "never a pole" gets nothing there, but 97 % in pixel accuracy, so don't judge thin things by that.
 # One thing this layer can never do: a pixel of a two-pixel pole has one bright and one dark neighbour, and so has the
-# edge of a wall. Nine pixels can't tell them apart.
+# edge of a wall. Nine pixels can't tell these two apart.
 #
 # The paper hands the *scores* to the planes of lecture 06, not the probabilities. Say that *post* leads by 6 in
 # one pixel and trails by 1 in the next. A point halfway between them gets a lead of 2.5, which is P = 0.92. If you
@@ -520,18 +520,20 @@ for name, found in scores.items():
 # We took a pretrained encoder, EfficientNet-Lite0, and a decoder that adds maps of five sizes, as FCN adds skips. The
 # street is real (PandaSet, six cameras). The network learned from 24 labelled images of four cameras, in 100 steps, and
 # is scored on the two other cameras; three rounds leave out each camera once. A control has ImageNet's weights
-# *shuffled* within each layer: the same numbers in another order, so it knows nothing.
+# *shuffled* within each layer: the same numbers in another order, so it knows nothing. (Both learn by smaller steps than
+# fresh weights, so as not to spoil what is known.)
 #
 # **Predict before you run.** "From ImageNet 46 % of the pixels are right, from fresh weights 65 %. So pretraining harms."
 # The shuffled weights reach 48 %. Which suspect does the control leave?
 #
 # <details><summary>Answer</summary>
 #
-# Not the knowledge: without it the same weights do as badly. What both have in common is the *size* of their weights.
+# Not the knowledge: without it the same weights do as badly. What both have in common is the *size* of their weights,
+# and the smaller steps.
 #
 # </details>
 #
-# Indeed the pretrained encoder's maps are three to seven times as large as fresh ones. The decoder normalises what comes
+# Take the size first. The pretrained encoder's maps are three to seven times as large as fresh ones. The decoder normalises what comes
 # up from the coarser maps, but adds the next finer map as it is. So the finest map, which has seen least, drowns the
 # others. If this is the cause, then normalising each map before it is added (subtract its mean, divide by its spread:
 # *batch normalisation*) must change the picture:
@@ -546,9 +548,9 @@ assert lecture_07_pretrained.OWN == {2: 92, 8: 87, 24: 86}
 assert lecture_07_pretrained.OTHERS == {2: 57, 8: 64, 24: 65}
 
 # %% [markdown]
-# Only the pretrained network changes its place. It gains 36 points and is now 17 above the fresh one (9 to 25, an
+# Only the pretrained network changes its place, with its smaller steps. It gains 36 points and is now 17 above the fresh one (9 to 25, an
 # interval over cameras). The shuffled one stays near the baseline, so what helps is what ImageNet taught. Is the fresh
-# network just slow? With three times the steps, maps as they are, it reaches 74 %, still less. That is one street and one training in each round.
+# network just slow? With three times the steps, maps as they are, it reaches 74 %, still less. (This is one street, and in B one training a round.)
 #
 # How much of a score is memory? Judge the fresh network also on the very images that it learned from:
 #
@@ -602,7 +604,8 @@ assert of_deeplab < 0.95
 # 2. To see far, halve: a layer adds (kernel - 1) · rate · jump to the field. What is lost is *where*.
 # 3. Indices put maxima back, skips add what finer maps say, atrous kernels see far without halving.
 # 4. Strides aren't to blame for thin posts: with an equal decoder they are no worse than pooling.
-# 5. Pretraining brings much where labels are few, if the decoder can use it. Score on images that nobody learned from.
+# 5. ImageNet's weights brought 17 points with 24 labelled images, once the decoder could use them. Score on images that
+#    nobody learned from.
 #
 # ## Further reading and exercise
 #
@@ -610,7 +613,7 @@ assert of_deeplab < 0.95
 # - Badrinarayanan, Kendall, Cipolla, *SegNet*, PAMI 39(12), 2017: pooling indices.
 # - Chen, Papandreou, Kokkinos, Murphy, Yuille, *DeepLab*, PAMI 40(4), 2018: atrous convolution.
 # - Tan, Le, *EfficientNet*, ICML 2019: the encoder of the last experiment.
-# - Zhang, *Making convolutional networks shift-invariant again*, ICML 2019: why labels flicker.
+# - Zhang, *Making convolutional networks shift-invariant again*, ICML 2019: labels that don't move along.
 #
 # [Exercise 07](exercises/07_segmentation.ipynb): the shortest chain that sees everything, pooling with overlap and the
 # way back, how far a real network's labels move along, which mechanism a black box has, a loss with four mistakes, and

@@ -9,6 +9,8 @@ from worlds import lecture_07_imagenet as imagenet
 from worlds import lecture_07_pretrained as pretrained
 from worlds.lecture_07_imagenet import FRESH, IMAGENET, SHUFFLED, Images, Run
 
+from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.frame import resize_image
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.storage.files import shipped_folder
 
@@ -59,6 +61,18 @@ def test_shuffled_weights_have_the_same_values_in_another_order():
     for name, tensor in taught.items():
         assert torch.equal(tensor.flatten().sort().values, shuffled[name].flatten().sort().values)
     assert not torch.equal(taught["_conv_stem.weight"], shuffled["_conv_stem.weight"])
+
+
+def test_maps_of_pretrained_weights_are_three_to_seven_times_as_large():
+    frame = sample_drive()[0]
+    image = torch.tensor(resize_image(frame.image, imagenet.SIZE)).permute(2, 0, 1)[None] / 255
+    sizes = []
+    for start in (IMAGENET, FRESH):
+        net = imagenet.start_from(start, 0).train()
+        with torch.no_grad():
+            sizes.append([one.std().item() for one in net.backbone((image - net.mean) / net.std)])
+    ratios = np.divide(*sizes)
+    assert 2.5 < ratios.min() < ratios.max() < 7.5
 
 
 def test_rules_without_an_image_know_rows():
