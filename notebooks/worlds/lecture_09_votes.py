@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.camera import project, transform_points
+from semgrid_edu.camera import transform_points
 from semgrid_edu.datasets.project_lidar import closest_returns
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
@@ -58,6 +58,11 @@ def outlines_off(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> ND
     return shown(replace(frame, labels=replace(frame.labels, image=labels)), numbers)
 
 
+def outlines_anew(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> NDArray:
+    """Return the classes, if the shift of an outline, equally large, were drawn anew for each pixel."""
+    return _at(frame, _homogeneous(frame, numbers), OUTLINES.outline * rng.standard_normal((len(numbers), 2)))
+
+
 def one_camera_off(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> NDArray:
     """Return the classes, if the camera is turned and displaced by a small random error."""
     return shown(replace(frame, camera=miscalibrated(frame.camera, CAMERA, rng)), numbers)
@@ -71,22 +76,23 @@ def own_camera_off(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> 
     return _at(frame, shifted @ frame.camera.K.T)
 
 
-KINDS: dict[str, Spoil] = {
-    "each return by itself": each_by_itself,
-    "outlines drawn off": outlines_off,
-    "the camera off": one_camera_off,
-    "a camera for each return": own_camera_off,
+KINDS: dict[str, tuple[Spoil, int]] = {
+    "each return by itself": (each_by_itself, 6),
+    "outlines drawn off": (outlines_off, 2),
+    "the camera off": (one_camera_off, 6),
+    "a camera for each return": (own_camera_off, 6),
+    "outlines, each pixel anew": (outlines_anew, 6),
 }
-"""The kinds of error, by name; the last one is a control that no data have."""
+"""The kinds of error by name, and how often each is drawn; outlines are slow, and differ in each frame, so two draws do.
+The last two kinds are controls that no data have: nothing is shared."""
 
 
 def shown(frame: Frame, numbers: NDArray) -> NDArray:
     """Return the class of the pixel on which each of some returns falls."""
-    in_camera = transform_points(frame.camera.T_camera_from_lidar, frame.points[numbers, :3])
-    return _at(frame, in_camera @ frame.camera.K.T)
+    return _at(frame, _homogeneous(frame, numbers))
 
 
-def count_votes(frames: Sequence[Frame], spec: GridSpec, spoil: Spoil, seeds: int = 6) -> Votes:
+def count_votes(frames: Sequence[Frame], spec: GridSpec, kind: str) -> Votes:
     """Let one error spoil the returns of some frames, and count what it does to the votes.
 
     Parameters
@@ -95,12 +101,10 @@ def count_votes(frames: Sequence[Frame], spec: GridSpec, spoil: Spoil, seeds: in
         Labelled frames.
     spec : GridSpec
         The grid; only cells with at least `MOST` returns count.
-    spoil : callable
-        One of `KINDS`.
-    seeds : int
-        How often the error is drawn; all frames share a draw, as those of a day share a camera.
+    kind : str
+        A key of `KINDS`. All frames share a camera, as those of a day do.
     """
-    exact, spoilt = (np.concatenate(part) for part in zip(*_drawn(frames, spec, spoil, seeds), strict=True))
+    exact, spoilt = (np.concatenate(part) for part in zip(*_drawn(frames, spec, *KINDS[kind]), strict=True))
     wrong = (exact != spoilt).sum(axis=1)
     another = (wrong * (wrong - 1)).sum() / max((wrong * (MOST - 1)).sum(), 1)
     changed = [(_majority(exact[:, :n]) != _majority(spoilt[:, :n])).mean() for n in COUNTS]
@@ -123,10 +127,18 @@ def _drawn(frames: Sequence[Frame], spec: GridSpec, spoil: Spoil, seeds: int) ->
             yield shown(frame, chosen.ravel()).reshape(chosen.shape), spoilt.reshape(chosen.shape)
 
 
-def _at(frame: Frame, uvw: NDArray) -> NDArray:
-    """Return the class at the nearest pixel of homogeneous image points, or at the image's rim if it is outside."""
+def _homogeneous(frame: Frame, numbers: NDArray) -> NDArray:
+    """Return the homogeneous image points of some returns, (N, 3)."""
+    return transform_points(frame.camera.T_camera_from_lidar, frame.points[numbers, :3]) @ frame.camera.K.T
+
+
+def _at(frame: Frame, uvw: NDArray, shift: NDArray | float = 0.0) -> NDArray:
+    """Return the class at the nearest pixel of homogeneous image points, or at the image's rim if it is outside.
+
+    `shift`, (N, 2), moves that pixel by whole pixels, as `flawed_labels` does.
+    """
     height, width = frame.camera.size
-    u, v = np.rint(uvw[:, :2] / uvw[:, 2:]).astype(int).T
+    u, v = (np.rint(uvw[:, :2] / uvw[:, 2:]) + np.rint(shift)).astype(int).T
     return frame.labels.image[v.clip(0, height - 1), u.clip(0, width - 1)]
 
 
