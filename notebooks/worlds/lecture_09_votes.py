@@ -83,7 +83,7 @@ KINDS: dict[str, tuple[Spoil, int]] = {
     "a camera for each return": (own_camera_off, 6),
     "outlines, each pixel anew": (outlines_anew, 6),
 }
-"""The kinds of error by name, and how often each is drawn; outlines are slow, and differ in each frame, so two draws do.
+"""The kinds of error by name, and how often each is drawn; outlines differ in each frame, so two draws are enough.
 The last two kinds are controls that no data have: nothing is shared."""
 
 

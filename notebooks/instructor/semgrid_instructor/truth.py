@@ -105,7 +105,7 @@ def check_labels_and_wrong(labels_and_wrong: Callable) -> None:
 
 @hidden
 def check_prices(prices: Callable) -> None:
-    """Other counts, among them a reach that removes nothing, one that loses no right label, and one that adds wrong ones."""
+    """Other counts: some reaches remove nothing, lose no right label, or add wrong ones."""
     for seed in range(4):
         rng = generator(112 + seed)
         labels, wrong = int(rng.integers(800, 2000)), int(rng.integers(100, 400))

@@ -364,7 +364,8 @@ def prices(before, after):
     removed = wrong - after[:, 1]
     lost = (labels - wrong) - (after[:, 0] - after[:, 1])
     price = np.full(len(after), np.nan)
-    price[removed > 0] = lost[removed > 0] / removed[removed > 0]
+    some = removed > 0
+    price[some] = lost[some] / removed[some]
     return price, (labels - wrong) / wrong
     ### END SOLUTION
 
@@ -385,7 +386,8 @@ def _test():
     given = after.copy()
     got = prices(before.copy(), given)
     assert np.array_equal(given, after), "prices changed its argument `after`: work on a copy"
-    assert isinstance(got, (tuple, list)) and len(got) == 2, "return two things: an array, and a number"
+    assert isinstance(got, (tuple, list)), "return two things: an array, and a number"
+    assert len(got) == 2, f"return two things, an array and a number; got {len(got)}"
     price, chance = answer_array(got[0], "prices"), answer_array(got[1], "price at random")
     assert price.shape == (3,), f"expected one price for each of 3 reaches, got shape {price.shape}"
     assert np.isnan(price[0]), "no wrong label was removed with the first reach: its price is NaN"
