@@ -15,7 +15,7 @@
 # **Prerequisites.** Lectures [05](05_pixels.ipynb) (equation (1)) and [04](04_cmcdot.ipynb) (the four occupancy
 # states). For d-separation: lecture [01b](01b_graphical_models.ipynb).
 #
-# **Time.** 75 minutes, of which the computer needs less than one.
+# **Time.** 64 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 4, the paragraph "KITTI Dataset": how its ground truth is made.
 
@@ -108,8 +108,8 @@ assert 0.5 < right < 0.7
 #
 # | return | where | row |
 # |---|---|---|
-# | F | rear of a car, 10 m ahead, height 1.03 m | 50 + 100 · 0.20 / 10 = **52** |
-# | G | wall, 30 m ahead, height 0.63 m | the same |
+# | F | rear of a car, 10 m ahead, height 1.03 m | **52** |
+# | G | wall, 30 m ahead, height 0.63 m | **52** |
 #
 # F and G share a pixel. The paper selects "the depth value that is closest to the image plane since the other one is
 # probably occluded". So F takes the label *car*, and G is dropped.
@@ -121,7 +121,7 @@ assert 0.5 < right < 0.7
 #
 # On row 50 + 100 · 0.30 / 30 = 51. No other return falls there, so the rule keeps H. But the camera's ray through row 51
 # sinks by 1 cm per metre. At 14 m it is at 1.23 - 0.14 = 1.09 m, below the car's roof. The pixel shows the car, so H
-# carries the label *car* to a cell 30 m ahead, where the wall is.
+# carries the label *car* to the cell of the wall.
 #
 # </details>
 
@@ -216,15 +216,15 @@ plt.show()
 #
 # ## Who wins the vote in a cell?
 #
-# A cell of 0.5 m may hold several returns, and they need not agree. There are two rules. **Majority** takes the most
+# A cell may hold several returns, and they need not agree. There are two rules. **Majority** takes the most
 # frequent class. By **what stands wins**, a class that rises from the ground outvotes the ground, because a thin pole
 # sends one return and the road around it ten.
 #
 # | cell | its returns bring | majority | what stands wins |
 # |---|---|---|---|
-# | 1 | road, road, road, road, car | road | **car** |
-# | 2 | road, road, sidewalk, sidewalk, sidewalk | sidewalk | sidewalk |
-# | 3 | sky | no label | no label |
+# | a | road, road, road, road, car | road | **car** |
+# | b | road, road, sidewalk, sidewalk, sidewalk | sidewalk | sidewalk |
+# | c | sky | no label | no label |
 #
 # *Sky* sends no return, so a return with that label is an error, and is dropped. With $x_k$ the class that return $k$
 # brings, the label of the cell is
@@ -251,7 +251,8 @@ assert [vote(classes, "standing") for classes in toy_cells] == [CAR, SIDEWALK, N
 # %% [markdown]
 # Which rule is better? Suppose that each return of a road cell says *car* with probability 0.1, by itself. Of three
 # returns, a majority is wrong if two or three are: $3 \cdot 0.1^2 \cdot 0.9 + 0.1^3 = 0.028$. By *what stands wins* one
-# is enough: $1 - 0.9^3 = 0.271$. For a car cell it is the other way round: 0.028 against $0.1^3 = 0.001$. So *what
+# is enough: $1 - 0.9^3 = 0.271$. For a car cell it is the
+# other way round. So *what
 # stands wins* keeps what is thin, and pays on the road. The true maps of this course follow it, so we use it for one scan.
 #
 # ## Which errors can a vote remove?
@@ -345,7 +346,7 @@ def vote_map(cells, classes, o):
 
 # %% [markdown]
 # The returns are on rings, and between two rings there is no vote. The paper applies "some morphological methods" and
-# says no more. **What follows is our reading of these words**, and half of this lecture's errors will depend on it.
+# says no more. **What follows is our reading of these words**. Most labels will come from it.
 #
 # Morphology works on masks. To **dilate** a mask is to add all cells within a reach. To **erode** it is to keep only
 # cells whose whole surroundings are in it. First dilate, then erode: that **closes** gaps and leaves the outer ends
@@ -414,7 +415,7 @@ plt.show()
 # First, how do we count? Six cells of a street, and for each what is there, whether the camera sees it, and what the
 # recipe made:
 #
-# | cell | 1 | 2 | 3 | 4 | 5 | 6 |
+# | cell | a | b | c | d | e | f |
 # |---|---|---|---|---|---|---|
 # | is there | road | road | road | car | car | road |
 # | camera sees it | yes | yes | yes | yes | no | no |
@@ -425,7 +426,7 @@ plt.show()
 #
 # <details><summary>Answer</summary>
 #
-# There are five labels, in all cells but 3. Those of 4 and 6 are wrong: 40 %. The camera sees four cells, and 1 and 2
+# There are five labels, in all cells but c. Those of d and f are wrong: 40 %. The camera sees four cells, and a and b
 # are right: 50 % found. Who labels less can lower the first number, and who labels everything can raise the second. So
 # both are needed.
 #
@@ -591,18 +592,18 @@ assert votes_wrong["all returns"][0][fence] > 65 > 15 > votes_wrong["no hidden r
 # by the vehicle's poses. But what moves was elsewhere before. We stand still, and a car drives ahead of us at 10 m/s.
 # In three scans, 0.1 s apart, its rear was at 10 m, at 11 m, and is now at 12 m. Three policies:
 #
-# | policy | what it does with the two earlier returns | the rear is put at |
+# | policy | what it does with the two earlier returns | where the rear is |
 # |---|---|---|
-# | **smeared** | leaves them where they were | three places |
-# | **carved** | removes returns from cells that are DYNAMIC | 12 m, from one return |
-# | **carried** | moves them on by velocity times time | 12 m, from three returns |
+# | **smeared** | leaves them where they were | in three places |
+# | **carved** | removes returns from cells that are DYNAMIC | at 12 m, from one return |
+# | **carried** | moves them on by velocity times time | at 12 m, from three returns |
 #
 # **Predict before you run.** Nobody tells us the velocity. The filter of lecture 04 estimates it, and here it says 8
 # m/s. Where does *carried* put the rear? And what if the filter takes the car for STATIC?
 #
 # <details><summary>Answer</summary>
 #
-# At 10 + 1.6 = 11.6 m, 11 + 0.8 = 11.8 m, and 12 m: a smear of 0.4 m instead of 2 m. A car that counts as STATIC isn't
+# At 11.6 m, 11.8 m and 12 m: a smear of 0.4 m instead of 2 m. A car that counts as STATIC isn't
 # touched, so carving and carrying leave the whole smear. What the filter gets wrong is now wrong in the truth.
 #
 # </details>
@@ -681,8 +682,8 @@ by_box, smeared = (
 assert (round(by_box), round(smeared)) == (5, 16)
 
 # %% [markdown]
-# Nineteen scans find ten points more than one, whatever is done with what moves. None of them has fewer wrong labels: more
-# scans add right and wrong labels alike. And *carried*, the cleverest, is the most wrong. Is carrying a bad idea, or
+# By the same rule of voting, nineteen scans find ten points more than one, whatever is done with what moves. None of them
+# has a smaller share of wrong labels. And *carried*, the cleverest, is the most wrong. Is carrying a bad idea, or
 # is the filter's velocity to blame? Switch the filter off. PandaSet has boxes that people drew around each moving
 # thing, and labels on the LIDAR points themselves. On simulated streets with such boxes and labels, smearing makes 16 %
 # wrong and carrying 5 %. So carrying is right, and needs a better source than our filter.
@@ -724,9 +725,9 @@ _ = interact(
 # %% [markdown]
 # ## Where this breaks
 #
-# **One degree of calibration.** Turn the camera by 1° to the side. At 20 m each label moves by 20 · tan 1° = 0.35 m.
-# Now let it nod by 1°. From a height of 1.65 m you see the ground 20 m ahead at an angle of 4.7°. At 3.7° you see the
-# ground at $1.65 / \tan 3.7° = 25.4$ m. The label has moved by more than 5 m.
+# **One degree of calibration.** Turn the camera by 1° to the side. A label 20 m ahead moves by 0.35 m.
+# Now let it nod by 1°. From a height of 1.65 m you see that ground at an angle of 4.7°, and at 3.7° you see the ground at
+# $1.65 / \tan 3.7° = 25.4$ m. The label has moved by more than 5 m.
 #
 # So is nodding always worse? On ten frames, with labels from a pixel above the right one, or from a pixel below:
 
@@ -787,7 +788,7 @@ assert off["from above, the rest repaired"] > 1.6 * off["from above, ground repa
 # 1. Truth on a grid is made: the closest return of each pixel, a vote in each cell, unknown by occupancy state, and a
 #    clean-up that the paper doesn't specify.
 # 2. Compare rates. The clean-up makes three in four wrong labels because it makes seven in ten labels: 24 % of its
-#    labels are wrong, 18 % of the voted ones.
+#    labels are wrong, and 18 % of the voted ones.
 # 3. Votes remove errors that hit each return by itself. Real errors gather at outlines and share a camera, so nine votes
 #    remove a third.
 # 4. Hidden returns make half of the wrong votes, and most of those of thin things. The farther a vote, the worse the
