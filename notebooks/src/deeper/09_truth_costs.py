@@ -132,8 +132,7 @@ _, *others = rows
 fig, axes = plt.subplots(1, 2, figsize=(11, 3.8), layout="constrained")
 for ax, (judge, name) in zip(axes, JUDGES.items(), strict=True):
     lost = {LEARNED_FROM[truth]: rows[truth]["differences"][judge]["all"]["pixel accuracy"] for truth in others}
-    forest_plot(lost, ax, "right cells: difference from the usual network [points]", reference=0)
-    ax.set_title(f"the {name} judge, all cells")
+    forest_plot(lost, ax, f"{name} judge: difference from the usual network [points]", reference=0)
 axes[1].set_yticklabels([])
 plt.show()
 
