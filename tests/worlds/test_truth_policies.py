@@ -5,17 +5,9 @@ import re
 import numpy as np
 import pytest
 from worlds import lecture_09_policies as policies
-from worlds.lecture_09_counts import (
-    BAND_EDGES,
-    COUNTED,
-    TruthCounts,
-    class_table,
-    counts_of,
-    distance_table,
-    policy_table,
-    truth_tables,
-)
+from worlds.lecture_09_counts import BAND_EDGES, COUNTED, TruthCounts, counts_of
 from worlds.lecture_09_policies import TRIALS, Trial
+from worlds.lecture_09_tables import class_table, distance_table, policy_table, truth_tables
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.ground_truth import TruthPolicy
