@@ -283,6 +283,14 @@ DRIVES = (
     Row("an empty drive", DEMO.replace("0001", "''"), "--drive: expected a value, found nothing"),
     Row("an empty date after an equals sign", "demo --kitti TINY --date= --drive 0001", "--date: expected a value"),
     Row("a folder without dates", DEMO.replace("TINY", "RUN"), "RUN/2026_01_01: expected a folder, found no dates"),
+    Row("a folder without a drive", "demo RUN --out OUT", "RUN: expected a drive of KITTI raw"),
+    Row(
+        "a file in place of a drive", "demo architecture.json --out OUT", "expected the folder of a drive, found a file"
+    ),
+    Row("a drive named twice", "demo TINY --pandaset TINY --out OUT", "--pandaset: expected PATH alone"),
+    Row("a reader and nothing to read", "demo --reader my.py --out OUT", "--reader: expected PATH"),
+    Row("no file of a reader", "demo TINY --reader none.py --out OUT", "none.py: expected a Python file"),
+    Row("a reader and a camera", "demo TINY --reader my.py --camera image_03 --out OUT", "--camera: expected none"),
     Row("half a drive's name", "demo --kitti TINY", "expected all three or none"),
     Row("half a scene's name", "demo --pandaset TINY", "expected both or none"),
     Row("two data sets", f"{DEMO} --pandaset TINY --scene 002", "--kitti, --pandaset: expected one of them"),

@@ -26,7 +26,7 @@ from ipywidgets import FloatSlider, interact
 
 from semgrid_edu import plotting
 from semgrid_edu.graphical import Dashed, Factor, GraphicalModel, d_separated, draw, eliminate, enumerate_marginals
-from semgrid_edu.graphical import in_rows, min_fill_order, product, sum_product, why_dependent
+from semgrid_edu.graphical import in_rows, product, sum_product, why_dependent
 
 # %% jupyter={"source_hidden": true}
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
@@ -49,7 +49,9 @@ def any_model(parents):
 #
 # So each stage of the system stores something smaller, for example one number per cell. It can do so only because it
 # assumes that some things tell nothing about others. In code such assumptions are hard to find. A graph shows them.
-# Each unknown or reading is a circle, and two circles are linked if they depend on each other *directly*:
+# Each unknown or reading is a circle, grey if we have seen its value. Two circles are linked if they depend on each
+# other *directly*: by an arrow if one comes first and acts on the other, and by a black square if neither does. The
+# square is a small table that the two share; you will soon see what is in it.
 
 # %% jupyter={"source_hidden": true} alt="three graphs of three variables: a chain of arrows from before to now to after; arrows from two cells m1 and m2 to one shaded beam z; three cells in a row, linked by black squares and without arrows"
 CHAIN = {"now": ("before",), "after": ("now",)}
@@ -68,7 +70,7 @@ plt.show()
 # %% [markdown]
 # - **Left**: one cell at three times. There is no arrow from *before* to *after*, because all that the past can tell
 #   about the future, it tells through the present.
-# - **Middle**: two cells on the way of one beam $z$, which comes back or doesn't. It is shaded because we see it. No
+# - **Middle**: two cells on the way of one beam $z$, which comes back or doesn't. We see which, so it is grey. No
 #   edge links the cells: before any beam, one tells nothing about the other.
 # - **Right**: three neighbours that tend to agree, because walls are long. None of them comes first, so there are no
 #   arrows. (The middle graph promises the contrary about neighbours. A graph is a model, and one may choose.)
@@ -104,9 +106,9 @@ print("P(z) =", joint.sum("m").table.round(3), "  P(m | return) =", joint.given(
 # %% [markdown]
 # For many variables nobody can invent such a table. It is easier to tell a story, one small table after the other.
 # First comes the world: two cells, each occupied with probability 0.2. Then comes the beam: it returns if at
-# least one of them is occupied, and this time it never errs. Each variable has one table, given the variables that come before it in the story, its
-# **parents**, and an arrow from each of them. The joint distribution is the product of the tables,
-# $P(m_1)\,P(m_2)\,P(z \mid m_1, m_2)$. Such a model is called **directed**, or a Bayesian network.
+# least one of them is occupied, and this time it never errs. Each variable has one table. It is given the variables
+# that act on it directly, its **parents**, and an arrow leads from each of them. The joint distribution is the product
+# of the tables, $P(m_1)\,P(m_2)\,P(z \mid m_1, m_2)$. Such a model is called **directed**, or a Bayesian network.
 #
 # **Predict before you run.** The beam returns. How probable is it now that $m_2$ is occupied? Then another sensor
 # reports that $m_1$ *is* occupied. Does the probability of $m_2$ go up, go down, or stay?
@@ -199,8 +201,9 @@ assert d_separated(in_time, "now", ("z1", "z3"), given=blanket)
 
 # %% [markdown]
 # - A scan of *now* isn't *now*. It may be wrong, so the chain stays open.
-# - Once *now* is known, nothing is open. This is why a Bayes filter may forget all old scans: its belief about *now* is
-#   all that they can still tell.
+# - If *now* is known, nothing is open. A filter never knows *now*, it only has a belief about it. But the promise holds
+#   for either state of *now*, so the filter may predict *after* from each state and weigh the two by its belief. The
+#   old scans enter through these two weights alone, and once they are in there the filter may forget them.
 # - The range $z$ is below the collider $r$ and tells something about it. So $r$ is open.
 #
 # And what must you know so that nothing else tells about *now* (ringed)? Its parent *before*, its child *after*, and
@@ -293,8 +296,17 @@ np.testing.assert_allclose(after.table, START.table @ M @ M)  # lecture 01's pre
 
 # %% [markdown]
 # The last line says that elimination on a chain is lecture 01's prediction: a vector times a matrix, once per step.
-# Does the order matter? Let the kind of street decide how full six cells are (the star on the left, below).
-#
+# Does the order matter? Let the kind of street decide how full six cells are:
+
+# %% jupyter={"source_hidden": true} alt="a circle named street with an arrow to each of six cells, m1 to m6"
+street = Factor("street", [0.5, 0.5])  # motorway, market place
+six = [Factor(("street", f"m{k}"), [[0.95, 0.05], [0.7, 0.3]]) for k in range(1, 7)]
+star = GraphicalModel([street, *six], parents={f"m{k}": ("street",) for k in range(1, 7)})
+fig, ax = plt.subplots(figsize=(5, 1.7), layout="constrained")
+draw(star, ax, positions=in_rows(["street"], [f"m{k}" for k in range(1, 7)]))
+plt.show()
+
+# %% [markdown]
 # **Predict before you run.** We want $P(m_1)$. How many entries has the largest table if you sum out *street* first?
 # And if you sum out the other five cells first, and *street* last?
 #
@@ -306,15 +318,20 @@ np.testing.assert_allclose(after.table, START.table @ M @ M)  # lecture 01's pre
 # </details>
 
 # %% jupyter={"outputs_hidden": true}
-street = Factor("street", [0.5, 0.5])  # motorway, market place
-six = [Factor(("street", f"m{k}"), [[0.95, 0.05], [0.7, 0.3]]) for k in range(1, 7)]
 others = [f"m{k}" for k in range(2, 7)]
 for order in (["street", *others], [*others, "street"]):
     m1, sizes = sum_in_order([street, *six], order)
     print(f"{order[0]:<7}first: P(m1) = {m1.table.round(3)}, largest table {max(sizes)}")
 
+# %% [markdown]
+# The answer is the same, and the cost isn't. **To sum a variable out is to link all its neighbours**: each cell hints at
+# the street, and so at every other cell.
+#
+# Is there always a cheap order? Take a square of cells, each with a table for every neighbour, and sum it out row by
+# row (left, below):
 
-# %% jupyter={"source_hidden": true} alt="left, a circle named street with an arrow to each of six cells; right, the largest table on a logarithmic scale against the side of a square of cells: all maps rise to 10 to the 30, elimination to about 16,000"
+
+# %% jupyter={"source_hidden": true} alt="left, a square of four by four cells linked through black squares; five cells are gone and have left a square that is linked to the four cells after them; these and the fifth have thick outlines, and the first is called next; right, entries on a logarithmic scale against the side of the square: all maps rise to 10 to the 30, the largest table of the row-by-row order to about 2,000"
 def square(n):
     """Return n x n cells, each linked with its neighbours to the right and below."""
     below = [((r, c), (r + 1, c)) for r in range(n - 1) for c in range(n)]
@@ -323,25 +340,30 @@ def square(n):
 
 
 sides = np.arange(2, 11)
-largest = [max(sum_in_order(square(n).factors, min_fill_order(square(n)))[1]) for n in sides]
-star = GraphicalModel([street, *six], parents={f"m{k}": ("street",) for k in range(1, 7)})
-fig, axes = plt.subplots(1, 2, figsize=(9, 2.8), layout="constrained", width_ratios=(1.3, 1))
-draw(star, axes[0], positions=in_rows(["street"], [f"m{k}" for k in range(1, 7)]))
+by_row = {n: [f"m{r},{c}" for r in range(n) for c in range(n)] for n in sides}
+largest = np.array([max(sum_in_order(square(n).factors, by_row[n])[1]) for n in sides])
+fig, axes = plt.subplots(1, 2, figsize=(8.8, 3.3), layout="constrained", width_ratios=(1.25, 1.4))
+left = [name for name in by_row[4] if name not in by_row[4][:5]]
+untouched = [f for f in square(4).factors if set(f.names) <= set(left)]
+rest = GraphicalModel([Factor(left[:4], np.ones([2] * 4)), *untouched])  # what the five cells leave behind links four
+PLACES = {name: (int(name[3]), -int(name[1])) for name in left} | {f"f({', '.join(left[:4])})": (0.9, -0.05)}
+words = dict.fromkeys(left, "") | {left[0]: "next"}
+draw(rest, axes[0], positions=PLACES, labels=words, highlight=left[:5])
+axes[0].set_title("five cells are summed out", fontsize=10)
 axes[1].semilogy(sides, 2.0 ** (sides**2), "s--", color="0.4", label="all maps, $2^{n^2}$")
-axes[1].semilogy(sides, largest, "o-", color="#0072b2", label="elimination's largest table")
+axes[1].semilogy(sides, largest, "o-", color="#0072b2", label="row by row: the largest table")
 axes[1].set(xlabel="side $n$ of a square of cells", ylabel="entries")
 axes[1].legend(frameon=False, fontsize=9)
 plt.show()
-assert largest[-1] == 2**14
+np.testing.assert_array_equal(largest, 2 ** (sides + 1))
 
 # %% [markdown]
-# The answer is the same, and the cost isn't. **To sum a variable out is to link all its neighbours**: each cell hints at
-# the street, and so at every other cell.
-#
-# Is there always a good order? Not in a square of neighbouring cells (right). Every order meets a table with more axes
-# than the square has cells on a side; this is a theorem. For ten by ten cells sixteen thousand entries are enough, in
-# place of $2^{100}$ maps. But the paper's grid has 155 cells on its shorter side, and its CRF links even every cell with
-# every other.
+# Left: five cells are summed out, and have left one table that links the next four (the black square above them). Now
+# the cell *next* is summed out. The table for this has five axes, the cells with thick outlines: one more than the
+# square has cells on a side. So ten by ten cells need tables of 2<sup>11</sup> = 2,048 entries, in
+# place of 2<sup>100</sup> maps. That is as good as it gets: in an $n$ by $n$ square *every* order meets a table with at
+# least $n$ + 1 axes. (A theorem: the square's *treewidth* is $n$, Diestel, chapter 12.) The paper's grid has 155 cells
+# on its shorter side, and its CRF links even every cell with every other.
 #
 # So an answer costs as much as its largest table. On a chain that is little. On a grid it is too much, and **this is
 # why the course needs approximations**.
@@ -374,11 +396,12 @@ plt.show()
 
 # %% [markdown]
 # Sum out from the left (blue). What arrives at *now* is a table that holds all that the left side can tell. It is
-# called a **message**. Another message comes from the right (orange). With $\ell_1, \ell_2, \ell_3$ for the
-# likelihoods of the three scans, and products entry by entry:
+# called a **message**. Another message comes from the right (orange). With $\lambda_1, \lambda_2, \lambda_3$ for the
+# tables of the three scans (how probable each scan is if the cell is free, and if it is occupied), and products entry
+# by entry:
 #
-# $$ P(\text{now} \mid \text{all scans}) \;\propto\; \underbrace{\bigl(P(\text{before})\, \ell_1\bigr)\, M}_{\text{from the left}}
-#    \;\cdot\; \underbrace{\ell_2}_{\text{own scan}} \;\cdot\; \underbrace{M\, \ell_3}_{\text{from the right}} $$
+# $$ P(\text{now} \mid \text{all scans}) \;\propto\; \underbrace{\bigl(P(\text{before})\, \lambda_1\bigr)\, M}_{\text{from the left}}
+#    \;\cdot\; \underbrace{\lambda_2}_{\text{own scan}} \;\cdot\; \underbrace{M\, \lambda_3}_{\text{from the right}} $$
 #
 # **Predict before you run.** When the return arrives, the filter believes with 0.82 that the cell is occupied *now*.
 # The third scan speaks against it. In hindsight, does the 0.82 rise or fall? And the belief about *before*, which was
@@ -420,74 +443,52 @@ np.testing.assert_allclose(all_answers.messages["now", "f(now, after)"], filtere
 #
 # ## Which graphs does this course use?
 #
-# Three of them, and each has one large question.
+# Three. You know the first: one cell over time, with a scan each time (lectures 02 to 04). It is there once for each
+# cell of the grid, and no edge links two cells, so each is filtered by itself. Here are the other two:
 
-# %% tags=["stages"] jupyter={"source_hidden": true} alt="left, a cell at three times in a row of arrows, each with an arrow to its shaded scan, all inside a box labelled each cell; right, four cells at the corners of a square, each pair linked through a black square, and one more square at each cell"
-fig, axes = plt.subplots(1, 2, figsize=(9, 3.2), layout="constrained", width_ratios=(1.5, 1))
-draw(
-    any_model(CELL_IN_TIME),
-    axes[0],
-    observed=("z1", "z2", "z3"),
-    positions=ROWS,
-    plates={"each cell": ("before", "now", "after", "z1", "z2", "z3")},
-)
+# %% tags=["stages"] jupyter={"source_hidden": true} alt="left, four cells at the corners of a square, each pair linked through a black square, and one more square at each cell; right, two columns, t-1 and t: the world w with an arrow to the next w, arrows from w to the grey readings l and i; l to o, o and i to g; o has an arrow to the next o, and a dashed arrow leads from g to the next g"
+fig, axes = plt.subplots(1, 2, figsize=(9.4, 3.2), layout="constrained", width_ratios=(1, 2.2))
 CORNERS = {"x1": (0, 0), "x2": (1.8, 0), "x3": (1.8, -1.8), "x4": (0, -1.8)}
 pairs = [(one, other) for one in CORNERS for other in CORNERS if one < other]
 beside = {f"f({name})": (1.4 * x - 0.36, 1.3 * y + 0.3) for name, (x, y) in CORNERS.items()}
 diagonals = {"f(x1, x3)": (0.6, -0.6), "f(x2, x4)": (1.2, -0.6)}
-own = [Factor(name, [1, 2]) for name in CORNERS]
-crf = GraphicalModel([*own, *(Factor(pair, AGREE) for pair in pairs)])
-draw(crf, axes[1], positions=CORNERS | diagonals | beside)
-axes[0].set_title("one cell over time", fontsize=10)
-axes[1].set_title("the CRF, on four cells", fontsize=10)
-plt.show()
-
-# %% [markdown]
-# **One cell over time** (lectures 02 to 04). The box is a **plate**: all this is there once for each cell. No edge links
-# two plates, so each cell is filtered by itself. In lecture 03 things move from cell to cell, and this promise is
-# broken.
-#
-# **The CRF** (lectures 10 and 11). Each cell has a table of its own, what the network says of it, and one with every
-# other cell that rewards agreement. There are loops everywhere and no cheap order. Lecture 10 shows what one does then.
-#
-# **The whole system** (lecture 00). Above is the world, below is what the system computes. The world $w$ goes on from
-# one instant to the next. LIDAR $l$ and image $i$ see it. The occupancy $o$ comes from the scans. The network's scores
-# $s$ are sampled into planes $p$, and $o$ and $p$ are fused to the semantic grid $g$.
-
-# %% jupyter={"source_hidden": true} alt="two columns, t-1 and t: the world w with an arrow to the next, arrows from w to the shaded readings l and i; l to o, i to s to p, o and p to g; o has an arrow to the next o, and a dashed arrow leads from g to the next g"
-SYSTEM, WHERE, WORDS = {"w1": ("w0",), "o1": ("l1", "o0")}, {}, {}
-COLUMN = {"w": (1, 0), "l": (0, -1), "i": (2, -1), "o": (0, -2.3), "s": (2, -1.75), "p": (2, -2.85), "g": (1, -3.6)}
+crf = GraphicalModel([*(Factor(name, [1, 2]) for name in CORNERS), *(Factor(pair, AGREE) for pair in pairs)])
+draw(crf, axes[0], positions=CORNERS | diagonals | beside).set_title("the CRF, on four cells", fontsize=10)
+COLUMN = {"w": (1.2, 0), "l": (0, -1), "i": (2.4, -1), "o": (0, -2.1), "g": (1.2, -2.9)}
+SYSTEM, WHERE = {"w1": ("w0",), "o0": ("l0",), "o1": ("l1", "o0")}, {}
 for t in (0, 1):
-    own = {"l": "w", "i": "w", "s": "i", "p": "s"}
-    SYSTEM |= {f"{child}{t}": (f"{parent}{t}",) for child, parent in own.items()} | {f"g{t}": (f"o{t}", f"p{t}")}
-    WHERE |= {f"{name}{t}": (x + 4.6 * t, y) for name, (x, y) in COLUMN.items()}
-    WORDS |= {f"{name}{t}": f"${name}_{{{'t' if t else 't-1'}}}$" for name in COLUMN}
-SYSTEM["o0"] = ("l0",)
+    SYSTEM |= {f"l{t}": (f"w{t}",), f"i{t}": (f"w{t}",), f"g{t}": (f"o{t}", f"i{t}")}
+    WHERE |= {f"{name}{t}": (x + 4.4 * t, y) for name, (x, y) in COLUMN.items()}
 system = any_model(SYSTEM)
-words = {
-    "w1": "world",
-    "l1": "LIDAR",
-    "i1": "image",
-    "o1": "occupancy",
-    "s1": "scores",
-    "p1": "planes",
-    "g1": "semantic grid",
-}
-draw(system, plt.subplots(figsize=(7.6, 4.4), layout="constrained")[1], observed=("l0", "l1", "i0", "i1"),
-     positions=WHERE, labels=WORDS, equations=words, dashed=[Dashed(("g0", "g1"))])  # fmt: skip
+draw(
+    system,
+    axes[1],
+    observed=("l0", "l1", "i0", "i1"),
+    positions=WHERE,
+    labels={f"{name}{t}": f"${name}_{{{'t' if t else 't-1'}}}$" for name in COLUMN for t in (0, 1)},
+    equations={"w1": "world", "l1": "LIDAR", "i1": "image", "o1": "occupancy", "g1": "semantic grid"},
+    dashed=[Dashed(("g0", "g1"))],
+)
+axes[1].set_title("the whole system", fontsize=10)
 plt.show()
 
 # %%
-print("the earlier image and the map, given o and p: ", why_dependent(system, "i0", "g1", given=("o1", "p1")))
-print("the earlier image and the world, given o and p:", why_dependent(system, "i0", "w1", given=("o1", "p1")))
+print("the earlier image and the map, given o and i:  ", why_dependent(system, "i0", "g1", given=("o1", "i1")))
+print("the earlier image and the world, given o and i:", why_dependent(system, "i0", "w1", given=("o1", "i1")))
 
 # %% [markdown]
-# An edge that the system deletes is dashed in this course. Here it is the one from $g$ to the next $g$. Does that
-# matter? Ask the graph. The map $g_t$ can't hear of the earlier image: once $o_t$ and $p_t$ are known, every path is
-# blocked. But about the *world* that image still has something to tell, because a path is open. So the system forgets
-# something that is worth knowing. Lecture 14 puts this edge back, and measures what it was worth.
+# **The CRF** (lectures 10 and 11). Each cell has a table of its own, what the network says of it, and one with every
+# other cell that rewards agreement. There are loops everywhere and no cheap order.
 #
-# So ask three things of each stage: what are its unknowns, what tells about what, and is the answer exact?
+# **The whole system** (lecture 00). The world $w$ goes on from one instant to the next. LIDAR $l$ and image $i$ see it.
+# The occupancy $o$ comes from the scans. It is fused with what a network reads in the image to the semantic grid $g$.
+# An edge that the system deletes is dashed: here the one from $g$ to the next $g$.
+#
+# What does the system lose by it? Ask the graph. The map $g_t$ can't hear of the earlier image: given $o_t$ and $i_t$
+# every path is blocked. About the *world* that image *may* have something to tell, because a path is open. How much, no
+# graph can say. An open path promises nothing. Lecture 14 puts the edge back and measures.
+#
+# So a graph tells what a stage can't know. What that costs must be measured.
 #
 # ## Where this breaks: an echo
 #
@@ -522,23 +523,22 @@ for closed, name in ((False, "row"), (True, "triangle")):
 
 # %% jupyter={"source_hidden": true}
 def echo(scan, ax):
-    """Draw P(m1 occupied) against the agreement: exact, messages in the triangle and in the row."""
+    """Draw P(m1 occupied) against the agreement: messages in the triangle, and the exact answer."""
     pulls = np.linspace(1, 8, 15)
     for closed, style, colour, label in (
-        (True, "o-", "#d55e00", "messages, triangle"),
-        (False, "s--", "#0072b2", "messages, row"),
+        (True, "o-", "#d55e00", "messages in the triangle"),
+        (False, "-", "0.4", "exact, and messages in the row"),
     ):
-        found = [
-            sum_product(neighbours(pull, scan, closed), iterations=500).marginals["m1"][OCCUPIED] for pull in pulls
-        ]
+        models = [neighbours(pull, scan, closed) for pull in pulls]
+        found = [sum_product(model, iterations=500).marginals["m1"][OCCUPIED] for model in models]
         ax.plot(pulls, found, style, color=colour, label=label)
-    ax.axhline(scan, color="black", linewidth=3, alpha=0.4, label="exact")
-    ax.set(xlabel="factor when two cells agree", ylim=(0.45, 1.02))
-    ax.set_title(f"a scan says {scan:g}", fontsize=10)
+    np.testing.assert_allclose(found, eliminate(neighbours(3, scan), "m1").normalised().table[OCCUPIED])
+    ax.set(xlabel=r"$\psi$ of two cells that agree", ylabel="P($m_1$ occupied)", ylim=(0.45, 1.02))
+    ax.legend(fontsize=9, frameon=False, loc="lower right")
 
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, three cells in a triangle of squares with orange arrows running round it; middle and right, P(m1 occupied) against the factor for scans of 0.8 and 0.6: exact and messages in a row are flat, messages in a triangle rise with the factor"
-fig, axes = plt.subplots(1, 3, figsize=(10, 3), layout="constrained", width_ratios=(1, 1.2, 1.2))
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, three cells in a triangle of squares, the scan's square beside m1, and an orange arrow from each cell to the next one round the triangle; right, P(m1 occupied) against the factor of agreement: the exact answer stays at 0.8, messages in the triangle rise from 0.8 to 0.95"
+fig, axes = plt.subplots(1, 2, figsize=(7.6, 3), layout="constrained", width_ratios=(1, 1.4))
 TRIANGLE = {"m1": (0, 0), "m2": (1.9, 0), "m3": (0.95, 1.45)}
 draw(neighbours(3, 0.8), axes[0], positions=TRIANGLE | {"f(m1)": (-0.6, 0)})
 axes[0].text(-0.6, 0.2, "scan", ha="center", fontsize=10)
@@ -549,10 +549,7 @@ for one, other in (("m1", "m2"), ("m2", "m3"), ("m3", "m1")):
     ends = [start + share * (end - start) + outwards for share in (0.75, 0.25)]
     axes[0].annotate("", *ends, arrowprops={"arrowstyle": "->", "color": "#d55e00", "lw": 1.8})
 axes[0].set(xlim=(-0.9, 2.5), ylim=(-0.6, 1.9))
-for ax, scan in zip(axes[1:], (0.8, 0.6), strict=True):
-    echo(scan, ax)
-axes[1].set_ylabel("P($m_1$ occupied)")
-axes[1].legend(fontsize=9, frameon=False, loc="lower right")
+echo(0.8, axes[1])
 plt.show()
 
 
@@ -560,15 +557,15 @@ plt.show()
 def show(scan):
     """Draw one setting."""
     echo(scan, plt.subplots(figsize=(4.5, 2.8), layout="constrained")[1])
-    plt.legend(fontsize=9, frameon=False, loc="lower right")
     plt.show()
 
 
 _ = interact(show, scan=FloatSlider(value=0.8, min=0.5, max=0.99, step=0.01))
 
 # %% [markdown]
-# The loop is the cause: take one factor of the triangle away, and the messages are exact again (blue). With the loop, the
-# stronger the agreement, the louder the echo. (The dial works with a running kernel. Why is there no echo at 0.5?)
+# The arrows show the way of the echo; it goes round the other way, too. The loop is the cause: take one factor of the
+# triangle away, and the messages are exact again. With the loop, the stronger the agreement, the louder the echo. (The
+# dial works with a running kernel. Why is there no echo at 0.5?)
 #
 # And no method repairs a wrong graph. If two beams share an error, and the graph has no circle for it, even exact
 # inference is too sure. Lecture [02](02_grids.ipynb) shows that.
@@ -590,8 +587,9 @@ _ = interact(show, scan=FloatSlider(value=0.8, min=0.5, max=0.99, step=0.01))
 # - Koller, Friedman, *Probabilistic Graphical Models*, MIT Press 2009, the reference.
 # - Kschischang, Frey, Loeliger, *Factor graphs and the sum-product algorithm*, IEEE Transactions on Information
 #   Theory, 2001.
+# - Diestel, *Graph Theory*, Springer, chapter 12: treewidth, and that of a square grid (an exercise there).
 # - Pearl, *Probabilistic Reasoning in Intelligent Systems*, Morgan Kaufmann 1988: d-separation, by its inventor.
 #
 # [Exercise 01b](exercises/01b_graphical_models.ipynb): tables with named axes, reports that aren't certain, independence
-# read off a graph, elimination with its cost, and a question. Next: lecture [02](02_grids.ipynb), thousands of cells
+# read off a graph, messages along a chain, and a question. Next: lecture [02](02_grids.ipynb), thousands of cells
 # side by side.

@@ -10,13 +10,12 @@
 # - change $K$ when an image is resized or cropped, without losing half a pixel;
 # - read, compose and invert transforms by their names;
 # - compute the pixels of a whole plane, with a mask for what lies behind the camera or outside the image;
-# - say what a wrong height, a hidden cell and a wrong angle do to the map, and what equation (1) leaves out as a
-#   graphical model.
+# - say what a wrong height, a hidden cell and a wrong angle do to the map.
 #
-# **Prerequisites.** Lecture [00](00_tour.ipynb): the grid, a first look at equation (1). A matrix times a vector; a
-# rotation as a matrix. For the graph: [graphical models](01b_graphical_models.ipynb).
+# **Prerequisites.** Lecture [00](00_tour.ipynb): the grid. Lecture [01b](01b_graphical_models.ipynb), for one graph. A
+# matrix times a vector; a rotation as a matrix.
 #
-# **Time.** 118 minutes; the computer needs less than one.
+# **Time.** 74 minutes; the computer needs less than one.
 #
 # **Paper.** Section 3.3, equation (1).
 
@@ -25,194 +24,49 @@ from dataclasses import replace
 
 import matplotlib.pyplot as plt
 import numpy as np
-from IPython.display import Markdown
 from ipywidgets import FloatSlider, interact
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
-from semgrid_edu.frame import resize_image
 from semgrid_edu import plotting
 from semgrid_edu.camera import Camera, invert_rigid, project, rigid_transform, transform_points
 from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.frame import resize_image
 from semgrid_edu.graphical import d_separated
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.planes import plane_pixels
-from worlds.lecture_00_ledger import ledger, ledger_table
-from worlds.lecture_05_pixel_ray import CAR_HEIGHTS, cell_by_cell, exact_ray, occlusion_cost, pixel_height, pixel_ray
+from worlds.lecture_05_pixel_ray import cell_by_cell, exact_ray, pixel_ray
 
 # %% jupyter={"source_hidden": true}
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 plt.rcParams["image.interpolation"] = "nearest"
 ROAD, SIDEWALK, CAR = (KITTI_14.index(name) for name in ("road", "sidewalk", "car"))
-spec, drive = GridSpec.compact(), sample_drive()
-frame = drive[len(drive) - 1]
-camera, (h, w) = frame.camera, frame.camera.size
-T_grid_from_camera = invert_rigid(camera.T_camera_from_grid)
-eye = T_grid_from_camera[:3, 3]
-z_cam = eye[2]
-
-# %% jupyter={"source_hidden": true}
-
-
-def paled(frame):
-    """Return the frame with a grey, light image, to draw on."""
-    grey = (120 + frame.image.mean(axis=2, keepdims=True) // 16 * 8).astype(np.uint8)
-    return replace(frame, image=np.repeat(grey, 3, axis=2))
-
-
-def places_of(rows, cols, frame=frame):
-    """Return what pixels see, in the grid frame, (N, 3): equation (1) backwards, with the simulator's true depth."""
-    Z = frame.labels.depth[rows, cols].astype(float)
-    triples = np.stack([cols, rows, np.ones_like(rows)]) * Z  # not yet divided by Z
-    return transform_points(T_grid_from_camera, (np.linalg.inv(camera.K) @ triples).T)
-
-
-pale = paled(frame)
-coarse = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, cell=1.0)  # to draw, so that dots stay apart
-instances, _ = ndimage.label(frame.labels.image == CAR)
-is_red_car = (instances == instances[140, 120]) & (frame.labels.depth < 13)
-car = places_of(*np.nonzero(is_red_car))
-pale.image[is_red_car] = pale.image[is_red_car] // 2 + np.array([110, 10, 10], np.uint8)
+PURPLE, BLUE = KITTI_14.colours(np.array([ROAD, CAR])) / 255
 
 # %% [markdown]
-# ## A plane that rises through the street
+# ## Where does a point appear in the image?
 #
-# To bring classes from pixels to cells of the map we need to know which pixel belongs to which cell. Watch what happens
-# when we lift the grid, as a flat sheet of points, from one metre below the ground to three metres above it:
-
-
-# %% jupyter={"source_hidden": true}
-def read_at(height):
-    """Return what cells read from the true labels, (H, W) each: the class (255 out of view), whether the red car."""
-    (pixels,), (visible,) = plane_pixels(spec, [height], camera)
-    read, red = np.full(spec.shape, 255), np.zeros(spec.shape, bool)
-    cols, rows = pixels[visible].round().astype(int).T
-    read[visible], red[visible] = frame.labels.image[rows, cols], is_red_car[rows, cols]
-    return read, red
-
-
-def draw_read(height, ax):
-    """Draw the map that a plane reads, and mark the cells that read the red car and its true place."""
-    read, red = read_at(height)
-    plotting.grid_labels(spec, read, KITTI_14, ax=ax)
-    ax.plot(*spec.centers()[red][:, ::-1].T, "s", color="tab:red", markersize=1.8, label="the red car")
-    ax.plot(*car[::60, 1::-1].T, "k.", markersize=3, label="its true place")
-    ax.set_ylim(0, 45)
-    named, style = ax.get_legend().legend_handles + ax.get_lines(), {"fontsize": "small", "frameon": False}
-    ax.legend(handles=named, loc="upper left", bbox_to_anchor=(1.02, 1), markerscale=3, **style)
-
-
-# %% jupyter={"source_hidden": true} alt="animation: A, a sheet of coloured dots rises through the camera image of a street with one car marked in red, and becomes a line at the camera's height; B, seen from the side, it cuts through the red car; C, the map of classes read on the sheet, with red dots where a cell reads the red car: a long smear from its place outwards on the ground plane, and a shorter one on both sides of its place at 0.8 m"
-
-
-def raised():
-    """Yield the figure with the plane at each height."""
-    fig = plt.figure(figsize=(8.4, 4.3), layout="constrained")
-    for height in (-1, -0.5, 0, 0.4, 0.8, 1.2, z_cam, 2, 2.5, 3):
-        fig.clear()
-        axes = fig.subplot_mosaic([["A", "C"], ["B", "C"]], width_ratios=(2.7, 1), height_ratios=(1.6, 1))
-        plotting.plane_on_image(coarse, height, pale, ax=axes["A"], size=2, colour_bar=False)
-        axes["B"].scatter(*car[::7, [0, 2]].T, s=1, color="tab:red")
-        axes["B"].plot([0, 40], [height] * 2, "C0", eye[0], z_cam, "ks")
-        axes["B"].set(xlim=(-1, 41), ylim=(-1.2, 3.2), xlabel="x, forward [m]", ylabel="height [m]")
-        draw_read(height, axes["C"])
-        for letter, ax in axes.items():
-            ax.set_title(f"A: plane at {height:.1f} m" if letter == "A" else letter, fontsize="medium")
-        yield fig
-
-
-plotting.animate(
-    raised(), period=0.4, alt="a plane of points rises through the street, and the map that it reads changes"
-)
-
-# %% [markdown]
-# A: each dot is the centre of a square of 1 m, drawn at its pixel; nearer cells are lighter. B: the same from the side, with
-# the pixels of the red car where they really are. The black square is the camera. C: the map of classes that the
-# plane reads. Bright red are the cells that read the red car (*pedestrian* is darker), black is its true place. At
-# 0 m the car is thrown over the map like a shadow. At 0.8 m, in the middle of its bodywork, the smear is shorter and
-# lies on both sides of the true place. At the camera's own height the sheet becomes a line, and above it the map
-# shows what is high: trees, houses, sky. **No height is right for everything.**
+# To bring a class from a pixel to a cell of the map we need to know which pixel belongs to which cell. Begin with the
+# simplest camera: a box with a tiny hole in front, and a film 200 pixels behind the hole (its *focal length*, measured
+# in the film's own pixels). Ten metres ahead stands a pole of two metres. Light runs straight through the hole. So the
+# pole and its picture are two triangles of the same shape: 200 · 2 / 10 = 40 pixels.
 #
-# ### The graph
-#
-# As a graphical model: four cells lie in a row, straight ahead: $m_1$ to $m_4$, each road or car.
-# $a_j$ is the label of the pixel that looks at the *ground* in cell $j$. Its ray passes over all cells before it: here
-# the car in cell 3 also blocks the ray to cell 4 (blue pixels say *car*). Equation (1) knows of one arrow only,
-# $m_j \to a_j$:
-
-# %% jupyter={"source_hidden": true} alt="a sketch from the side: a camera, its four pixels, and their rays to the ground in four cells; a car in cell 3 blocks the rays to cells 3 and 4"
-colours = KITTI_14.colours(np.array([ROAD, ROAD, CAR, CAR])) / 255
-fig, side = plt.subplots(figsize=(5.6, 3.2), layout="constrained")
-side.add_patch(plt.Rectangle((7.1, 0), 1.8, 1.3, color=colours[2], alpha=0.4))
-for j, (x, colour) in enumerate(zip((4, 6, 8, 10), colours, strict=True), start=1):
-    stop = np.array([0, min(x, 7.1), x])  # camera, first thing, ground
-    side.plot(stop[:2], 3 - 3 * stop[:2] / x, color=colour, linewidth=1.2)
-    side.plot(stop[1:], 3 - 3 * stop[1:] / x, ":", color="0.4", linewidth=1.2)
-    side.plot(2.8, 3 - 3 * 2.8 / x, "s", color=colour, markersize=6)
-    right, up = {3: (-0.36, 0.09), 4: (0, 0.35)}.get(j, (0, -0.1))  # where no other square or ray lies
-    side.text(2.8 + right, 3 - 3 * 2.8 / x + up, f"$a_{j}$", ha="center", va="top", fontsize=9)
-    side.plot([x - 0.9, x + 0.9], [0, 0], color="black", linewidth=3, solid_capstyle="butt")
-    side.text(x, -0.15, f"$m_{j}$", ha="center", va="top")
-side.plot(0, 3, "ks")
-side.set(xlim=(-0.4, 11), ylim=(-0.6, 3.2), title="A car in cell 3, from the side")
-side.axis("off")
-plt.show()
-
-# %% [markdown]
-# **Predict before you run.** The four pixels say road, car, car, car. Three cars, or one? Each cell is a car with
-# probability 0.2 beforehand, and a pixel's label is right with 0.95. Draw the graph. Are $m_1$ and $m_3$ independent,
-# before the pixels are known and once $a_3$ is known?
+# **Predict before you run.** How tall is the picture when the pole is twice as far away? And that of a pole a tenth as
+# tall, at a tenth of the distance?
 #
 # <details><summary>Answer</summary>
 #
-# One car in cell 2 explains all three labels. So cell 2 is a car with 0.91, and the cells behind it stay near their
-# prior, 0.23 and 0.20: behind a car the image says nothing. Equation (1) gives each cell its own pixel: 0.83 three
-# times. $m_1$ and $m_3$ are independent beforehand; given $a_3$, their common child, they compete to explain it.
-#
-# </details>
-
-# %% jupyter={"outputs_hidden": true}
-stage, labels = pixel_ray(), [0, 1, 1, 1]
-print("exact,        P(car):", exact_ray(labels).round(2))
-print("equation (1), P(car):", cell_by_cell(labels).round(2))
-print("by how much (1) is off, mean over all labels:", occlusion_cost().round(2))
-assert d_separated(stage.model, "m1", "m3")
-assert not d_separated(stage.model, "m1", "m3", given=("a3",))
-
-# %% [markdown]
-# Here is the graph:
-
-# %% tags=["graph"] jupyter={"source_hidden": true, "outputs_hidden": true} alt="a directed graph: four cells m1 to m4 above, four observed pixels a1 to a4 below; each pixel has arrows from its own cell and from all nearer ones; one of the slanted arrows is dashed and carries its price"
-fig, ax = plt.subplots(figsize=(5.4, 3.2), layout="constrained")
-stage.draw(ax)
-plt.show()
-
-# %% [markdown]
-# Equation (1) cuts every slanted arrow, $m_i \to a_j$ with $i < j$: *occlusion*. One of them is dashed, with its
-# price. With these numbers the error grows along the ray, because more can stand in front of a cell that is farther
-# away. Nothing in this lecture repairs it; the LIDAR can help (lecture 08).
-#
-# ## Two similar triangles
-#
-# Now the geometry. Take a box with a tiny hole in front and a film 200 pixels behind the hole (its focal
-# length, measured in the film's own pixels). Ten metres ahead stands a pole, 2 m tall. Light runs straight through the
-# hole, so the pole and its picture (upside down) are two triangles of the same shape: 200 · 2 / 10 = 40 pixels.
-#
-# **Predict before you run.** How tall is the picture when the pole is 20 m away? And that of a pole of 20 cm, 1 m
-# away?
-#
-# <details><summary>Answer</summary>
-#
-# 20 pixels: twice as far, half as tall. The small one: 200 · 0.2 / 1 = 40 pixels, the same as the real pole at 10 m. A
-# picture cannot tell a small thing nearby from a big one far away.
+# Half as tall, 20 pixels. The small one: 40 pixels again, like the first pole. A picture cannot tell a small thing
+# nearby from a big one far away.
 #
 # </details>
 #
-# Count pixels to the right and down, from the first pixel's centre; the camera's axis meets the film at the *principal
-# point* $(c_u, c_v)$, and $f_u, f_v$ are the *focal lengths* in pixels. With $X$ to the right, $Y$ down, $Z$ ahead:
+# Count pixels to the right ($u$) and down ($v$), from the first pixel's centre. The camera's axis meets the film at the
+# *principal point* $(c_u, c_v)$, and $f_u, f_v$ are the focal lengths. With $X$ to the right, $Y$ down and $Z$ ahead of
+# the hole:
 #
-# $$ u - c_u = f_u \frac{X}{Z}, \qquad v - c_v = f_v \frac{Y}{Z} $$
+# $$ u = c_u + f_u \frac{X}{Z}, \qquad v = c_v + f_v \frac{Y}{Z} $$
 
 
 # %% jupyter={"outputs_hidden": true}
@@ -221,11 +75,8 @@ def pinhole(X, Y, Z, f_u=200, f_v=200, c_u=160, c_v=48):
     return c_u + f_u * X / Z, c_v + f_v * Y / Z
 
 
-K = np.array([[200.0, 0, 160], [0, 200, 48], [0, 0, 1]])
-for name, point in {"10 m ahead": (0, -2, 10), "20 m ahead": (0, -2, 20), "20 cm, 1 m": (0, -0.2, 1)}.items():
-    package, _ = project(np.array(point, float), Camera(K, np.eye(4), size=(96, 320)))
-    np.testing.assert_allclose(pinhole(*point), package)
-    print(f"top of the pole, {name}: {48 - package[1]:.0f} pixels above the axis")
+for name, top in {"10 m ahead": (0, -2, 10), "20 m ahead": (0, -2, 20), "20 cm, 1 m": (0, -0.2, 1)}.items():
+    print(f"top of the pole, {name}: {48 - pinhole(*top)[1]:.0f} pixels above the axis")
 
 # %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="three poles seen from the side; the rays from the hole to the top of the pole ten metres ahead and of the small one one metre ahead are the same line"
 fig, ax = plt.subplots(figsize=(7.5, 2.4), layout="constrained")
@@ -233,99 +84,42 @@ for Z, top, colour in ((10, 2.0, "tab:blue"), (20, 2.0, "tab:orange"), (1, 0.2, 
     ax.plot([0, Z], [0, top], color=colour, linewidth=0.8)
     ax.plot([Z, Z], [0, top], color=colour, linewidth=4, solid_capstyle="butt")
     ax.text(Z + 0.2, top, f"{top:g} m, {Z} m ahead", color=colour, va="center")
-ax.axvline(1, color="0.7", linestyle=":")
 ax.plot(0, 0, "ko")
 ax.set(xlabel="Z, ahead of the hole [m]", ylabel="up, −Y [m]", ylim=(-0.3, 2.3), xlim=(-0.5, 25))
 plt.show()
 
 # %% [markdown]
-# Blue and green share one ray, so they share a pixel. The dotted line stands one metre ahead: a ray meets it at $(X/Z,
-# Y/Z)$. The picture is what you see on that line, in pixels instead of metres, and this change of unit is what the
-# numbers $f$ and $c$ do.
+# The small pole and the near tall one share one ray, so they share a pixel. **A point has one pixel, but a pixel has a
+# whole ray of points.**
 #
-# ## One matrix, and the division last
+# ## How does one matrix do it?
 #
-# A camera shifts (by $c$), scales (by $f$) and divides (by $Z$). The division is not linear, so do it last and carry a
-# third number along. The point (1.5, 1, 10): $K$ times it is (200 · 1.5 + 160 · 10, 200 · 1 + 48 · 10, 10) = (1900,
-# 680, 10). Divide by the last number: (190, 68). The points (3, 2, 20) and (0.15, 0.1, 1) give (190, 68) too, since
-# multiples of one triple are one pixel, as all points of one ray are. Triples read like this are called *homogeneous
-# coordinates*; $K$ is the *intrinsic matrix*.
-#
-# $$ \begin{pmatrix} u \\ v \\ 1 \end{pmatrix} = K \begin{pmatrix} X/Z \\ Y/Z \\ 1 \end{pmatrix}
-#    = \frac{1}{Z}\, K \begin{pmatrix} X \\ Y \\ Z \end{pmatrix}, \qquad
-#    K = \begin{pmatrix} f_u & 0 & c_u \\ 0 & f_v & c_v \\ 0 & 0 & 1 \end{pmatrix} \qquad (1) $$
+# A camera scales by $f$, shifts by $c$ and divides by $Z$. The division isn't linear, so do it last, and carry a third
+# number along. $K$, the **intrinsic matrix**, makes of the point $(X, Y, Z)$ the triple $(f_u X + c_u Z,\; f_v Y + c_v
+# Z,\; Z)$. Divide by its last number, and you have the pixel.
 
 
 # %%
 def pixel(point, K):
-    """Return u and v of a point of the camera's frame: equation (1), the division last."""
+    """Return u and v of a point of the camera's frame: multiply, then divide."""
     triple = K @ point
     return triple[:2] / triple[2]
 
 
+K = np.array([[200.0, 0, 160], [0, 200, 48], [0, 0, 1]])
+print(K @ [1.5, 1, 10], "= 200 * 1.5 + 160 * 10, 200 * 1 + 48 * 10, 10")
 for point in ([1.5, 1, 10], [3, 2, 20], [0.15, 0.1, 1]):
     np.testing.assert_allclose(pixel(np.array(point), K), pinhole(*point))
     print(f"{point!s:<14} -> {pixel(np.array(point), K).round(6).tolist()}")
 
 # %% [markdown]
-# **Predict before you run.** Two rails run straight ahead, 1.5 m to the left and to the right, 1.5 m below the camera:
-# the points $(\pm 1.5, 1.5, Z)$. At $Z$ = 10 they are at u = 160 ± 30, at 20 at 160 ± 15. Where do they meet?
+# All three points are multiples of one triple. They are on one ray, and have one pixel. And where do lines end? Two
+# rails run straight ahead, one to the left of the camera and one to the right. Far away $X/Z$ and $Y/Z$ vanish for
+# both, so both end at the principal point. Lines of one direction meet in one pixel, their **vanishing point**.
 #
-# <details><summary>Answer</summary>
+# So $K$ holds all that the camera itself does, and the division is left to the end.
 #
-# As $Z$ grows, $X/Z$ and $Y/Z$ go to 0: at (160, 48), the principal point. Wherever they start, all lines in this
-# direction end in this one point, the direction's *vanishing point*.
-#
-# </details>
-#
-# On the drive, the sidewalk on the right has two straight edges, 2.1 m and 4.45 m to the right of the vehicle. Draw the
-# two lines on the ground, at height 0, through equation (1):
-
-# %% jupyter={"outputs_hidden": true}
-straight_on = camera.K @ camera.T_camera_from_grid[:3, :3] @ np.array([1.0, 0, 0])  # the grid's forward direction
-vanishing = straight_on[:2] / straight_on[2]
-print("what runs straight ahead ends at u = {:.0f}, v = {:.0f}".format(*vanishing))
-for y, side in ((-2.1, 0), (-4.45, -1)):
-    u, v = project(transform_points(camera.T_camera_from_grid, np.array([8.0, y, 0])), camera)[0]
-    edge = np.flatnonzero(frame.labels.image[round(v)] == SIDEWALK)[side]
-    print(f"line {-y:.2f} m to the right, 8 m ahead: u = {u:.0f}; the sidewalk ends at {edge}: {edge - u:+.0f} pixels")
-
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="the image with two red lines on the ground that meet at the vanishing point; the left one, A, runs along the foot of the kerb, the right one, B, runs inside the sidewalk instead of along its edge; a dashed line 16 cm higher fits near by"
-fig, ax = plt.subplots(figsize=(7.5, 3.4), layout="constrained")
-ax.imshow(pale.image)
-for y, z, style in ((-2.1, 0.0, "-"), (-4.45, 0.0, "-"), (-4.45, 0.16, "--")):
-    rail = np.array([[x, y, z] for x in np.geomspace(6, 1000, 200)])
-    pixels, visible = project(transform_points(camera.T_camera_from_grid, rail), camera)
-    ax.plot(*pixels[visible].T, style, color="tab:red", linewidth=1.2)
-for letter, at, text in (("A", (400, 162), (360, 172)), ("B", (517, 164), (470, 178)), ("C", (532, 162), (560, 150))):
-    ax.annotate(letter, at, text, color="tab:blue", fontweight="bold", arrowprops={"arrowstyle": "->"})
-ax.plot(*vanishing, "+", color="tab:red", markersize=16, markeredgewidth=2)
-ax.set(xlim=(270, 610), ylim=(187, 60), xlabel="u [pixels]", ylabel="v [pixels]")
-plt.show()
-
-# %% [markdown]
-# The cross is the vanishing point. A fits within a few pixels. B doesn't: 8 m ahead it misses the edge by 24 pixels,
-# half a metre. The calibration is
-# right and so is the code. What is wrong is "on the ground": A runs at the foot of the kerb, but the sidewalk lies *on*
-# it. The miss even tells how high, by similar triangles: the ray through the edge meets the ground farther out than the
-# edge is.
-
-# %%
-outwards = 4.45 + eye[1]  # of the camera, which stands a little to the left
-u, v = project(transform_points(camera.T_camera_from_grid, np.array([8.0, -4.45, 0])), camera)[0]
-edge = np.flatnonzero(frame.labels.image[round(v)] == SIDEWALK)[-1]
-meets = outwards + (edge - u) * 8 / camera.K[0, 0]
-height = z_cam * (1 - outwards / meets)
-(true_height,) = places_of(np.array([round(v)]), np.array([edge]))[:, 2]
-assert abs(height - true_height) < 0.03
-print(f"line {outwards:.2f} m from the camera, ray {meets:.2f} m: the sidewalk is {height:.2f} m high", end=", ")
-print(f"by the simulator {true_height:.2f} m")
-
-# %% [markdown]
-# That is the kerb, and the slopes of road and sidewalk. Drawn at 16 cm, the line fits near by (C, dashed); farther
-# ahead the street sinks. So 17 cm of height are half a metre on the map: this is why the system needs several planes.
-#
-# ## A new image, a new $K$
+# ## What if the image is resized or cropped?
 #
 # Networks see smaller images, and often only a part. Take a row of 8 pixels with its axis in the middle, at $c_u$ =
 # 3.5, and $f_u$ = 10. Average the pixels in pairs: 4 are left.
@@ -334,21 +128,16 @@ print(f"by the simulator {true_height:.2f} m")
 #
 # <details><summary>Answer</summary>
 #
-# The middle of 4 pixels, at 0, 1, 2, 3, is 1.5. Not 3.5 / 2 = 1.75! The image begins half a pixel *before* the centre
-# of its first pixel, and that edge is what stays in place: 3.5 + 0.5 = 4 pixels from the edge, half of them is 2,
-# less 0.5. The focal length is only scaled: 5. A cut shifts: $c_u$ = 1.5, and $f_u$ is still 10.
+# The middle of four pixels is 1.5, and not half of 3.5! The image begins half a pixel *before* the centre of its first
+# pixel, and that edge is what stays in place: the axis is 4 pixels from the edge, then 2, so 1.5 from the first centre.
+# The focal length is only halved. A cut shifts: $c_u$ = 1.5, and $f_u$ stays.
 #
 # </details>
-#
-# From $w \times h$ to $w' \times h'$ pixels, and with $u_0$ columns cut off on the left (the same for $v$):
-#
-# $$ \text{resized:} \quad f_u' = f_u \frac{w'}{w}, \quad c_u' = \left(c_u + \tfrac12\right) \frac{w'}{w} - \tfrac12
-#    \qquad\qquad \text{cropped:} \quad f_u' = f_u, \quad c_u' = c_u - u_0 $$
 
 
 # %% jupyter={"outputs_hidden": true}
 def resize(scale_u, scale_v):
-    """Return the matrix that takes pixels of an image to those of a resized one."""
+    """Return the matrix that takes pixels of an image to those of a resized one: (u + 1/2) * scale - 1/2."""
     return np.array([[scale_u, 0, (scale_u - 1) / 2], [0, scale_v, (scale_v - 1) / 2], [0, 0, 1]])
 
 
@@ -359,58 +148,42 @@ def crop(left, top):
 
 row = np.array([[10, 0, 3.5], [0, 10, 0], [0, 0, 1]])
 print("halved: f_u, c_u =", (resize(0.5, 1) @ row)[0, ::2], "  cropped:", (crop(2, 0) @ row)[0, ::2])
-np.testing.assert_allclose(resize(320 / w, 96 / h) @ camera.K, camera.resized((96, 320)).K)
 
 # %% [markdown]
-# Is it true of pictures, too? Paint a soft dot on a black image at the pixel of a place 15 m ahead. Cut off the first
-# column, halve the rest, and ask where the dot's middle is now.
+# Is it true of pictures, too? Paint a soft dot on a black image, at the pixel of some place. Cut off the first column,
+# halve the rest, and look where the middle of the dot is now:
 
 # %% jupyter={"source_hidden": true}
-place = transform_points(camera.T_camera_from_grid, np.array([15.0, 2.0, 1.0]))
-(u, v), (columns, rows) = pixel(place, camera.K), np.meshgrid(np.arange(w), np.arange(h))
+place = np.array([1.5, 1.0, 10.0])
+(u, v), (columns, rows) = pixel(place, K), np.meshgrid(np.arange(321), np.arange(96))
 dot = 255 * np.exp(-((columns - u) ** 2 + (rows - v) ** 2) / (2 * 5**2))
 part = np.dstack([dot.round().astype(np.uint8)] * 3)[:, 1:]
-small = resize_image(part, (94, 310))[..., 0].astype(float)
-middle = np.array([small.sum(axis=0) @ np.arange(310), small.sum(axis=1) @ np.arange(94)]) / small.sum()
-np.testing.assert_allclose(middle, pixel(place, resize(0.5, 0.5) @ crop(1, 0) @ camera.K), atol=0.02)
-careless = pixel(place, np.diag([0.5, 0.5, 1]) @ crop(1, 0) @ camera.K)
-print(
-    "the rule finds the dot; K times one half misses it by {:.2f} and {:.2f} pixels".format(*np.abs(careless - middle))
-)
+small = resize_image(part, (48, 160))[..., 0].astype(float)
+middle = np.array([small.sum(axis=0) @ np.arange(160), small.sum(axis=1) @ np.arange(48)]) / small.sum()
+np.testing.assert_allclose(middle, pixel(place, resize(0.5, 0.5) @ crop(1, 0) @ K), atol=0.02)
+careless = pixel(place, np.diag([0.5, 0.5, 1]) @ crop(1, 0) @ K)
+print(f"with the half pixel the rule finds the dot; without it misses by {careless[0] - middle[0]:.2f} pixels")
 
 # %% [markdown]
-# A quarter of a pixel, and no error message. Lecture 06 turns such errors into metres.
+# A quarter of a pixel, and no error message. So scale distances from the image's *edge*, half a pixel before the first
+# centre. Focal lengths only scale, and a cut only shifts.
 #
-# ## Where the camera stands: reading names
+# ## Where is the camera?
 #
-# Until now points were given in the camera's frame. The map has its own. In a toy car the LIDAR is 2 m above the
-# ground, the camera 0.5 m below the LIDAR and looks ahead. A post stands 10 m ahead, 2 m to the right; its top is 0.5 m
-# above the ground. Three frames, three triples for one place:
+# Until now points were given in the camera's frame, but the map has its own. In a toy car the LIDAR is two metres above
+# the ground. The camera is half a metre below the LIDAR and looks ahead. Here is the top of a post in three frames:
 #
 # | frame | axes | origin | top of the post |
 # |---|---|---|---|
 # | grid | x forward, y left, z up | on the ground below the LIDAR | (10, -2, 0.5) |
-# | LIDAR | the same | 2 m higher | (10, -2, -1.5) |
-# | camera | X right, Y down, Z ahead | 0.5 m below the LIDAR | (2, 1, 10) |
+# | LIDAR | the same | two metres higher | (10, -2, -1.5) |
+# | camera | X right, Y down, Z ahead | half a metre below the LIDAR | (2, 1, 10) |
 #
-# Each step turns and shifts. As 4 x 4 matrices on $(x, y, z, 1)$ a turn with its shift is one factor (the *extrinsic*
-# calibration), and the names tell the order: **neighbours that are equal cancel**, from right to left.
-#
-# $$ T_\text{camera←grid} = T_\text{camera←lidar}\; T_\text{lidar←grid}, \qquad
-#    T = \begin{pmatrix} R & t \\ 0 & 1 \end{pmatrix}, \qquad
-#    T^{-1} = \begin{pmatrix} R^\top & -R^\top t \\ 0 & 1 \end{pmatrix} $$
-#
-# **Predict before you run.** $T^{-1}$ of `T_camera_from_grid` is called `T_grid_from_camera`. What does it make of (0,
-# 0, 0), in the toy car? And why is it not simply $-t$?
-#
-# <details><summary>Answer</summary>
-#
-# The camera's own place, seen from the grid: (0, 0, 1.5). The shift $t$ = (0, 1.5, 0) is written in the *camera's*
-# axes, where down is $Y$. Its negative would put the camera 1.5 m to the right.
-#
-# </details>
+# Each step turns and shifts. One matrix on $(x, y, z, 1)$ does both: a rotation $R$, and a shift $t$ in its last
+# column. The names tell the order. **Neighbours that are equal cancel**: *camera from lidar* times *lidar from grid* is
+# *camera from grid*. And the way back? From $Rp + t$, first take off $t$, then turn back by $R^\top$.
 
-# %% jupyter={"outputs_hidden": true}
+# %%
 axes_of_camera = np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]])  # X is -y, Y is -z, Z is x
 
 
@@ -421,37 +194,21 @@ def inverse(T):
 
 
 T_camera_from_lidar = rigid_transform(axes_of_camera, np.array([0, -0.5, 0]))
-T_camera_from_grid = T_camera_from_lidar @ rigid_transform(np.eye(3), np.array([0, 0, -2.0]))
-toy = Camera(K, T_camera_from_lidar, size=(96, 320), lidar_height=2.0)
-np.testing.assert_allclose(T_camera_from_grid, toy.T_camera_from_grid)
-np.testing.assert_allclose(inverse(T_camera_from_grid), invert_rigid(T_camera_from_grid))
+T_lidar_from_grid = rigid_transform(np.eye(3), np.array([0, 0, -2.0]))
+T_camera_from_grid = T_camera_from_lidar @ T_lidar_from_grid
 print("post, from the camera:", (T_camera_from_grid @ [10, -2, 0.5, 1])[:3])
 print("camera, from the grid:", inverse(T_camera_from_grid)[:3, 3] + 0.0)  # + 0.0 makes 0 of -0
 
 # %% [markdown]
-# ## Equation (1) for a plane
+# The last line is where the grid sees the camera: 1.5 m above the ground. It isn't $-t$. The shift $t$ is written in
+# the axes of the camera, so it must be turned as well.
 #
-# Now everything in turn, for the top of the post: grid (10, -2, 0.5), camera (2, 1, 10), pixel u = 160 + 200 · 2 / 10 =
-# 200, v = 48 + 200 · 1 / 10 = 68. A plane is many such points: the centres of all cells, lifted to one height
-# $\delta_d$. Straight ahead of the toy car, a point of the plane at $\delta$ is 1.5 - $\delta$ metres lower than the
-# camera, so $v = 48 + 200\,(1.5 - \delta) / Z$:
+# So one matrix, put together by names, brings any point of the map into the camera's frame.
 #
-# | | $Z$ = 5 m | 10 m | 20 m | 40 m |
-# |---|---|---|---|---|
-# | $\delta$ = 0 m | 108 | 78 | 63 | 55.5 |
-# | $\delta$ = 1 m | 68 | 58 | 53 | 50.5 |
-# | $\delta$ = 1.5 m | ? | ? | ? | ? |
-# | $\delta$ = 2 m | 28 | 38 | 43 | 45.5 |
+# ## Which pixel belongs to which cell?
 #
-# **Predict before you run.** Fill in the missing row. To which number does every row tend? And which of the places in
-# the table is not in the picture, whose rows run from 0 to 95?
-#
-# <details><summary>Answer</summary>
-#
-# 48, four times: the plane at the camera's own height is seen edge-on, as a line. All rows tend to 48, the *horizon*:
-# infinitely far ahead, 1 m up or down makes no difference. The ground 5 m ahead, row 108, lies below the lower border.
-#
-# </details>
+# Now everything in turn. A cell $j$ is a place $(x_j, y_j)$. Give it a height: lift the whole grid, as a flat sheet of
+# cell centres, to the height $\delta_d$. This is plane number $d$, and equation (1) gives a pixel to each of its points:
 #
 # $$ \begin{pmatrix} X \\ Y \\ Z \\ 1 \end{pmatrix} = T_\text{camera←grid}
 #    \begin{pmatrix} x_j \\ y_j \\ \delta_d \\ 1 \end{pmatrix}, \qquad
@@ -463,260 +220,134 @@ def pixels_of_planes(spec, heights, camera):
     """Return the pixels, (D, H, W, 2), and which of them are in view, (D, H, W): one point at a time."""
     pixels = np.full((len(heights), *spec.shape, 2), np.nan)
     visible = np.zeros((len(heights), *spec.shape), bool)
-    h, w = camera.size
+    n_rows, n_columns = camera.size
     for d, r, c in np.ndindex(visible.shape):
         x, y = spec.centers()[r, c]
         X, Y, Z, _ = camera.T_camera_from_grid @ [x, y, heights[d], 1]
         if Z > 0:
             u, v, _ = camera.K @ [X / Z, Y / Z, 1]
             pixels[d, r, c] = u, v
-            visible[d, r, c] = 0 <= u <= w - 1 and 0 <= v <= h - 1
+            visible[d, r, c] = 0 <= u <= n_columns - 1 and 0 <= v <= n_rows - 1
     return pixels, visible
 
 
+# %% jupyter={"source_hidden": true}
+spec, drive = GridSpec.compact(), sample_drive()
+frame = drive[len(drive) - 1]
+camera = frame.camera
+T_grid_from_camera = invert_rigid(camera.T_camera_from_grid)
+eye = T_grid_from_camera[:3, 3]
+z_cam = eye[2]
+toy = Camera(K, T_camera_from_lidar, size=(96, 320), lidar_height=2.0)
+np.testing.assert_allclose(T_camera_from_grid, toy.T_camera_from_grid)
 block = GridSpec(x_min=-10, x_max=41, y_min=-7, y_max=8, cell=3)  # some of it behind the camera
 for some_camera in (toy, camera):
-    literal, seen = pixels_of_planes(block, [0.0, 1.0, 1.5, 2.0], some_camera)
-    package, visible = plane_pixels(block, [0.0, 1.0, 1.5, 2.0], some_camera)
+    literal, seen = pixels_of_planes(block, [0.0, 1.5, 2.0], some_camera)
+    package, visible = plane_pixels(block, [0.0, 1.5, 2.0], some_camera)
     np.testing.assert_allclose(literal, package)
     np.testing.assert_array_equal(seen, visible)
-
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="rows of the image against the distance ahead, for planes at six heights: lower planes climb towards the horizon at row 48, higher ones sink to it, the one at 1.5 m is a level line"
-fig, ax = plt.subplots(figsize=(7.5, 2.9), layout="constrained")
-ahead = GridSpec(x_min=0, x_max=60, y_min=-0.1, y_max=0.1, cell=0.2)
-toy_heights = [0.0, 0.5, 1.0, 1.5, 2.0, 3.0]
-toy_pixels, toy_visible = plane_pixels(ahead, toy_heights, toy)
-for height, pixels, visible in zip(toy_heights, toy_pixels, toy_visible, strict=True):
-    colour = plt.get_cmap("viridis")(height / 3.3)
-    ax.plot(ahead.centers()[:, 0, 0], pixels[:, 0, 1], color=colour, label=f"{height} m")
-    first = np.flatnonzero(visible[:, 0]).max()
-    ax.plot(ahead.centers()[first, 0, 0], pixels[first, 0, 1], "o", color=colour)
-ax.axhspan(-0.5, 95.5, color="0.93", zorder=0)
-ax.set(xlabel="x, forward [m]", ylabel="v, down [pixels]", xlim=(0, 60), ylim=(115, -20))
-ax.legend(title="plane at", loc="center left", bbox_to_anchor=(1, 0.5))
-plt.show()
+assert pinhole(-2, 1.5, -10) == (200, 18)  # ten metres behind the camera: above the horizon, row 48
 
 # %% [markdown]
-# Grey: the image. Each curve is a plane, straight ahead; the dot is where it comes into view. **All planes meet at the
-# horizon**, which is also where the plane at the camera's height lies. So whatever is higher than the camera rises
-# above the horizon *at any distance*, and all heads in a crowd are on one line if you are as tall as they are. Near the
-# car the curves are far apart; sixty metres ahead, three metres of height are ten rows.
+# Why `if Z > 0`? A place on the ground *behind* the toy camera has a negative $Z$. The formula alone gives it a pixel
+# in the sky, since minus signs cancel. There is no error and no NaN. So a point is **in view** only if it is in front
+# of the camera *and* its pixel is within the image.
 #
-# ## Behind the camera, outside the image
-#
-# The grid may reach behind the car.
-#
-# **Predict before you run.** What does the formula alone say of a place 10 m *behind* the toy camera, 2 m to the left,
-# on the ground: $(-2, 1.5, -10)$? Would you notice that something is wrong?
+# **Predict before you run.** Straight ahead of the toy car a point of a plane is $1.5 - \delta$ metres below the camera,
+# so it is in row $v = 48 + 200\,(1.5 - \delta) / Z$. Which row is the plane at 1.5 m? And to which row does *every*
+# plane tend, far ahead?
 #
 # <details><summary>Answer</summary>
 #
-# u = 160 + 200 · (-2) / (-10) = 200 and v = 48 + 200 · 1.5 / (-10) = 18: a fine pixel, in the sky on the right. Two
-# minus signs have cancelled. You would not notice: no error, no NaN, only ground that is taken from the sky.
+# Row 48, twice. The plane at the camera's own height is seen edge-on, as a line. And far ahead $Z$ is so large that the
+# height doesn't matter: all planes meet in this row, the horizon.
 #
 # </details>
-
+#
 # %% jupyter={"outputs_hidden": true}
-behind = np.array([-2, 1.5, -10])
-print("formula alone: u = {:.0f}, v = {:.0f}".format(*pinhole(*behind)))
-print("package:", project(behind, toy)[0], " in view:", project(behind, toy)[1])
-(ground,) = plane_pixels(spec, [0.0], camera)[1]
-print(f"of the course's grid {100 * ground.mean():.0f} % is in view on the ground plane of the drive's camera")
+for Z in (5, 20, 80, 1000):
+    rows = ", ".join(f"{48 + 200 * (1.5 - delta) / Z:.1f}" for delta in (0, 1, 1.5, 2))
+    print(f"{Z:>4} m ahead, planes at 0, 1, 1.5, 2 m: rows {rows}")
 
 # %% [markdown]
-# So a point is **in view** if it lies in front of the camera *and* its pixel lies between the outermost *centres* of
-# the image's pixels, $0 \le u \le w - 1$, $0 \le v \le h - 1$, since equation (2) of lecture 06 interpolates between
-# centres. The
-# code calls this `visible`; it says nothing about what stands in between.
-#
-# ## The wrong height
-#
-# So far each point had a height, and we found its pixel. Now somebody gives you a pixel that says *car*, and you look
-# for its cell. If you know nothing, you assume that the world is flat: $\delta$ = 0.
-#
-# **Predict before you run.** The top of a post, 1 m high, 10 m ahead of the toy car. Draw the ray from the camera, 1.5
-# m up, over the top of the post, to the ground. How far ahead does it land? And over the roof of a car at 1.4 m? Over a
-# sign at 2 m?
-#
-# <details><summary>Answer</summary>
-#
-# The ray sinks by 0.5 m in 10 m, so it has 1.5 m down after 30 m: 20 m behind the post. Over the roof it sinks by 0.1 m
-# in 10 m: 150 m. Over the sign it rises: never.
-#
-# </details>
-#
-# Two similar triangles once more. From the camera, $z_\text{cam}$ above the ground, one goes down to the thing, $x$ metres
-# ahead of the camera and $z$ high, the other on to the plane at $\delta$, which it meets at $x_\delta$:
-#
-# $$ x_\delta = x\, \frac{z_\text{cam} - \delta}{z_\text{cam} - z} $$
+# Watch it on the drive, whose camera is 1.66 m above the ground:
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true}
-for z in (0.0, 1.0, 1.4):
-    x_flat = 10 * 1.5 / (1.5 - z)
-    both = np.array([[0, 1.5 - z, 10], [0, 1.5, x_flat]])
-    np.testing.assert_allclose(*project(both, toy)[0])  # the thing and its place on the ground share a pixel
-    print(f"{z} m high, 10 m ahead: drawn {x_flat:.0f} m ahead on the ground")
-
-# %% [markdown]
-# Now the red car in front of us. Each of its pixels has its true depth, so we know its true place. Where does each
-# plane draw it?
-
-# %%
-down = (z_cam - np.array([0.0, 0.8])[:, None]) / (z_cam - car[:, 2])
-on_ground, on_plane = eye[:2] + down[..., None] * (car - eye)[:, :2]
-off_ground, off_plane = (np.linalg.norm(drawn - car[:, :2], axis=1) for drawn in (on_ground, on_plane))
-print(f"{len(car)} pixels of one car, {car[:, 0].min():.1f} to {car[:, 0].max():.1f} m ahead")
-print(f"on the ground plane half of them are off by more than {np.median(off_ground):.1f} m", end=", ")
-print(f"on the plane at 0.8 m by more than {np.median(off_plane):.1f} m")
-every = eye[:2] + ((z_cam - np.arange(8)[:, None] / 5) / (z_cam - car[:, 2]))[..., None] * (car - eye)[:, :2]
-best = np.linalg.norm(every - car[:, :2], axis=2).min(axis=0)
-print(
-    f"each on the best of the planes 20 cm apart: {100 * (best > spec.cell).mean():.0f} % are off by more than a cell"
-)
-
-# %% jupyter={"source_hidden": true} alt="A, from the side: pixels of a car that stands 7 to 11 m ahead, and three rays from the camera through pixels 0.4, 0.9 and 1.2 m high, which meet the ground 10, 19 and 24 m ahead; B and C, from above: the car drawn on the ground plane is a smear from its place to beyond 45 m, on the plane at 0.8 m one from 4 to 25 m, around the true place"
-fig, axes = plt.subplots(1, 3, figsize=(8.6, 3.4), layout="constrained", width_ratios=(2, 1, 1))
-axes[0].scatter(*car[::7, [0, 2]].T, s=2, c=plt.get_cmap("viridis")(car[::7, 2] / 1.7))
-for z in (0.4, 0.9, 1.2):
-    k = np.abs(car[:, 2] - z).argmin()
-    axes[0].plot([eye[0], on_ground[k, 0]], [z_cam, 0], color="0.7", linewidth=0.8, zorder=0)
-    axes[0].plot(on_ground[k, 0], 0, "x", color="tab:red")
-axes[0].plot(eye[0], z_cam, "ks")
-axes[0].set(xlabel="x, forward [m]", ylabel="height [m]", xlim=(-1, 30), ylim=(-0.2, 2), title="A")
-for ax, drawn, name in ((axes[1], on_ground, "B: plane at 0 m"), (axes[2], on_plane, "C: plane at 0.8 m")):
-    ax.scatter(*drawn[::3, ::-1].T, s=1, color="tab:red", label="drawn")
-    ax.scatter(*car[::3, 1::-1].T, s=1, color="black", label="true")
-    ax.set(xlim=(15.5, -5), ylim=(0, 50), aspect="equal", xlabel="y, to the left [m]", title=name)
-axes[1].set_ylabel("x, forward [m]")
-axes[2].legend(markerscale=6, fontsize="small")
-plt.show()
-
-# %% [markdown]
-# A, from the side: the pixels of the car, coloured by height, and where the flat world puts three of them (crosses).
-# B and C, from above: the true places, black, and the drawn ones, red. On the plane at 0.8 m what is lower lies
-# too near, what is higher too far. Even if someone chose the best plane for each pixel, four in ten would be off by
-# more than a cell, because near the camera's own height a ray is nearly level: there 10 cm of height are metres of
-# road. The planes only make sure that better answers are among those offered. The choice is left to what is learnt.
-#
-# As a graph: a class $c$ says something about the height $h$ of what a pixel shows (in metres; not the image's $h$),
-# and the height says at which place $x$ along the ray the thing stands. Dashed: the cut edge; its price is explained below.
-
-# %% tags=["graph-height"] jupyter={"source_hidden": true} alt="a directed graph: class c to height h (dashed, with its price), h to place x, and class c to the observed label a"
-height_stage = pixel_height()
-fig, ax = plt.subplots(figsize=(5, 2.4), layout="constrained")
-height_stage.draw(ax, highlight=["h"])
-plt.show()
-
-# %% [markdown]
-# How high above the road are the pixels of cars on the drive, up to 45 m ahead?
 
 # %% jupyter={"source_hidden": true}
-counts = np.zeros(4)
-for other in drive:
-    ground, cars = (places_of(*np.nonzero(other.labels.image == c), other) for c in (ROAD, CAR))
-    profile = np.polyfit(ground[:, 0], ground[:, 2], 3, w=1 / (1 + ground[:, 0]))
-    cars = cars[cars[:, 0] < 45]
-    counts += np.histogram(cars[:, 2] - np.polyval(profile, cars[:, 0]), [-5, 0.175, 0.55, 0.925, 9])[0]
-print("lowest, about 0.35 m, 0.75 m, 1.1 m or higher:", *(f"{share:.0%}" for share in counts / counts.sum()))
-np.testing.assert_allclose(counts / counts.sum(), CAR_HEIGHTS, atol=0.01)
+def places_of(rows, cols, frame=frame):
+    """Return what pixels see, in the grid frame, (N, 3): equation (1) backwards, with the simulator's true depth."""
+    Z = frame.labels.depth[rows, cols].astype(float)
+    triples = np.stack([cols, rows, np.ones_like(rows)]) * Z  # not yet divided by Z
+    return transform_points(T_grid_from_camera, (np.linalg.inv(camera.K) @ triples).T)
 
-# %% [markdown]
-# For a ray of the toy camera that meets the ground at 30 m, these four heights are places at 30, 23, 15 and 8 m. So,
-# given a pixel
-# that says car, the exact answer spreads over four places, and the flat world is sure of the least likely one: P(30 m)
-# = 1 instead of 0.03. The twenty planes don't infer the height either: they keep all places, without probabilities.
-#
-# ## Hidden cells
-#
-# The first graph said: behind the first thing, the image says nothing. How much of a street is that?
-#
-# **Predict before you run.** In the last frame of the drive, take all cells in view on the ground plane. In how many of
-# them does the pixel show something that stands *in front of* the cell?
-#
-# <details><summary>Answer</summary>
-#
-# In more than half, 55 %; over the whole drive it is 52 to 67 %. But another 32 % read something
-# *behind* the cell. The road has a crest. In this frame the ground 40 m ahead lies 0.7 m lower than below the
-# vehicle, so the ray through the plane's cell passes above the road there and meets something farther away, lower
-# than the plane. Only 13 % read something at the cell's own distance, to within a tenth.
-#
-# </details>
 
-# %% jupyter={"outputs_hidden": true}
-(pixels,), (visible,) = plane_pixels(spec, [0.0], camera)
-cols, rows = pixels[visible].round().astype(int).T
-wanted = np.linalg.norm(spec.centers()[visible] - eye[:2], axis=1)
-shares = []
-for other in drive:
-    there = places_of(rows, cols, other)
-    seen_at = np.linalg.norm(there[:, :2] - eye[:2], axis=1) / wanted
-    shares.append([(seen_at < 0.9).mean(), (np.abs(seen_at - 1) <= 0.1).mean(), (seen_at > 1.1).mean()])
-print("cells whose pixel shows something nearer, in place, farther (within a tenth of the distance):")
-print("last frame:", *(f"{100 * s:.0f} %" for s in shares[-1]), end="; all frames: ")
-print(*(f"{100 * min(s):.0f} to {100 * max(s):.0f} %" for s in zip(*shares, strict=True)), sep=", ")
-front, right = seen_at < 0.9, frame.labels.image[rows, cols] == frame.labels.birdseye_on(spec)[visible]
-ground = places_of(*np.nonzero(frame.labels.image == ROAD))
-assert np.isclose(np.median(ground[np.abs(ground[:, 0] - 40) < 2, 2]), -0.7, atol=0.03)  # the crest
-assert (there[seen_at > 1.1, 2] < 0).mean() > 0.99
-for name, which in (("nearer", front), ("in place", np.abs(seen_at - 1) <= 0.1), ("farther", seen_at > 1.1)):
-    print(f"{name}: {100 * right[which].mean():.0f} % read their true class")
+def paled(frame):
+    """Return the frame with a grey, light image, to draw on."""
+    grey = (120 + frame.image.mean(axis=2, keepdims=True) // 16 * 8).astype(np.uint8)
+    return replace(frame, image=np.repeat(grey, 3, axis=2))
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="two maps: the classes that the ground plane reads, with cars drawn out into long streaks, hatched where something nearer is read; and the true classes"
-hidden, label = np.zeros(spec.shape, bool), np.full(spec.shape, 255)
-hidden[visible], label[visible] = front, frame.labels.image[rows, cols]
-maps = {"what the ground plane reads": label, "truth": frame.labels.birdseye_on(spec)}
-fig = plotting.label_maps(spec, maps, KITTI_14)
-plt.rcParams["hatch.color"] = "white"
-fig.axes[0].contourf(
-    spec.centers()[0, :, 1], spec.centers()[:, 0, 0], hidden, [0.5, 1.5], colors="none", hatches=["////"]
+
+def read_at(height):
+    """Return the class that each cell reads from the true labels of the image, (H, W): 255 out of view."""
+    (pixels,), (visible,) = plane_pixels(spec, [height], camera)
+    read = np.full(spec.shape, 255)
+    cols, rows = pixels[visible].round().astype(int).T
+    read[visible] = frame.labels.image[rows, cols]
+    return read
+
+
+# %% jupyter={"source_hidden": true}
+pale = paled(frame)
+coarse = GridSpec(spec.x_min, spec.x_max, spec.y_min, spec.y_max, cell=1.0)  # to draw, so that dots stay apart
+instances, _ = ndimage.label(frame.labels.image == CAR)
+is_front_car = (instances == instances[140, 120]) & (frame.labels.depth < 13)
+car = places_of(*np.nonzero(is_front_car))
+pale.image[is_front_car] = (pale.image[is_front_car] // 2 + 100 * BLUE).astype(np.uint8)
+HEIGHTS = (0, 0.4, 0.8, z_cam, 2, 2.5)
+MAPS = {height: read_at(height) for height in HEIGHTS}
+LEGEND = [c for c in range(len(KITTI_14.names)) if max((read == c).sum() for read in MAPS.values()) > 20]
+
+
+def draw_map(ax, height):
+    """Draw the map that a plane reads, with the true place of the blue car and all classes in the legend."""
+    plotting.grid_labels(spec, MAPS[height], KITTI_14, ax=ax)
+    dots = ax.plot(*car[::60, 1::-1].T, "ko", markersize=2.5, markeredgecolor="white", markeredgewidth=0.4)
+    squares = [plt.Rectangle((0, 0), 1, 1, color=KITTI_14.colours(np.array([c]))[0] / 255) for c in LEGEND]
+    names = [*(KITTI_14.names[c] for c in LEGEND), "true place of the blue car"]
+    style = {"fontsize": 8, "frameon": False, "handlelength": 1}
+    ax.legend([*squares, *dots], names, loc="upper left", bbox_to_anchor=(1.02, 1), **style)
+    ax.set_ylim(0, 45)
+
+
+# %% jupyter={"source_hidden": true} alt="animation: A, a sheet of dots rises through the camera image of a street with one car marked in blue, and becomes a line at the camera's height; B, seen from the side, it cuts through the car; C, the map of classes that the sheet reads, with the car's true place in black: on the ground plane a long blue smear from there outwards, at 0.8 m a shorter one on both sides of it"
+
+
+def raised():
+    """Yield the figure with the plane at each height."""
+    fig = plt.figure(figsize=(8.4, 4.3), layout="constrained")
+    for height in HEIGHTS:
+        fig.clear()
+        axes = fig.subplot_mosaic([["A", "C"], ["B", "C"]], width_ratios=(2.7, 1), height_ratios=(1.6, 1))
+        plotting.plane_on_image(coarse, height, pale, ax=axes["A"], size=2, colour_bar=False)
+        axes["B"].scatter(*car[::7, [0, 2]].T, s=1, color=BLUE)
+        axes["B"].plot([0, 40], [height] * 2, "tab:orange", eye[0], z_cam, "ks")
+        axes["B"].set(xlim=(-1, 41), ylim=(-1.2, 3.2), xlabel="x, forward [m]", ylabel="height [m]")
+        draw_map(axes["C"], height)
+        for letter, text in {"A": f"A: plane at {height:.1f} m", "B": "B: from the side", "C": "C: the map"}.items():
+            axes[letter].set_title(text, fontsize="medium")
+        yield fig
+
+
+plotting.animate(
+    raised(), period=0.5, alt="a plane of points rises through the street, and the map that it reads changes"
 )
-plt.show()
 
 # %% [markdown]
-# Left: the *true* labels of the image, laid on the ground by equation (1); right: the true map. White: out of view.
-# Hatched: the pixel
-# shows something nearer, which is drawn out, often to the edge of the grid. No camera model repairs that. The LIDAR
-# knows which cells are hidden, and the occupancy grid calls them UNKNOWN: one reason to use both sensors. Far ahead,
-# what the map lacks is the road's own shape: there a plane *below* zero would be right.
-# [The companion](deeper/05_cells_and_slopes.ipynb) measures slopes, and how few pixels a far cell has.
-#
-# ## A real street
-#
-# The same code on a real camera, from PandaSet: another lens, another vehicle, the camera 2.09 m up. We have no true
-# depth here. But the LIDAR has returns, each with its own height, and people have labelled them.
-
-# %%
-real = real_drive()[9]
-real_eye = invert_rigid(real.camera.T_camera_from_grid)[:3, 3]
-returns = real.points_grid[:, :3].astype(float)
-at, in_view = project(transform_points(real.camera.T_camera_from_grid, returns), real.camera)
-cols, rows = at[in_view].round().astype(int).T
-road = returns[in_view][real.labels.image[rows, cols] == ROAD]
-print(f"focal length {real.camera.K[0, 0]:.0f} pixels, camera {real_eye[2]:.2f} m above the ground")
-for x in (15, 20, 30, 40, 50):
-    height = np.median(road[np.abs(road[:, 0] - x) < 0.05 * x, 2])
-    lands = x * real_eye[2] / (real_eye[2] - height)
-    print(f"road {x} m ahead: {height:+.2f} m high, so the ground plane draws it {lands:.1f} m ahead")
-
-# %% jupyter={"source_hidden": true} alt="a real street with LIDAR returns on it, coloured by depth, that follow the cars' outlines; below it the dots of the ground plane, which lie on the road and also over the cars"
-fig, axes = plt.subplots(2, 1, figsize=(5.6, 4), layout="constrained")
-plotting.points_on_image(real, axes[0], size=2)
-plotting.plane_on_image(coarse, 0.0, paled(real), ax=axes[1], size=4)
-axes[0].set_title("A: LIDAR returns", fontsize="medium")
-axes[1].set_title("B: centres of cells of 1 m on the ground plane", fontsize="medium")
-fig.supxlabel(real_drive().credit, fontsize=8)
-plt.show()
-
-# %% [markdown]
-# A: nearer returns are lighter. Their colour changes where the outlines of cars and trees are in the image, as it must
-# if the calibration is right. B: a carpet on the road. It also lies over the cars, because equation (1) knows nothing
-# of cars. This street is nearly flat: at these five distances its road is at most 8 cm above or below the ground plane.
-# Even so the road 40 m ahead is drawn 1.5 m too near.
-#
-# ## Play with it
-#
-# Drag the height of the plane. At which height does it become a line, and what happens
-# beyond? (Without a running kernel there is no slider; the animation above shows the same.)
+# A: each dot is the centre of a square of a metre; nearer ones are lighter. One car is marked in blue. B: the same from the
+# side, with the camera as a black square. C: the map that the plane reads from the image's true labels. On the ground plane
+# the car is thrown over the map like a shadow. At 0.8 m, half-way up its body, the smear lies on both sides of the true
+# place. Above the camera's height the map shows what is high, as trees and houses. (With a running kernel, drag the
+# plane yourself.)
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="the grid lifted to a height, drawn over the image"
 
@@ -732,102 +363,307 @@ def show(height):
 _ = interact(show, height=FloatSlider(value=0.0, min=-1.0, max=3.8, step=0.05, description="height [m]"))
 
 # %% [markdown]
-# ## Where this breaks
+# So equation (1) gives each cell one pixel per plane, and no plane is right for everything in the street.
 #
-# Equation (1) is exact about a camera without lens distortion that is where you think it is, and about a point that
-# you know to be there. You have seen the second fail. The first: the camera is turned by $\psi$ = 1°, and nobody has
-# told the calibration.
+# ## What if the height is wrong?
 #
-# **Predict before you run.** In metres, 30 m ahead: how far is a cell off if the toy camera is turned to the side
-# (yaw)? And if it nods (pitch)? Row 48 + 300 / 30 = 58, where the ground at 30 m should be, then really looks where
-# row 54.5 or 61.5 should.
+# How far off is a thing that isn't at the plane's height?
+#
+# **Predict before you run.** A post, 1 m high, stands 10 m ahead of the toy camera. Draw the ray from the camera, 1.5
+# m up, over the top of the post, to the ground. How far ahead does it land? And over a sign that is higher than the
+# camera?
 #
 # <details><summary>Answer</summary>
 #
-# To the side: 30 · tan 1° = 0.52 m, one cell. Nodding: rows 6.5 and 13.5 below the horizon are 300 / 6.5 = 46 m and 300
-# / 13.5 = 22 m: 16 m too far, or 8 m too near. The same degree, and fifteen or thirty times the error, because the camera
-# looks at the road at a very flat angle.
+# The ray sinks by half a metre on its way to the post, so it has come all the way down after 30 m: far behind it. Over
+# the sign it rises: never.
 #
 # </details>
 #
-# With $\tan\psi \approx \psi$ the focal length drops out: yaw moves a place by $x\,\psi$, and pitch makes a place of
-# the ground at $x$ read another one, at $x'$ (minus with the nose up, plus with the nose down):
+# %% jupyter={"outputs_hidden": true}
+print("the post's top, on the ground:", 10 * 1.5 / (1.5 - 1), "m ahead")
+
+# %% [markdown]
+# Two similar triangles once more. Seen from the camera, $z_\text{cam}$ above the ground, one goes down to the thing, $x$
+# ahead and $z$ high. The other goes on to the plane at $\delta$, which it meets at $x_\delta$ ahead:
 #
-# $$ \frac{1}{x'} = \frac{1}{x} \mp \frac{\psi}{z_\text{cam}} $$
+# $$ x_\delta = x\, \frac{z_\text{cam} - \delta}{z_\text{cam} - z} $$
+#
+# Try it on the drive, where the sidewalk on the right ends in a straight edge. Eight metres ahead, take the pixel of
+# this edge. As a control take the pixel of the kerb's foot, where the sidewalk begins at the height of the road. The
+# simulator knows the true place of both.
+
+
+# %%
+def drawn(places, delta):
+    """Return where the plane at delta draws what stands at some places, in the grid frame, (N, 3)."""
+    return eye + (z_cam - delta) / (z_cam - places[:, 2:]) * (places - eye)
+
+
+edges = {}
+for name, y, side in (("kerb's foot", -2.1, 0), ("far edge", -4.45, -1)):
+    row = round(project(transform_points(camera.T_camera_from_grid, np.array([8, y, 0])), camera)[0][1])
+    column = np.flatnonzero(frame.labels.image[row] == SIDEWALK)[side]
+    edges[name] = there = places_of(np.array([row]), np.array([column]))
+    print(f"{name}: truly at ({there[0, 0]:.2f}, {there[0, 1]:.2f}), {there[0, 2]:+.2f} m high", end="; drawn ")
+    np.testing.assert_allclose(drawn(there, there[0, 2]), there)  # in place on the plane of its own height
+    ground = drawn(there, 0)[0]
+    print(f"at ({ground[0]:.2f}, {ground[1]:.2f}) on the ground plane; {np.hypot(*(ground - there[0])[:2]):.2f} m off")
+
+# %% jupyter={"source_hidden": true}
+off = {name: np.hypot(*(drawn(there, 0) - there)[0, :2]) for name, there in edges.items()}
+np.testing.assert_allclose(list(off.values()), (0.16, 0.88), atol=0.006)
+np.testing.assert_allclose(edges["far edge"][0], (7.26, -4.48, 0.16), atol=0.006)
+missed = np.linalg.norm(drawn(car, 0) - car, axis=1)
+for name, part in (("below 0.4 m", car[:, 2] < 0.4), ("above 1.2 m", car[:, 2] > 1.2)):
+    print(f"pixels of the car {name}: half of them are drawn more than {np.median(missed[part]):.1f} m off")
+
+# %% jupyter={"source_hidden": true} alt="A, from above: the camera, and in front of it black dots where the edges of the sidewalk truly are and orange crosses where the ground plane draws them; at the foot of the kerb they nearly coincide, at the far edge the cross is farther away on the same ray; B and C, from above, a car of which the ground plane makes a long smear outwards, and the plane at 0.8 m a shorter one around its true place"
+fig, axes = plt.subplots(1, 3, figsize=(8.8, 3.4), layout="constrained", width_ratios=(1.5, 1, 1))
+for k, (name, there) in enumerate(edges.items()):
+    both = np.concatenate([there, drawn(there, 0)])
+    axes[0].plot(*both[:, 1::-1].T, color="0.6")
+    axes[0].plot(*both[0, 1::-1], "ko", label=None if k else "true place")
+    axes[0].plot(*both[1, 1::-1], "x", color="#d55e00", markersize=9, label=None if k else "drawn at 0 m")
+    side = 1 if k else -1  # the kerb's name to the left of its dot
+    axes[0].text(both[0, 1] - 0.4 * side, both[0, 0], name, ha="left" if k else "right", va="center", fontsize=9)
+axes[0].plot(eye[1], eye[0], "ks")
+axes[0].plot([eye[1], ground[1]], [eye[0], ground[0]], ":", color="0.5", zorder=0)
+axes[0].text(eye[1] + 0.6, eye[0] + 0.4, "camera", ha="left", fontsize=9)
+axes[0].set(xlim=(2.6, -8), ylim=(-0.5, 11.5), aspect="equal", title="A: the sidewalk's two edges")
+axes[0].legend(fontsize=8, loc="upper left")
+for ax, delta, title in ((axes[1], 0.0, "B: a car, on 0 m"), (axes[2], 0.8, "C: on 0.8 m")):
+    ax.scatter(*drawn(car, delta)[::3, 1::-1].T, s=1, color="#d55e00", label="drawn")
+    ax.scatter(*car[::3, 1::-1].T, s=1, color="black", label="true place")
+    ax.set(xlim=(15.5, -5), ylim=(0, 50), aspect="equal", title=title)
+for ax in axes:
+    ax.set_xlabel("y, to the left [m]")
+axes[0].set_ylabel("x, forward [m]")
+axes[2].legend(markerscale=6, fontsize=8)
+plt.show()
+
+# %% [markdown]
+# The far edge is drawn 0.88 m from its true place (A), though calibration and code are right. What is wrong is the
+# height: the sidewalk is 16 cm higher than the plane. By hand: the ray meets the ground 1.66 / 1.50 = 1.11 times as far
+# from the camera as the edge is, and the edge is 8.3 m away. On a plane of the edge's own height the miss is gone. The
+# control misses by less, because it is only 3 cm off the plane.
+#
+# A car is worse, because it reaches up nearly to the camera's height, where rays are almost level (B). Half of its
+# pixels below 0.4 m are drawn more than 1.4 m off, half of those above 1.2 m more than 27.9 m. On the plane at 0.8 m,
+# what is lower is drawn too near and what is higher too far (C).
+#
+# So a thing is drawn in its place only on the plane of its own height. Several planes *offer* several places, and one
+# of them may be nearly right. Nobody says which. Whether a network profits must be measured: in lecture
+# [08](08_fusion.ipynb) twenty planes are hardly better than one.
+#
+# ## What does the image say of hidden cells?
+#
+# Four cells lie in a row straight ahead, $m_1$ to $m_4$, each road or car. Pixel $a_j$ looks at the *ground* in cell
+# $j$. Its ray passes over all cells before it, so a car in any of them hides the ground. This is called **occlusion**.
+# As a graph, a pixel has an arrow from each cell that its ray passes:
+
+# %% tags=["graph"] jupyter={"source_hidden": true} alt="left, a sketch from the side: a camera and its rays to the ground in four cells; a car in cell 2 blocks the rays to cells 2, 3 and 4; right, a directed graph: four cells m1 to m4 above, four grey pixels a1 to a4 below, and each pixel has arrows from its own cell and from all nearer ones"
+fig, (side, ax) = plt.subplots(1, 2, figsize=(9, 2.9), layout="constrained", width_ratios=(1.1, 1))
+side.add_patch(plt.Rectangle((5.1, 0), 1.8, 1.3, color=BLUE, alpha=0.4))
+for j, x in enumerate((4, 6, 8, 10), start=1):
+    stop = np.array([0, x if j == 1 else max(5.1, x - 1.3 * x / 3), x])  # camera, first thing, ground
+    side.plot(stop[:2], 3 - 3 * stop[:2] / x, color=BLUE if j > 1 else PURPLE, linewidth=1.5)
+    side.plot(stop[1:], 3 - 3 * stop[1:] / x, ":", color="0.4", linewidth=1.2)
+    side.text(x / 3, 2, f"$a_{j}$", ha="center", va="center", fontsize=9, bbox={"fc": "white", "ec": "none", "pad": 1})
+    side.plot([x - 0.9, x + 0.9], [0, 0], color="black", linewidth=3, solid_capstyle="butt")
+    side.text(x, -0.15, f"$m_{j}$", ha="center", va="top")
+side.plot(0, 3, "ks")
+side.set(xlim=(-0.4, 11), ylim=(-0.6, 3.2))
+side.set_title("a car in cell 2, from the side", fontsize=10)
+side.axis("off")
+stage = pixel_ray()
+stage.draw(ax)
+ax.set_title("which cells a pixel depends on", fontsize=10)
+plt.show()
+
+# %% [markdown]
+# **Predict before you run.** The four pixels say road, car, car, car. Each cell is a car with probability 0.2
+# beforehand, and a pixel's label is right with 0.95. Which cells are cars? And are $m_1$ and $m_3$ independent once
+# $a_3$ is known?
+#
+# <details><summary>Answer</summary>
+#
+# One car explains all labels, the one in cell 2. Behind it nothing is known, so a cell there nearly keeps its 0.2. And
+# no: $a_3$ is a known collider, so $m_1$ and $m_3$ compete to explain it. The code does it by hand: it asks where the
+# *first* car is.
+#
+# </details>
+
+# %% jupyter={"outputs_hidden": true}
+first_in_2 = 0.8 * 0.2 * 0.95**4  # no car in cell 1, one in cell 2, and all four labels are right
+first_in_1 = 0.2 * 0.05 * 0.95**3  # the first label is wrong
+first_in_3 = 0.8**2 * 0.2 * 0.05 * 0.95**3  # the second label is wrong
+later = 0.8**3 * (0.2 * 0.05**2 * 0.95**2 + 0.8 * 0.05**3 * 0.95)  # in cell 4, or nowhere: nearly nothing
+total = first_in_1 + first_in_2 + first_in_3 + later
+print(f"cell 2: {(first_in_2 + 0.2 * first_in_1) / total:.2f}")  # behind a first car in cell 1 it keeps its 0.2
+print(f"cell 3: {(first_in_3 + 0.2 * (first_in_1 + first_in_2)) / total:.2f}")
+print(f"its own pixel only: {0.2 * 0.95 / (0.2 * 0.95 + 0.8 * 0.05):.2f}")
+
+# %% jupyter={"source_hidden": true}
+exact, own = exact_ray([0, 1, 1, 1]), cell_by_cell([0, 1, 1, 1])
+np.testing.assert_allclose(exact[1], (first_in_2 + 0.2 * first_in_1) / total)
+np.testing.assert_allclose(exact[2], (first_in_3 + 0.2 * (first_in_1 + first_in_2)) / total)
+print("P(car) of the four cells, exact:", exact.round(2), " own pixel only:", own.round(2))
+assert d_separated(stage.model, "m1", "m3")
+assert not d_separated(stage.model, "m1", "m3", given=("a3",))
+
+# %% [markdown]
+# A reader that gives each cell its own pixel, as equation (1) does, believes in three cars with 0.83 each. In the
+# image there is evidence for one: 0.91, and 0.23 behind it. Behind the first car the image says nothing.
+#
+# How much of a street is that? In the last frame, look up all cells in view on the ground plane. Compare how far away
+# the cell is with how far away the thing is that its pixel shows. Then do it again with each cell at the road's *own*
+# height, because this road has a crest:
+
+# %% jupyter={"source_hidden": true}
+ground = places_of(*np.nonzero(frame.labels.image == ROAD))
+profile = np.polyfit(ground[:, 0], ground[:, 2], 3, w=1 / (1 + ground[:, 0]))
+along_road = np.polyval(profile, np.minimum(spec.centers()[..., 0], 60))
+centres = spec.centers().reshape(-1, 2)
+wanted = np.linalg.norm(centres - eye[:2], axis=1)
+shares = {}
+for name, height in (("at 0 m", np.zeros(len(centres))), ("at the road's height", along_road.ravel())):
+    lifted = np.column_stack([centres, height])
+    pixels, visible = project(transform_points(camera.T_camera_from_grid, lifted), camera)
+    cols, rows = pixels[visible].round().astype(int).T
+    ratio = np.linalg.norm(places_of(rows, cols)[:, :2] - eye[:2], axis=1) / wanted[visible]
+    shares[name] = [100 * part.mean() for part in (ratio < 0.9, np.abs(ratio - 1) <= 0.1, ratio > 1.1)]
+    print(f"cells {name:<21} pixel shows something nearer {shares[name][0]:.0f} %", end=", ")
+    print(f"in place {shares[name][1]:.0f} %, farther {shares[name][2]:.0f} %")
+    if name == "at 0 m":
+        hidden = np.zeros(spec.shape, bool)
+        hidden.ravel()[visible] = ratio < 0.9
+np.testing.assert_allclose(np.polyval(profile, 40), -0.7, atol=0.03)
+
+# %% jupyter={"source_hidden": true} alt="two maps: the classes that the ground plane reads, with cars drawn out into long streaks, hatched where something nearer is read; and the true classes"
+maps = {"read on the ground plane": read_at(0.0), "truth": frame.labels.birdseye_on(spec)}
+fig = plotting.label_maps(spec, maps, KITTI_14)
+plt.rcParams["hatch.color"] = "white"
+fig.axes[0].contourf(
+    spec.centers()[0, :, 1], spec.centers()[:, 0, 0], hidden, [0.5, 1.5], colors="none", hatches=["////"]
+)
+plt.show()
+
+# %% [markdown]
+# On the ground plane more than half of the pixels show something nearer (hatched), which is drawn out into long streaks.
+# Another third show something *farther*, because the road falls away and the ray passes over it. At the road's own
+# height these are nearly gone, so the crest was the cause. The hidden cells stay, and no plane repairs them.
+#
+# So *in view* isn't yet *seen*. The LIDAR knows which cells are hidden: one reason to use both sensors.
+#
+# ## Does it work on a real street?
+#
+# The same code on a real camera, from PandaSet: another lens, another vehicle, the camera 2.09 m up. We have no true
+# depth here, but the LIDAR has returns with heights of their own.
+
+# %% jupyter={"source_hidden": true} alt="a real street with LIDAR returns on it, coloured by depth, that follow the cars' outlines; below it the dots of the ground plane, which lie on the road and also over the cars"
+real = real_drive()[9]
+real_eye = invert_rigid(real.camera.T_camera_from_grid)[:3, 3]
+returns = real.points_grid[:, :3].astype(float)
+at, in_view = project(transform_points(real.camera.T_camera_from_grid, returns), real.camera)
+cols, rows = at[in_view].round().astype(int).T
+road = returns[in_view][real.labels.image[rows, cols] == ROAD]
+road_height = np.median(road[np.abs(road[:, 0] - 40) < 2, 2])
+lands = 40 * real_eye[2] / (real_eye[2] - road_height)
+np.testing.assert_allclose((real_eye[2], road_height, 40 - lands), (2.09, -0.08, 1.5), atol=0.06)
+fig, axes = plt.subplots(2, 1, figsize=(5.6, 4), layout="constrained")
+plotting.points_on_image(real, axes[0], size=2)
+plotting.plane_on_image(coarse, 0.0, paled(real), ax=axes[1], size=4)
+axes[0].set_title("A: LIDAR returns", fontsize="medium")
+axes[1].set_title("B: centres of cells of 1 m on the ground plane", fontsize="medium")
+fig.supxlabel(real_drive().credit, fontsize=8)
+plt.show()
+
+# %% [markdown]
+# A: nearer returns are lighter. Their colour changes at the outlines of cars and trees, as it must if the calibration is
+# right. B: a carpet on the road. It also lies over the cars, because equation (1) knows nothing of cars. The
+# street is nearly flat; still its road 40 m ahead, 8 cm lower than the plane, is drawn 1.5 m too near.
+#
+# So it works, and it shows the same limits.
+#
+# ## Where this breaks: a camera that nods
+#
+# Equation (1) is exact about a camera that is where you think it is. Let the camera be turned by $\psi$ = 1°, and
+# nobody has told the calibration.
+#
+# **Predict before you run.** The toy camera sees the ground at $Z$ in the row that is $300 / Z$ below the horizon, so
+# that at 30 m is 10 rows below. The car brakes, and the camera nods by a degree, 3.5 rows. Which ground does it see
+# there now? And if the nose goes up instead?
+#
+# <details><summary>Answer</summary>
+#
+# What belongs to 13.5 rows below the horizon, or to 6.5: the ground at 22 m, or at 46 m.
+#
+# </details>
+#
+# With $\tan\psi \approx \psi$ the focal length drops out. Where the ground at $x$ is expected, the ground at $x'$ is
+# seen (plus with the nose down, minus with the nose up):
+#
+# $$ \frac{1}{x'} = \frac{1}{x} \pm \frac{\psi}{z_\text{cam}} $$
 
 
 # %% jupyter={"outputs_hidden": true}
-def turned(camera, axis, degrees):
-    """Return the camera after a small turn about its own axis: "x" nods, "y" turns to the side."""
-    turn = Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
+def nodded(camera, degrees):
+    """Return the camera after a small turn about its own X axis, the nose down."""
+    turn = Rotation.from_euler("x", degrees, degrees=True).as_matrix()
     T = rigid_transform(turn, np.zeros(3)) @ camera.T_camera_from_lidar
     return Camera(camera.K, T, camera.size, camera.lidar_height)
 
 
-def read_instead(x, camera, truly):
-    """Return the place on the ground, x and y, that is really seen where the calibration expects (x, 0)."""
+def seen_instead(x, camera, truly):
+    """Return how far ahead the ground is that is really seen where the calibration expects (x, 0)."""
     u, v = project(transform_points(camera.T_camera_from_grid, np.array([x, 0.0, 0])), camera)[0]
     back = invert_rigid(truly.T_camera_from_grid)
     ray = back[:3, :3] @ np.linalg.inv(truly.K) @ [u, v, 1]
-    return (back[:3, 3] - back[2, 3] / ray[2] * ray)[:2] if ray[2] < 0 else np.full(2, np.nan)
+    return (back[:3, 3] - back[2, 3] / ray[2] * ray)[0] if ray[2] < 0 else np.nan
 
 
-for name, axis, sign in (("nose down", "x", 1), ("nose up", "x", -1), ("to the side", "y", 1)):
-    x, y = read_instead(30.0, toy, turned(toy, axis, sign))
-    assert axis == "y" or np.isclose(1 / x, 1 / 30 + sign * np.radians(1) / 1.5, rtol=0.01)
-    print(f"{name:<12} the cell 30 m ahead reads the ground {x:.1f} m ahead, {abs(y):.1f} m to the side")
-on_drive = [read_instead(at, camera, turned(camera, "x", sign))[0] for at, sign in ((30.0, 1), (37.0, -1))]
-np.testing.assert_allclose(on_drive, (23, 60), atol=0.5)  # the drive's camera, for the figure below
+for sign, name in ((1, "down"), (-1, "up")):
+    x = seen_instead(30.0, toy, nodded(toy, sign))
+    np.testing.assert_allclose(1 / x, 1 / 30 + sign * np.radians(1) / 1.5, rtol=0.01)
+    print(f"nose {name}: the cell 30 m ahead reads the ground {x:.0f} m ahead")
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="which ground a cell reads, against the cell's distance, for pitch errors of a quarter, half and one degree: nose up bends far above the diagonal, nose down below it"
-fig, ax = plt.subplots(figsize=(6, 3.2), layout="constrained")
-x = np.linspace(6.5, 60, 100)
+# %% jupyter={"source_hidden": true} alt="which ground a cell reads, against the cell's distance, for half a degree and one degree: nose up bends far above the diagonal, nose down below it"
+fig, ax = plt.subplots(figsize=(6, 3), layout="constrained")
+x = np.linspace(6.5, 60, 60)
 ax.plot([0, 60], [0, 60], color="0.6", linewidth=1, label="as calibrated")
-for degrees, style in ((0.25, ":"), (0.5, "--"), (1.0, "-")):
-    for sign, colour in ((1, "tab:blue"), (-1, "tab:red")):
-        read = [read_instead(a, camera, turned(camera, "x", sign * degrees))[0] for a in x]
-        ax.plot(x, read, style, color=colour, label=f"{degrees}° nose {'down' if sign > 0 else 'up'}")
+for degrees, style in ((0.5, "--"), (1.0, "-")):
+    for sign, colour, name in ((-1, "#d55e00", "up"), (1, "#0072b2", "down")):
+        read = [seen_instead(a, camera, nodded(camera, sign * degrees)) for a in x]
+        ax.plot(x, read, style, color=colour, label=f"{degrees}° nose {name}")
 ax.set(xlabel="cell, x [m]", ylabel="reads the ground at x [m]", xlim=(0, 60), ylim=(0, 60))
-ax.legend(fontsize="small", loc="center left", bbox_to_anchor=(1, 0.5))
+ax.legend(fontsize=9, loc="center left", bbox_to_anchor=(1, 0.5))
 plt.show()
 
 # %% [markdown]
-# The drive's camera: with the nose one degree down, the cell at 30 m gets the label of the road at 23 m; with the nose
-# one degree up, the cell at 37 m gets that of 60 m. The crest of
-# the drive does the same: the grid is fixed to the vehicle, so the road tilts under it.
+# The figure shows it for the drive's camera. Near the car the error is small. Far ahead it explodes, because there the
+# camera looks at the road at a very flat angle.
 #
-# ## The ledger
+# So a calibration must be right to a fraction of a degree.
 #
-# Two edges are cut here, with their prices in the worlds of the two graphs:
-
-# %% jupyter={"source_hidden": true}
-Markdown(ledger_table(ledger("pixel") + ledger("height")))
-
-# %% [markdown]
 # ## In five lines
 #
-# 1. $(X/Z, Y/Z)$ is the picture one metre ahead; $K$ turns it into pixels. Resizing scales $c$ from the image's edge,
-#    half a pixel before the first centre; cropping shifts it.
-# 2. Transforms are read by names, right to left; the inverse undoes the shift first, then the turn.
-# 3. A point in view has one pixel, (1); a pixel has a whole ray of points. All planes meet at the horizon.
-# 4. A wrong height moves a thing by $x\,(z - \delta) / (z_\text{cam} - z)$: 17 cm of sidewalk are half a metre on the map.
-# 5. In view is not yet seen: (1) cuts occlusion (0.83 instead of 0.23) and the height (1 instead of 0.03).
+# 1. A point has one pixel: scale by the focal length, divide by the depth, shift. A pixel has a whole ray of points.
+# 2. Resizing scales from the image's edge, half a pixel before the first centre; cropping shifts.
+# 3. Transforms are read by names. The inverse undoes the shift first, then the turn.
+# 4. A plane draws things in place only at its own height: 16 cm of sidewalk are 0.88 m on the map.
+# 5. In view isn't yet seen: behind the first thing on its ray a pixel says nothing.
 #
-# **What you can now do**: lay any map over any calibrated, undistorted image, and say how far off each cell may be,
-# and why.
+# ## Further reading and exercise
 #
-# ## Further reading
-#
-# - Hartley, Zisserman, *Multiple View Geometry in Computer Vision*, 2nd edition, Cambridge 2004, chapters 6 and 8: the
-#   camera matrix, vanishing points and the horizon.
-# - Zhang, *A flexible new technique for camera calibration*, PAMI 22(11), 2000: where $K$ comes from.
+# - Hartley, Zisserman, *Multiple View Geometry in Computer Vision*, 2nd edition, Cambridge 2004, chapters 6 and 8.
 # - Mallot, Bülthoff, Little, Bohrer, *Inverse perspective mapping simplifies optical flow computation and obstacle
 #   detection*, Biological Cybernetics 64, 1991: the flat world, and what stands up in it.
-# - Roddick, Kendall, Cipolla, *Orthographic feature transform for monocular 3D object detection*, BMVC 2019: planes for
-#   boxes.
-# - Philion, Fidler, *Lift, splat, shoot*, ECCV 2020: pixels that guess their depth; the cut edge put back.
+# - Philion, Fidler, *Lift, splat, shoot*, ECCV 2020: pixels that guess their depth.
 #
-# ## Exercise
+# [The companion](deeper/05_cells_and_slopes.ipynb) asks how many pixels a far cell has, and which planes a road on a
+# slope needs.
 #
 # [Exercise 05](exercises/05_pixels.ipynb): undo a crop, transforms by name, what a cell's pixel really shows, a height
-# from a miss on the map, and a calibration with a fault that you find, and repair on two streets. Next: lecture [06](06_planes.ipynb), reading between pixels.
+# from a miss on the map, and a calibration with a fault that you find. Next: lecture [06](06_planes.ipynb),
+# reading between pixels.

@@ -27,7 +27,9 @@ def things(truth: NDArray) -> NDArray[np.bool_]:
     return ~np.isin(truth, (ROAD, SIDEWALK, IGNORE))
 
 
-def add_up(frames: Sequence[Frame], spec: GridSpec, sensor: Sensor, tau: float = np.inf) -> list[NDArray]:
+def add_up(
+    frames: Sequence[Frame], spec: GridSpec, sensor: Sensor, tau: float = np.inf, highest: float = 0.97
+) -> list[NDArray]:
     """Return the log-odds grid's map of P(occupied) after each frame.
 
     Parameters
@@ -40,8 +42,10 @@ def add_up(frames: Sequence[Frame], spec: GridSpec, sensor: Sensor, tau: float =
         The sensor model.
     tau : float
         Memory of a cell, seconds; `LogOddsGrid` itself never forgets.
+    highest : float
+        Upper limit of P(occupied).
     """
-    grid = LogOddsGrid(spec, LogOddsParams(sensor=sensor))
+    grid = LogOddsGrid(spec, LogOddsParams(sensor=sensor, highest=highest))
     before = frames[0]
     maps = []
     for frame in frames:

@@ -96,7 +96,7 @@ def _evidence(z: float | None, sensor: SensorModel, n_cells: int, rings: int) ->
 
 
 def thick_walls(
-    noise: float = 0.5, scans: int = 20, draws: int = 600, wall: int = 4, seed: int = 1
+    noise: float = 0.5, scans: int = 20, draws: int = 600, wall: int = 4, seed: int = 1, clutter: float | None = None
 ) -> dict[str, NDArray[np.float64]]:
     """Scan a wall of one cell, with free space before and behind it, and switch off what may make it thick.
 
@@ -114,6 +114,8 @@ def thick_walls(
         The only occupied cell of eight, counted from 0.
     seed : int
         Seed of reflections and noise.
+    clutter : float, optional
+        Probability that a free cell of the drawn scans reflects; the sensor model's when left out.
 
     Returns
     -------
@@ -124,7 +126,8 @@ def thick_walls(
     world = same_sensor(noise)
     rng = np.random.default_rng(seed)
     row = np.arange(world.n_cells) == wall
-    drawn = [draw_ranges(world, row, scans, rng) for _ in range(draws)]
+    real = world if clutter is None else replace(world, clutter=clutter)
+    drawn = [draw_ranges(real, row, scans, rng) for _ in range(draws)]
     beams = SensorModel(ground=None, p_pass_occupied=1 - world.hit, p_pass_free=1 - world.clutter)
     free = {"lowest": 1e-9, "highest": 1 - 1e-9}
     grids = {

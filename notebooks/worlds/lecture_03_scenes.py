@@ -1,17 +1,30 @@
 """The scenes of lecture 03: a belief that is sheared, boxes that move, a bus; and how they are drawn."""
 
 from collections.abc import Callable, Iterator
+from functools import cache, cached_property
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from semgrid_edu import fast, plotting
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy import BofParams, BofState, Evidence, VelocityLattice, WorldModel, bof_predict, bof_update
-from worlds.lecture_02_boxes import Box, scan_boxes
+from semgrid_edu.occupancy import (
+    BofParams,
+    BofState,
+    Evidence,
+    State,
+    VelocityLattice,
+    WorldModel,
+    bof_predict,
+    bof_update,
+)
+from semgrid_edu.occupancy.bof_state import whole_cells
+from semgrid_edu.occupancy.planar_motion import shift
+from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 STEADY = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=0, walls=None)
 """A world in which things move, and that is all."""
@@ -28,11 +41,10 @@ def bus_at(t: float) -> list[Box]:
     return [Box.around(30 - 8 * t, FLANK + 1.25, 12, 2.5, 3)]
 
 
-def watch(
-    boxes_at: Callable[[float], list[Box]], spec: GridSpec, params: BofParams, times: NDArray,
-    columns: int = 300, field: float = 180,
-) -> list[BofState]:  # fmt: skip
-    """Return what BOF believes after each scan of a vehicle that doesn't move.
+def scans_of(
+    boxes_at: Callable[[float], list[Box]], spec: GridSpec, times: NDArray, columns: int, field: float = 180
+) -> list[Evidence]:
+    """Return what each scan of a vehicle that doesn't move tells about the cells.
 
     Parameters
     ----------
@@ -40,19 +52,28 @@ def watch(
         Returns the boxes of the world at a time, seconds.
     spec : GridSpec
         The cells.
-    params : BofParams
-        The lattice, and how the world changes.
     times : sequence of float
-        Times of the scans, seconds, evenly spaced.
+        Times of the scans, seconds.
     columns, field
         The scanner, as in `scan_boxes`.
     """
-    rng, dt = np.random.default_rng(0), times[1] - times[0]
+    rng, sensor = np.random.default_rng(0), WorldModel().sensor
+    scans = [scan_boxes(boxes_at(t), columns=columns, rings=16, field=field, noise=0.02, rng=rng) for t in times]
+    return [fast.scan_evidence(points, spec, sensor) for points in scans]
+
+
+@cache
+def _bus_scans(columns: int, first: float) -> tuple[NDArray, list[Evidence]]:
+    """Return the times of the scans of the bus, from the first one on, and what they tell."""
+    times = np.arange(round(10 * first), 29) / 10
+    return times, scans_of(bus_at, BUS, times, columns)
+
+
+def watch(scans: list[Evidence], spec: GridSpec, params: BofParams, predict: Callable = bof_predict) -> list[BofState]:
+    """Return what BOF believes after each of some scans, a tenth of a second apart."""
     state, states = BofState.nothing_known(spec, params.lattice), []
-    for t in times:
-        points = scan_boxes(boxes_at(t), columns=columns, rings=16, field=field, noise=0.02, rng=rng)
-        state = bof_predict(state, spec, params, dt)
-        state = bof_update(state, spec, fast.scan_evidence(points, spec, params.world.sensor), params)
+    for scan in scans:
+        state = bof_update(predict(state, spec, params, 0.1), spec, scan, params)
         states.append(state)
     return states
 
@@ -71,11 +92,115 @@ def pass_by(
     first_sight : (float, float, float)
         Probabilities of FREE, STATIC and DYNAMIC when a cell is first seen.
     """
-    times = np.arange(round(10 * first), 29) / 10
-    params = BofParams(VelocityLattice(8, spacing=2), WorldModel(first_sight=first_sight))
-    states = watch(bus_at, BUS, params, times, columns)
+    times, scans = _bus_scans(columns, first)
+    states = watch(scans, BUS, BofParams(VelocityLattice(8, spacing=2), WorldModel(first_sight=first_sight)))
     _, (col,), _ = BUS.cells(np.array([[1.0, FLANK]]))
     return times, np.stack([state.probability[:, ::-1, col] for state in states], axis=1)
+
+
+class OnlyTheBus(VelocityLattice):
+    """A lattice on which everything that moves has the velocity of the bus, so that nothing is spread over others."""
+
+    @cached_property
+    def prior(self) -> NDArray[np.float64]:
+        """(V,): all mass on the velocity of the bus."""
+        return (self.velocities == (-8, 0)).all(axis=1).astype(float)
+
+
+def late(odds: float, spread: bool, strike_out: bool) -> NDArray[np.float64]:
+    """Return P(DYNAMIC | occupied) after each scan, (11,), in the middle of a bus that was in view from the start.
+
+    It is the mean over the cells that the bus has covered since the first scan, but for its last two metres. In this
+    world nothing starts, stops, is forgotten or changes its velocity.
+
+    Parameters
+    ----------
+    odds : float
+        P(STATIC) : P(DYNAMIC) at first sight.
+    spread : bool
+        Whether moving mass is spread over all velocities of a lattice, or has that of the bus.
+    strike_out : bool
+        Whether what stands and what arrives are struck out as a pair. If not, each antecedent keeps its mass.
+    """
+    static = 0.048 * odds / (1 + odds)
+    world = WorldModel(STEADY.rates, 0, STEADY.stop_speed, 0, (0.952, static, 0.048 - static), None)
+    params = BofParams(VelocityLattice(8, spacing=2) if spread else OnlyTheBus(8, spacing=8), world)
+    times, scans = _bus_scans(1000, 1.6)
+    states = watch(scans[:11], BUS, params, bof_predict if strike_out else _fly_alone)
+    (_,), (col,), _ = BUS.cells(np.array([[1.0, FLANK]]))
+    x, told = BUS.centers()[:, col, 0], []
+    for t, state in zip(times, states, strict=False):
+        here = (x > 30 - 8 * times[0] - 6) & (x < 30 - 8 * t + 6 - 2)
+        probability = state.probability[:, here, col]
+        told.append(probability[State.DYNAMIC].sum() / probability[[State.STATIC, State.DYNAMIC]].sum())
+    return np.array(told)
+
+
+def _fly_alone(state: BofState, spec: GridSpec, params: BofParams, dt: float) -> BofState:
+    """Predict for `STEADY` without the strike-out: each velocity shifts its mass, sums above 1 are scaled down."""
+    cells, remainder = whole_cells(state, spec, dt)
+    occupied = np.stack([shift(mass, way) for mass, way in zip(state.occupied, cells, strict=True)])
+    occupied /= np.maximum(occupied.sum(axis=0) / 0.999, 1)
+    unknown = np.minimum(state.unknown, 1 - occupied.sum(axis=0))
+    return BofState(1 - occupied.sum(axis=0) - unknown, unknown, occupied, state.velocity, remainder)
+
+
+WALK = np.arange(41) / 10
+"""Times of the scans of a walker, seconds."""
+
+
+def _person(t: float, speed: float, start: float) -> list[Box]:
+    """Return a person who walks towards us."""
+    return [Box.around(start - speed * t, 0, 0.6, 0.6, 1.7)]
+
+
+@cache
+def _walk_scans(speed: float, start: float, spec: GridSpec) -> list[Evidence]:
+    """Return what the scans of a walker tell."""
+    return scans_of(lambda t: _person(t, speed, start), spec, WALK, columns=100, field=60)
+
+
+def walker(speed: float, spacing: float, leaks: bool, start: float = 15.2, cell: float = 0.5) -> NDArray[np.float64]:
+    """Return P(DYNAMIC) of a person who walks towards us, after each scan of `WALK`, (41,).
+
+    Parameters
+    ----------
+    speed : float
+        Speed of the person, m/s.
+    spacing : float
+        Spacing of the velocities of the lattice, which ends at 2 m/s.
+    leaks : bool
+        Whether what moves may stop or be forgotten.
+    start : float
+        Where the person is at first, metres ahead.
+    cell : float
+        Side of a cell, metres.
+    """
+    lane = GridSpec(x_min=4, x_max=18, y_min=-2, y_max=2, cell=cell)
+    rates = WorldModel.rates
+    world = WorldModel() if leaks else WorldModel(rates=(*rates[:2], (0.0,) * 4, rates[3]), stop_rate=0)
+    states = watch(_walk_scans(speed, start, lane), lane, BofParams(VelocityLattice(2, spacing), world))
+    told = []
+    for t, state in zip(WALK, states, strict=True):
+        here = cells_in(_person(t, speed, start)[0], lane, margin=0.5) & (state.occupied.sum(axis=0) > 0.5)
+        told.append(state.probability[State.DYNAMIC, here].mean())
+    return np.array(told)
+
+
+def outline(ax: Axes, boxes: list[Box]) -> list[Line2D]:
+    """Draw the outlines of boxes on a map whose axes are y and x, and return them."""
+    lines = [ax.plot([], [], color="#d00000", linewidth=1.8)[0] for _ in boxes]
+    move_outline(lines, boxes)
+    return lines
+
+
+def move_outline(lines: list[Line2D], boxes: list[Box]) -> None:
+    """Move the outlines of `outline` to where the boxes are now."""
+    for line, box in zip(lines, boxes, strict=True):
+        line.set_data(
+            [box.y_min, box.y_max, box.y_max, box.y_min, box.y_min],
+            [box.x_min, box.x_min, box.x_max, box.x_max, box.x_min],
+        )
 
 
 def draw_flank(ax: Axes, times: NDArray, states: NDArray, title: str) -> None:
@@ -85,9 +210,20 @@ def draw_flank(ax: Axes, times: NDArray, states: NDArray, title: str) -> None:
     ax.imshow(picture, extent=extent, origin="lower", aspect="auto", interpolation="nearest")
     span = np.array([0, 3])
     for end, style in ((24, "-"), (36, "--")):
-        ax.plot(end - 8 * span, span, style, color="tab:red", linewidth=1.5)
-    ax.set(xlim=(0, 18), ylim=(0, 2.85), xlabel="x, forward [m]", facecolor="white")
+        ax.plot(end - 8 * span, span, style, color="#c000c0", linewidth=2)
+    ax.set(xlim=(0, 18), ylim=(0, 2.85), xticks=range(0, 19, 3), xlabel="x, forward [m]", facecolor="white")
     ax.set_title(title, fontsize=10)
+
+
+def draw_flanks(passed: dict[str, tuple[NDArray, NDArray]]) -> None:
+    """Draw what `pass_by` returned, by title: panels side by side, with the legend below."""
+    from matplotlib import pyplot as plt
+
+    fig, axes = plt.subplots(1, len(passed), figsize=(8.6, 3.5), layout="constrained", sharex=True, sharey=True)
+    for ax, (name, run) in zip(axes, passed.items(), strict=True):
+        draw_flank(ax, *run, name)
+    axes[0].set_ylabel("time [s]")
+    flank_legend(fig)
 
 
 def sheared() -> list[tuple[str, NDArray, int | None]]:
@@ -132,11 +268,12 @@ def sheared_frames(story: list[tuple[str, NDArray, int | None]]) -> Iterator[Fig
 
 def flank_legend(fig: Figure) -> None:
     """Add the states' colours and the lines of `draw_flank` below a figure."""
-    from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
     names = ("free", "STATIC", "DYNAMIC", "unknown")
     colours = plotting.occupancy_colours(np.eye(4)[:, None])[0] / 255
     states = [Patch(facecolor=c, edgecolor="0.6", label=name) for c, name in zip(colours, names, strict=True)]
-    ends = [Line2D([], [], linestyle=s, color="tab:red", label=n) for s, n in (("-", "front"), ("--", "rear"))]
+    ends = [
+        Line2D([], [], linestyle=s, color="#c000c0", linewidth=2, label=n) for s, n in (("-", "front"), ("--", "rear"))
+    ]
     fig.legend(handles=states + ends, loc="outside lower center", ncols=6, fontsize=9, frameon=False)

@@ -69,7 +69,7 @@ def cmcdot_stage(world: CellsInARow = FROM_BOTH_SIDES, cell: int = 2) -> StageGr
             "m1": (3.4, -1.8),
             "z1": (3.4, -2.9),
         },
-        labels={"q0": "$q_{t-1}^{(i)}$", "q1": "$q_t^{(i)}$", "one1": r"$\leq 1$"}
+        labels={"q0": "$q_{t-1}^{(i)}$", "q1": "$q_t^{(i)}$", "one1": "fits"}
         | {"m0": "$m_k^{t-1}$", "m1": "$m_k^t$", "z1": "$z_k^t$", "neighbour": "$m_{k+1}^t$"},
         plates={"particles $i$": ("q0", "q1"), "cells $k$": ("m0", "m1", "one1", "z1")},
         cut=CUT,

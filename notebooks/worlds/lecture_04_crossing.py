@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +18,8 @@ from semgrid_edu.labels import KITTI_14
 from semgrid_edu.occupancy import Belief, CmcdotParams, FilterState, Particles, PlanarMotion, State
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 from worlds.lecture_04_scenes import hit_cells
+from worlds.lecture_04_street_scores import StreetScores
+from worlds.lecture_04_suspects import Suspect, counts, run_filter, scenes_of
 
 SPEC = GridSpec(x_min=0, x_max=40, y_min=-12, y_max=12, cell=0.5)
 PARAMS = CmcdotParams(sensor=SensorModel(), n_particles=30_000)
@@ -24,6 +27,33 @@ PARAMS = CmcdotParams(sensor=SensorModel(), n_particles=30_000)
 WALL, PARKED = Box(5, 60, 7.0, 7.5, 2.5), Box.around(22, -6, 4, 1.8, 1.5)
 CAR, PERSON = 2, 3
 """Their places in the list of `crossing`."""
+
+EVEN = (0.952, 0.024, 0.024)
+"""Odds of first sight at which STATIC and DYNAMIC are equally probable."""
+_NOT_BORN = tuple(
+    tuple(0.0 if state == State.DYNAMIC else rate for state, rate in zip(State, row, strict=True))
+    for row in PARAMS.rates
+)
+ARRIVALS = {
+    "as it is": {},
+    "even odds at first sight": {"first_sight": EVEN},
+    "nothing DYNAMIC at first sight": {"first_sight": (0.952, 0.048, 0.0)},
+    "no particles": {"first_sight": (0.952, 0.048, 0.0), "rates": _NOT_BORN},
+    "particles that don't fly": {"max_speed": 0.0, "max_acceleration": 0.0, "stop_rate": 0.0},
+}
+"""What is switched off to find out what tells STATIC from DYNAMIC. Particles at rest mustn't stop, or none is left."""
+DRIVES_AWAY = {
+    "as it is": {},
+    "without the rule": {"walls": None},
+    "even odds at first sight": {"first_sight": EVEN},
+    "both": {"walls": None, "first_sight": EVEN},
+}
+"""What is switched off to find out why the car F isn't DYNAMIC."""
+KNOWN_FREE = "F's way known to be free"
+"""The control: nothing is switched off, but the filter begins with the cells ahead of F's rear as FREE."""
+WIDE = GridSpec(x_min=0, x_max=40, y_min=-12, y_max=16, cell=0.5)
+BORDERS = (("mesh", 0), ("mesh", 1), ("mesh", 2), ("walls", 0), ("walls", 1), ("hedge", 0))
+"""Simulated drives along fences, walls and hedges: the street and the seed of each."""
 
 
 class Seen(NamedTuple):
@@ -48,6 +78,11 @@ def crossing(t: float) -> list[Box]:
 def hurrying(t: float) -> list[Box]:
     """Return `crossing` with a person who runs at 3 m/s."""
     return [*crossing(t)[:PERSON], Box.around(11, -6 + 3 * t, 0.5, 0.5, 1.75)]
+
+
+def wide(t: float) -> list[Box]:
+    """Return `crossing` with a walker four times as wide."""
+    return [*crossing(t)[:PERSON], Box.around(11, -4 + 1.4 * t, 2.0, 2.0, 1.75)]
 
 
 def watch(
@@ -100,6 +135,84 @@ def measure_luck(
     return np.array(found)
 
 
+def measure_arrivals(seeds: Sequence[int]) -> dict[str, NDArray[np.float64]]:
+    """Return how much of wall, parked car and coming car of `street` is called DYNAMIC, (seeds, 3) per cent.
+
+    From 0.5 s to 1.5 s, while we drive 5 m/s, for each filter of `ARRIVALS`.
+    """
+    found = {}
+    for name, changed in ARRIVALS.items():
+        runs = [list(watch(street, 1.5, 5.0, replace(PARAMS, **changed), seed)) for seed in seeds]
+        found[name] = np.array(
+            [[called_moving(run, lambda t, k=k: street(t)[k], since=0.5) for k in range(3)] for run in runs]
+        )
+    return found
+
+
+def measure_drives_away(frames: Sequence[Frame], seeds: Sequence[int]) -> dict[str, NDArray[np.float64]]:
+    """Return the share of the cells of the car F that are DYNAMIC in the last scan, (seeds,) per cent.
+
+    For each filter of `DRIVES_AWAY`, and for the control `KNOWN_FREE`.
+    """
+    filters = DRIVES_AWAY | {KNOWN_FREE: {}}
+    found = {name: [] for name in filters}
+    for name, changed in filters.items():
+        for seed in seeds:
+            tracker = Cmcdot(WIDE, CmcdotParams(sensor=SensorModel(), **changed), seed=seed)
+            if name == KNOWN_FREE:
+                tracker._state = _free_ahead(tracker.map_spec)
+            beliefs = []
+            for before, now in pairwise([frames[0], *frames]):
+                motion = PlanarMotion.from_poses(before.T_world_from_lidar, now.T_world_from_lidar)
+                beliefs.append(tracker.step(now.points_grid, motion, now.time - before.time or 0.1))
+            found[name].append(dynamic_shares(WIDE, frames, beliefs, "the car F")[-1])
+    return {name: np.array(shares) for name, shares in found.items()}
+
+
+def _free_ahead(spec: GridSpec) -> FilterState:
+    """Return a state that knows nothing but that the 12 m ahead of F's rear, in its lane, are FREE."""
+    x, y = np.moveaxis(spec.centers(), -1, 0)
+    way = (x > 10.5) & (x < 22) & (np.abs(y) < 1.75)
+    state = FilterState.unknown(spec)
+    probability = np.where(way, np.eye(4)[State.FREE][:, None, None], state.probability)
+    return replace(state, probability=probability.astype(np.float32))
+
+
+def measure_borders(drives: Sequence[tuple[str, int]] = BORDERS) -> dict[str, NDArray[np.float64]]:
+    """Return how much of what stands at the border of simulated streets is called DYNAMIC, (drives,) per cent.
+
+    For each filter of `DRIVES_AWAY`. A drive takes half a minute.
+    """
+    spec = GridSpec.compact()
+    found = {name: [] for name in DRIVES_AWAY}
+    for street_name, number in drives:
+        drive, scenes = scenes_of(street_name, number, spec, Suspect())
+        for name, changed in DRIVES_AWAY.items():
+            scores = StreetScores(spec)
+            run_filter(drive, scenes, Suspect(params=CmcdotParams(**changed)), scores)
+            cells, called = counts(scores)["scenery"]
+            found[name].append(100 * called / cells)
+    return {name: np.array(shares) for name, shares in found.items()}
+
+
+def arrivals() -> dict[str, NDArray[np.float64]]:
+    """Return what `measure_arrivals` found, (8 seeds, 3: wall, parked car, coming car) per cent, by filter."""
+    return {
+        name: np.array([shares[thing] for thing in ("wall", "parked", "coming")]).T
+        for name, shares in _measured()["arrivals"].items()
+    }
+
+
+def drives_away() -> dict[str, NDArray[np.float64]]:
+    """Return what `measure_drives_away` found, (12 seeds,) per cent, by filter."""
+    return {name: np.array(shares) for name, shares in _measured()["drives away"].items()}
+
+
+def borders() -> dict[str, NDArray[np.float64]]:
+    """Return what `measure_borders` found, (6 drives,) per cent, by filter."""
+    return {name: np.array(shares) for name, shares in _measured()["borders"].items()}
+
+
 def luck() -> dict[int, NDArray[np.float64]]:
     """Return the measured shares, (24 seeds, 2: car and person) per cent, by number of particles."""
     table = _measured()
@@ -111,6 +224,11 @@ def luck() -> dict[int, NDArray[np.float64]]:
 def luck_of_who_runs() -> NDArray[np.float64]:
     """Return the measured shares of the person of `hurrying` with 3,000 particles, (24 seeds,) per cent."""
     return np.array(_measured()["3000"]["running"])
+
+
+def luck_of_who_is_wide() -> NDArray[np.float64]:
+    """Return the measured shares of the person of `wide` with 3,000 particles, (8 seeds,) per cent."""
+    return np.array(_measured()["3000"]["wide"])
 
 
 def _measured() -> dict:
@@ -130,7 +248,7 @@ def on_a_line(
         The cell that may hold a fence, and the probability that it does. All else is FREE.
     """
     line = GridSpec(x_min=0, x_max=6, y_min=0, y_max=1, cell=1)
-    calm = CmcdotParams(rates=((0.0,) * 4,) * 4, stop_rate=0.0, max_acceleration=0.0, walls=None)
+    calm = CmcdotParams(rates=((0.0,) * 4,) * 4, max_acceleration=0.0, walls=None)
     b = np.zeros((4, 6))
     b[State.DYNAMIC] = np.bincount(x.astype(int), weight, minlength=6)
     b[State.STATIC, fence] = b_s

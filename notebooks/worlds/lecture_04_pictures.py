@@ -7,6 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
@@ -51,39 +52,54 @@ def draw_round(
     axes: Sequence[Axes], spec: GridSpec, predicted: FilterState, evidence: Evidence,
     updated: FilterState, resampled: FilterState,
 ) -> None:  # fmt: skip
-    """Draw the surroundings of the overtaking car after step 2, in the scan, and after steps 3 and 4."""
+    """Draw the overtaking car A after step 1, in the scan, after steps 2 and 3, and after step 4."""
     plotting.occupancy(spec, predicted.probability, ax=axes[0], legend=False)
     draw_map(spec, np.log10(evidence.occupied / evidence.free), axes[1], cmap="RdGy", vmin=-1, vmax=1)
     plotting.occupancy(spec, updated.probability, ax=axes[2], legend=False)
     empty = np.zeros((4, *spec.shape))
     empty[State.FREE] = 1
     plotting.particles(spec, resampled.particles, plotting.occupancy(spec, empty, ax=axes[3], legend=False))
-    for ax, title in zip(axes, ("2 predicted", "the scan", "3 updated", "4 resampled: particles"), strict=True):
-        ax.set(xlim=(8, -1), ylim=(2, 15), xticks=(0, 5), yticks=(5, 10, 15), xlabel="y, to the left [m]", ylabel="")
+    titles = "after step 1", "the scan", "after steps 2 and 3", "after step 4: particles"
+    for ax, title in zip(axes, titles, strict=True):
+        ax.set(xlim=(5.5, 0.5), ylim=(2, 12), xticks=(1, 3, 5), yticks=(4, 8, 12), xlabel="y, to the left [m]")
+        ax.set(ylabel="x, forward [m]" if ax is axes[0] else "")
         ax.set_title(title, fontsize=10)
-    axes[0].set_ylabel("x, forward [m]")
+    axes[0].text(4.9, 7.6, "A", weight="bold", fontsize=11)
+    for x, y, name, colour in ((3.7, 4.2, "hit", "k"), (3.7, 2.7, "passed", "k"), (5.1, 10.5, "not seen", "k")):
+        axes[1].text(x, y, name, color=colour, fontsize=9)
+    axes[1].annotate("", (3.2, 5.3), (3.2, 4.75), arrowprops={"arrowstyle": "->", "color": "k"})
 
 
 def legend_of_round(fig: Figure) -> None:
     """Add the legend of `draw_round` below its panels."""
-    scan = plt.get_cmap("RdGy")([1.0, 0.5 + 0.5 * np.log10(0.3 / 0.7), 0.5])[:, :3] * 255
-    named = colour_patches(plotting.STATE_NAMES, plotting.STATE_COLOURS)
-    named += colour_patches(("hit", "passed", "not seen"), scan)
-    named += colour_patches(("particle: our way", "towards us"), HEADING_COLOURS[::2])
-    fig.legend(handles=named, loc="outside lower center", ncols=5, fontsize=9, frameon=False)
+    shown = [State.FREE, State.DYNAMIC, State.UNKNOWN]
+    named = colour_patches([plotting.STATE_NAMES[k] for k in shown], [plotting.STATE_COLOURS[k] for k in shown])
+    named += colour_patches(("particle that flies our way",), HEADING_COLOURS[:1])
+    fig.legend(handles=named, loc="outside lower center", ncols=4, fontsize=9, frameon=False)
 
 
 def draw_error(error: SamplingError) -> None:
     """Draw the errors of CMCDOT against its number of particles, with BOF's bias."""
-    _, ax = plt.subplots(figsize=(7.2, 2.8), layout="constrained")
-    ax.loglog(error.numbers, error.to_exact, "s", color=ORANGE, label="error: CMCDOT to exact")
-    ax.axhline(error.bias, color=ORANGE, ls="--", label="bias: BOF to exact")
-    ax.loglog(error.numbers, error.to_bof, "o", color=VIOLET, label="sampling: CMCDOT to BOF")
-    ax.loglog(error.numbers, error.to_bof[1] * (error.numbers / error.numbers[1]) ** -0.5, "k:", label="slope -1/2")
+    _, ax = plt.subplots(figsize=(7.2, 3.4), layout="constrained")
+    fine = np.geomspace(error.numbers[0], error.numbers[-1], 50)
+    falling = error.to_bof[1] * (fine / error.numbers[1]) ** -0.5
+    ax.loglog(fine, np.hypot(error.bias, falling), color=ORANGE)
+    ax.loglog(error.numbers, error.to_exact, "s", color=ORANGE)
+    ax.axhline(error.bias, color="0.3", ls="--")
+    ax.loglog(fine, falling, ":", color=VIOLET)
+    ax.loglog(error.numbers, error.to_bof, "o", color=VIOLET)
+    names = (
+        (34, 0.070, "error: CMCDOT to the exact answer", ORANGE),
+        (10, 0.043, "bias: BOF to the exact answer", "0.3"),
+        (85, 0.0135, "sampling: CMCDOT to BOF,\nwith a line of slope -1/2", VIOLET),
+    )
+    for x, y, name, colour in names:
+        ax.text(x, y, name, color=colour, fontsize=9, va="center")
     ax.set_xticks(error.numbers, [f"{number:,}" for number in error.numbers])
-    ax.xaxis.minorticks_off()
-    ax.set(xlabel="particles", ylabel="root mean square error", ylim=(8e-4, 0.12))
-    ax.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.02, 1), fontsize=9)
+    ax.set_yticks([0.003, 0.01, 0.03, 0.1], ["0.003", "0.01", "0.03", "0.1"])
+    ax.minorticks_off()
+    ax.set(xlabel="particles", ylabel="root mean square error", ylim=(0.003, 0.1))
+    ax.set_title("mean of 16 seeds", fontsize=10)
 
 
 def draw_crossing(
@@ -119,8 +135,14 @@ def draw_luck(ax: Axes, luck: dict[int, NDArray]) -> None:
 
 
 def draw_street(ax: Axes, spec: GridSpec, belief: Belief, title: str, legend: bool) -> None:
-    """Draw a belief of the real street, with letters at the oncoming cars E and at the car F ahead of us."""
+    """Draw a belief of the real street, with frames around the lane E, the car F and what stands to the right."""
     plotting.velocity_wheel(spec, belief.probability, belief.velocity, ax=ax, legend=legend)
-    for letter, place in (("E", (5.4, 14)), ("F", (2.4, 12))):
-        ax.text(*place, letter, weight="bold", ha="center", zorder=3)
+    frames = (("E", (6.5, 0.3), 4.5, 32.4), ("F", (-1.5, 9), 3.0, 11), ("right of us", (-11.8, 0.3), 9.8, 32.4))
+    outline = [withStroke(linewidth=2.5, foreground="w")]
+    for name, corner, width, height in frames:
+        frame = Rectangle(corner, width, height, fill=False, color=VIOLET, lw=1.8, zorder=3)
+        ax.add_patch(frame)
+        place = (corner[0] + width - 0.4, corner[1] + height - 0.5)
+        ax.text(*place, name, weight="bold", va="top", zorder=4, path_effects=outline)
+    ax.set(ylim=(0, 33))
     ax.set_title(title, fontsize=10)

@@ -61,8 +61,8 @@ def camera_scores(counts: Counts, method: str, rule: str) -> dict[str, object]:
     found: dict[str, object] = {}
     for name in ("pixel accuracy", "class accuracy"):
         metric = METRICS[name]
-        found[name] = _named(drive_interval(ours, metric))
-        found[f"{name} above the {rule}"] = _named(paired_interval(ours, theirs, metric))
+        found[name] = named(drive_interval(ours, metric))
+        found[f"{name} above the {rule}"] = named(paired_interval(ours, theirs, metric))
         found[f"{name} by camera"] = {
             camera: float(metric(matrix)) for camera, matrix in zip(counts[method], ours[0], strict=True)
         }
@@ -80,7 +80,14 @@ def by_camera(matrices: dict[str, NDArray]) -> NDArray[np.int64]:
     return on_cells(np.stack([of_frames.sum(axis=0) for of_frames in matrices.values()])[None], "semantic", KITTI_14)
 
 
-def _named(interval: tuple[float, float, float]) -> dict[str, float]:
+def named(interval: tuple[float, float, float]) -> dict[str, float]:
+    """Name the ends and the middle of an interval.
+
+    Parameters
+    ----------
+    interval : (float, float, float)
+        Low, mean and high.
+    """
     return dict(zip(("low", "mean", "high"), interval, strict=True))
 
 

@@ -1,6 +1,6 @@
 """The report card of a drive: every check with its reading and one of three verdicts, in one figure."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,13 +15,15 @@ from semgrid_edu.metrics import METRICS
 from semgrid_edu.workshop.course.street import motion_between, piece_confusions
 from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 from worlds import lecture_13_checks as checks
-from worlds.lecture_13_domain import distances, training_images
 from worlds.lecture_13_faults import YAWS
 from worlds.lecture_13_scan_borders import edge_contrast
 
 TURNED, LEANS, SHIFTED, OVERSURE = 0.5, 1.0, 0.05, 0.05
 """Limits: a camera turned by more (degrees), ground that leans by more (degrees), a motion that fits worse than another
 by more (metres), probabilities that are further from the shares of right cells."""
+
+BINS = 8
+"""Number of bins for the expected calibration error."""
 
 MARKS = {True: ("passes", "#1b9e77", "o"), False: ("ALARM", "#d95f02", "X"), None: ("can't tell", "0.55", "s")}
 """Word, colour and mark of each verdict."""
@@ -95,11 +97,10 @@ def check_lines(drive: FrameSequence, frames: Sequence[Frame]) -> list[Line]:
     frames : sequence of Frame
         Its frames with scan and image, more than five.
     """
-    times, errors = [frame.time for frame in frames], checks.axes_errors(frames)
+    times, errors = [frame.time for frame in frames], checks.axes_errors(frames, thin=3)
     contrast = np.mean([edge_contrast(frame, YAWS) for frame in frames[::3]], axis=0)
     ground = np.mean([checks.ground_plane(frame.points, frame.camera.lidar_height) for frame in frames], axis=0)
     problems, gaps, best = len(drive.problems()), len(checks.time_gaps(times)), YAWS[contrast.argmax()]
-    passes = motion_verdict(errors)
     far = float(np.linalg.norm(motion_between(frames[0], frames[-1])[:3, 3]))
     return [
         Line("files", f"{problems} problems", problems == 0),
@@ -108,8 +109,7 @@ def check_lines(drive: FrameSequence, frames: Sequence[Frame]) -> list[Line]:
         Line("borders", f"best at {best:+.2f}°, contrast {contrast.max():.2f}", border_verdict(contrast, YAWS)),
         Line("ground ahead", f"rises by {ground[1]:+.1f}°", bool(abs(ground[1]) <= LEANS)),
         Line("ground to the left", f"rises by {ground[2]:+.1f}°", bool(abs(ground[2]) <= LEANS)),
-        Line("motion", f"{errors['as the poses say']:.2f} m off; {far:.1f} m driven", passes),
-        _colour_line(frames),
+        Line("motion", f"{errors['as the poses say']:.2f} m off; {far:.1f} m driven", motion_verdict(errors)),
     ]
 
 
@@ -122,16 +122,8 @@ def _clock_line(drive: FrameSequence) -> Line:
     return Line("clocks", f"up to {largest:.0f} ms apart", bool(largest < 50) if largest else None)
 
 
-def _colour_line(frames: Sequence[Frame]) -> Line:
-    """Compare the colours with those of the training images, of which one is the farthest from the others."""
-    images = training_images()
-    apart = [distances([images[k]], images[:k] + images[k + 1 :])["colour distance"] for k in range(len(images))]
-    distance = distances([frame.need_image() for frame in frames[::4]], images)["colour distance"]
-    return Line("colours", f"{distance:.2f} from simulated ones (limit {max(apart):.2f})", distance <= max(apart))
-
-
-def map_lines(name: str, truths: NDArray, grids: NDArray, table: NDArray, pieces: NDArray) -> list[Line]:
-    """Judge a map by its labels: against the best table of occupancy states, and whether it knows how sure to be.
+def map_lines(name: str, truths: NDArray, grids: NDArray, rivals: Mapping[str, NDArray], pieces: NDArray) -> list[Line]:
+    """Judge a map by its labels: against each trivial map, and whether it knows how sure to be.
 
     Parameters
     ----------
@@ -141,21 +133,20 @@ def map_lines(name: str, truths: NDArray, grids: NDArray, table: NDArray, pieces
         True classes, 255 where a cell doesn't count.
     grids : (F, C, H, W) float
         The semantic grids.
-    table : (F, H, W) int
-        From `best_table`.
+    rivals : mapping of str to (F, H, W) int
+        The trivial maps by name.
     pieces : (F, H, W) int
         From `street_pieces`.
     """
-    ours, theirs = (piece_confusions(truths, called, pieces) for called in (grids.argmax(axis=1), table))
-    accuracy = METRICS["pixel accuracy"]
-    low, gain, high = paired_interval(ours, theirs, accuracy)
-    error = expected_calibration_error(reliability(np.moveaxis(grids, 1, 0), truths, 10))
-    right = f"{100 * drive_interval(ours, accuracy).mean:.0f} % right"
-    more = f"{100 * gain:+.0f} points ({100 * low:+.0f} to {100 * high:+.0f})"
-    return [
-        Line(f"{name} against the table", f"{right}; {more}", None if low <= 0 <= high else bool(gain > 0)),
-        Line(f"{name}: confidence", f"off by {100 * error:.0f} points", bool(error <= OVERSURE)),
-    ]
+    ours, accuracy, lines = piece_confusions(truths, grids.argmax(axis=1), pieces), METRICS["pixel accuracy"], []
+    right = 100 * drive_interval(ours, accuracy).mean
+    for rival, called in rivals.items():
+        low, gain, high = paired_interval(ours, piece_confusions(truths, called, pieces), accuracy)
+        points = [f"{round(100 * value) + 0:+d}" for value in (low, gain, high)]  # no -0
+        reading = f"{right:.0f} % right, {points[1]} points ({points[0]} to {points[2]})"
+        lines.append(Line(f"{name} against {rival}", reading, None if low <= 0 <= high else bool(gain > 0)))
+    error = expected_calibration_error(reliability(np.moveaxis(grids, 1, 0), truths, BINS))
+    return [*lines, Line(f"{name}: how sure", f"off by {100 * error:.0f} points", bool(error <= OVERSURE))]
 
 
 def draw_report_card(lines: Sequence[Line], ax: Axes) -> Axes:

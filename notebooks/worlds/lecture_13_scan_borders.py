@@ -1,5 +1,7 @@
 """Borders of things in a scan and in its image: with the right calibration they coincide."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import gaussian_gradient_magnitude, map_coordinates
@@ -61,7 +63,27 @@ def depth_edges(points: NDArray, jump: float = 0.5) -> NDArray[np.float64]:
     return points[edge]
 
 
-def edge_contrast(frame: Frame, yaws: ArrayLike) -> NDArray[np.float64]:
+def on_image(borders: NDArray, frame: Frame, yaw: float = 0.0) -> NDArray[np.float64]:
+    """Return the pixels (n, 2), columns u and v, of the borders in the image of a camera turned by some degrees.
+
+    Parameters
+    ----------
+    borders : (m, 3) float
+        Places in the LIDAR frame, metres.
+    frame : Frame
+        Its calibration is used.
+    yaw : float
+        The turn to the right, degrees; 0 is the calibration as it is.
+    """
+    in_camera = transform_points(frame.camera.T_camera_from_lidar, borders)
+    turned = in_camera @ Rotation.from_rotvec([0, yaw, 0], degrees=True).as_matrix().T
+    pixels, visible = project(turned, frame.camera)
+    return pixels[visible]
+
+
+def edge_contrast(
+    frame: Frame, yaws: ArrayLike, borders_of: Callable[[NDArray], NDArray] = depth_edges
+) -> NDArray[np.float64]:
     """Return how much the image changes where the scan has borders of things, for a camera turned to and fro.
 
     With the right calibration a border in the scan falls on a border in the image (Levinson and Thrun, RSS 2013).
@@ -73,6 +95,8 @@ def edge_contrast(frame: Frame, yaws: ArrayLike) -> NDArray[np.float64]:
         A frame with an image.
     yaws : (n,) float
         Turns of the camera to try, degrees; 0 is the calibration as it is.
+    borders_of : callable
+        Finds the borders in a scan, as `depth_edges` does.
 
     Returns
     -------
@@ -80,12 +104,7 @@ def edge_contrast(frame: Frame, yaws: ArrayLike) -> NDArray[np.float64]:
         Mean gradient of the image at the borders over its mean gradient everywhere; 1 says that they have nothing
         to do with each other.
     """
-    image, camera = frame.need_image(), frame.camera
-    gradient = gaussian_gradient_magnitude(image.mean(axis=2), 1.6e-3 * camera.size[1])
-    in_camera = transform_points(camera.T_camera_from_lidar, depth_edges(frame.points))
-    found = []
-    for yaw in np.atleast_1d(yaws):
-        turned = in_camera @ Rotation.from_rotvec([0, yaw, 0], degrees=True).as_matrix().T
-        pixels, visible = project(turned, camera)
-        found.append(map_coordinates(gradient, pixels[visible, ::-1].T, order=1).mean() / gradient.mean())
-    return np.array(found)
+    gradient = gaussian_gradient_magnitude(frame.need_image().mean(axis=2), 1.6e-3 * frame.camera.size[1])
+    borders = borders_of(frame.points)
+    at = [on_image(borders, frame, yaw)[:, ::-1].T for yaw in np.atleast_1d(yaws)]
+    return np.array([map_coordinates(gradient, one, order=1).mean() for one in at]) / gradient.mean()

@@ -212,9 +212,9 @@ def mean_field(
     tolerance : float
         Stop as soon as an update changes no probability by more than this.
     pad : int
-        Number of cells by which the border is padded (with its own values) before the CRF; cut off afterwards. At the
-        edge of the grid a cell has neighbours on one side only; a pad of 8 recovers sidewalks at the edge of real
-        streets.
+        Number of cells by which the border is padded (with its own values) before the CRF; cut off afterwards. This
+        asserts that what is at the border goes on outside: a sidewalk of which the grid holds two columns is outvoted
+        by the road as any thin strip is, and kept with a pad of 8 (lecture 10).
 
     Returns
     -------

@@ -1,14 +1,11 @@
-"""Pixels along a ray: occlusion by hand, what cell by cell makes of it, heights, and errors that cells share."""
+"""Pixels along a ray: occlusion by hand, what cell by cell makes of it, and heights."""
 
-from itertools import pairwise, product
+from itertools import product
 
 import numpy as np
-import pytest
-from worlds.lecture_05_pixel_ray import RayWorld, cell_by_cell, exact_ray, occlusion_cost, pixel_height, pixel_ray
-from worlds.lecture_06_shared_pixel import believed_by_readers, shared_pixel
-from worlds.lecture_07_post import believed_of_post, post_pixels
+from worlds.lecture_05_pixel_ray import RayWorld, cell_by_cell, exact_ray, pixel_ray
 
-from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals
+from semgrid_edu.graphical import d_separated
 
 
 def test_the_posterior_is_the_sum_over_all_streets():
@@ -33,11 +30,6 @@ def test_without_occlusion_there_is_one_cell_and_both_agree():
     for label in (0, 1):
         world = RayWorld(1, prior=0.3, right=0.8)
         np.testing.assert_allclose(exact_ray([label], world), cell_by_cell([label], world), atol=1e-12)
-    assert occlusion_cost(RayWorld(1))[0] == pytest.approx(0, abs=1e-12)
-
-
-def test_occlusion_costs_more_the_farther_a_cell_is():
-    assert (np.diff(occlusion_cost()) > 0).all()
 
 
 def test_a_pixel_makes_the_cells_on_its_ray_depend_on_each_other():
@@ -45,49 +37,3 @@ def test_a_pixel_makes_the_cells_on_its_ray_depend_on_each_other():
     assert d_separated(model, "m1", "m3")
     assert not d_separated(model, "m1", "m3", given=("a3",))
     assert d_separated(model, "m4", "a3")
-
-
-def test_the_height_of_a_car_tells_where_along_the_ray_it_is():
-    model = pixel_height((0.2, 0.3, 0.5)).model
-    np.testing.assert_allclose(eliminate(model, ("x",), {"a": 1}).normalised().table, [0.2, 0.3, 0.5])
-    np.testing.assert_allclose(eliminate(model, ("x",), {"a": 0}).normalised().table, [1, 0, 0])
-    assert d_separated(model, "a", "x", given=("h",))
-
-
-@pytest.mark.parametrize("readers", [1, 2, 5])
-def test_cells_that_share_a_pixel_know_no_more_than_one(readers):
-    exact, alone = believed_by_readers(readers, right=0.8, prior=0.5)
-    assert exact == pytest.approx(0.8)
-    assert alone == pytest.approx(0.8**readers / (0.8**readers + 0.2**readers))
-    model = shared_pixel(readers).model
-    assert enumerate_marginals(model, ("m",), {"x1": 1}).normalised().table[1] == pytest.approx(0.8)
-    assert readers == 1 or d_separated(model, "x1", "x2", given=("a",))
-    assert readers == 1 or not d_separated(model, "x1", "x2", given=("m",))
-
-
-def test_a_post_is_the_sum_over_all_its_labels():
-    says, right = (1, 1, 0, 1), 1 / (1 + np.exp(-2))
-    weight = {}
-    for labels in product((0, 1), repeat=4):
-        told = np.prod([right if one == label else 1 - right for one, label in zip(says, labels, strict=True)])
-        weight[labels] = told * np.prod([0.7 if a == b else 0.3 for a, b in pairwise(labels)])
-    total = sum(weight.values())
-    by_hand = [sum(w for labels, w in weight.items() if labels[k]) / total for k in range(4)]
-    np.testing.assert_allclose(believed_of_post(says, stays=0.7, lead=2.0)[0], by_hand, atol=1e-12)
-
-
-def test_a_soft_max_per_pixel_is_exact_where_neighbours_say_nothing_of_each_other():
-    exact, alone = believed_of_post([1, 0, 0, 1, 0], stays=0.5)
-    np.testing.assert_allclose(exact, alone, atol=1e-12)
-
-
-def test_the_edge_that_fills_a_gap_wipes_out_what_is_thin():
-    along, across = believed_of_post([1, 1, 0, 1, 1])[:, 2], believed_of_post([0, 0, 1, 0, 0])[:, 2]
-    assert along[1] < 0.5 < along[0]
-    np.testing.assert_allclose(along + across, 1, atol=1e-12)
-
-
-def test_labels_along_a_post_depend_on_each_other_until_one_between_them_is_known():
-    model = post_pixels().model
-    assert not d_separated(model, "x1", "x5", given=("s1", "s2", "s3", "s4", "s5"))
-    assert d_separated(model, "x1", "x5", given=("x3",))

@@ -1,18 +1,18 @@
 """A thin pole through pooling, indices, skips, strides and holes, against what can be worked out by hand."""
 
-import math
-
 import numpy as np
 import pytest
 import torch
 from torch import nn
 from worlds.lecture_07_thin_pole import (
-    MECHANISMS,
+    REACHED,
+    WAYS,
     PoleNet,
+    Way,
     apply_mechanism,
     draw_poles,
-    place_and_width,
-    score_poles,
+    overlap,
+    overlap_of,
     train_pole_net,
 )
 
@@ -33,20 +33,13 @@ def _pole(column, shape=(16, 24)):
 
 
 @pytest.mark.parametrize("column", [8, 9, 10, 11])
-@pytest.mark.parametrize(
-    ("mechanism", "offsets", "widths"),
-    [
-        ("nearest", (1.5, 0.5, -0.5, -1.5), (4, 4, 4, 4)),
-        ("bilinear", (1.5, 0.5, -0.5, -1.5), (4, 4, 4, 4)),
-        ("indices", (0, 0, 0, 0), (1, 1, 1, 1)),
-        ("skips", (0, 0, 0, 0), (2, 2, 2, 2)),
-        ("strided", (0, -1, 0, 1), (5, 6, 9, 6)),
-        ("atrous", (0, 0, 0, 0), (5, 5, 5, 5)),
-    ],
-)
-def test_where_the_pole_ends_up_and_how_wide(mechanism, offsets, widths, column):
+@pytest.mark.parametrize(("mechanism", "width"), [("nearest", 4), ("indices", 1), ("skips", 2), ("atrous", 5)])
+def test_where_the_pole_ends_up_and_how_wide(mechanism, width, column):
+    """Width is the number of pixels with at least half the largest brightness."""
     row = apply_mechanism(_pole(column), mechanism)[8]
-    assert place_and_width(row) == (column + offsets[column % 4], widths[column % 4])
+    assert (row >= row.max() / 2).sum() == width
+    brightest = np.flatnonzero(np.isclose(row, row.max()))
+    assert brightest.mean() == (9.5 if mechanism == "nearest" else column)
 
 
 def test_two_kernels_make_a_pyramid():
@@ -54,11 +47,6 @@ def test_two_kernels_make_a_pyramid():
     expected = np.zeros(24)
     expected[6:13] = np.array([1, 2, 3, 4, 3, 2, 1]) / 16
     np.testing.assert_allclose(apply_mechanism(_pole(9), "atrous")[8], expected)
-
-
-def test_holes_keep_what_strides_would_have_given():
-    image = np.random.default_rng(0).random((16, 24))
-    np.testing.assert_allclose(apply_mechanism(image, "strided")[::4, ::4], apply_mechanism(image, "atrous")[::4, ::4])
 
 
 def test_indices_leave_fifteen_pixels_of_sixteen_empty():
@@ -77,13 +65,8 @@ def test_of_two_poles_in_a_window_indices_keep_one():
     assert np.flatnonzero(apply_mechanism(both, "indices").any(axis=0)).tolist() == [9]
 
 
-def test_half_a_maximum_is_still_within():
-    assert place_and_width([0, 1, 2, 1, 0]) == (2, 3)
-    assert place_and_width([0, 0.9, 2, 2, 0.9]) == (2.5, 2)
-
-
-def test_networks_differ_in_their_mechanism_alone():
-    nets = [PoleNet(mechanism, seed=3) for mechanism in MECHANISMS]
+def test_networks_differ_in_their_way_alone():
+    nets = [PoleNet(way, seed=3) for way in WAYS]
     first = nn.utils.parameters_to_vector(nets[0].parameters())
     for net in nets[1:]:
         assert torch.equal(nn.utils.parameters_to_vector(net.parameters()), first)
@@ -94,7 +77,7 @@ def test_networks_differ_in_their_mechanism_alone():
 
 
 def test_the_atrous_network_holds_the_strided_ones_scores():
-    strided, atrous = PoleNet("strided").double().eval(), PoleNet("atrous").double().eval()
+    strided, atrous = (PoleNet(way).double().eval() for way in (Way("strides", "at once"), Way("atrous", "")))
     image = torch.rand(1, 1, 32, 32, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
     torch.testing.assert_close(strided(image)[..., ::4, ::4], atrous(image)[..., ::4, ::4])
 
@@ -116,21 +99,23 @@ def test_poles_are_thin_and_walls_wide():
     assert not torch.equal(draw_poles(100, seed=1)[0], images)
 
 
-def test_scores_by_hand():
-    truth = [[[0, 1, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]], [[0, 0, 1, 1], [0, 0, 0, 0], [0, 0, 0, 0]]]
-    called = [[[0, 1, 1, 0], [0, 0, 0, 0], [1, 0, 0, 0]], [[0, 0, 1, 1], [0, 0, 0, 0], [0, 0, 0, 0]]]
-    assert score_poles(called, truth) == pytest.approx((3 / 6, 1 / 3, 2, 1.5, 0.25))
-    assert score_poles(truth, truth) == (1, 0, 4 / 3, 4 / 3, 0)
-    missed = score_poles(np.zeros_like(truth), truth)
-    assert missed[:2] == (0, 1)
-    assert all(math.isnan(value) for value in missed[2:])
+def test_overlap_by_hand():
+    truth = [[[0, 1, 0, 0], [0, 1, 0, 0]], [[0, 0, 1, 1], [0, 0, 0, 0]]]
+    called = [[[0, 1, 1, 0], [0, 0, 0, 0]], [[0, 0, 1, 1], [0, 0, 0, 1]]]
+    assert overlap(called, truth) == 3 / 6
+    assert overlap(truth, truth) == 1
 
 
-def test_learning_finds_poles_and_is_the_same_each_time():
-    images, truth = draw_poles(50, seed=99)
-    net, again = (train_pole_net("skips", steps=60, seed=1) for _ in range(2))
+def test_learning_is_the_same_each_time():
+    images, _ = draw_poles(5, seed=99)
+    net, again = (train_pole_net(Way("pooling", "skips"), seed=1, steps=5) for _ in range(2))
     with torch.no_grad():
-        scores = net(images)
-        assert torch.equal(again(images), scores)
+        assert torch.equal(again(images), net(images))
     assert not net.training
-    assert score_poles(scores.argmax(1), truth).iou > 0.5
+
+
+def test_a_network_reaches_what_the_lecture_shows():
+    """Other processors round otherwise, so a network ends elsewhere, but not far away."""
+    way = Way("strides", "at once")
+    assert set(REACHED) == set(WAYS)
+    assert overlap_of(way, seed=0) == pytest.approx(REACHED[way][0], abs=8)

@@ -34,6 +34,13 @@ def in_any_order(cases: Iterable) -> list:
     return [cases[k] for k in np.random.default_rng().permutation(len(cases))]
 
 
+def asked_in_any_order(ask: Callable[[Any], Any], cases: Iterable) -> list[tuple[Any, Any]]:
+    """Return each case with what an answer says to it: asked as by `in_any_order`, judged always in the same order."""
+    cases = list(cases)
+    said = {k: ask(cases[k]) for k in in_any_order(range(len(cases)))}
+    return [(case, said[k]) for k, case in enumerate(cases)]
+
+
 def close(got: ArrayLike, wanted: ArrayLike, rtol: float = 1e-5, atol: float = 1e-6, equal_nan: bool = False) -> bool:
     """Return whether two results have one shape, which isn't empty, and the same numbers as far as float32 can tell.
 

@@ -1,6 +1,7 @@
 """Hidden tests of exercise 01, Bayes' rule on a line: filterpy and the package itself are the reference."""
 
 from collections.abc import Callable
+from itertools import product
 
 import numpy as np
 from filterpy import discrete_bayes
@@ -8,7 +9,7 @@ from scipy.linalg import expm, logm
 
 from semgrid_edu.occupancy import CmcdotParams, transition_matrix
 from semgrid_edu.workshop.course.answers import answer_array, answer_number
-from semgrid_instructor import close, generator, hidden, keeping
+from semgrid_instructor import asked_in_any_order, close, generator, hidden, in_any_order, keeping
 
 
 def _check_locate(locate: Callable, says_pole: bool) -> None:
@@ -16,8 +17,8 @@ def _check_locate(locate: Callable, says_pole: bool) -> None:
 
     Silence is judged by what the answer itself makes of a sensor that says "pole" as often as this one says nothing.
     """
-    rng = generator(11)
-    for n_cells in (5, 30):
+    for n_cells in in_any_order((5, 30)):
+        rng = generator(1100 + n_cells)
         belief = rng.dirichlet(np.ones(n_cells))
         belief[2] = 0
         belief /= belief.sum()
@@ -64,11 +65,12 @@ def _moved(belief: np.ndarray, moved: np.ndarray) -> np.ndarray:
 def check_predict_ring(predict: Callable) -> None:
     """Drive moves of other lengths, up to once round the ring, and another one in each cell."""
     rng = generator(12)
-    for n_cells, reach in ((9, 5), (6, 6), (4, 2)):
-        belief, moved = rng.dirichlet(np.ones(n_cells)), rng.dirichlet(np.ones(reach), size=n_cells)
+    sizes = (9, 5), (6, 6), (4, 2)
+    drives = [(rng.dirichlet(np.ones(n)), rng.dirichlet(np.ones(reach), size=n)) for n, reach in sizes]
+    for (belief, moved), got in asked_in_any_order(lambda drive: answer_array(predict(*map(np.copy, drive))), drives):
+        n_cells, reach = moved.shape
         expected = np.zeros(n_cells)
         np.add.at(expected, np.arange(n_cells + reach - 1) % n_cells, _moved(belief, moved))
-        got = answer_array(predict(belief.copy(), moved.copy()))
         assert got.shape == belief.shape, "another shape"
         assert close(got.sum(), 1), "probability is lost or made (a row of moves may have any length)"
         assert close(got, expected), "sums are right, values are not (a row of moves may have any length)"
@@ -78,8 +80,8 @@ def check_predict_ring(predict: Callable) -> None:
 @keeping
 def check_predict_wall(predict: Callable) -> None:
     """Drive moves that would end far behind the wall, judged also by what the answer itself makes of a long ring."""
-    rng = generator(13)
-    for n_cells, reach in ((7, 3), (5, 5)):
+    for n_cells, reach in in_any_order(((7, 3), (5, 5))):
+        rng = generator(1300 + n_cells)
         belief, moved = rng.dirichlet(np.ones(n_cells)), rng.dirichlet(np.ones(reach), size=n_cells)
         got = answer_array(predict(belief.copy(), moved.copy(), ring=False))
         assert got.shape == belief.shape, "another shape"
@@ -129,10 +131,13 @@ def check_follow(follow: Callable) -> None:
 @keeping
 def check_follow_lag(follow: Callable) -> None:
     """Other lags, one longer than the drive, one of a hundred scans."""
+    cells = []
     for scans, lag, scale in ((12, 2, 1), (12, 5, 1), (6, 9, 1), (120, 100, 0.001)):
         belief, likelihoods, M = _cell(18, scans)
-        likelihoods *= scale  # only ratios matter
-        got = answer_array(follow(belief.copy(), likelihoods.copy(), M.copy(), lag=lag))
+        cells.append((belief, likelihoods * scale, M, lag))  # only ratios matter
+    asked = asked_in_any_order(lambda cell: answer_array(follow(*map(np.copy, cell[:3]), lag=cell[3])), cells)
+    for (belief, likelihoods, M, lag), got in asked:
+        scans = len(likelihoods)
         assert got.shape == likelihoods.shape, "another shape"
         assert np.isfinite(got).all(), "NaN with a long lag: normalise the message on the way"
         forward = _filtered(belief, likelihoods, M)
@@ -164,11 +169,11 @@ def _over(counts: np.ndarray, dt: float, new_dt: float) -> np.ndarray:
 @keeping
 def check_transition(transition: Callable) -> None:
     """Other counts and times, up to very long ones; states of unequal frequency; a world that never changes."""
-    for counts in _counts(16):
-        for dt, new_dt in ((0.1, 0.02), (0.2, 0.5), (0.05, 5.0)):
-            got = answer_array(transition(counts.copy(), dt, new_dt))
-            assert np.isfinite(got).all(), "NaN (a change may never have been seen)"
-            assert close(got, _over(counts, dt, new_dt), atol=1e-5), "wrong for other counts and times"
+    cases = product(_counts(16), ((0.1, 0.02), (0.2, 0.5), (0.05, 5.0)))
+    asked = asked_in_any_order(lambda case: answer_array(transition(case[0].copy(), *case[1])), cases)
+    for (counts, (dt, new_dt)), got in asked:
+        assert np.isfinite(got).all(), "NaN (a change may never have been seen)"
+        assert close(got, _over(counts, dt, new_dt), atol=1e-5), "wrong for other counts and times"
     got = answer_array(transition(np.array([[40, 0], [0, 7]]), 0.1, 0.3))
     assert np.isfinite(got).all(), "NaN where no change was ever seen"
     assert close(got, np.eye(2), atol=1e-5), "where no change was ever seen the matrix is the identity"
@@ -178,19 +183,18 @@ def check_transition(transition: Callable) -> None:
 @keeping
 def check_half_life(half_life: Callable) -> None:
     """Measure it on the matrix itself."""
-    for counts in _counts(17):
-        for dt in (0.1, 0.5):
-            M = _over(counts, dt, answer_number(half_life(counts.copy(), dt)))
-            message = "wrong for other counts or another `dt`: two beliefs must come half as close"
-            assert close(M[0, 0] - M[1, 0], 0.5, atol=1e-4), message
+    for counts, dt in in_any_order(product(_counts(17), (0.1, 0.5))):
+        M = _over(counts, dt, answer_number(half_life(counts.copy(), dt)))
+        message = "wrong for other counts or another `dt`: two beliefs must come half as close"
+        assert close(M[0, 0] - M[1, 0], 0.5, atol=1e-4), message
 
 
 @hidden
 @keeping
 def check_build_map(build_map: Callable) -> None:
     """Take maps of several sizes, scans with gaps of several lengths, and a single scan."""
-    rng = generator(19)
-    for shape, first in (((9, 4, 3), 0.5), ((6, 2, 7), 0.1), ((1, 3, 3), 0.3)):
+    for shape, first in in_any_order((((9, 4, 3), 0.5), ((6, 2, 7), 0.1), ((1, 3, 3), 0.3))):
+        rng = generator(1900 + shape[0])
         occupied, free = rng.uniform(0.05, 0.95, size=(2, *shape))
         silent = rng.random(shape) < 0.4
         occupied[silent] = free[silent] = 0.5

@@ -7,7 +7,7 @@ from filterpy.discrete_bayes import update as discrete_update
 from scipy import ndimage
 
 from semgrid_edu.workshop.course.answers import answer_array, answer_arrays
-from semgrid_instructor import close, generator, hidden, keeping
+from semgrid_instructor import asked_in_any_order, close, generator, hidden, keeping
 
 
 @hidden
@@ -16,8 +16,8 @@ def check_shift(shift: Callable) -> None:
     """Every direction, no way at all, and ways that leave the map."""
     rng = generator(2)
     mass = rng.uniform(0.1, 1, size=(5, 4))
-    for down, right in ((0, 0), (0, 1), (2, 0), (1, -2), (-4, -1), (3, 3), (7, 0), (0, -9)):
-        got = answer_array(shift(mass.copy(), down, right))
+    ways = ((0, 0), (0, 1), (2, 0), (1, -2), (-4, -1), (3, 3), (7, 0), (0, -9))
+    for (down, right), got in asked_in_any_order(lambda way: answer_array(shift(mass.copy(), *way)), ways):
         how = "a way of 0" if 0 in (down, right) else "another direction"
         how = "a way longer than the map" if max(abs(down), abs(right)) > 4 else how
         assert got.shape == mass.shape, "wrong shape for " + how
@@ -150,13 +150,14 @@ def _pairs(own: np.ndarray, a: float) -> np.ndarray:
 def check_follow(follow: Callable) -> None:
     """Several scans, uneven priors, velocities that leave the line on either side; by summing over the places."""
     rng = generator(6)
+    steps, cases = np.array([-2, -1, 0, 1, 3]), []
     for start, scans, cells in ((0, 2, 6), (4, 4, 6), (3, 1, 7)):
-        steps, prior = np.array([-2, -1, 0, 1, 3]), rng.dirichlet(np.ones(5))
-        occupied, free = rng.uniform(0.2, 1, size=(2, scans, cells))
-        got = answer_array(follow(start, steps.copy(), prior.copy(), occupied.copy(), free.copy()))
+        cases.append((start, steps, rng.dirichlet(np.ones(5)), *rng.uniform(0.2, 1, size=(2, scans, cells))))
+    asked = asked_in_any_order(lambda case: answer_array(follow(case[0], *map(np.copy, case[1:]))), cases)
+    for (start, _, prior, occupied, free), got in asked:
         assert got.shape == (5,), "wrong shape (there need not be three velocities)"
         weight = prior.copy()
-        for t, place in np.ndindex(scans, cells):
+        for t, place in np.ndindex(free.shape):
             here = start + steps * (t + 1) == place
             weight *= np.where(here, occupied[t, place], free[t, place])
         left = "wrong where a thing leaves the line" if start == 0 else "wrong values"

@@ -6,13 +6,14 @@ import numpy as np
 
 from semgrid_edu.datasets.samples import real_drive, sample_drive
 from semgrid_edu.fast import track_drive
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams, Evidence, FilterState, Particles
 from semgrid_edu.occupancy import update as package_update
 from semgrid_edu.occupancy.cmcdot import velocity_moments
 from semgrid_edu.occupancy.state import cells_of, systematic_resample, weight_in_cells
 from semgrid_edu.workshop.course.answers import answer_array, answer_arrays
-from semgrid_instructor import close, generator, hidden, keeping
+from semgrid_instructor import close, generator, hidden, in_any_order, keeping
 
 
 @hidden
@@ -25,11 +26,23 @@ def check_in_cells(in_cells: Callable) -> None:
     particles = Particles(*(a.astype(np.float32) for a in (position, velocity, weight)))
     cells = cells_of(particles.position, spec)
     expected, _ = velocity_moments(particles, cells, spec.shape)
-    before = position + np.array([1.3, -0.4])
-    got = in_cells(before, velocity, weight, 1.3, -0.4, spec.x_max, spec.y_max, spec.cell, spec.shape)
+    total = weight_in_cells(particles.weight, cells, spec.shape)
+    dx, dy = rng.uniform((1.0, -0.9), (1.9, -0.3))
+    before = position + np.array([dx, dy])
+    slips = {
+        "`dy` isn't subtracted: the vehicle has driven `dx` forward and `dy` to the left": (0, dy),
+        "`dx` isn't subtracted: the vehicle has driven `dx` forward and `dy` to the left": (dx, 0),
+        "`dy` is added: the vehicle has driven to the left, so what it sees is farther right": (0, 2 * dy),
+    }
+    wrong = {
+        hint: weight_in_cells(particles.weight, cells_of(position + np.array(shift), spec), spec.shape)
+        for hint, shift in slips.items()
+    }
+    got = in_cells(before.copy(), velocity.copy(), weight.copy(), dx, dy, spec.x_max, spec.y_max, spec.cell, spec.shape)
     dynamic, mean = answer_arrays(got, 2)
     assert dynamic.shape == spec.shape, "dynamic has another shape"
-    total = weight_in_cells(particles.weight, cells, spec.shape)
+    for hint, sums in wrong.items():
+        assert not close(dynamic, sums, atol=1e-5), hint
     inner, right = close(dynamic[1:, 1:], total[1:, 1:], atol=1e-5), close(dynamic, total, atol=1e-5)
     cut = (
         "wrong sums in row 0 or column 0: int() and astype(int) cut -0.6 to 0, a cell of the grid; take np.floor first"
@@ -62,12 +75,12 @@ def check_update(update: Callable) -> None:
     belief = rng.dirichlet(np.ones(4), size=(6, 5)).transpose(2, 0, 1)
     likelihood = rng.uniform(0.05, 1, size=(3, 6, 5))
     likelihood[0, 0], likelihood[2, 1], likelihood[0, 2] = likelihood[1, 0], likelihood[1, 1], likelihood[2, 2]
+    expected = _scan(belief, likelihood, (0.5, 0.2, 0.3))
     got = answer_array(update(belief.copy(), likelihood.copy(), (0.5, 0.2, 0.3)))
     assert got.shape == belief.shape, "another shape"
     assert close(got.sum(axis=0), 1), "the states of some cells don't sum to 1"
     left = "UNKNOWN is left where two of the three likelihoods are equal: a scan is silent only where all three are"
     assert close(got[3], 0), left
-    expected = _scan(belief, likelihood, (0.5, 0.2, 0.3))
     assert close(got, expected, atol=1e-5), "sums are right, values are not"
     evidence = np.stack([likelihood[0], likelihood[1], likelihood[1]])  # a scanner that measures no speed
     assert close(_package(belief, evidence), _scan(belief, evidence, (0.5, 0.2, 0.3)), atol=1e-5)
@@ -92,13 +105,13 @@ def check_update_limits(update: Callable) -> None:
     free[0, 0] = occupied[0, 1] = occupied[0, 2] = free[0, 3] = 0
     free[0, 4:] = occupied[0, 4:]
     likelihood = np.stack([free, occupied, occupied])
+    expected = _scan(belief, likelihood, (0.5, 0.2, 0.3))
     got = answer_array(update(belief.copy(), likelihood.copy(), (0.5, 0.2, 0.3)))
     assert np.isfinite(got).all(), "a cell is NaN or infinite"
     assert close(got[..., 4:], belief[..., 4:]), "where the scan is silent the belief must stay"
-    expected = _scan(belief, likelihood, (0.5, 0.2, 0.3))
     assert close(got, expected, atol=1e-5), "wrong where a cell is certain or contradicted"
     for tiny in (1e-4, 1e-7):
-        got = answer_array(update(belief[..., :1], np.array([tiny, 0.9, 0.9])[:, None, None], (0.5, 0.2, 0.3)))
+        got = answer_array(update(belief[..., :1].copy(), np.array([tiny, 0.9, 0.9])[:, None, None], (0.5, 0.2, 0.3)))
         possible = "a cell, surely free, explains its scan with a small probability: that is no contradiction"
         assert close(got[:, 0, 0], [1, 0, 0, 0]), possible
 
@@ -109,10 +122,10 @@ def check_stratified(stratified: Callable) -> None:
     rng = generator(4)
     for size, count in ((50, 50), (7, 200), (400, 20)):
         weight, offsets = rng.dirichlet(np.full(size, 0.3)) * 3, rng.random(count)
-        got = answer_array(stratified(weight.copy(), count, offsets.copy()))
-        assert got.shape == (count,), "another number of indices than were asked for"
         teeth = (np.arange(count) + offsets) / count * weight.sum()
         expected = [int(np.argmax(np.cumsum(weight) > tooth)) for tooth in teeth]
+        got = answer_array(stratified(weight.copy(), count, offsets.copy()))
+        assert got.shape == (count,), "another number of indices than were asked for"
         assert np.array_equal(got, expected), "wrong indices for random weights"
     one = rng.random()
     comb = systematic_resample(weight, 20, one)
@@ -157,12 +170,27 @@ class _Stratified:
 
 @hidden
 def check_track(maps: Callable) -> None:
-    """Frames from the middle of both drives, on another grid, against the same filter with the right resampling."""
-    spec = GridSpec(x_min=0, x_max=24, y_min=-8, y_max=12, cell=0.5)
-    for drive, first in ((sample_drive(), 9), (real_drive(), 4)):
-        frames = [drive[k] for k in range(first, first + 4)]
-        got = answer_array(maps(frames, spec, _one_tooth_in_each_part))
-        assert got.shape == (4, *spec.shape), "maps of another shape, or for another number of frames"
-        *_, last = track_drive(frames, spec, CmcdotParams(n_particles=20_000, resampling=_Stratified()), seed=0)
-        same = close(got[-1], last.probability[2], atol=1e-4)
+    """Compare frames of both drives, drawn like the grid, with the same filter under the right resampling.
+
+    What is right is worked out first, from frames of its own. The answer gets others, in any order.
+    """
+    rng = generator(6)
+    params = CmcdotParams(n_particles=20_000, resampling=_Stratified())
+    cases = []
+    for drive in (sample_drive, real_drive):
+        count = int(rng.integers(3, 5))
+        first = int(rng.integers(1, len(drive()) - count + 1))
+        x_max, y_max = (float(edge) for edge in rng.integers((18, 8), (26, 13)))
+        spec = GridSpec(x_min=0, x_max=x_max, y_min=y_max - 20, y_max=y_max, cell=0.5)
+        beliefs = track_drive(_frames(drive, first, count), spec, params, seed=0)
+        cases.append((drive, first, spec, np.array([belief.probability[2] for belief in beliefs])))
+    for drive, first, spec, expected in in_any_order(cases):
+        got = answer_array(maps(_frames(drive, first, len(expected)), spec, _one_tooth_in_each_part))
+        assert got.shape == expected.shape, "maps of another shape, or for another number of frames"
+        same = close(got, expected, atol=1e-4)
         assert same, "it isn't the same filter (20,000 particles, seed 0, offsets from rng.random(count))"
+
+
+def _frames(drive: Callable, first: int, count: int) -> list[Frame]:
+    opened = drive()
+    return [opened[k] for k in range(first, first + count)]

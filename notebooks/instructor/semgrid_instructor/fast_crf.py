@@ -147,7 +147,7 @@ def check_refine(refine: Callable) -> None:
 
 @hidden
 def check_refine_memory(refine: Callable) -> None:
-    """Whether memory grows with the number of cells, not of pairs; what one cell says must reach its neighbours."""
+    """Whether memory grows with the number of cells, not of pairs; the large map must be right, too, and one map."""
     log_g, o = _street(128, 4, (45, 44))
     refined, megabytes = peak_megabytes(refine, log_g.copy(), o.copy())
     refined = answer_array(refined)
@@ -160,6 +160,7 @@ def check_refine_memory(refine: Callable) -> None:
     elsewhere[20, 20] = False
     moved = np.abs(answer_array(refine(turned, o.copy())) - refined)[:, elsewhere]
     assert moved.max() > 1e-5 * np.abs(refined).max(), "what one cell says doesn't reach any other"
+    assert np.abs(refined - _refined(log_g, o)).mean() < 0.02, "too far off on a large map"
     assert megabytes < 25, (
         "1980 cells took more memory than passes along rows and columns need: are all pairs written down?"
     )

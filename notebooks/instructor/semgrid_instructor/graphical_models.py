@@ -2,14 +2,14 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from itertools import combinations, permutations
+from itertools import combinations, pairwise, permutations
 
 import numpy as np
 
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, enumerate_marginals
 from semgrid_edu.graphical import eliminate as eliminate_exactly
 from semgrid_edu.workshop.course.answers import answer_array
-from semgrid_instructor import close, generator, hidden
+from semgrid_instructor import asked_in_any_order, close, generator, hidden, in_any_order, keeping
 
 
 def _named(shapes: dict[str, int], names: tuple[str, ...], rng: np.random.Generator) -> tuple:
@@ -19,8 +19,9 @@ def _named(shapes: dict[str, int], names: tuple[str, ...], rng: np.random.Genera
 
 def _check_quotients(divide: Callable, pairs: tuple[tuple[str, str], ...], seed: int, zeros: bool = False) -> None:
     """Divide products by one of their factors, two to four states each; with `zeros`, a state of it is impossible."""
-    rng, shapes = generator(seed), {"a": 2, "b": 3, "c": 4, "d": 2}
-    for one, other in pairs:
+    shapes = {"a": 2, "b": 3, "c": 4, "d": 2}
+    for k, (one, other) in in_any_order(enumerate(pairs)):
+        rng = generator(100 * seed + k)
         quotient, g = _named(shapes, tuple(one), rng), _named(shapes, tuple(other), rng)
         if zeros and other:
             g[1][(0,) * len(other)] = 0
@@ -57,12 +58,19 @@ def check_posterior(posterior: Callable) -> None:
     """Four variables with other numbers of states, asked in every place, with none to three reports."""
     rng, shapes = generator(22), {"a": 3, "b": 2, "c": 4, "d": 2}
     joint = _named(shapes, tuple("abcd"), rng)
+    questions = []
     for wanted, about in (("c", "ad"), ("a", "b"), ("d", "cab"), ("b", ""), ("d", "dc")):
         heard = {name: rng.uniform(0.05, 1, shapes[name]) for name in about}
         if len(heard) > 1:
             heard[about[1]] = np.eye(shapes[about[1]])[-1]
+        questions.append((wanted, heard))
+
+    def ask(question: tuple[str, dict]) -> np.ndarray:
+        wanted, heard = question
+        return answer_array(posterior(joint, wanted, {name: row.copy() for name, row in heard.items()}))
+
+    for (wanted, heard), got in asked_in_any_order(ask, questions):
         expected = enumerate_marginals(GraphicalModel([Factor(*joint), *map(Factor, heard, heard.values())]), wanted)
-        got = answer_array(posterior(joint, wanted, {name: row.copy() for name, row in heard.items()}))
         assert got.shape == expected.table.shape, "another shape"
         right = close(got, expected.normalised().table)
         assert right, "wrong with " + ("reports of some variables" if heard else "nothing heard")
@@ -143,88 +151,109 @@ def _linked(parents: dict, a: str, b: str) -> bool:
 def check_separated_three(separated: Callable) -> None:
     """Chains, forks and colliders of three variables, named differently; in none are there two paths."""
     rng = generator(23)
-    for given, exact in ((("d",), ("b",)), (("d",), ()), ((), ("b",))):
-        _check_question(separated, _shuffled(rng, BELOW), *rng.permutation(["a", "c"]).tolist(), given, exact)
+    questions = [
+        (_shuffled(rng, BELOW), *rng.permutation(["a", "c"]).tolist(), given, exact)
+        for given, exact in ((("d",), ("b",)), (("d",), ()), ((), ("b",)))
+    ]
     for _ in range(150):
         parents = _random_graph(rng, 3)
         a, b, *others = rng.permutation(list(parents)).tolist()
         given = tuple(others[: rng.integers(0, 2)])
         if sum(map(len, parents.values())) < 3:
-            _check_question(separated, parents, a, b, given)
+            questions.append((parents, a, b, given))
+    for question in in_any_order(questions):
+        _check_question(separated, *question)
 
 
 @hidden
 def check_separated_large(separated: Callable) -> None:
     """Random graphs of six variables, one with what is known far below a collider, one with two ways to a collider."""
     rng = generator(24)
-    for _ in range(40):
-        _check_question(separated, _shuffled(rng, TWO_WAYS), *rng.permutation(["b", "d"]).tolist(), ("c",))
+    questions = [(_shuffled(rng, TWO_WAYS), *rng.permutation(["b", "d"]).tolist(), ("c",)) for _ in range(40)]
     for _ in range(300):
         parents = _random_graph(rng, 6)
         a, b, *others = rng.permutation(list(parents)).tolist()
         exact = tuple(name for name in parents if parents[name] and rng.random() < 0.5)
         if not _linked(parents, a, b):
-            _check_question(separated, parents, a, b, tuple(others[: rng.integers(0, len(others) + 1)]), exact)
+            questions.append((parents, a, b, tuple(others[: rng.integers(0, len(others) + 1)]), exact))
     for a, b in permutations(DEEP, 2):
         others = [name for name in DEEP if name not in (a, b)]
         for given in ((), *combinations(others, 1), *combinations(others, 2)):
             if not _linked(DEEP, a, b):
-                _check_question(separated, DEEP, a, b, given)
+                questions.append((DEEP, a, b, given))
+    for question in in_any_order(questions):
+        _check_question(separated, *question)
 
 
 BELOW = {"a": ("b",), "b": ("d",), "c": ("b",), "d": ()}
 """A fork whose middle has a parent."""
 
-STATES = {"a": 2, "b": 3, "c": 2, "d": 4, "e": 3}
+
+def _chain(rng: np.random.Generator, K: int, T: int) -> tuple[np.ndarray, ...]:
+    """Return the prior, the matrix and the scans of a chain; some scans are missing, and some steps impossible."""
+    M = rng.uniform(0.05, 1, (K, K)) * (rng.random((K, K)) < 0.8) + np.eye(K)
+    scans = rng.uniform(0.05, 0.95, (T, K))
+    scans[rng.random(T) < 0.2] = 1
+    return rng.dirichlet(np.ones(K)), M / M.sum(axis=1, keepdims=True), scans
 
 
-def _ring() -> list[Factor]:
-    """Return a ring of four variables, a factor of one of them, and a variable without neighbours."""
-    rng = generator(25)
-    families = (("a", "b"), ("b", "c"), ("c", "d"), ("d", "a"), ("e",), ("b",))
-    return [Factor(names, rng.uniform(0.1, 1, size=[STATES[name] for name in names])) for names in families]
+def _all_tables(prior: np.ndarray, M: np.ndarray, scans: np.ndarray, left_out: set[int]) -> GraphicalModel:
+    """Return the chain as a model of one factor for each table, without the scans that are left out."""
+    names = [f"x{t}" for t in range(len(scans))]
+    steps = [Factor(pair, M) for pair in pairwise(names)]
+    return GraphicalModel(
+        [
+            Factor(names[0], prior),
+            *steps,
+            *(Factor(names[t], np.ones_like(prior) if t in left_out else scans[t]) for t in range(len(scans))),
+        ]
+    )
 
 
-@hidden
-def check_eliminate(eliminate: Callable) -> None:
-    """Several variables left, several orders, none to two variables seen, and none to three asked for their best."""
-    factors = _ring()
-    for order, seen, best in (
-        (["c", "e", "b"], {}, ""),
-        (["b", "e", "d"], {}, "d"),
-        (["a", "b", "c", "e"], {}, "ac"),
-        (["e"], {}, ""),
-        (["c", "e"], {"b": 2}, "c"),
-        (["e", "a"], {"d": 3, "c": 0}, ""),
-        (["a", "c"], {"e": 1}, "ac"),
-    ):
-        result = eliminate(list(factors), list(order), dict(seen), list(best))
-        result = result[0] if isinstance(result, tuple | list) else result
-        left = [name for name in STATES if name not in order and name not in seen]
-        assert sorted(result.names) == sorted(left), "wrong variables are left"
-        joint = eliminate_exactly(GraphicalModel(factors), [*left, *order], seen)
-        for name in order:
-            joint = joint.max(name) if name in best else joint.sum(name)
-        got, expected = result.ordered(*left).table, joint.ordered(*left).table
-        same_shares = close(got / got.sum(), expected / expected.sum())
-        assert close(got.sum(), expected.sum()) or not same_shares, (
-            "right up to a factor: don't normalise, and keep the number that a variable without neighbours leaves"
-        )
-        assert close(got, expected), "wrong result"
+CHAINS = (2, 1), (2, 3), (3, 5), (4, 2), (5, 6), (2, 7)
+"""States and times of the chains that are asked for."""
 
 
 @hidden
-def check_cost(eliminate: Callable) -> None:
-    """Two to four states, several orders, and what is seen."""
-    for order, seen, right in (
-        (["c", "e", "b"], {}, 24),
-        (["b", "e", "d"], {}, 16),
-        (["e"], {}, 3),
-        (["a", "b", "c", "e"], {}, 24),
-        (["b", "e", "c"], {"a": 1}, 8),
-    ):
-        largest = eliminate(_ring(), list(order), dict(seen))[1]
-        assert largest == right, (
-            "wrong size of the largest table, for variables of two to four states: count the entries of the tables "
-            "from which a variable is taken out, not of what is left"
-        )
+@keeping
+def check_messages(messages: Callable) -> None:
+    """Two to five states, one to seven times; what is left of time t and what is right of it, by elimination."""
+    rng, cases = generator(25), []
+    for K, T in CHAINS:
+        chain = _chain(rng, K, T)
+        left = [
+            _all_tables(*(part[: t + 1] if k == 2 else part for k, part in enumerate(chain)), {t}) for t in range(T)
+        ]
+        from_left = np.array([eliminate_exactly(model, f"x{t}").table for t, model in enumerate(left)])
+        together = np.array([eliminate_exactly(_all_tables(*chain, {t}), f"x{t}").table for t in range(T)])
+        possible = from_left > 0
+        from_right = np.divide(together, from_left, out=np.ones_like(together), where=possible)
+        cases.append((chain, from_left, from_right, possible))
+    for chain, from_left, from_right, possible in in_any_order(cases):
+        got = messages(*chain)
+        assert isinstance(got, tuple | list), "not two tables"
+        assert len(got) == 2, "not two tables"
+        left, right = (answer_array(one) for one in got)
+        assert left.shape == right.shape == from_left.shape, "another shape (K may be two to five, T may be 1)"
+        scaled = left / left.sum(axis=1, keepdims=True)
+        if close(scaled, from_left / from_left.sum(axis=1, keepdims=True)):
+            assert close(left, from_left), "from_left is right up to a factor: don't normalise"
+        assert close(left, from_left), "wrong messages from the left"
+        assert close(right[possible], from_right[possible]), "wrong messages from the right"
+
+
+@hidden
+@keeping
+def check_credible(credible: Callable) -> None:
+    """How probable each scan is, by two eliminations of the whole chain: with it and without it."""
+    rng, cases = generator(26), []
+    for K, T in CHAINS:
+        chain = _chain(rng, K, T)
+        names = tuple(f"x{t}" for t in range(T))
+        with_all = eliminate_exactly(_all_tables(*chain, set()), names[0]).table.sum()
+        without = [eliminate_exactly(_all_tables(*chain, {t}), names[t]).table.sum() for t in range(T)]
+        cases.append((chain, with_all / np.array(without)))
+    for chain, right in in_any_order(cases):
+        got = answer_array(credible(*chain))
+        assert got.shape == right.shape, "another shape"
+        assert close(got, right), "wrong probability of a scan, given all the others"

@@ -69,59 +69,15 @@ def check_border(four_pixels: Callable) -> None:
     assert len(heaviest) > 4, "the same pixel has most weight, wherever the point is"
 
 
-def _cells(seed: int, all_visible: bool = False) -> tuple[NDArray, NDArray, NDArray]:
-    """Return scores (3, 7, 5), pixels (6, 4, 2) of cells with corners of the image among them, and what is visible."""
+def _places(seed: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Return scores (3, 7, 5), pixels (24, 2) with corners of the image among them, and what is visible."""
     rng = generator(seed)
-    scores, pixels = rng.normal(size=(3, 7, 5)), rng.uniform(0, 1, size=(6, 4, 2)) * (4, 6)
-    pixels[0, :3] = [[0, 0], [4, 6], [4, 0]]
-    visible = np.ones((6, 4), bool) if all_visible else rng.random((6, 4)) < 0.5
-    if not all_visible:
-        visible[1], visible[2] = [True, False, False, False], False
+    scores, pixels = rng.normal(size=(3, 7, 5)), rng.uniform(0, 1, size=(24, 2)) * (4, 6)
+    visible = rng.random(24) < 0.5
+    pixels[:3], visible[:6] = [[0, 0], [4, 6], [4, 0]], [True, True, True, True, False, False]
     pixels[~visible] = rng.choice([np.nan, -3.2, 1e6, 1.5], size=(np.sum(~visible), 2))
-    for row, col in np.argwhere(~visible)[:2]:
-        pixels[row, col] = 1.5  # in the image: something hides it
+    pixels[4:6] = 1.5  # in the image: something hides it
     return scores, pixels, visible
-
-
-def _means(scores: NDArray, pixels: NDArray, visible: NDArray) -> NDArray:
-    """Return the mean of each cell's visible points, (C, N)."""
-    return _read(scores, pixels, visible).sum(axis=2) / np.maximum(visible.sum(axis=1), 1)
-
-
-@hidden
-@keeping
-def check_cell_means(cell_means: Callable) -> None:
-    """Random scores of an image that is higher than wide, with points on all corners; and cells of one point."""
-    scores, pixels, visible = _cells(62, all_visible=True)
-    got = answer_array(cell_means(scores.copy(), pixels.copy(), visible.copy()))
-    assert got.shape == (3, 6), "another shape"
-    right = _means(scores, pixels, visible)
-    assert close(got[:, 1:], right[:, 1:]), "wrong means"
-    assert close(got, right), "points on the last row or column read wrong values"
-    alone = answer_array(cell_means(scores, pixels[:, :1].copy(), visible[:, :1].copy()))
-    assert close(alone, _means(scores, pixels[:, :1], visible[:, :1])), "wrong where a cell has one point"
-
-
-@hidden
-@keeping
-def check_invisible(cell_means: Callable) -> None:
-    """Not visible for every reason: behind the camera (NaN), outside, hidden by something; or no point of a cell."""
-    scores, pixels, visible = _cells(63)
-    got = answer_array(cell_means(scores.copy(), pixels.copy(), visible.copy()))
-    assert got.shape == (3, 6), "another shape"
-    assert not np.isnan(got).any(), "NaN got in from points that aren't visible, or from a cell without any"
-    assert (got[:, ~visible.any(axis=1)] == 0).all(), "a cell without visible points doesn't take 0"
-    some = np.flatnonzero(visible.any(axis=1))
-    for cell in some:
-        seen = np.s_[cell : cell + 1], visible[cell]
-        alone = answer_array(cell_means(scores, pixels[seen[0]][:, seen[1]], np.ones((1, seen[1].sum()), bool)))
-        assert close(got[:, cell], alone[:, 0]), "another mean than that of the visible points alone"
-    assert np.ptp(got[:, some]) > 0, "all cells have the same mean"
-    other = answer_array(cell_means(scores**2, pixels.copy(), visible.copy()))
-    assert not close(other, got), "the same means of other scores"
-    nothing = answer_array(cell_means(scores, np.full_like(pixels, np.nan), np.zeros_like(visible)))
-    assert nothing.shape == (3, 6), "the shape is wrong where nothing is visible"
-    assert (nothing == 0).all(), "not all 0 where nothing is visible"
 
 
 def _boxes(rng: np.random.Generator, kind: int, h: int, w: int, n: int) -> tuple[Callable, Callable]:
@@ -249,15 +205,16 @@ def _four(u: float, v: float, h: int, w: int) -> tuple[NDArray, NDArray, NDArray
 
 @hidden
 @keeping
-def check_cell_matrix(there_and_back: Callable) -> None:
-    """Judge values and gradients of other images and cells; where pixels meet, and where nothing is visible."""
+def check_sampling_matrix(there_and_back: Callable) -> None:
+    """Judge values and gradients of other images and points; where pixels meet, and where points aren't visible."""
     for seed in (68, 69):
-        scores, pixels, visible = _cells(seed)
-        p_bar = generator(seed + 10).normal(size=(3, 6))
+        scores, pixels, visible = _places(seed)
+        p_bar = generator(seed + 10).normal(size=(3, 24))
         given = scores.copy(), p_bar.copy(), pixels.copy(), visible.copy()
         p, s_bar = map(answer_array, there_and_back(*given, _four))
-        assert p.shape == (3, 6), "another shape"
-        assert close(p, _means(scores, pixels, visible)), "wrong means (an image may be higher than wide)"
+        assert p.shape == (3, 24), "another shape"
+        assert not np.isnan(p).any(), "NaN got in from points that aren't visible"
+        assert close(p, _read(scores, pixels, visible)), "wrong values (an image may be higher than wide)"
         units = np.eye(35).reshape(35, 7, 5)
-        wanted = np.einsum("kn,cn->ck", _means(units, pixels, visible), p_bar).reshape(3, 7, 5)
+        wanted = np.einsum("kn,cn->ck", _read(units, pixels, visible), p_bar).reshape(3, 7, 5)
         assert close(s_bar, wanted), "wrong gradient in the scores"

@@ -1,7 +1,6 @@
 """Hidden tests of exercise 07, segmentation: scipy is the reference; PyTorch takes seconds to load, a cell has few."""
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -106,62 +105,44 @@ def check_unpool(unpool: Callable) -> None:
         assert close(got, np.reshape(expected, maps.shape)), "a value isn't where its index says, or isn't what it was"
 
 
-OF_LAYERS = {"middle": "other numbers of channels", "plain": "other kernels and rates"}
-"""What differs in the cases of `_check_layer`, by their kind."""
+def _every(every: int, border: int, shape: tuple[int, int]) -> tuple[Callable, NDArray]:
+    """Return a toy network that looks at every so many columns and knows nothing at the border, and a street for it."""
+    street = generator(77 + every).integers(0, 200, (*shape, 3)).astype(np.uint8)
 
+    def label(image: NDArray) -> NDArray:
+        image = np.asarray(image)
+        assert image.size < 100_000, "a network takes images of at most 100,000 numbers"
+        places = every * (np.arange(image.shape[1]) // every)
+        classes = image[:, places, 1].astype(int) // 40
+        outside = np.minimum(np.arange(image.shape[1]), np.arange(image.shape[1])[::-1]) < border
+        classes[:, outside] = 9
+        return classes
 
-def _layer(maps: NDArray, kernels: NDArray, bias: NDArray, stride: int, rate: int) -> NDArray:
-    """Return the outputs of a layer, (K, h', w'), by scipy: each kernel spread with zeros, then every output."""
-    reach = rate * (kernels.shape[-1] - 1)
-    spread = np.zeros((*kernels.shape[:2], reach + 1, reach + 1))
-    spread[..., ::rate, ::rate] = kernels
-    outputs = [sum(map(partial(correlate, mode="constant"), maps, of_one)) for of_one in spread]
-    return (np.array(outputs) + bias[:, None, None])[:, ::stride, ::stride]
-
-
-def _check_layer(atrous: Callable, seed: int, cases: tuple, kind: str) -> None:
-    """Compare with `_layer` on random maps: kind "middle" has nothing around a kernel's middle, "plain" no bias."""
-    rng = generator(seed)
-    for n_outputs, shape, size, stride, rate in cases:
-        maps, bias = rng.normal(size=shape), rng.normal(size=n_outputs) * (kind != "plain")
-        kernels = rng.normal(size=(n_outputs, shape[0], size, size))
-        if kind == "middle":
-            kernels[..., [0, 0, 0, 1, 1, 2, 2, 2], [0, 1, 2, 0, 2, 0, 1, 2]] = 0
-        expected = _layer(maps, kernels, bias, stride, rate)
-        got = answer_array(atrous(maps.copy(), kernels.copy(), bias.copy(), stride, rate))
-        if kind == "plain" and got.shape[-2:] == expected.shape[-2:] and got.size == expected.size:
-            got = got.reshape(expected.shape)
-        assert got.shape == expected.shape, "wrong shape with " + OF_LAYERS[kind]
-        assert close(got, expected), "wrong with " + OF_LAYERS[kind]
+    return label, street
 
 
 @hidden
 @keeping
-def check_channels(atrous: Callable) -> None:
-    """Other numbers of channels; the outputs depend on channels and bias alone."""
-    _check_layer(atrous, 77, ((4, (3, 5, 6), 3, 1, 1), (1, (5, 6, 4), 3, 1, 1)), kind="middle")
+def check_moved(share_moved: Callable) -> None:
+    """Other networks, shifts and margins."""
+    for every, border, shift, margin in ((1, 0, 1, 0), (4, 6, 3, 7), (8, 2, 11, 2), (2, 5, 1, 9)):
+        label, street = _every(every, border, (4, 90))
+        places = np.arange(shift + margin, 90 - shift - margin)
+        before, after = label(street[:, :-shift])[:, places], label(street[:, shift:])[:, places - shift]
+        got = answer_array(share_moved(label, street.copy(), shift, margin)).ravel()
+        assert got.size == 1, "it doesn't return one number"
+        assert close(got, [(before == after).sum() / before.size]), "wrong share, with other shifts and margins"
 
 
 @hidden
-def check_holes(atrous: Callable) -> None:
-    """Other rates, one of them as large as the map, and other kernels; one map, one output, no bias."""
-    cases = (((4, 6), 3, 1), ((8, 11), 3, 3), ((6, 7), 3, 6), ((8, 10), 5, 1), ((9, 7), 1, 4))
-    _check_layer(atrous, 78, tuple((1, (1, *shape), size, 1, rate) for shape, size, rate in cases), kind="plain")
-
-
-@hidden
-def check_stride(atrous: Callable) -> None:
-    """Other strides, kernels and rates: every so many of the outputs of stride 1."""
-    rng = generator(79)
-    for shape, size, stride, rate in (((9, 6), 3, 3, 1), ((8, 10), 5, 2, 1), ((5, 5), 1, 4, 3), ((9, 7), 3, 2, 3)):
-        maps, kernels = rng.normal(size=(1, *shape)), rng.normal(size=(1, 1, size, size))
-        full, got = (answer_array(atrous(maps.copy(), kernels.copy(), np.zeros(1), s, rate)) for s in (1, stride))
-        wanted = full[..., ::stride, ::stride]
-        assert full.size == 1 or np.ptp(full) > 0, "all outputs are the same"
-        other = answer_array(atrous(maps.copy(), -kernels, np.zeros(1), 1, rate))
-        assert not close(full, other), "the same outputs by other kernels"
-        assert got.shape == wanted.shape, "wrong shape with another stride"
-        assert close(got, wanted), "not the outputs of stride 1 at every step of the stride"
+@keeping
+def check_period(period: Callable) -> None:
+    """Other networks, with a border that doesn't count."""
+    for every, wanted in ((8, 8), (1, 1), (64, 64), (16, 16), (3, 0)):
+        label, street = _every(every, 5, (4, 300))
+        got = answer_array(period(label, street.copy(), 5)).ravel()
+        assert got.size == 1, "it doesn't return one number"
+        assert got[0] == wanted, "a wrong period, for another network"
 
 
 def _of_test_size(image: NDArray) -> NDArray:

@@ -8,7 +8,7 @@ from semgrid_edu.camera import Camera, project, rigid_transform, transform_point
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import class_accuracy, frequency_weighted_iou, pixel_accuracy
 from semgrid_edu.workshop.course.answers import answer_array
-from semgrid_instructor import close, generator, hidden, keeping
+from semgrid_instructor import close, generator, hidden, in_any_order, keeping
 
 
 @hidden
@@ -17,7 +17,7 @@ def check_cell_of(cell_of: Callable) -> None:
     rng = generator(1)
     spec = GridSpec(x_min=-10, x_max=30, y_min=-6, y_max=14, cell=0.2)
     centers = spec.centers()
-    for row, col in rng.integers(0, spec.shape, size=(40, 2)):
+    for row, col in in_any_order(rng.integers(0, spec.shape, size=(40, 2))):
         x, y = centers[row, col] + rng.uniform(-0.09, 0.09, size=2)
         got = answer_array(cell_of(float(x), float(y), spec.x_max, spec.y_max, spec.cell))
         assert got.shape == (2,), "return two numbers, row and column"
@@ -55,7 +55,7 @@ def _rig(seed: int) -> tuple[np.ndarray, np.ndarray, np.random.Generator]:
 def check_pixel_of(pixel_of: Callable) -> None:
     """Try a camera with two focal lengths that looks a little aside."""
     K, T_camera_from_grid, rng = _rig(3)
-    points = rng.uniform([4, -5, 0], [60, 5, 3], size=(30, 3))
+    points = np.array(in_any_order(rng.uniform([4, -5, 0], [60, 5, 3], size=(30, 3))))
     camera = Camera(K, np.eye(4), size=(375, 1242))
     expected, _ = project(transform_points(T_camera_from_grid, points), camera)
     got = np.array([answer_array(pixel_of(point, K, T_camera_from_grid)) for point in points])
@@ -71,20 +71,23 @@ def check_pixel_behind(pixel_of: Callable) -> None:
     """
     K, T_camera_from_grid, rng = _rig(4)
     points = rng.uniform([-60, 3, 0], [-2, 5, 3], size=(10, 3))
-    behind, ahead = (answer_array([pixel_of(p, K, T_camera_from_grid) for p in some]) for some in (points, -points))
-    assert np.isfinite(ahead).any(), "no point has a pixel, on whatever side of the camera it is"
-    assert np.isnan(behind).all(), "Z < 0, yet a pixel"
     ahead = np.array([[0.0, -1, 0, 0], [0, 0, -1, 1.5], [1, 0, 0, 0], [0, 0, 0, 1]])
-    beside = answer_array(pixel_of(np.array([0.0, 2.0, 1.0]), K, ahead))
-    assert np.isnan(beside).all(), "Z = 0: a point in the camera's own plane has no pixel"
+    cases = [(np.array([0.0, 2.0, 1.0]), ahead, "beside")]
+    for point in points:
+        cases += [(point, T_camera_from_grid, "behind"), (-point, T_camera_from_grid, "ahead")]
+    got = {"behind": [], "ahead": [], "beside": []}
+    for point, T, where in in_any_order(cases):
+        got[where].append(answer_array(pixel_of(point, K, T)))
+    assert np.isfinite(got["ahead"]).any(), "no point has a pixel, on whatever side of the camera it is"
+    assert np.isnan(got["behind"]).all(), "Z < 0, yet a pixel"
+    assert np.isnan(got["beside"]).all(), "Z = 0: a point in the camera's own plane has no pixel"
 
 
 @hidden
 def check_accuracies(accuracies: Callable) -> None:
     """Random confusion over fourteen classes, three of them without truth, one never found."""
     rng = generator(5)
-    for _ in range(5):
-        confusion = rng.integers(0, 50, size=(14, 14))
+    for confusion in in_any_order(rng.integers(0, 50, size=(5, 14, 14))):
         confusion[[2, 7, 13]] = 0
         confusion[4, 4] = 0
         pixel, per_class = answer_array(accuracies(confusion.copy()))
@@ -97,8 +100,7 @@ def check_accuracies(accuracies: Callable) -> None:
 def check_fm_iou(fm_iou: Callable) -> None:
     """Random confusion: classes without truth, one of them claimed, one never found, and one that never occurs."""
     rng = generator(6)
-    for _ in range(5):
-        confusion = rng.integers(0, 50, size=(14, 15))
+    for confusion in in_any_order(rng.integers(0, 50, size=(5, 14, 15))):
         confusion[[2, 7, 13]] = 0
         confusion[:, 7] = 0
         confusion[4, 4] = 0

@@ -14,12 +14,11 @@
 # **Time.** 27 minutes, of which the computer needs less than one.
 #
 # The real images of this page are those of the street that comes with the course, and two stretches of KITTI's drive
-# 0013, its frames 0 to 23 and 24 to 60, whose numbers are read from [docs/results/real_drive.json](../../docs/results/real_drive.json).
+# 0013, its frames 0 to 23 and 24 to 60. That drive doesn't come with the course; its numbers were measured once.
 
 # %% jupyter={"source_hidden": true}
 import json
 import sys
-from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -31,6 +30,7 @@ from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_image_stage
 from semgrid_edu.labels import IGNORE
 from semgrid_edu.networks import load_net
+from semgrid_edu.storage.files import shipped_folder
 
 # %% jupyter={"source_hidden": true}
 sys.path.append("..")  # for worlds/, in the folder above
@@ -40,7 +40,7 @@ from worlds.lecture_13_domain import (
 )  # fmt: skip
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
-measured = json.loads(Path("../../docs/results/real_drive.json").read_text())
+measured = json.loads((shipped_folder("docs") / "results" / "real_drive.json").read_text(encoding="utf-8"))
 CALLED = {"stretch 1": "drive 0013, frames 0-23", "stretch 2": "drive 0013, frames 24-60", "sample": "sample drive"}
 drives = {CALLED[name]: one for name, one in measured["drives"].items()}
 street = real_drive()[:]
@@ -122,13 +122,12 @@ for name in (CALLED["stretch 1"], CALLED["stretch 2"]):
 # largest and the smallest of red, green and blue, and *edges* the mean gradient. On drive 0013 contrast and edges are
 # larger than in the training images by 59 to 72 %: one image has a black car, deep shadows of trees and a bright sky.
 # The real street is about as dark as drive 0013, but its contrast is larger by only an eighth, and its saturation and
-# edges hardly differ. And yet the map that the network makes of it is wrong in nearly half of the labelled cells
-# (lecture 13).
+# edges hardly differ. And yet the map that the network makes of it is no better than *always road* (lecture 13).
 #
 # ## Is the distance the damage?
 #
 # **Predict before you run.** We change the sample images in seven ways, and measure each time the colour distance to
-# the training images and the share of right pixels. (Printed as well, from lecture 13: *confidence*, the mean
+# the training images and the share of right pixels. (Printed as well: *confidence*, the mean
 # probability of the class that is called, and *lane*, the share of LIDAR returns from the ground of our own lane whose
 # pixels are called road.) If the distance were the damage, the larger distance would always have the lower share. What
 # do you expect for an image that is a little warmer (red x 1.15, blue x 0.8), compared with one at half the brightness?
@@ -214,7 +213,7 @@ for name, one in drives.items():
 #
 # ## What one would do
 #
-# Lecture 13 does the first of these in ten seconds. The others are options, with what each of them asks for:
+# Lecture 13 does the first of these in a second. The others are options, with what each of them asks for:
 #
 # - **Fine-tune.** Train on with a few labelled images of the new domain. It needs labels there, and a place to test
 #   from which you haven't learned.

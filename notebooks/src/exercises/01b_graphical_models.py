@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 01b: graphical models
 #
-# Four pieces of a small inference library: the quotient of two tables, Bayes' rule on a table, independence read off a graph, and elimination with its cost.
+# Four pieces of a small inference library: the quotient of two tables, Bayes' rule on a table, independence read off a graph, and messages along a chain.
 # Then one question to answer in words. About 90 minutes. The lecture is [01b: graphical models](../01b_graphical_models.ipynb).
 #
 # | task | about | points |
@@ -9,7 +9,7 @@
 # | 1 | divide two tables with named axes | 1 + 1 |
 # | 2 | what is heard: multiply, sum out, normalise | 2 + 1 |
 # | 3 | independence read off a graph | 2 + 2 |
-# | 4 | eliminate what isn't seen, in a given order, and say what it costs | 2 + 1 |
+# | 4 | messages along a chain, and which scan doesn't fit | 2 + 1 |
 # | 5 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
@@ -22,7 +22,6 @@ import warnings
 import numpy as np
 
 from semgrid_edu.workshop.course.answers import answer_array
-from semgrid_edu.graphical import Factor
 
 warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number does
 
@@ -226,11 +225,32 @@ _test()
 # `a` and `b` is blocked once the variables in `given` are known, and `False` otherwise. Some variables may be **exact**: each of those in `exact` is a function of its parents, without noise,
 # as the pixel of a point is a function of the camera's pose. So as soon as all its parents are known, it is known as well. `a` and `b` are two different variables that aren't known.
 #
-# You may follow paths. But there is a shorter recipe with the same result: (0) add to `given` what is exact and has no unknown parent, again and again;
-# (1) keep only `a`, `b`, `given` and all their ancestors (parents, parents of parents, and so on); (2) link each variable with its parents, and the parents of each variable with each other (moralise); (3) take `given` out;
-# (4) is there still a way from `a` to `b`?
+# First add to what is known whatever is exact and has no unknown parent, again and again. Then use the lecture's rule: look at every path from `a` to `b`, and at every variable inside it. Two helpers do the walking:
+# `paths(parents, a, b)` lists all paths as tuples of names, from `a` to `b`, with or against the arrows and through no variable twice; `below(parents, name)` is the set of `name` and all variables further down its arrows.
+# What is left for you is to say when a path is blocked.
 #
 # Two points are for graphs of three or four variables, two for larger ones.
+
+
+# %% nbgrader={"grade": false, "grade_id": "walking", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def below(parents, name):
+    """Return the set of `name` and all variables further down its arrows."""
+    found = {name}
+    while more := {child for child in parents if child not in found and found & set(parents[child])}:
+        found |= more
+    return found
+
+
+def paths(parents, a, b):
+    """Return all paths from a to b, each a tuple of names; none goes through a variable twice."""
+    found, started = [], [(a,)]
+    while started:
+        path = started.pop()
+        beside = {name for name in parents if name in parents[path[-1]] or path[-1] in parents[name]}
+        longer = [(*path, name) for name in sorted(beside.difference(path))]
+        found += [path for path in longer if path[-1] == b]
+        started += [path for path in longer if path[-1] != b]
+    return found
 
 
 # %% nbgrader={"grade": false, "grade_id": "separated", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -240,23 +260,13 @@ def separated(parents, a, b, given=(), exact=()):
     given = set(given)
     for _ in exact:
         given |= {name for name in exact if given.issuperset(parents[name])}
-    kept, queue = set(), [a, b, *given]
-    while queue:
-        name = queue.pop()
-        kept.add(name)
-        queue += parents[name]
-    linked = {name: set() for name in kept}
-    for child in kept:
-        family = {child, *parents[child]}
-        for name in family:
-            linked[name] |= family
-    reached, queue = set(given), [a]
-    while queue:
-        name = queue.pop()
-        if name not in reached:
-            reached.add(name)
-            queue += linked[name]
-    return b not in reached
+
+    def blocks(before, middle, after):
+        if before in parents[middle] and after in parents[middle]:  # a collider
+            return not below(parents, middle) & given
+        return middle in given
+
+    return all(any(blocks(*path[k : k + 3]) for k in range(len(path) - 2)) for path in paths(parents, a, b))
     ### END SOLUTION
 
 
@@ -269,8 +279,8 @@ _THREE = (
     (_CHAIN, "before", "after", ("now",), True, "now is known, so it blocks the chain: before has no other way"),
     (_FORK, "z1", "z2", (), False, "both beams hint at the same cell: the fork is open while m isn't known"),
     (_FORK, "z1", "z2", ("m",), True, "m is known, so it blocks the fork: only the sensor's own errors are left"),
-    (_MEET, "m1", "m2", (), True, "z isn't known: arrows that meet block. Take z out in step (1)"),
-    (_MEET, "m1", "m2", ("z",), False, "explaining away: a known z opens the way. Link its parents, in step (2)"),
+    (_MEET, "m1", "m2", (), True, "z isn't known: a collider blocks until it, or something below it, is known"),
+    (_MEET, "m1", "m2", ("z",), False, "explaining away: a known collider opens the path"),
     (_MEET, "m1", "z", ("m2",), False, "an arrow links them: neighbours are never separated"),
 )
 _PIXEL = {"pose": (), "pixel": ("pose",), "z1": ("pixel",), "z2": ("pixel",)}
@@ -348,86 +358,84 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: eliminate, and say what it costs (2 + 1 points)
+# ## Task 4: messages along a chain (2 + 1 points)
 #
-# From here on factors are the package's: `f.names`, `f.table`, the product `f * g`, and `f.sum("x")`, the factor without x.
+# Something has K states and is scanned T times; from time to time it may change its state, as in the lecture. `prior`, (K,), is P(state at time 0). `M`, (K, K), has a row for each state
+# before a step and a column for each state after it. `scans`, (T, K), has a row for each scan: how probable this scan is in each state. A row of ones is a scan that got lost.
 #
-# Complete `eliminate`. `factors` is a list of `Factor`s; `seen` says what is known, such as `{"z": 1}`, or nothing, `{}`; `order` holds the names of variables to sum out,
-# one after the other in this order. First slice each factor at what is known (`f.given(z=1)` does it; it refuses a variable that `f` doesn't have). Then, for each name in `order`,
-# multiply only those factors that contain it, and sum it out; but a name that is in `best` as well is asked for its best state, so take the largest entry over it in place of the sum (`f.max("x")`
-# is the package's). Return two things: the product of all that is left in the end, as a `Factor`, not normalised; and the number of
-# entries of the largest table from which a variable was taken out. At least one variable is left in the end. Two points are for the factor, one for the size.
+# Complete `messages`: it returns two tables, both (T, K). Row t of `from_left` is the message that arrives at time t from the left; it holds the prior and all scans *before* t, not the scan of t itself.
+# Row t of `from_right` arrives from the right and holds all scans *after* t; nothing comes after the last, so its row is ones. Don't normalise any of them. (Then each row of
+# `from_left * scans * from_right` has the same sum, the probability of all the scans. Why?)
+#
+# Complete `credible`, for one more point: which scan doesn't fit the others? It returns for each scan how probable it was, given *all the other* scans, (T,). Use your messages: what do they say of the state at time t, without
+# the scan of t, and how probable is the scan then?
 
 
-# %% nbgrader={"grade": false, "grade_id": "eliminate", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def eliminate(factors, order, seen, best=()):
-    """Return the Factor over the variables that are neither seen nor in `order`, and the entries of the largest table."""
+# %% nbgrader={"grade": false, "grade_id": "messages", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def messages(prior, M, scans):
+    """Return the messages from the left and from the right, both (T, K), not normalised."""
     ### BEGIN SOLUTION
-    factors = [factor.given(**{name: seen[name] for name in factor.names if name in seen}) for factor in factors]
-    largest = 0
-    for name in order:
-        together = Factor((), 1.0)
-        for factor in factors:
-            if name in factor.names:
-                together = together * factor
-        largest = max(largest, together.table.size)
-        factors = [factor for factor in factors if name not in factor.names] + [
-            together.max(name) if name in best else together.sum(name)
-        ]
-    result = Factor((), 1.0)
-    for factor in factors:
-        result = result * factor
-    return result, largest
+    from_left, from_right = [np.asarray(prior)], [np.ones(len(prior))]
+    for scan in scans[:-1]:
+        from_left.append((from_left[-1] * scan) @ M)
+    for scan in scans[:0:-1]:
+        from_right.append(M @ (scan * from_right[-1]))
+    return np.array(from_left), np.array(from_right[::-1])
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "star", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
-_AGREE = [[3.0, 1.0], [1.0, 3.0]]
-_ROW = (Factor(("m1", "m2"), _AGREE), Factor(("m2", "m3"), _AGREE))
-_SEEN = [[0.9, 0.1], [0.6, 0.4]]
-_STAR = (Factor("street", [0.5, 0.5]), *(Factor(("street", cell), _SEEN) for cell in ("m1", "m2", "m3", "m4")))
-_SEEN_SLIPS = {
-    (0.75, 0.25): "you summed m2 out: it is known, so slice at its state",
-    (0.585, 0.165): "that is for m2 = 0: slice at the state that was seen",
-    (0.66, 0.34): "you divided by the sum, P(m2 = 1) = 0.25: don't normalise",
+def credible(prior, M, scans):
+    """Return how probable each scan was, given all the others, (T,)."""
+    ### BEGIN SOLUTION
+    from_left, from_right = messages(prior, M, scans)
+    without = from_left * from_right
+    return (without * scans).sum(axis=1) / without.sum(axis=1)
+    ### END SOLUTION
+
+
+# %% nbgrader={"grade": false, "grade_id": "a-chain", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+_PRIOR, _M, _TWO_SCANS = np.array([0.5, 0.5]), np.array([[0.9, 0.1], [0.3, 0.7]]), np.array([[0.8, 0.4], [0.2, 1.0]])
+_LEFT_SLIPS = {  # row 1 of from_left: (0.5 * 0.8, 0.5 * 0.4) = (0.4, 0.2), then M
+    (0.084, 0.18): "the scan of time 1 is in its own message: it comes from neither side",
+    (0.6, 0.4): "the scan of time 0 is missing: it is before time 1",
+    (0.38, 0.26): "M stands the wrong way round: a row is the state before the step",
+    (0.7, 0.3): "these sum to 1: don't normalise",
+    (0.48, 0.16): "the scan of time 0 belongs to the state at time 0: multiply it in before the step",
+    (0.4, 0.2): "the step is missing: a message goes through M",
 }
-_SEEN_BY_HAND = "P(m1, m2 = 1): 0.05 * 0.9 + 0.2 * 0.6 and 0.05 * 0.1 + 0.2 * 0.4"
+_RIGHT_SLIPS = {  # row 0 of from_right: M times (0.2, 1.0)
+    (0.48, 0.72): "M stands the wrong way round: from the right, sum over the state AFTER the step, its columns",
+    (0.224, 0.304): "the scan of time 0 is in its own message: it comes from neither side",
+    (0.28 / 1.04, 0.76 / 1.04): "these sum to 1: don't normalise",
+    (0.14, 0.38): "the prior is in the message from the right: it belongs to the left alone",
+    (0.76, 0.52): "that is the scan of time 0: from the right come the scans after t",
+    (1, 1): "nothing arrives at time 0: the last row is ones, and from there go back",
+}
 
 
-# %% nbgrader={"grade": true, "grade_id": "eliminate-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+# %% nbgrader={"grade": true, "grade_id": "messages-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
-    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"], {})
-    assert got is not None, "eliminate returned nothing: did you forget `return`?"
-    result = got[0] if isinstance(got, tuple | list) else got
-    assert isinstance(result, Factor), f"the first thing must be a Factor, got {type(result).__name__}"
-    assert result.names, "nothing is left: put each sum back among the factors, it is multiplied later"
-    assert result.names == ("m1",), f"m1 alone must be left, not {result.names}: take used factors out of the list"
-    _explain(result.table, {(12, 4): "multiply first, then sum: a sum of products isn't the product of the sums"})
-    share = result.table[0] / (total := result.table.sum())
-    assert np.isclose(total, 1) or not np.isclose(share, 0.75), "right up to a factor: normalise nowhere"
-    mean = "P(m1): the mean of 0.9, 0.1 and 0.6, 0.4"
-    np.testing.assert_allclose(result.table, [0.75, 0.25], atol=1e-9, err_msg=mean)
-
-    got = eliminate(list(_STAR), ["m3", "m4", "street"], {"m2": 1})
-    result = got[0] if isinstance(got, tuple | list) else got
-    assert "m2" not in result.names, "m2 is seen: slice the factors at its state, then it has no axis any more"
-    _explain(result.table, _SEEN_SLIPS)
-    np.testing.assert_allclose(result.table, [0.165, 0.085], atol=1e-9, err_msg=_SEEN_BY_HAND)
-
-    got = eliminate(list(_ROW), ["m2"], {})
-    result = got[0] if isinstance(got, tuple | list) else got
-    assert sorted(result.names) == ["m1", "m3"], f"m1 and m3 are left, your result is over {result.names}"
-    assert np.isclose(total := result.table.sum(), 32), f"weights must sum to Z = 32, not {total:.3g}: don't normalise"
-    np.testing.assert_allclose(np.diag(result.table), [10, 10], err_msg="m1 = m3: 3 * 3 + 1 * 1")
-
-    got = eliminate(list(_ROW), ["m2"], {}, best=["m2"])
-    result = got[0] if isinstance(got, tuple | list) else got
-    assert not np.allclose(np.diag(result.table), 10), "m2 is in `best`: take the largest entry over it, don't sum"
-    np.testing.assert_allclose(result.table, [[9, 3], [3, 9]], err_msg="the best m2: 3 * 3 where m1 = m3, else 3 * 1")
+    given = _PRIOR.copy(), _M.copy(), _TWO_SCANS.copy()
+    got = messages(*given)
+    assert got is not None, "messages returned nothing: did you forget `return`?"
+    kept = all(np.array_equal(now, old) for now, old in zip(given, (_PRIOR, _M, _TWO_SCANS), strict=True))
+    assert kept, "messages changed a table that it was given: make a new one"
+    assert isinstance(got, tuple | list), f"return two tables, from_left and from_right, got {type(got).__name__}"
+    assert len(got) == 2, f"return two tables, from_left and from_right, got {len(got)}"
+    left, right = (answer_array(one, "messages") for one in got)
+    assert left.shape == right.shape == (2, 2), f"both are (T, K) = (2, 2), got {left.shape} and {right.shape}"
+    _explain(left[0], {(0.4, 0.2): "row 0 of from_left is the prior alone: no scan comes before time 0"})
+    _explain(left[1], _LEFT_SLIPS)
+    _explain(right[0], _RIGHT_SLIPS)
+    _explain(right[1], {(0.2, 1.0): "the last row of from_right is ones: its own scan doesn't come from the right"})
+    by_hand = "row 1: 0.4 * 0.9 + 0.2 * 0.3 and 0.4 * 0.1 + 0.2 * 0.7"
+    np.testing.assert_allclose(left, [[0.5, 0.5], [0.42, 0.18]], atol=1e-9, err_msg=by_hand)
+    by_hand = "row 0: 0.9 * 0.2 + 0.1 * 1.0 and 0.3 * 0.2 + 0.7 * 1.0"
+    np.testing.assert_allclose(right, [[0.28, 0.76], [1, 1]], atol=1e-9, err_msg=by_hand)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
-    complaint = graphical_models.check_eliminate(eliminate)
+    complaint = graphical_models.check_messages(messages)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -435,34 +443,20 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "eliminate-cost-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+# %% nbgrader={"grade": true, "grade_id": "credible-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
-    got = eliminate(list(_STAR), ["m2", "m3", "m4", "street"], {})
-    assert isinstance(got, tuple | list), f"return two things, the factor and the size, got one {type(got).__name__}"
-    costs = {
-        32: "you multiplied all factors first: of each variable only those that contain it",
-        2: "count the product before the variable is summed out, and its entries, not its axes",
-        16: "that is the sum of all sizes: the largest counts",
-    }
-    assert got[1] == 4, f"largest {got[1]}: {costs.get(got[1], 'each product here has two axes of two states')}"
-    largest = eliminate(list(_STAR), ["street", "m2", "m3", "m4"], {})[1]
-    costs = {
-        16: "count before the variable is summed out: with the street the product still has five axes",
-        4: "street comes first in this order: keep to `order`, and keep the largest, not the last",
-        5: "five axes of two states are 32 entries: count entries, not axes",
-        60: "that is the sum of all sizes: the largest counts",
-    }
-    assert largest == 32, (
-        f"largest {largest}: {costs.get(largest, 'street links all four cells: five axes, 32 entries')}"
-    )
-    largest = eliminate(list(_STAR), ["street", "m3", "m4"], {"m2": 1})[1]
-    assert largest == 16, f"largest {largest}: m2 is seen, so it has no axis: the street, m1, m3, m4, 16 entries"
-    largest = eliminate(list(_ROW), ["m2"], {})[1]
-    assert largest == 8, f"largest {largest}: the product over m1, m2, m3 has 8 entries before m2 is summed out"
+    got = answer_array(credible(_PRIOR.copy(), _M.copy(), _TWO_SCANS.copy()), "credible")
+    assert got.shape == (2,), f"one number for each of the 2 scans, shape (2,), got {got.shape}"
+    all_scans = "that is the probability of ALL scans: divide by that of the others alone"
+    _explain(got, {(0.264, 0.264): all_scans})
+    _explain(got[0], {0.6: "that is before any other scan: from the right come the scans after it"})
+    right = 0.264 / 0.52, 0.264 / 0.6
+    by_hand = "scan 0: without it 0.5 * 0.28, 0.5 * 0.76; with it 0.8 and 0.4 times as much"
+    np.testing.assert_allclose(got, right, atol=1e-9, err_msg=by_hand)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
-    complaint = graphical_models.check_cost(eliminate)
+    complaint = graphical_models.check_credible(credible)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 

@@ -497,13 +497,14 @@ def light_up():
 #
 # A train of small cars passes you on your left at 20 m/s. Each car carries one thin post, and the posts follow each other at a distance of exactly 2 m. Your
 # scanner turns ten times a second and sees the posts alone. The lattice has velocities 5 m/s apart, up to 20 m/s. Among the posts that have been in view from
-# the beginning, what will the filter say of their velocity? Which velocities of the lattice explain all scans of them alike, and what decides between these? The first
+# the beginning, what will the filter say of their velocity? Which velocities of the lattice explain all scans of them alike, and which parts of the filter decide between these? The first
 # post of the train drives into free road, where the filter sees that it moves: what does BOF forget, so that this doesn't help the posts behind it?
 # And name one change to the scanner that would help. Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "posts", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # In a tenth of a second each post moves by 2 m, to where the next one was. So each scan looks like the one before, and the antecedents of a post's cell hold a post for 0 m/s,
-# for 20 m/s and for 20 m/s the other way. All three explain the scans alike, and the prior decides: most things stand, so the filter calls the posts STATIC.
-# (The others of the lattice, 5 to 15 m/s, lead from a gap to a post and are refuted.) The first post arrives in cells that were free, so it is DYNAMIC. (In a simulation
-# the first one or two posts are DYNAMIC and all others STATIC.) But the filter keeps each cell by itself and forgets what ties it to the others. So what is known of the first post says nothing about those behind it. A scanner with another rate would help, 15 scans a second say: then standing and driving predict different places. So would one that measures velocity (Doppler).
-# One point for 0 and 20 m/s (either way) together with the prior, one for cells kept by themselves and a change that helps.
+# for 20 m/s and for 20 m/s the other way. All three explain the scans alike, so the filter's own steps decide. First sight is for STATIC, and STATIC is one velocity, while DYNAMIC is
+# spread over 48, of which only two fit. So STATIC leads, and the strike-out makes the lead certain: the posts are STATIC. (In a simulation so are they with even odds at first sight, and with reversed ones: the spread is enough.
+# The other velocities, 5 to 15 m/s, lead from a gap to a post and are refuted.) The first post arrives in cells that were free, so it is DYNAMIC. (In the simulation
+# a few posts behind it are, too.) But the filter keeps each cell by itself and forgets what ties it to the others. So what is known of the first post says nothing about those far behind it. A scanner with another rate would help, 15 scans a second say: then standing and driving predict different places, and in the simulation all posts are DYNAMIC. So would one that measures velocity (Doppler).
+# One point for 0 and 20 m/s (either way) together with a lead of STATIC (first sight or the spread), one for cells kept by themselves and a change that helps.

@@ -1,17 +1,17 @@
 # %% [markdown]
 # # Exercise 04: CMCDOT
 #
-# Five functions, none of which the lecture prints, and one question to answer in words. At the end your own filter runs on two streets. About 75 minutes.
+# Five functions, none of which the lecture prints, and one question to answer in words. At the end your own filter runs on two streets. About 85 minutes.
 # The lecture is [04: CMCDOT](../04_cmcdot.ipynb).
 #
-# | task | about | points |
-# |---|---|---|
-# | 1 | move, and sum in cells: dynamic mass and mean velocity | 2 |
-# | 2 | two arrivals in one cell, exactly | 3 |
-# | 3 | a scanner that also measures speed | 2 + 1 |
-# | 4 | resampling with an offset for each tooth | 3 |
-# | 5 | your filter on a simulated and on a real street | 2 |
-# | 6 | in your own words | 2 |
+# | task | about | points | minutes |
+# |---|---|---|---|
+# | 1 | move, and sum in cells: dynamic mass and mean velocity | 2 | 20 |
+# | 2 | two arrivals in one cell, exactly | 3 | 15 |
+# | 3 | a scanner that also measures speed | 2 + 1 | 20 |
+# | 4 | resampling with an offset for each tooth | 3 | 10 |
+# | 5 | your filter on a simulated and on a real street | 2 | 10 |
+# | 6 | in your own words | 2 | 10 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -64,17 +64,18 @@ def in_cells(position, velocity, weight, dx, dy, x_max, y_max, cell, shape):
 
 # %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "in-cells-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # 3 x 4 cells of one metre, 0..3 m ahead. We drove 1 m: particles 0 and 1 are in cell (0, 2), far ahead, now.
-    position = np.array([[3.5, 0.5], [3.3, 0.2], [2.4, 1.2], [4.5, 1.5]])  # the last one is ahead of the grid
+    # 3 x 4 cells of one metre, 0..3 m ahead. We drove 1 m ahead, 1 m right: particles 0 and 1 are in cell (0, 2) now.
+    position = np.array([[3.5, -0.5], [3.3, -0.8], [2.4, 0.2], [4.5, 0.5]])  # the last one is ahead of the grid
     speed, weight = np.array([[10.0, 0], [2, 4], [-3, 1], [5, 5]]), np.array([0.1, 0.3, 0.2, 0.4])
-    got = in_cells(position, speed, weight, dx=1, dy=0, x_max=3, y_max=3, cell=1, shape=(3, 4))
+    got = in_cells(position, speed, weight, dx=1, dy=-1, x_max=3, y_max=3, cell=1, shape=(3, 4))
     assert isinstance(got, (tuple, list)), f"return two arrays, dynamic and velocity; got {got}"
     dynamic, velocity = answer_arrays(got, 2, "in_cells")
     assert dynamic.shape == (3, 4), f"expected dynamic of shape (3, 4), got {dynamic.shape}"
     assert velocity.shape == (2, 3, 4), f"expected velocity of shape (2, 3, 4), got {velocity.shape}"
-    assert dynamic.any(), "we drove forward, so what stands comes nearer: subtract dx, dy"
+    assert dynamic.any(), "what stands comes nearer: subtract dx from x, column 0 of `position`, and dy from y"
     slips = {
-        (0, 1, 0.2): "positions are in the frame of the last scan: we have driven dx, dy since",
+        (0, 2, 0.2): "positions are in the frame of the last scan: we have driven dx, dy since",
+        (0, 3, 0.4): "dx is subtracted and dy isn't: we have driven sideways, too",
         (2, 0, 0.4): "row and column are swapped: rows count along x (forward), columns along y (left)",
         (2, 2, 0.4): "row 0 is the farthest ahead: count rows from x_max",
         (0, 0, 0.4): "column 0 is the leftmost: count columns from y_max",
@@ -82,7 +83,6 @@ def _test():
         (0, 1, 0.4): "a particle ahead of the grid fell into row 0: int() and astype(int) cut -0.5 to 0; take np.floor first",
         (1, 0, 0.2): "a row has W cells: in one long row of all cells, (row, col) is cell row * W + col",
         (0, 2, 0.3): "two particles share cell (0, 2), you count one: `dynamic[rows, cols] += weight` keeps the last; use np.add.at",
-        (0, 2, 0.2): "dx goes with x, column 0 of `position`, and dy with y",
     }  # fmt: skip
     for (row, col, slip), hint in slips.items():
         assert not np.isclose(dynamic[row, col], slip), f"{slip} in cell ({row}, {col}): {hint}"
@@ -107,8 +107,9 @@ _test()
 #
 # The lecture's formula knows one arrival, with probability $a$, and the package adds up what arrives from all sides. Now be exact for two. From the left
 # something arrives in the cell with probability `from_left`, from the right with `from_right`. The cell itself holds something STATIC with probability
-# `static`, else it is FREE. The three are independent, until you know that **two solid things can't share a cell**. So write down all combinations, strike
-# out each in which two things would be in the cell, and scale the rest to 1.
+# `static`, else it is FREE. The three are independent, until you know two rules. As in the lecture, **nothing arrives where something stands**. And
+# **not both arrive**: in the lecture's table what moves in the cell and what arrives may be parts of one thing, but what comes from the left and what comes
+# from the right are two things that would collide. So write down all combinations, strike out each that breaks a rule, and scale the rest to 1.
 #
 # Complete `two_arrivals`: its arguments are arrays (H, W), and it returns the belief of each cell, (3, H, W), in the order FREE, STATIC, DYNAMIC. At least
 # one combination is always possible.
@@ -134,15 +135,19 @@ def _test():
     assert np.isclose(both.sum(), 1, atol=0.01), f"the first cell sums to {both.sum():.2f}: scale what is left to 1"
     slips = {
         (0.098, 0.024, 0.878): "you add up the two arrivals, as if at most one could come: they are independent",
-        (0.279, 0.07, 0.651): "both may arrive, and that counts as DYNAMIC here: two things in one cell, strike it out",
-        (0.3, 0.075, 0.625): "an arrival where something STATIC is can't be, either",
-        (0.24, 0.06, 0.7): "you strike out nothing: no two things share a cell",
+        (
+            0.279,
+            0.07,
+            0.651,
+        ): "both may arrive here, and that counts as DYNAMIC: strike it out, because the two would collide",
+        (0.3, 0.075, 0.625): "nothing arrives where something STATIC stands: strike that out, too",
+        (0.24, 0.06, 0.7): "you strike out nothing: nothing arrives where something stands, and not both arrive",
     }
     for slip, hint in slips.items():
         assert not np.allclose(both, slip, atol=0.002), f"the first cell is {both}: {hint}"
     by_hand = "by hand: FREE 0.24, STATIC 0.06 and DYNAMIC 0.40, of what is left, 0.70"
     np.testing.assert_allclose(both, [0.343, 0.086, 0.571], atol=0.002, err_msg=by_hand)
-    np.testing.assert_allclose(single, [2 / 7, 2 / 7, 3 / 7], atol=0.002, err_msg="one arrival: as in lecture 03")
+    np.testing.assert_allclose(single, [2 / 7, 2 / 7, 3 / 7], atol=0.002, err_msg="one arrival: as in the lecture")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import cmcdot
 
@@ -300,10 +305,14 @@ _test()
 # %% [markdown]
 # ## Task 5: your filter on two streets (2 points)
 #
-# Now your resampling drives. Complete `track`: it runs the package's `track_drive(frames, spec, params, seed=0)` with 20,000 particles and a resampling that
-# draws by the function `draws`, and returns or yields its beliefs. `draws(weight, count, offsets)` is a function such as your `stratified`, which it is unless
-# something else is handed over. A resampling is an object with a method `draw(self, weight, count, rng)` that returns `count` indices; take the offsets from
-# `rng.random(count)`, and hand the object over as `CmcdotParams(resampling=...)`. The tests call `maps`; leave it as it is.
+# Now your resampling drives. Complete `track`:
+#
+# 1. write a class with one method, `draw(self, weight, count, rng)`, that returns `draws(weight, count, rng.random(count))`. The argument `draws` is your
+#    `stratified`, or a function like it that a test hands over;
+# 2. make `CmcdotParams` with `n_particles=20_000` and an object of this class as `resampling`;
+# 3. return what `track_drive(frames, spec, params, seed=0)` gives.
+#
+# The tests call `maps`, which collects P(DYNAMIC) from it; leave it as it is.
 
 
 # %% nbgrader={"grade": false, "grade_id": "track", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -332,12 +341,11 @@ def _test():
 
     spec = GridSpec(x_min=0, x_max=30, y_min=-10, y_max=10, cell=0.5)
     for drive in (sample_drive(), real_drive()):
-        frames = [drive[k] for k in range(3)]
-        got = answer_array(maps(frames, spec, draws), "maps")
+        *_, usual = track_drive([drive[k] for k in range(3)], spec, CmcdotParams(n_particles=20_000), seed=0)
+        got = answer_array(maps([drive[k] for k in range(3)], spec, draws), "maps")
         assert got.shape == (3, *spec.shape), (
             f"expected one map for each of 3 frames, {(3, *spec.shape)}; got {got.shape}"
         )
-        *_, usual = track_drive(frames, spec, CmcdotParams(n_particles=20_000), seed=0)
         change = np.abs(got[-1] - usual.probability[DYNAMIC]).max()
         assert change > 1e-4, "that is the package's own resampling: hand yours over as `resampling` of CmcdotParams"
     ### BEGIN HIDDEN TESTS

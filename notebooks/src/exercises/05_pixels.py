@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 05: from grid to pixel
 #
-# Seven small functions around equation (1), and one question to answer in words. About 100 minutes.
+# Six small functions around equation (1), and one question to answer in words. About 90 minutes.
 # The lecture is [05: from grid to pixel](../05_pixels.ipynb).
 #
 # | task | about | points |
@@ -11,8 +11,7 @@
 # | 3 | what the pixel of a cell shows | 3 + 2 |
 # | 4 | how high something is, from where a plane draws it | 2 + 1 |
 # | 5 | a calibration with a fault | 2 + 2 |
-# | 6 | put together: your calibration on two streets | 3 |
-# | 7 | in your own words | 2 |
+# | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -274,7 +273,7 @@ _test()
 # %% [markdown]
 # ## Task 4: how high is it? (2 + 1 points)
 #
-# In the lecture a line on the ground missed the sidewalk's edge, and the miss told how high the sidewalk is. The same on the map: a level camera is `z_cam`
+# In the lecture the ground plane drew the sidewalk's far edge too far away, because the sidewalk is higher than the plane. Turn this round: how far a thing is off on the map tells how high it is. A level camera is `z_cam`
 # metres above the ground. Things stand `x` metres ahead of it, `(N,)`: the LIDAR has measured that. The plane at the height `delta` (below the ground where it
 # is negative) draws them `x_drawn` metres ahead of the camera, `(N,)`.
 #
@@ -405,7 +404,7 @@ def find_fault(points, pixels, K, T_camera_from_lidar):
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "fault-cases", "locked": true, "schema_version": 3, "solution": false, "task": false}
+# %% nbgrader={"grade": false, "grade_id": "fault-cases", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _faulty():
     """Return four cases: points, pixels, K and T, which has one fault each, and what is wrong."""
     K = np.array([[100.0, 0, 50], [0, 120, 20], [0, 0, 1]])
@@ -465,155 +464,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 6: put together, your calibration on two streets (3 points)
-#
-# The calibration of a street has one of the four faults, and somebody has clicked. Complete `repaired`: it returns the **true** intrinsic matrix, `(3, 3)`, and
-# the true `T_camera_from_lidar`, `(4, 4)`. Let `find` tell you the fault and its amount; it is your `find_fault` unless something else is handed over, as the tests do, which
-# know the fault. Undo it; the table of task 5 says what is true. Leave the arguments as they are.
-#
-# The tests take LIDAR returns of the simulated street and of the real one, and ask that your camera sees each within 0.004 pixels of where it is.
-
-
-# %% nbgrader={"grade": false, "grade_id": "repaired", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def repaired(points, pixels, K, T_camera_from_lidar, find=find_fault):
-    """Return the true K (3, 3) and T_camera_from_lidar (4, 4)."""
-    ### BEGIN SOLUTION
-    fault, amount = find(points, pixels, K, T_camera_from_lidar)
-    if fault == SHIFT:
-        return K - amount * np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]]), T_camera_from_lidar
-    if fault == INVERSE:
-        return K, np.linalg.inv(T_camera_from_lidar)
-    return K, turned(T_camera_from_lidar, "x" if fault == PITCH else "y", amount)
-    ### END SOLUTION
-
-
-# %% nbgrader={"grade": false, "grade_id": "streets", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _street(frame, fault, amount):
-    """Return what somebody clicked, points and pixels, on a frame, and the calibration with a fault, K and T."""
-    K, T, (h, w) = frame.camera.K, frame.camera.T_camera_from_lidar, frame.camera.size
-    points = np.asarray(frame.points[:, :3], float)
-    points = points[points[:, 0] > 5]
-    seen = project_points(points, K, T)
-    inside = np.flatnonzero(((seen >= 0) & (seen <= (w - 1, h - 1))).all(axis=1))
-    chosen = inside[:: max(1, len(inside) // 80)]
-    if fault == SHIFT:
-        K = K + amount * np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]])
-    elif fault == INVERSE:
-        T = np.linalg.inv(T)
-    else:
-        T = turned(T, "x" if fault == PITCH else "y", -amount)
-    return points[chosen], seen[chosen], K, T
-
-
-# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "repaired-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    from semgrid_edu.datasets.samples import real_drive, sample_drive
-
-    simulated, real = sample_drive()[0], real_drive()[0]
-    for frame, fault, amount in ((simulated, 1, 0.8), (real, 2, -1.2), (simulated, 0, 1.5), (real, 3, 0.0)):
-        points, seen, K, T = _street(frame, fault, amount)
-        given = K.copy(), T.copy()
-        got = repaired(points.copy(), seen.copy(), K, T, lambda *_, told=(fault, amount): told)
-        kept = np.array_equal(K, given[0]) and np.array_equal(T, given[1])
-        assert kept, "repaired changed an argument: work on copies"
-        pair = isinstance(got, (tuple, list)) and len(got) == 2
-        assert pair, "return two matrices, K and T_camera_from_lidar"
-        K_got, T_got = (answer_array(one, "repaired") for one in got)
-        shapes = K_got.shape, T_got.shape
-        assert shapes == ((3, 3), (4, 4)), f"expected the shapes (3, 3) and (4, 4), got {shapes}"
-        name = ("SHIFT", "PITCH", "YAW", "INVERSE")[fault]
-        assert not (np.allclose(K_got, K) and np.allclose(T_got, T)), f"fault {name}: nothing was repaired"
-        before, after = (np.abs(project_points(points, *both) - seen).max() for both in ((K, T), (K_got, T_got)))
-        assert after < before or fault == 3, (
-            f"fault {name}: it has grown, from {before:.1f} to {after:.1f} pixels. The table says what is TRUE: turn by the amount"
-        )
-        assert after < 0.004, (
-            f"fault {name}: a return is seen up to {after:.3f} pixels from where it is; before, {before:.1f}"
-        )
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import pixels
-
-    complaint = pixels.check_repaired(repaired)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# Now it becomes a stage of the pipeline: `sample` lays the planes through your camera. The pipeline doesn't tell this stage which camera it has, but the filter sees every
-# frame first, so `track` notes it there. The calibration gets a fault, a pitch of -1°, and is repaired by your functions; equation (2) is the package's. Take the `#` away from
-# the last line (half a minute), then set `WITH_FAULT = True` and run the cell again: how much of the map does the fault cost?
-
-
-# %%
-WITH_FAULT = False  # True: leave the fault in
-noted = {}
-
-
-def sampler_of(frame):
-    """Return equation (2) for the planes of the street's repaired camera, or of the one with the fault."""
-    from semgrid_edu.camera import Camera
-    from semgrid_edu.fast import PlaneSampler
-    from semgrid_edu.grid import GridSpec
-    from semgrid_edu.planes import plane_heights, plane_pixels
-
-    points, seen, K, T = _street(frame, PITCH, -1.0)
-    if not WITH_FAULT:
-        K, T = repaired(points, seen, K, T)
-    camera = Camera(K, T, frame.camera.size, frame.camera.lidar_height).resized((96, 320))
-    return PlaneSampler(*plane_pixels(GridSpec.compact(), plane_heights(), camera), camera.size)
-
-
-# %%
-def track(frames, spec):
-    """Yield the package's beliefs, and note the camera."""
-    from semgrid_edu.fast import track_drive
-
-    def looked_at():
-        for frame in frames:
-            noted["sampler"] = noted.get("sampler") or sampler_of(frame)
-            yield frame
-
-    noted.clear()
-    return track_drive(looked_at(), spec)
-
-
-def sample(s):
-    """Return the scores on the planes, (C, D, H, W)."""
-    import torch
-
-    return noted["sampler"](torch.from_numpy(np.asarray(s, np.float32))[None])[0].numpy()
-
-
-# %%
-def right_cells():
-    """Print how many cells of the simulated street get their true class, with your stage."""
-    from semgrid_edu.datasets.samples import sample_drive
-    from semgrid_edu.grid import GridSpec
-    from semgrid_edu.pipeline import Stages, run_pipeline
-
-    spec, frames = GridSpec.compact(), [sample_drive()[k] for k in range(0, 20, 4)]
-    results = list(run_pipeline(frames, Stages(track=track, sample=sample)))
-    shares = []
-    for frame, result in zip(frames, results, strict=True):
-        in_view = frame.labels.visible_on(spec)
-        shares.append((result.grid.argmax(axis=0) == frame.labels.birdseye_on(spec))[in_view].mean())
-    print(f"{100 * np.mean(shares):.0f} % of the cells that the camera sees have their true class")
-
-
-# right_cells()
-
-# %% [markdown]
-# And a surprise: with a pitch of +1°, left in, the map loses nothing. Why not? Think of the crest. To see all this on the demo's page, put `import numpy as np`, the tools
-# of task 5, your `find_fault` and `repaired`, and the three cells from `_street` to `sample` into a file `my_stages.py`, and run
-#
-#     semgrid-edu demo --stages my_stages.py
-#
-# It shows both streets, the real one too, with your planes and with the package's. After a good repair you can't tell them apart. Where on the map do they
-# differ when the fault is left in, and why does it look worse far ahead?
-#
-# ## Task 7: in your own words (2 points)
+# ## Task 6: in your own words (2 points)
 #
 # The car brakes, its nose goes down by a degree, and nobody tells the calibration. In which direction do the labels move on the map, and where on the map is it
 # worst? A colleague proposes forty planes instead of twenty. Does that help? Five sentences are enough.

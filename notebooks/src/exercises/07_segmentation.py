@@ -1,15 +1,15 @@
 # %% [markdown]
 # # Exercise 07: three networks for segmentation
 #
-# Each function here asks for more than the lecture gives. You design a chain of layers, take pooling and atrous convolution a step further than the lecture's toy, find out
-# which mechanism works inside a black box, repair a loss with four mistakes, and answer one question in words. About 100 minutes. The lecture is
+# Each function here asks for more than the lecture gives. You design a chain of layers, take pooling a step further than the lecture's toy, measure three trained
+# networks, find out which mechanism works inside a black box, repair a loss with four mistakes, and answer one question in words. About 100 minutes. The lecture is
 # [07: three networks for segmentation](../07_segmentation.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
 # | 1 | the shortest chain that sees everything | 1 + 2 |
 # | 2 | pooling with windows that overlap, and the way back | 1 + 1 + 1 |
-# | 3 | a layer, with channels, holes and stride | 1 + 1 + 1 |
+# | 3 | how far must a real street move? | 1 + 2 |
 # | 4 | which mechanism is in the box? | 1 + 2 |
 # | 5 | a loss with four mistakes | 1 + 2 + 1 |
 # | 6 | in your own words | 2 |
@@ -284,129 +284,114 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 3: a layer, with channels, holes and stride (1 + 1 + 1 points)
+# ## Task 3: how far must a street move? (1 + 2 points)
 #
-# A layer of a network has a kernel for each pair of an output channel $k$ and an input channel $c$, and a bias for each output channel. `maps` is `(C, h, w)`, `kernels` is
-# `(K, C, N, N)` with an odd N (3, but also 1 or 7), `bias` is `(K,)`. The weights lie `rate` inputs apart, the outputs `stride` inputs. Outside the maps everything
-# is zero, and as everywhere in deep learning the kernel isn't turned round:
+# The lecture moved a street by one pixel, and an eighth of SegNet's labels didn't move along. You measure this for any network. It is given as a function: `label(image)`
+# takes an image `(h, w, 3)` and returns the class of each pixel, `(h, w)`.
 #
-# $$ \text{out}[k, v, u] = \text{bias}[k] + \sum_c \sum_{n=0}^{N-1} \sum_{m=0}^{N-1} \text{kernels}[k, c, n, m]\;
-#    \text{in}\left[c,\; \text{stride}\, v + \text{rate}\, \left(n - \tfrac{N-1}{2}\right),\; \text{stride}\, u + \text{rate}\, \left(m - \tfrac{N-1}{2}\right)\right] $$
+# `share_moved(label, image, shift, margin)` shows the network two views of one image: all columns but the last `shift`, and all but the first `shift`. In the second view
+# everything is `shift` columns further left. Return the share of pixels that get the same class in both views. Count all places of the street that are at least `margin` columns away from
+# the left and the right border of *both* views: the outermost `margin` columns of each view don't count. (Near a border the network sees what is beyond it, which doesn't move along.)
 #
-# Complete `atrous`: it returns the outputs of all places $(\text{stride}\, v, \text{stride}\, u)$ that lie in the map. With stride 1 these are h x w, whatever N and rate are.
-# One point is for channels and bias, one for holes and for any odd N, one for the stride (again with any N).
+# `period(label, image, margin)` returns the smallest shift out of 1, 2, 4, 8, 16, 32, 64 with which *all* labels move along, or 0 if there is none.
+#
+# One point is for the share, two are for the period. The last test asks the three shipped networks. Write down what you expect for each before you run it; the lecture's drawings are enough.
 
 
-# %% nbgrader={"grade": false, "grade_id": "atrous", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def atrous(maps, kernels, bias, stride, rate):
-    """Return the K outputs of a layer, (K, places down, places across)."""
+# %% nbgrader={"grade": false, "grade_id": "moved", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def share_moved(label, image, shift, margin):
+    """Return the share of pixels that keep their class when the street moves left by `shift` columns."""
     ### BEGIN SOLUTION
-    _, h, w = maps.shape
-    N = kernels.shape[-1]
-    reach = rate * (N - 1) // 2
-    padded = np.pad(maps, ((0, 0), (reach, reach), (reach, reach)))
-    out = bias[:, None, None]
-    for n, m in np.ndindex(N, N):
-        seen = padded[:, rate * n : rate * n + h : stride, rate * m : rate * m + w : stride]
-        out = out + np.tensordot(kernels[:, :, n, m], seen, axes=1)
-    return out
+    before, after = label(image[:, :-shift]), label(image[:, shift:])
+    width = before.shape[1]
+    return np.mean(before[:, shift + margin : width - margin] == after[:, margin : width - margin - shift])
     ### END SOLUTION
 
 
-# %% nbgrader={"grade": false, "grade_id": "layer-inputs", "locked": true, "schema_version": 3, "solution": false, "task": false}
-def _kernels():
-    """Return kernels (2, 2, 3, 3): for output 0 input 0 meets 1 2 3 / 4 5 6 / 7 8 9, input 1 meets 10 11 12 / 13 14 15 / 16 17 18."""
-    return np.arange(1.0, 37).reshape(2, 2, 3, 3)
+def period(label, image, margin):
+    """Return the smallest shift out of 1, 2, 4, ... 64 with which all labels move along; 0 if there is none."""
+    ### BEGIN SOLUTION
+    for shift in (1, 2, 4, 8, 16, 32, 64):
+        if share_moved(label, image, shift, margin) == 1:
+            return shift
+    return 0
+    ### END SOLUTION
 
 
-def _one_layer(answer, maps, kernel, stride, rate):
-    """Return what `atrous` says of one map and one kernel, without bias: this is about holes and stride alone."""
-    got = answer(maps[None].copy(), kernel[None, None].copy(), np.zeros(1), stride, rate)
-    got = answer_array(got, "atrous")
-    return got.reshape(got.shape[-2:]) if got.size and got.shape[:-2].count(1) == got.ndim - 2 else got
+# %% nbgrader={"grade": false, "grade_id": "toy-network", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _street(width=150, seed=5):
+    """Return a street of patches, (3, width, 3)."""
+    patches = np.random.default_rng(seed).integers(0, 200, (3, width // 3 + 1, 3))
+    return np.repeat(patches, 3, axis=1)[:, :width].astype(np.uint8)
 
 
-# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "channel-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_CHANNEL_SLIPS = {  # by hand 5 + 14 * 100 + 0.5
-    1405: "the bias is missing",
-    1406: "the bias is added for each input channel: once is enough",
-    1409.5: "the bias is added for each weight: once is enough",
-    1414: "the bias is added for each weight and each channel: once is enough",
-    5.5: "that is channel 0 alone: sum over c",
-    1400.5: "that is the last channel alone: sum over c",
-    703: "that is the mean over channels: sum over c",
-    2305.5: "input and output channel are swapped: kernels are (K, C, N, N)",
-    505.5: "all inputs meet the kernel of channel 0: each pair of channels has its own",
+def _network(every, border=0):
+    """Return a toy that looks at every so many columns, as a network that has halved; at the border all is class 9."""
+
+    def label(image):
+        image = np.asarray(image)
+        classes = np.repeat(image[:, ::every, 0] // 50, every, axis=1)[:, : image.shape[1]].astype(int)
+        if border:
+            classes[:, :border] = classes[:, -border:] = 9
+        return classes
+
+    return label
+
+
+# %% nbgrader={"grade": false, "grade_id": "real-networks", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _real_network(name):
+    """Return one of the course's image networks as a function, and a wide strip of four images of the drive."""
+    import torch
+
+    from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
+    from semgrid_edu.frame import resize_image
+    from semgrid_edu.networks import load_net
+
+    torch.set_num_threads(1)
+    drive = sample_drive()
+    net = load_net(sample_image_stage(name), drive.camera).segmenter
+    images = [resize_image(drive[k].image, (96, 320))[40:72] for k in (2, 6, 10, 14)]
+
+    @torch.inference_mode()
+    def label(image):
+        x = torch.from_numpy(np.array(image, np.uint8)).permute(2, 0, 1)[None] / 255
+        return net(x)[0].argmax(dim=0).numpy()
+
+    return label, np.concatenate(images, axis=1)[:, :768]
+
+
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "moved-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_MOVED_SLIPS = {
+    0.1813: "you compare the same column of both views: in the second view the street is `shift` columns further left",
+    0.2583: "you move the second view the wrong way",
+    0.6214: "the borders of the views count: leave out `margin` columns of each",
+    0.6308: "only one side of the views is left out: there are two borders",
+    0.6160: "`margin` counts in one view only: what is far from the border in one may be near it in the other",
+    0.3583: "that is the share that does not move along",
+    0.6400: "np.roll puts the columns of one border at the other: take two views of the image",
+    0.6480: "np.roll puts the columns of one border at the other: take two views of the image",
+    231: "that is a number of pixels: divide by all that you compare",
 }
 
 
-# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "atrous-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "moved-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    inputs = np.zeros((2, 5, 8))
-    inputs[:, 2, 4] = 1, 100
-    got = answer_array(atrous(inputs, _kernels(), np.array([0.5, 0.25]), stride=1, rate=1), "atrous")
-    slips = {
-        (2, 2, 5, 8): "sum over the input channels",
-        (5, 8): "one output channel is missing, or the two are summed",
-        (2, 3, 6): "the border is missing: pad with zeros on each side",
-    }
-    assert got.shape == (2, 5, 8), f"shape {got.shape}: {slips.get(got.shape, '2 outputs of 5 x 8 were expected')}"
-    _explain("output 0 at the ones themselves, (2, 4), is", got[0, 2, 4], _CHANNEL_SLIPS)
-    middle, other = got[:, 2, 4]
-    hand = "the middle weights, 5 and 14, meet 1 and 100"
-    assert np.isclose(middle, 1405.5), f"{hand}: expected 5 + 1400 + 0.5, got {middle:g}"
-    assert np.isclose(other, 3223.25), f"output 1 at the same place: expected 23 + 3200 + 0.25, got {other:g}"
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import segmentation
-
-    complaint = segmentation.check_channels(atrous)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "hole-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_HOLE_SHAPES = {
-    (3, 4): "you take the rate for a stride: it is the weights that lie apart, not the outputs",
-    (3, 6): "with rate 2 the kernel reaches 2 pixels beyond the border: pad by rate, not by 1",
-    (1, 4): "the border is missing: pad with zeros on each side",
-}
-_HOLE_SLIPS = {
-    1: "the kernel is turned round: the 1 lies below and to the right, so it meets 9",
-    3: "the kernel is turned round from top to bottom: the 1 lies below, so it meets its last row",
-    7: "the kernel is turned round from left to right: the 1 lies to the right, so it meets its last column",
-    0: "nothing arrives there: (rate + 1) is too far, rate is the distance from weight to weight",
-}
-
-
-# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "holes-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    # One map with a 1 at (2, 4), one kernel, 1 2 3 / 4 5 6 / 7 8 9, no bias.
-    dot, kernel = np.zeros((5, 8)), _kernels()[0, 0]
-    dot[2, 4] = 1
-    got = _one_layer(atrous, dot, kernel, stride=1, rate=2)
-    assert got.shape == (5, 8), (
-        f"shape {got.shape}: {_HOLE_SHAPES.get(got.shape, 'with stride 1 it is that of the map')}"
+    got = answer_array(share_moved(_network(4, border=10), _street(), 5, 10), "share_moved").ravel()
+    assert got.size == 1, f"return one number, the share; got shape {got.shape}"
+    for slip, hint in _MOVED_SLIPS.items():
+        assert not np.isclose(got[0], slip, atol=1e-4), f"a share of {got[0]:.4f}: {hint}"
+    expected = "231 of 3 x 120 pixels, 0.6417"
+    assert np.isclose(got[0], 231 / 360, atol=1e-5), (
+        f"expected {expected}, got {got[0]:.4f}: which columns do you compare?"
     )
-    assert not np.isclose(got[2, 3], 6), "the neighbour at (2, 3) answers: with rate 2 the kernel skips it"
-    _explain("the output at (0, 2) is", got[0, 2], _HOLE_SLIPS)
-    assert not np.isclose(got[4, 4], 4), "rows and columns of the kernel are swapped: n counts rows, m columns"
-    hand = "the output at every second pixel around the 1"
-    np.testing.assert_allclose(got[::2, 2:7:2], [[9, 8, 7], [6, 5, 4], [3, 2, 1]], err_msg=hand)
-    corner = _one_layer(atrous, np.ones((5, 8)), kernel, stride=1, rate=2)[0, 0]
-    assert np.isclose(corner, 28), f"a map of ones gives {corner:g} in the corner, not 5 + 6 + 8 + 9: outside is zero"
-    try:
-        got = _one_layer(atrous, dot, kernel[1:2, 1:2], stride=1, rate=2)
-    except IndexError:
-        raise AssertionError("kernels of 1 x 1 are refused: take N from kernels.shape") from None
-    assert got.shape != (9, 12), "kernels of 1 x 1 reach beyond nothing: pad by rate * (N - 1) / 2"
-    assert got.shape == (5, 8), f"kernels of 1 x 1, stride 1: expected 5 x 8 outputs, got {got.shape}"
-    assert np.isclose(got[2, 4], 5), f"a kernel of 1 x 1 meets the pixel itself: expected 5, got {got[2, 4]:g}"
+    whole = answer_array(share_moved(_network(4, border=10), _street(), 8, 10), "share_moved").ravel()[0]
+    assert np.isclose(whole, 1), (
+        f"moved by 8, a network that looks at every fourth column is right everywhere; got {whole:g}"
+    )
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import segmentation
 
-    complaint = segmentation.check_holes(atrous)
+    complaint = segmentation.check_moved(share_moved)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -414,31 +399,25 @@ def _test():
 _test()
 
 
-# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "stride-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false}
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "period-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
-    # One map with a 1 at (2, 3), one kernel, 1 2 3 / 4 5 6 / 7 8 9, no bias. Your outputs with stride 1 tell what is right.
-    dot = np.zeros((5, 8))
-    dot[2, 3] = 1
-    full, got = (_one_layer(atrous, dot, _kernels()[0, 0], stride, rate=1) for stride in (1, 2))
-    assert np.count_nonzero(full) == 9, "with stride 1 the nine outputs around the 1 must hear of it, and no others"
-    slips = {
-        (5, 8): "the stride is ignored",
-        (2, 4): "of five rows the stride keeps 0, 2 and 4: three",
-        (3, 8): "the stride counts across as well as down",
-        (5, 4): "the stride counts down as well as across",
-    }
-    wanted = full[::2, ::2]
-    assert got.shape == wanted.shape, f"shape {got.shape}: {slips.get(got.shape, f'{wanted.shape} was expected')}"
-    assert got.any() or not wanted.any(), (
-        "all outputs are 0: the rate counts inputs, also where a stride leaves outputs out"
-    )
-    np.testing.assert_allclose(
-        got, wanted, err_msg="output (v, u) belongs to pixel (2v, 2u): every second one of stride 1"
-    )
+    for every in (1, 4, 32, 2):
+        got = answer_array(period(_network(every, border=3), _street(), 3), "period").ravel()
+        assert got.size == 1, f"return one number, the shift; got shape {got.shape}"
+        hint = "all labels must move along, and a smaller shift comes first"
+        assert got[0] == every, (
+            f"a network that looks at every {every} columns: expected {every}, got {got[0]:g}: {hint}"
+        )
+    got = answer_array(period(_network(7), _street(), 3), "period").ravel()[0]
+    assert got == 0, f"no power of 2 is a multiple of 7, so expected 0, got {got:g}"
+    periods = {"segnet": 16, "fcn": 32, "deeplab": 8}
+    for name, wanted in periods.items():
+        got = answer_array(period(*_real_network(name), 256), "period").ravel()[0]
+        assert got == wanted, f"{name}: expected {wanted}, the cells of its coarsest map in pixels, got {got:g}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import segmentation
 
-    complaint = segmentation.check_stride(atrous)
+    complaint = segmentation.check_period(period)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 

@@ -279,7 +279,7 @@ _test()
 #
 # Their first call takes some seconds, because they are compiled then.
 #
-# For one more point: no matrix of all pairs, so that it can refine the maps of a drive. Lecture 10's damping isn't needed with these settings; if you use it,
+# For one more point: the right map of a larger street without a matrix of all pairs, so that it can refine the maps of a drive. Lecture 10's damping isn't needed with these settings; if you use it,
 # that is right too. (The test accepts the result with damping by $p_i$ as in lecture 10, by 0.9 or by 0.95, and
 # without any.)
 

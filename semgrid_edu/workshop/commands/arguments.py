@@ -12,6 +12,8 @@ from typer.core import TyperGroup
 from semgrid_edu.errors import ArgumentError
 
 if TYPE_CHECKING:  # a command that needs no drive starts faster without numpy
+    from pathlib import Path
+
     from semgrid_edu.datasets.frames import FrameSequence
 
 LARGEST = 2**63 - 1
@@ -134,3 +136,40 @@ def chosen_drive(kitti: dict[str, object], pandaset: dict[str, object], camera: 
     if camera not in (None, VIEWS[0]) and not opened:
         raise ArgumentError("--camera", f"{VIEWS[0]}, the only one of the shipped drives", camera)
     return next((reader(*names, **view) for reader, names, view in opened), None)
+
+
+def drive_in(
+    path: "Path | None", reader: "Path | None", named: dict[str, object], camera: str | None
+) -> "FrameSequence":
+    """Open the drive in a folder, and say what it is.
+
+    Parameters
+    ----------
+    path : Path or None
+        The folder.
+    reader : Path or None
+        A Python file with a class that reads it.
+    named : dict of str to object
+        The values of the options that name a drive in another way; None for one that isn't given.
+    camera : str or None
+        The data set's name for the camera.
+
+    Raises
+    ------
+    ArgumentError
+        When there is a reader and no folder, or options name a drive, too, or a camera that the reader doesn't know.
+    DataError
+        When there isn't one drive.
+    """
+    from semgrid_edu.workshop.demo.find_drives import drive_at, read_with
+
+    given = [name for name, value in named.items() if value is not None]
+    if given:
+        raise ArgumentError(", ".join(given), "PATH alone, which names the drive", "both")
+    if path is None:
+        raise ArgumentError("--reader", "PATH, the folder that it reads", "no PATH")
+    if reader is not None and camera is not None:
+        raise ArgumentError("--camera", "none: the class in --reader chooses it", camera)
+    kind, drive = ("a recording", read_with(reader, path)) if reader else drive_at(path, camera)
+    typer.echo(f"semgrid-edu: {kind}: {drive.name}, {len(drive)} frames", err=True)
+    return drive

@@ -13,7 +13,7 @@ from semgrid_edu import __version__
 from semgrid_edu.errors import ArgumentError, DataError, MissingExtraError
 from semgrid_edu.fast.numba_cache import keep_compiled_functions
 from semgrid_edu.storage.files import CACHE_VARIABLE
-from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, tell
+from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, drive_in, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import reproduce
@@ -53,6 +53,8 @@ def main(
 
 @app.command()
 def demo(
+    path: Annotated[Path | None, typer.Argument(help="The folder of a drive, or one above it.")] = None,
+    reader: Annotated[Path | None, typer.Option(help="A Python file with a class that reads PATH.")] = None,
     kitti: Annotated[Path | None, typer.Option(help="A folder of KITTI raw drives, which holds the dates.")] = None,
     date: Annotated[str | None, typer.Option(help="Such as 2011_09_26.")] = None,
     drive: Annotated[str | None, typer.Option(help="Such as 0013.")] = None,
@@ -77,8 +79,9 @@ def demo(
 ) -> None:
     """Run every stage over a drive, and write a page that shows it; without a drive, over the two shipped ones.
 
-    These are a real street, and in the folder simulated/ a simulated one. Without --frames all frames are run. A file
-    for --stages defines some of track, segment, sample, fuse, refine and remember.
+    PATH is a drive of KITTI raw, KITTI tracking, SemanticKITTI or PandaSet, or a recording that a class in --reader
+    reads. The shipped drives are a real street, and in the folder simulated/ a simulated one. Without --frames all
+    frames are run. A file for --stages defines some of track, segment, sample, fuse, refine and remember.
     """
     from semgrid_edu.datasets.samples import real_weights
     from semgrid_edu.networks.weights import weights_doubts
@@ -86,7 +89,11 @@ def demo(
     from semgrid_edu.workshop.doubts import drive_doubts
 
     kitti_named = {"--kitti": kitti, "--date": date, "--drive": drive}
-    chosen = chosen_drive(kitti_named, {"--pandaset": pandaset, "--scene": scene}, camera)
+    pandaset_named = {"--pandaset": pandaset, "--scene": scene}
+    if path or reader:
+        chosen = drive_in(path, reader, kitti_named | pandaset_named, camera)
+    else:
+        chosen = chosen_drive(kitti_named, pandaset_named, camera)
     tell([*(drive_doubts(chosen) if chosen else ()), *(weights_doubts(weights) if weights else ())])
     options = {"stages": stages, "frames": frames, "force": force, "memory": memory}
     if skip_damaged:

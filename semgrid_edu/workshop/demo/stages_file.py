@@ -125,7 +125,7 @@ def load_stages(path: str | Path) -> Stages:
     if path.suffix != ".py" or not path.is_file():
         found = "another file" if path.is_file() else "a folder" if path.is_dir() else "no such file"
         raise DataError(path, f"a Python file with functions named {names}", found)
-    module = _imported(path)
+    module = imported(path)
     found = {name: getattr(module, name) for name in STAGES | REMEMBER if hasattr(module, name)}
     if not found:
         others = [name for name, value in vars(module).items() if callable(value) and not name.startswith("_")]
@@ -137,9 +137,20 @@ def load_stages(path: str | Path) -> Stages:
         raise DataError(path, f"{name} to be {expected}", wrong) from error
 
 
-def _imported(path: Path) -> ModuleType:
-    """Execute a file as a module; meanwhile its own folder is searched for imports too."""
-    spec = spec_from_file_location(f"_stages_in_{path.stem}", path)
+def imported(path: Path) -> ModuleType:
+    """Execute a file as a module; meanwhile its own folder is searched for imports too.
+
+    Parameters
+    ----------
+    path : Path
+        A Python file.
+
+    Raises
+    ------
+    DataError
+        When it raises an error or ends the program.
+    """
+    spec = spec_from_file_location(f"_read_from_{path.stem}", path)
     module = module_from_spec(spec)
     sys.modules[spec.name] = module  # a dataclass in the file looks up its module there
     searched = sys.path[:]

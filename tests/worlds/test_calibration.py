@@ -1,0 +1,70 @@
+"""A camera that learns its pitch: pixels, readings and slopes against the package, and the noise that a cell keeps."""
+
+import numpy as np
+import pytest
+import torch
+from worlds import lecture_06_calibration as calibration
+
+from semgrid_edu.camera import Camera, project
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.planes import sample_planes_naive
+
+K = np.array([[60.0, 0, 39.5], [0, 60, 23.5], [0, 0, 1]])
+T_CAMERA_FROM_LIDAR = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+CAMERA = Camera(K, T_CAMERA_FROM_LIDAR, (48, 80), lidar_height=1.5)
+
+
+def points_ahead(count=30):
+    """Return points of the ground in the camera's frame, (J, 3)."""
+    rng = np.random.default_rng(0)
+    return torch.from_numpy(
+        np.column_stack([rng.uniform(-2, 2, count), np.full(count, 1.5), rng.uniform(6, 20, count)])
+    )
+
+
+def test_without_a_pitch_the_pixels_are_those_of_equation_1():
+    points = points_ahead()
+    u, v = calibration.pixels_at(points, torch.tensor(0.0), K)
+    pixels, visible = project(points.numpy(), CAMERA)
+    assert visible.all()
+    np.testing.assert_allclose(np.column_stack([u, v]), pixels)
+
+
+def test_a_camera_that_looks_down_sees_points_higher_in_the_image():
+    points = points_ahead()
+    before, after = (calibration.pixels_at(points, torch.tensor(a), K)[1] for a in (0.0, 0.01))
+    assert (after < before).all()
+
+
+def test_points_read_by_equation_2():
+    rng = np.random.default_rng(1)
+    s, u, v = rng.normal(size=(2, 48, 80)), rng.uniform(0, 79, 20), rng.uniform(0, 47, 20)
+    literal = sample_planes_naive(s, np.stack([u, v], axis=-1)[None, None], np.ones((1, 1, 20), bool))
+    np.testing.assert_allclose(calibration.read_points(*map(torch.from_numpy, (s, u, v))), literal[:, 0, 0])
+
+
+def test_the_slope_in_the_pitch_is_that_of_a_nudge():
+    rng, points = np.random.default_rng(2), points_ahead()
+    lesson = torch.from_numpy(rng.normal(size=(2, 48, 80))), torch.from_numpy(rng.normal(size=(2, 30))), points
+    pitch = torch.tensor(0.01, dtype=torch.float64, requires_grad=True)
+    (slope,) = torch.autograd.grad(calibration.loss_at(pitch, [lesson], K), pitch)
+    before, after = (calibration.loss_at(pitch.detach() + a, [lesson], K) for a in (-1e-7, 1e-7))
+    assert slope.item() == pytest.approx((after - before).item() / 2e-7, rel=1e-4)
+
+
+def test_only_points_among_road_and_sidewalk_are_clear():
+    flat = torch.zeros(2, 48, 80)
+    flat[0, 24:, :40] = 1  # road on the left of the image, below the horizon
+    points = torch.tensor([[-2.0, 1.5, 10.0], [2.0, 1.5, 10.0], [-0.1, 1.5, 10.0]], dtype=torch.float64)
+    _, wanted, kept = calibration.clear_of_things((flat, torch.zeros(2, 3), points), K)
+    assert kept.tolist() == points[:1].tolist()
+    assert wanted.shape == (2, 1)
+    assert len(calibration.as_many_at_random((flat, torch.zeros(2, 3), points), 2, seed=0)[2]) == 2
+
+
+def test_four_pixels_keep_half_to_all_of_an_error_and_a_mean_keeps_less():
+    spec = GridSpec(6, 20, -1, 1, 0.5)
+    four, mean = (calibration.noise_left(spec, CAMERA, side) for side in (1, 4))
+    assert ((four >= 0.5) & (four <= 1)).all()
+    assert (mean < four).mean() > 0.9
+    assert mean[-1].mean() < mean[0].mean()

@@ -1,0 +1,78 @@
+"""Pretraining on a real street: what the lecture shows is what was measured, and the parts of the measurement."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+from worlds import lecture_07_imagenet as imagenet
+from worlds import lecture_07_pretrained as pretrained
+from worlds.lecture_07_imagenet import FRESH, IMAGENET, SHUFFLED, Images, Run
+
+from semgrid_edu.labels import IGNORE, KITTI_14
+from semgrid_edu.storage.files import shipped_folder
+
+
+@pytest.fixture(scope="module")
+def measured():
+    path = shipped_folder("docs") / "results" / "imagenet_worth.json"
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def share(measured, name):
+    return round(100 * measured["scores"][name]["pixel accuracy"]["mean"])
+
+
+def test_the_lectures_numbers_are_those_of_the_results(measured):
+    for reached, normalised in ((pretrained.AS_IT_IS, False), (pretrained.NORMALISED, True)):
+        names = [Run(start, 24, 100, normalised).name for start in (IMAGENET, SHUFFLED, FRESH)]
+        assert list(reached) == [share(measured, name) for name in names]
+    assert share(measured, Run(FRESH, 24, 300).name) == pretrained.LONGER
+    assert share(measured, "the most frequent class of each row") == pretrained.ROWS
+    added = measured["scores"][Run(IMAGENET, 24, 100, True).name]["above fresh weights"]["pixel accuracy"]
+    assert [round(100 * added[key]) for key in ("mean", "low", "high")] == list(pretrained.ADDED)
+    names = {frames: Run(FRESH, frames, 100).name for frames in (2, 8, 24)}
+    assert {frames: share(measured, name) for frames, name in names.items()} == pretrained.OTHERS
+    assert {frames: round(100 * measured[imagenet.OWN][name]) for frames, name in names.items()} == pretrained.OWN
+
+
+def _images(n, seed, label=0):
+    drawn = torch.from_numpy(np.random.default_rng(seed).integers(0, 256, (n, 3, *imagenet.SIZE), np.uint8))
+    labels = torch.full((n, *imagenet.SIZE), IGNORE)
+    labels[:, 50:] = label
+    return Images(drawn, labels)
+
+
+def test_frames_come_from_all_cameras_alike_and_fewer_are_among_more():
+    cameras = [_images(6, seed) for seed in range(4)]
+    few, many = (imagenet.draw_frames(cameras, n, seed=1) for n in (8, 24))
+    assert all(torch.equal(a.image, b.image) for a, b in zip(few, many, strict=False))
+    found = [
+        [k for k, camera in enumerate(cameras) if (camera.image == frame.image).flatten(1).all(1).any()]
+        for frame in few
+    ]
+    assert sorted(found) == 2 * [[0]] + 2 * [[1]] + 2 * [[2]] + 2 * [[3]]
+
+
+def test_shuffled_weights_have_the_same_values_in_another_order():
+    taught, shuffled = (imagenet.start_from(start, 0).imagenet_tensors() for start in (IMAGENET, SHUFFLED))
+    for name, tensor in taught.items():
+        assert torch.equal(tensor.flatten().sort().values, shuffled[name].flatten().sort().values)
+    assert not torch.equal(taught["_conv_stem.weight"], shuffled["_conv_stem.weight"])
+
+
+def test_rules_without_an_image_know_rows():
+    learned, tested = _images(2, 0, label=1), _images(1, 1, label=1)
+    learned.labels[:, 80:] = 3
+    tested.labels[:, 80:] = 3
+    always, by_row = imagenet.baselines([learned], tested).values()
+    assert (always.trace() / always.sum(), by_row.trace() / by_row.sum()) == (30 / 46, 1)
+    assert always.shape == (len(KITTI_14),) * 2
+
+
+def test_an_ended_run_is_read_from_its_file(tmp_path):
+    counts = {"camera": np.eye(2, dtype=int)}
+    first, seconds = imagenet._once(tmp_path / "run.npz", lambda: counts)
+    again, same = imagenet._once(tmp_path / "run.npz", lambda: 1 / 0)
+    assert again["camera"].tolist() == first["camera"].tolist() == [[1, 0], [0, 1]]
+    assert seconds == same
