@@ -78,12 +78,12 @@ def own_camera_off(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> 
 
 KINDS: dict[str, tuple[Spoil, int]] = {
     "each return by itself": (each_by_itself, 6),
-    "outlines drawn off": (outlines_off, 2),
+    "outlines drawn off": (outlines_off, 4),
     "the camera off": (one_camera_off, 6),
     "a camera for each return": (own_camera_off, 6),
     "outlines, each pixel anew": (outlines_anew, 6),
 }
-"""The kinds of error by name, and how often each is drawn; outlines differ in each frame, so two draws are enough.
+"""The kinds of error by name, and how often each is drawn; outlines differ in each frame, so four draws are enough.
 The last two kinds are controls that no data have: nothing is shared."""
 
 
