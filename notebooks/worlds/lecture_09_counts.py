@@ -4,18 +4,14 @@ We know two things about each cell: its true class, and whether the camera sees 
 class. A cell that the camera sees should have a label.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from semgrid_edu.errors import ArgumentError, check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14, LabelSet
-from semgrid_edu.workshop.scoring.confusions import band_names
-from semgrid_edu.workshop.scoring.counting import distance_bands
-from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per_cent
 
 BAND_EDGES = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 73.0)
 """Limits of the bands of distance from the LIDAR, metres; the grid's far corners are 72.7 m away."""
@@ -65,7 +61,7 @@ class TruthCounts:
         """
         for name, grid in (("labels", labels), ("truth", truth), ("standing", standing)):
             check_shape(name, grid, spec.shape)
-        band, n = distance_bands(spec, BAND_EDGES), label_set.n_semantic
+        band, n = np.digitize(spec.distances(), BAND_EDGES[1:-1]), label_set.n_semantic
         chosen = (
             (truth, truth < n),
             (truth, (truth < n) & (labels == truth)),
@@ -132,55 +128,3 @@ def counts_of(result: dict, name: str) -> TruthCounts:
     if name not in result["sums"]:
         raise ArgumentError("name", f"one of {', '.join(result['sums'])}", repr(name))
     return TruthCounts(np.array(result["sums"][name]))
-
-
-def policy_table(result: dict) -> str:
-    """Return one row per policy, over all classes and distances, per cent; "mean iou" is the mean over the classes.
-
-    Parameters
-    ----------
-    result : dict
-        From `truth_policies`, or from the JSON file that it was written to.
-    """
-    of = {name: counts_of(result, name) for name in result["sums"]}
-    rows = [one.shares(axis=(0, 1)) | {"mean iou": np.nanmean(one.shares(axis=0)["iou"])} for one in of.values()]
-    return _table({column: [row[column] for row in rows] for column in rows[0]}, of)
-
-
-def class_table(result: dict, name: str) -> str:
-    """Return one row per class of one policy, over all distances, per cent.
-
-    Parameters
-    ----------
-    result : dict
-        From `truth_policies`, or from the JSON file that it was written to.
-    name : str
-        The name of the policy.
-    """
-    return _table(counts_of(result, name).shares(axis=0), result["classes"])
-
-
-def distance_table(result: dict, name: str) -> str:
-    """Return one row per band of distance of one policy, over all classes. Parameters are those of `class_table`."""
-    return _table(counts_of(result, name).shares(axis=1), band_names(result["bands"]))
-
-
-def _table(shares: dict[str, ArrayLike], names: Iterable[str]) -> str:
-    """Return one row per entry of the shares, one column per share."""
-    texts = ([per_cent(None if np.isnan(share) else share) for share in column] for column in shares.values())
-    return markdown_table([["per cent", *shares], *([*row] for row in zip(names, *texts, strict=True))])
-
-
-def truth_tables(result: dict) -> str:
-    """Return all policies, then classes and distances of the first one, each table under its title.
-
-    Parameters
-    ----------
-    result : dict
-        From `truth_policies`, or from the JSON file that it was written to.
-    """
-    first = next(iter(result["sums"]))
-    return (
-        f"{len(result['drives'])} drives\n\n{policy_table(result)}\n\n"
-        f"{first}, by class\n\n{class_table(result, first)}\n\n{first}, by distance\n\n{distance_table(result, first)}"
-    )

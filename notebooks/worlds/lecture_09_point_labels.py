@@ -28,8 +28,9 @@ from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.things.materials import Kind, class_of_kind
 from worlds.lecture_04_filters import GRIDS, LIDARS
 from worlds.lecture_04_scenes import labelled_frame
-from worlds.lecture_09_counts import ABOUT, TruthCounts, truth_tables
+from worlds.lecture_09_counts import ABOUT, TruthCounts
 from worlds.lecture_09_policies import HELD_OUT, REACH
+from worlds.lecture_09_tables import truth_tables
 
 MOVABLE = (Kind.CAR, Kind.PEDESTRIAN, Kind.BICYCLE)
 FLAT = [KITTI_14.index(name) for name in ("road", "sidewalk")]

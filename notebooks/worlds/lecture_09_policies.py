@@ -29,7 +29,8 @@ from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from worlds.lecture_04_filters import GRIDS, LIDARS
 from worlds.lecture_04_scenes import labelled_frame
-from worlds.lecture_09_counts import ABOUT, TruthCounts, truth_tables
+from worlds.lecture_09_counts import ABOUT, TruthCounts
+from worlds.lecture_09_tables import truth_tables
 
 HELD_OUT = 700
 """Seed of the first drive for seed 0; each further seed adds 1000."""

@@ -26,7 +26,7 @@ from semgrid_edu.workshop.workplace import Workplace
 
 REDUCED = SCALES["reduced"]
 LABORATORY = {
-    "lidar": "one scan (the paper)",
+    "lidar": "one scan (our reading)",
     "no-cleanup": "one scan, no clean-up",
     "camera-mask": "one scan, visible to camera",
     "de-skewed": "one scan, de-skewed",

@@ -1,8 +1,9 @@
 """How wrong truth from labelled returns is: the counts add up, and carrying moving things is better than smearing."""
 
 import pytest
-from worlds.lecture_09_counts import counts_of, truth_tables
+from worlds.lecture_09_counts import counts_of
 from worlds.lecture_09_point_labels import point_labels
+from worlds.lecture_09_tables import truth_tables
 
 
 @pytest.fixture(scope="module")

@@ -5,17 +5,9 @@ import re
 import numpy as np
 import pytest
 from worlds import lecture_09_policies as policies
-from worlds.lecture_09_counts import (
-    BAND_EDGES,
-    COUNTED,
-    TruthCounts,
-    class_table,
-    counts_of,
-    distance_table,
-    policy_table,
-    truth_tables,
-)
+from worlds.lecture_09_counts import BAND_EDGES, COUNTED, TruthCounts, counts_of
 from worlds.lecture_09_policies import TRIALS, Trial
+from worlds.lecture_09_tables import class_table, distance_table, policy_table, truth_tables
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.ground_truth import TruthPolicy
@@ -84,7 +76,7 @@ def test_every_cell_of_the_grid_lies_in_a_band():
 def scored():
     """Four trials on a frame of the shipped drive."""
     trials = {
-        "paper": TRIALS["one scan (the paper)"],
+        "paper": TRIALS["one scan (our reading)"],
         "bare": Trial(TruthPolicy(cleanup="none")),
         "exact": Trial(flaws=NO_FLAWS),
         "wide": Trial(TruthPolicy(past=2, future=2, movers="carved")),
@@ -148,7 +140,7 @@ def test_the_counts_of_all_drives_are_added_up(monkeypatch):
     monkeypatch.setattr(policies, "score_trials", score)
     result = policies.truth_policies(seed=1, drives=4)
     assert numbers == [1700, 1701, 1702, 1703]
-    paper = "one scan (the paper)"
+    paper = "one scan (our reading)"
     np.testing.assert_array_equal(counts_of(result, paper).cells, counts().cells * (1 + 2 + 3 + 4))
     assert list(result["drives"]) == ["1700", "1701", "1702", "1703"]
     assert policy_table(result) in truth_tables(result)

@@ -1,4 +1,4 @@
-"""Hidden tests of exercise 09, where truth comes from: loops, sums over all outcomes and a graph are the reference."""
+"""Hidden tests of exercise 09, where truth comes from: loops and sums over all outcomes are the reference."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,7 +11,6 @@ from scipy.ndimage import minimum_filter
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets.ground_truth import TruthPolicy, lidar_truth
 from semgrid_edu.datasets.samples import sample_drive
-from semgrid_edu.graphical import Factor, GraphicalModel, eliminate
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_instructor import close, generator, hidden
@@ -87,21 +86,6 @@ def check_audit(audit: Callable) -> None:
 
 
 @hidden
-def check_between(between: Callable) -> None:
-    """Every combination of votes, by elimination in the graph; other tables and filters."""
-    for seed, (left, right) in enumerate(product((0, 1, None), repeat=2)):
-        rng = generator(105 + seed)
-        same, table, o = rng.uniform(0.55, 0.95), rng.dirichlet(np.ones(4), 2), rng.dirichlet(np.ones(4))
-        alike = [[same, 1 - same], [1 - same, same]]
-        factors = [Factor("m1", [0.5, 0.5]), Factor(("m1", "m2"), alike), Factor(("m2", "m3"), alike)]
-        row = GraphicalModel([*factors, Factor(("m2", "s"), table), Factor("s", o)])
-        votes = {name: vote for name, vote in (("m1", left), ("m3", right)) if vote is not None}
-        wanted = eliminate(row, ("m2",), votes).normalised().table[0]
-        got = answer_number(between(left, right, o.copy(), same, table.copy()))
-        assert close(got, wanted), "another belief for some votes"
-
-
-@hidden
 def check_labels_and_wrong(labels_and_wrong: Callable) -> None:
     """Other frames of the sample drive, other reaches and gaps, and a rule that must be asked."""
     drive, spec = sample_drive(), GridSpec.compact()
@@ -117,3 +101,28 @@ def check_labels_and_wrong(labels_and_wrong: Callable) -> None:
         assert got.shape == (2,), "another shape"
         assert got[0] == (made < 10).sum(), "another number of labels"
         assert got[1] == wrong, "another number of wrong labels"
+
+
+@hidden
+def check_prices(prices: Callable) -> None:
+    """Other counts: some reaches remove nothing, lose no right label, or add wrong ones."""
+    for seed in range(4):
+        rng = generator(112 + seed)
+        labels, wrong = int(rng.integers(800, 2000)), int(rng.integers(100, 400))
+        kept = np.column_stack([rng.integers(50, labels - wrong, 5), rng.integers(5, wrong, 5)])  # right and wrong ones
+        kept = np.concatenate(
+            [kept, [[labels - wrong, wrong // 2], [labels - wrong - 9, wrong], [labels // 3, wrong + 3]]]
+        )
+        wanted = [
+            (labels - wrong - right) / (wrong - left) if left < wrong else np.nan for right, left in kept.tolist()
+        ]
+        after = np.column_stack([kept.sum(axis=1), kept[:, 1]])
+        price, chance = prices(np.array([labels, wrong]), after)
+        price = answer_array(price)
+        assert price.shape == (8,), "another shape"
+        assert np.array_equal(np.isnan(price), np.isnan(wanted)), (
+            "a price is NaN where no wrong label was removed, only there"
+        )
+        for a, b in zip(price.tolist(), wanted, strict=True):
+            assert np.isnan(b) or close(a, b), "another price of a reach"
+        assert close(answer_number(chance), (labels - wrong) / wrong), "another price at random"

@@ -9,8 +9,8 @@
 # | 1 | a stricter rule for hidden returns | 2 |
 # | 2 | which rule of voting to choose | 2 |
 # | 3 | an audit of clean-ups | 2 |
-# | 4 | a cell between two votes | 2 |
-# | 5 | what your rule changes in a map | 3 |
+# | 4 | what your rule changes in a map | 3 |
+# | 5 | what a wrong label costs | 2 |
 # | 6 | in your own words | 2 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
@@ -127,7 +127,7 @@ _test()
 # A cell holds `n` returns, an odd number. It is a car with probability `p_car`, otherwise road, and each return brings one of these two classes. Two kinds of error are in the data:
 #
 # - with probability `calibration` the camera is off, and then **all** returns of the cell fall on pixels of the other class;
-# - whether it is or not, each return **by itself** brings the class that its pixel doesn't show, with probability `outline`.
+# - whether it is or not, each return **by itself** brings the class that its pixel doesn't show, with probability `alone`.
 #
 # The cell takes its label by *majority*, or by *what stands wins* (car, as soon as one return brings car). Which rule should one choose?
 #
@@ -136,11 +136,11 @@ _test()
 
 
 # %% nbgrader={"grade": false, "grade_id": "wrong-shares", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def wrong_shares(n, outline, calibration, p_car):
+def wrong_shares(n, alone, calibration, p_car):
     """Return how often a majority is wrong, and how often what stands wins is."""
     ### BEGIN SOLUTION
     majority = standing = 0.0
-    for wrong, chance in ((outline, 1 - calibration), (1 - outline, calibration)):
+    for wrong, chance in ((alone, 1 - calibration), (1 - alone, calibration)):
         most = sum(comb(n, m) * wrong**m * (1 - wrong) ** (n - m) for m in range(n // 2 + 1, n + 1))
         majority += chance * most
         standing += chance * ((1 - p_car) * (1 - (1 - wrong) ** n) + p_car * wrong**n)
@@ -151,12 +151,12 @@ def wrong_shares(n, outline, calibration, p_car):
 # %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "wrong-shares-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _MAJORITY_SLIPS = {
     0.0280: "the calibration is ignored",
-    0.1252: "when the camera is off, outlines err too: then a return is right with probability `outline`",
-    0.1280: "when the camera is off, outlines err too, and both errors can't be added: go through both cases",
+    0.1252: "when the camera is off, returns err by themselves, too: then one is right with probability `alone`",
+    0.1280: "when the camera is off, returns err by themselves, too, and both errors can't be added: go through both cases",
     0.0855: "you let the camera be off for each return by itself: it is off for all of them together",
     0.8776: "that is how often the label is right",
     0.0486: "three wrong returns of three are a wrong majority, too: go up to m = n",
-    0.1000: "that holds without errors of outlines",
+    0.1000: "that holds if no return errs by itself",
     0.0738: "that is the probability that all are wrong: more than half is enough",
 }
 _STANDING_SLIPS = {
@@ -202,7 +202,7 @@ _test()
 #
 # ## Task 3: an audit of clean-ups (2 points)
 #
-# In the lecture most wrong labels came from the clean-up. You are given finished maps, and want to know which of them break the rules of their own recipe. `votes` is a map of classes, `(H, W)`, with 255 where no
+# In the lecture the clean-up made most labels, and its guesses were worse than votes. You are given finished maps, and want to know which of them break the rules of their own recipe. `votes` is a map of classes, `(H, W)`, with 255 where no
 # return has brought a label. `unseen`, `(H, W)`, is True in cells that the filter has not observed. `made` is the finished map, `(H, W)`: classes 0 to 9 have a meaning, 10 to 13 are the unknown ones.
 #
 # Complete `audit`: it returns three numbers, how many cells break each of these rules.
@@ -284,72 +284,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 4: a cell between two votes (2 points)
-#
-# The lecture's clean-up gives a cell the class of its neighbour and doesn't ask the occupancy grid which state the cell is in: that edge is cut. Here you put it back. Three cells lie in a row, and each is ROAD (0) or CAR (1).
-#
-# - `left` and `right` are the votes of the outer cells, 0 or 1; they are right for sure. `None` means that there is no vote.
-# - Two neighbours show the same class with probability `same`; each class is as probable as the other for an outer cell.
-# - `table`, `(2, 4)`, holds the probability of the states FREE, STATIC, DYNAMIC, UNKNOWN in a cell of road (row 0) and of car (row 1).
-# - `o`, `(4,)`, is what the filter says of the middle cell. It may be unsure: each state counts with its probability, so a class has the weight $\sum_s o_s\, \text{table}_{c,s}$.
-#
-# Complete `between`: it returns the probability of road in the middle cell.
-
-
-# %% nbgrader={"grade": false, "grade_id": "between", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def between(left, right, o, same, table):
-    """Return the probability that the middle cell is road."""
-    ### BEGIN SOLUTION
-    weight = np.asarray(table) @ o
-    for vote in (left, right):
-        if vote is not None:
-            weight = weight * np.where(np.arange(2) == vote, same, 1 - same)
-    return weight[0] / weight.sum()
-    ### END SOLUTION
-
-
-# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "between-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
-_TABLE = np.array([[0.85, 0.05, 0.05, 0.05], [0.05, 0.6, 0.25, 0.1]])
-_BETWEEN_SLIPS = {
-    0.9878: "the occupancy is ignored",
-    0.8710: "you take the most probable state for certain: each state counts with its probability",
-    0.7178: "only one neighbour counts, or they are averaged: both votes count, multiply",
-    0.2203: "both neighbours are ignored, or they cancel: multiply by `same` for the class of a vote, 1 - `same` for the other",
-}
-
-
-# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "between-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
-def _test():
-    # By hand, as in the lecture: one vote for road, STATIC for sure: 0.9 * 0.05 = 0.045 against 0.1 * 0.6 = 0.06.
-    static = np.array([0.0, 1.0, 0.0, 0.0])
-    got = answer_array(between(ROAD, None, static, 0.9, _TABLE.copy()), "between")
-    assert got.size == 1, f"expected one number, got an array of shape {got.shape}"
-    none = "the cell on the right has no vote: it says nothing"
-    zero = (
-        "the vote has no effect. ROAD is 0, which `if vote` takes for no vote; or do you take the missing vote for car?"
-    )
-    assert not np.isclose(got, 0.0405 / 0.0465), f"one vote for road, {got:.3f}: {none}, not road"
-    assert not np.isclose(got, 0.05 / 0.65), f"one vote for road, {got:.3f}: {zero}"
-    np.testing.assert_allclose(got, 0.045 / 0.105, atol=1e-6, err_msg="one vote for road, the middle cell STATIC")
-    unsure = np.array(
-        [0.1, 0.7, 0.1, 0.1]
-    )  # road 0.13, car 0.46; with two votes 0.81 * 0.13 = 0.1053 against 0.01 * 0.46
-    got = answer_array(between(ROAD, ROAD, unsure, 0.9, _TABLE.copy()), "between")
-    for slip, hint in _BETWEEN_SLIPS.items():
-        assert not np.isclose(got, slip, atol=1e-3), f"two votes for road, an unsure filter, {got:.4f}: {hint}"
-    np.testing.assert_allclose(got, 0.1053 / 0.1099, atol=1e-6, err_msg="two votes for road, an unsure filter")
-    ### BEGIN HIDDEN TESTS
-    from semgrid_instructor import truth
-
-    complaint = truth.check_between(between)
-    assert not complaint, complaint
-    ### END HIDDEN TESTS
-
-
-_test()
-
-# %% [markdown]
-# ## Task 5: what your rule changes in a map (3 points)
+# ## Task 4: what your rule changes in a map (3 points)
 #
 # Does the rule of task 1 make a better truth? Complete `labels_and_wrong`: it makes a map from one frame without the returns that `open_to_view(uv, Z, reach, gap)` calls hidden, and returns two numbers:
 #
@@ -412,7 +347,69 @@ def _test():
 _test()
 
 # %% [markdown]
-# When the tests have passed, ask your rule: how do labels and wrong labels change on `sample_drive()[10]` with a reach of 0, 2, 4 and 8 pixels and a gap of 0.5 m? How many right labels does each wrong one cost that you get rid of?
+# ## Task 5: what a wrong label costs (2 points)
+#
+# A rule that removes wrong labels removes right ones, too. Its **price** is the number of right labels that are lost for each wrong one that is removed. Is that cheap? Compare it with a rule that knows nothing: if labels
+# are removed at random, each wrong one costs as many right ones as there are right ones for each wrong one.
+#
+# You are given the counts of task 4, labels and wrong labels: `before`, two numbers, without any rule, and `after`, `(R, 2)`, with R different reaches. Complete `prices`: it returns an array `(R,)` with the price of each reach, NaN
+# where no wrong label was removed, and then one number, the price of removing at random.
+
+
+# %% nbgrader={"grade": false, "grade_id": "prices", "locked": false, "schema_version": 3, "solution": true, "task": false}
+def prices(before, after):
+    """Return right labels lost for each wrong one removed, (R,), and that of removing at random, a number."""
+    ### BEGIN SOLUTION
+    (labels, wrong), after = before, np.asarray(after)
+    removed = wrong - after[:, 1]
+    lost = (labels - wrong) - (after[:, 0] - after[:, 1])
+    price = np.full(len(after), np.nan)
+    some = removed > 0
+    price[some] = lost[some] / removed[some]
+    return price, (labels - wrong) / wrong
+    ### END SOLUTION
+
+
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "prices-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
+_PRICE_SLIPS = {
+    3.0: "you divide the labels that are lost, wrong ones included: count the right ones alone",
+    0.5: "upside down: right labels lost, divided by wrong ones removed",
+    6.0: "those are the right labels that are left for each wrong one that is left",
+    0.2: "that is the share of all right labels that is lost",
+}
+
+
+# %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "prices-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
+def _test():
+    # By hand: 1000 labels, 200 wrong, so 800 right and a price of 4 at random. 760 and 120: 80 wrong ones removed, 160 right ones lost.
+    before, after = np.array([1000, 200]), np.array([[1000, 200], [760, 120], [400, 50]])
+    given = after.copy()
+    got = prices(before.copy(), given)
+    assert np.array_equal(given, after), "prices changed its argument `after`: work on a copy"
+    assert isinstance(got, (tuple, list)), "return two things: an array, and a number"
+    assert len(got) == 2, f"return two things, an array and a number; got {len(got)}"
+    price, chance = answer_array(got[0], "prices"), answer_array(got[1], "price at random")
+    assert price.shape == (3,), f"expected one price for each of 3 reaches, got shape {price.shape}"
+    assert np.isnan(price[0]), "no wrong label was removed with the first reach: its price is NaN"
+    for slip, hint in _PRICE_SLIPS.items():
+        assert not np.isclose(price[1], slip), f"price {price[1]:.4f}: {hint}"
+    np.testing.assert_allclose(price[1:], [160 / 80, 450 / 150], err_msg="prices, by hand")
+    assert chance.size == 1, f"the price at random is one number, got shape {chance.shape}"
+    assert not np.isclose(chance, 0.25), "at random: right labels for each wrong one, not the other way round"
+    assert not np.isclose(chance, 5), "at random: a wrong label isn't a right one that is lost"
+    np.testing.assert_allclose(chance, 4, err_msg="the price of removing at random, by hand")
+    ### BEGIN HIDDEN TESTS
+    from semgrid_instructor import truth
+
+    complaint = truth.check_prices(prices)
+    assert not complaint, complaint
+    ### END HIDDEN TESTS
+
+
+_test()
+
+# %% [markdown]
+# When the test has passed, ask your rule: what is its price on `sample_drive()[10]` with a reach of 0, 2, 4 and 8 pixels and a gap of 0.5 m? Up to which reach is it cheaper than chance?
 #
 # ## Task 6: in your own words (2 points)
 #

@@ -1,0 +1,147 @@
+"""Which errors a vote can remove: the same cells of a drive, with one kind of error after the other."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from semgrid_edu.camera import transform_points
+from semgrid_edu.datasets.project_lidar import closest_returns
+from semgrid_edu.frame import Frame
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
+from semgrid_edu.workshop.flaws import NO_FLAWS, TruthFlaws, flawed_labels, miscalibrated
+
+MOST = 9
+"""Votes of each cell that is looked at; cells with fewer returns are left out."""
+COUNTS = (1, 3, 5, 9)
+"""How many of them vote."""
+RATE = 0.1
+"""Probability that a return brings a wrong class, each by itself: about as often as with a camera that is off."""
+CAMERA = replace(NO_FLAWS, rotation=TruthFlaws().rotation, translation=TruthFlaws().translation)
+OUTLINES = replace(NO_FLAWS, outline=TruthFlaws().outline)
+
+
+class Votes(NamedTuple):
+    """What an error does to the returns of many cells, and to the vote of some of them.
+
+    Parameters
+    ----------
+    one : float
+        Probability that a return brings another class than without the error.
+    another : float
+        Probability that another return of its cell does, too, if it does.
+    changed : (len(COUNTS),) float64
+        Share of the cells whose majority is another one than without the error, by the number of votes.
+    """
+
+    one: float
+    another: float
+    changed: NDArray[np.float64]
+
+
+Spoil = Callable[[Frame, NDArray, np.random.Generator], NDArray]
+
+
+def each_by_itself(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> NDArray:
+    """Return the class that each return brings, if one in ten brings a class drawn at random."""
+    classes = shown(frame, numbers)
+    other = (classes + rng.integers(1, KITTI_14.n_semantic, len(classes))) % KITTI_14.n_semantic
+    return np.where(rng.random(len(classes)) < RATE, other, classes)
+
+
+def outlines_off(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> NDArray:
+    """Return the classes, if outlines are drawn a little off: neighbouring pixels are shifted alike."""
+    labels = flawed_labels(frame.labels.image, KITTI_14, OUTLINES, rng)
+    return shown(replace(frame, labels=replace(frame.labels, image=labels)), numbers)
+
+
+def outlines_anew(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> NDArray:
+    """Return the classes, if the shift of an outline, equally large, were drawn anew for each pixel."""
+    return _at(frame, _homogeneous(frame, numbers), OUTLINES.outline * rng.standard_normal((len(numbers), 2)))
+
+
+def one_camera_off(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> NDArray:
+    """Return the classes, if the camera is turned and displaced by a small random error."""
+    return shown(replace(frame, camera=miscalibrated(frame.camera, CAMERA, rng)), numbers)
+
+
+def own_camera_off(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> NDArray:
+    """Return the classes, if each return had a camera of its own with such an error: nothing is shared."""
+    in_camera = transform_points(frame.camera.T_camera_from_lidar, frame.points[numbers, :3])
+    turn = np.radians(CAMERA.rotation) * rng.standard_normal((len(numbers), 3))
+    shifted = in_camera + np.cross(turn, in_camera) + CAMERA.translation * rng.standard_normal((len(numbers), 3))
+    return _at(frame, shifted @ frame.camera.K.T)
+
+
+KINDS: dict[str, tuple[Spoil, int]] = {
+    "each return by itself": (each_by_itself, 6),
+    "outlines drawn off": (outlines_off, 4),
+    "the camera off": (one_camera_off, 6),
+    "a camera for each return": (own_camera_off, 6),
+    "outlines, each pixel anew": (outlines_anew, 6),
+}
+"""The kinds of error by name, and how often each is drawn; outlines differ in each frame, so four draws are enough.
+The last two kinds are controls that no data have: nothing is shared."""
+
+
+def shown(frame: Frame, numbers: NDArray) -> NDArray:
+    """Return the class of the pixel on which each of some returns falls."""
+    return _at(frame, _homogeneous(frame, numbers))
+
+
+def count_votes(frames: Sequence[Frame], spec: GridSpec, kind: str) -> Votes:
+    """Let one error spoil the returns of some frames, and count what it does to the votes.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        Labelled frames.
+    spec : GridSpec
+        The grid; only cells with at least `MOST` returns count.
+    kind : str
+        A key of `KINDS`. All frames share a camera, as those of a day do.
+    """
+    exact, spoilt = (np.concatenate(part) for part in zip(*_drawn(frames, spec, *KINDS[kind]), strict=True))
+    wrong = (exact != spoilt).sum(axis=1)
+    another = (wrong * (wrong - 1)).sum() / max((wrong * (MOST - 1)).sum(), 1)
+    changed = [(_majority(exact[:, :n]) != _majority(spoilt[:, :n])).mean() for n in COUNTS]
+    return Votes(float(wrong.mean() / MOST), float(another), np.array(changed))
+
+
+def _drawn(frames: Sequence[Frame], spec: GridSpec, spoil: Spoil, seeds: int) -> Iterator[tuple[NDArray, NDArray]]:
+    """Yield the classes of `MOST` returns of each cell in random order, (N, MOST), without the error and with it."""
+    for seed in range(seeds):
+        for number, frame in enumerate(frames):
+            returns, _ = closest_returns(frame)
+            rows, cols, inside = spec.cells(frame.points_grid[returns])
+            returns, cells = returns[inside], (rows * spec.shape[1] + cols)[inside]
+            order = np.random.default_rng([seed, number]).permutation(len(cells))
+            order = order[np.argsort(cells[order], kind="stable")]
+            _, first, count = np.unique(cells[order], return_index=True, return_counts=True)
+            chosen = returns[order[first[count >= MOST, None] + np.arange(MOST)]]
+            key = [seed] if spoil is one_camera_off else [seed, number]
+            spoilt = spoil(frame, chosen.ravel(), np.random.default_rng([9, *key]))
+            yield shown(frame, chosen.ravel()).reshape(chosen.shape), spoilt.reshape(chosen.shape)
+
+
+def _homogeneous(frame: Frame, numbers: NDArray) -> NDArray:
+    """Return the homogeneous image points of some returns, (N, 3)."""
+    return transform_points(frame.camera.T_camera_from_lidar, frame.points[numbers, :3]) @ frame.camera.K.T
+
+
+def _at(frame: Frame, uvw: NDArray, shift: NDArray | float = 0.0) -> NDArray:
+    """Return the class at the nearest pixel of homogeneous image points, or at the image's rim if it is outside.
+
+    `shift`, (N, 2), moves that pixel by whole pixels, as `flawed_labels` does.
+    """
+    height, width = frame.camera.size
+    u, v = (np.rint(uvw[:, :2] / uvw[:, 2:]) + np.rint(shift)).astype(int).T
+    return frame.labels.image[v.clip(0, height - 1), u.clip(0, width - 1)]
+
+
+def _majority(classes: NDArray) -> NDArray:
+    """Return the most frequent class of each row, the first of equally frequent ones."""
+    return (classes[..., None] == np.arange(KITTI_14.n_semantic)).sum(axis=1).argmax(axis=1)
