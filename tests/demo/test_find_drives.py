@@ -34,10 +34,19 @@ def test_one_drive_is_found_from_above_and_from_within(data, inside):
     np.testing.assert_array_equal(drive[0].points, drive_at(data)[1][0].points)
 
 
-def test_of_two_drives_neither_is_chosen(data):
+@pytest.mark.parametrize("relative", [False, True])
+def test_of_two_drives_neither_is_chosen(data, monkeypatch, relative):
     write_tiny_drive(data, "0002")
+    monkeypatch.chdir(data.parent)
     with pytest.raises(DataError, match=r"give the folder .* found .*_0001_sync, .*_0002_sync"):
-        drive_at(data)
+        drive_at(data.name if relative else data)
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(DataError, match="no folder"):
+        drive_at(tmp_path / "nowhere")
+    with pytest.raises(DataError, match="the folder of a recording, found no folder"):
+        read_with("my_reader.py", tmp_path / "nowhere")
 
 
 @pytest.mark.parametrize(

@@ -39,9 +39,6 @@ _PARTS = table_beside(__file__)
 LECTURE_PARTS, COMPANION_PARTS = (_PARTS["common"] | _PARTS[kind] for kind in ("lecture", "companion"))
 """The parts of a lecture and of a companion, and how each is recognised in its source."""
 
-SECOND_EDITION = _PARTS["second_edition"]["lectures"]
-"""Lectures that are still to be shortened; until then, the limits of length don't hold for them."""
-
 MACHINE = re.compile(r"(?<![\w.:/<])(?:/(?:home|root|tmp|work|usr|opt|mnt|srv|private|Users)/|[A-Z]:\\\\)\S*")
 ADDRESS = re.compile(r"\bat 0x[0-9a-f]{6,}\b")
 BARE = re.compile(r"(allclose|isclose|almost_equal|approx_equal)\(")
@@ -57,8 +54,7 @@ def lecture_problems(source: Path) -> list[str]:
     source : Path
         The source, `notebooks/src/NN_name.py`. The executed notebook is looked for where `built_path` puts it.
     """
-    rules = COMPANION_RULES if source.stem in SECOND_EDITION else LECTURE_RULES
-    return [f"{built_path(source).name}: {problem}" for problem in _problems(source, LECTURE_PARTS, rules)]
+    return [f"{built_path(source).name}: {problem}" for problem in _problems(source, LECTURE_PARTS, LECTURE_RULES)]
 
 
 def companion_problems(source: Path) -> list[str]:

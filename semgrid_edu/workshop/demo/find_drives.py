@@ -69,19 +69,25 @@ def drive_at(path: str | Path, camera: str | None = None) -> tuple[str, FrameSeq
     >>> drive_at(sample_drive().folder)[0]
     'KITTI raw'
     """
-    path = Path(path)
-    if not path.is_dir():
-        raise DataError(path, "the folder of a drive", "a file" if path.exists() else "no folder")
+    path = _existing(path, "the folder of a drive")
     found = find_drives(path)
     if not found:
         kinds = "a drive of KITTI raw, KITTI tracking, SemanticKITTI or PandaSet"
         advice = what_is(path)
         raise DataError(path, f"{kinds}, or --reader FILE", f"what looks like {advice}" if advice else "none of them")
     if len(found) > 1:
-        listed = [str(one.folder.relative_to(path)) for one in found[:SHOWN]]
+        listed = [str(one.folder.relative_to(path.resolve())) for one in found[:SHOWN]]
         more = [f"and {len(found) - SHOWN} more"] if len(found) > SHOWN else []
         raise DataError(path, "one drive; give the folder of the one to show", ", ".join(listed + more))
     return found[0].kind, found[0].open(camera)
+
+
+def _existing(path: str | Path, what: str) -> Path:
+    """Return the path of a folder, or raise an error if there is none."""
+    path = Path(path)
+    if not path.is_dir():
+        raise DataError(path, what, "a file" if path.exists() else "no folder")
+    return path
 
 
 def find_drives(path: Path) -> list[FoundDrive]:
@@ -125,8 +131,9 @@ def _kitti_raw(folder: Path) -> Iterator[FoundDrive]:
 def _pandaset(folder: Path) -> Iterator[FoundDrive]:
     """Yield the scene of a folder that holds lidar/poses.json."""
     if (folder / "lidar" / "poses.json").is_file():
-        root, scene = folder.parent, folder.name
-        yield FoundDrive("PandaSet", folder, lambda camera: PandasetScene(root, scene, camera or CAMERAS[0]))
+        yield FoundDrive(
+            "PandaSet", folder, lambda camera: PandasetScene(folder.parent, folder.name, camera or CAMERAS[0])
+        )
 
 
 def _semantic_kitti(folder: Path) -> Iterator[FoundDrive]:
@@ -178,10 +185,11 @@ def read_with(reader: str | Path, folder: str | Path) -> FrameSequence:
     Raises
     ------
     DataError
-        When Python can't import the file, it doesn't define exactly one such class, the class fails, or the recording
-        has no frames.
+        When there is no such folder, Python can't import the file, it doesn't define exactly one such class, the class
+        fails, or the recording has no frames.
     """
-    reader, folder = Path(reader), Path(folder)
+    reader = Path(reader)
+    folder = _existing(folder, "the folder of a recording")
     if reader.suffix != ".py" or not reader.is_file():
         raise DataError(reader, "a Python file with a class derived from FrameSequence", "no such file")
     module = imported(reader)
