@@ -155,7 +155,7 @@ CERTAIN = 1 - 1e-3
 
 
 def ratio(part: NDArray, whole: NDArray) -> NDArray[np.floating]:
-    """Return part / whole cell by cell, and 0 where the divisor is 0.
+    """Return part / whole cell by cell, and 0 where the divisor is 0 or so small that the quotient may overflow.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def ratio(part: NDArray, whole: NDArray) -> NDArray[np.floating]:
         Dividend and divisor, not negative.
     """
     out = np.zeros(np.broadcast_shapes(np.shape(part), np.shape(whole)), np.result_type(part, whole))
-    return np.divide(part, whole, out=out, where=whole > 0)
+    return np.divide(part, whole, out=out, where=whole >= np.finfo(out.dtype).tiny)
 
 
 def cells_of(position: NDArray, spec: GridSpec) -> NDArray[np.int64]:

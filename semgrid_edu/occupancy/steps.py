@@ -191,9 +191,10 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     carried = weight_in_cells(weight, cells, spec.shape)
     probability = state.probability.astype(np.float64)
     dynamic = probability[DYNAMIC]
-    weight = weight * at_cells(ratio(dynamic, carried), cells)
-    probability[UNKNOWN] += np.where(carried > 0, 0, dynamic)  # too little mass for a single particle
-    probability[DYNAMIC] = np.where(carried > 0, dynamic, 0)
+    factor = ratio(dynamic, carried)
+    weight = weight * at_cells(factor, cells)
+    probability[UNKNOWN] += np.where(factor > 0, 0, dynamic)  # too little mass for a single particle
+    probability[DYNAMIC] = np.where(factor > 0, dynamic, 0)
     return FilterState(probability, Particles(position, velocity, weight), np.zeros(spec.shape))
 
 

@@ -87,6 +87,7 @@ def test_one_cell_that_nothing_leaves_is_filterpys_discrete_bayes(belief, dt, sc
 @example(
     seed=255, dt=0.0, dx=0.0, dy=0.5, dyaw=-1.5, floor=0
 )  # a cell that moving mass leaves, nearly all that was there
+@example(seed=0, dt=2.225073858507e-311, dx=0.0, dy=0.0, dyaw=0.0, floor=1)  # mass too small to divide by
 def test_every_step_conserves_probability(seed, dt, dx, dy, dyaw, floor):
     rng = np.random.default_rng(seed)
     evidence = Evidence(*np.maximum(rng.random((2, *GRID.shape)) ** 9, floor))
