@@ -18,7 +18,7 @@ MAX_NUMBERS = 12
 
 
 def probability_lines(
-    lines: Mapping[str, NDArray], names: Sequence[str] | None = None, truth: int | None = None
+    lines: Mapping[str, NDArray], names: Sequence[str] | None = None, marked: Sequence[int] = ()
 ) -> Figure:
     """Draw several lines of cells below each other on one scale, such as prior, likelihood and posterior.
 
@@ -28,26 +28,29 @@ def probability_lines(
         The numbers of each line, 0..1, by its title, from top to bottom.
     names : sequence of str, optional
         Names of the N cells; 0, 1, ... when left out.
-    truth : int, optional
-        The true cell, marked by a triangle in every line.
+    marked : sequence of int, optional
+        Cells with a triangle below every line, and a darker bar, such as those with a pole.
     """
     size = (6, 0.5 + 1.3 * len(lines))
     top = TOP * (max(np.max(values, initial=0) for values in lines.values()) or 1)
     figure, axes = plt.subplots(len(lines), 1, figsize=size, sharex=True, layout="constrained", squeeze=False)
     for ax, (title, values) in zip(axes[:, 0], lines.items(), strict=True):
-        _line(np.asarray(values), ax, title, names, truth)
+        _line(np.asarray(values), ax, title, names, marked)
         ax.set_ylim(0, top)
         ax.label_outer()
     return figure
 
 
-def _line(values: NDArray, ax: Axes, title: str, names: Sequence[str] | None, truth: int | None) -> None:
+def _line(values: NDArray, ax: Axes, title: str, names: Sequence[str] | None, marked: Sequence[int]) -> None:
     """Draw one number per cell, as bars from left to right."""
-    bars = ax.bar(range(len(values)), values, width=0.8, color="0.45")
+    colours = ["0.3" if cell in marked else "0.65" for cell in range(len(values))]
+    bars = ax.bar(range(len(values)), values, width=0.8, color=colours)
     if len(values) <= MAX_NUMBERS:
         ax.bar_label(bars, [f"{value:.2f}" for value in values], fontsize="small")
-    if truth is not None:
-        ax.plot(truth, 1.02, "v", color="#d55e00", transform=ax.get_xaxis_transform(), clip_on=False)
+    if len(marked):
+        below = np.full(len(marked), -0.12)
+        ax.plot(marked, below, "k^", markersize=7, transform=ax.get_xaxis_transform(), clip_on=False)
+        ax.tick_params(axis="x", pad=11)
     ax.set_xticks(range(len(values)), [str(cell) for cell in range(len(values))] if names is None else names)
     ax.set_title(title, loc="left", fontsize="medium")
     ax.set(xlim=(-0.6, len(values) - 0.4), xlabel="cell" if names is None else "", ylabel="probability")
@@ -63,14 +66,20 @@ def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | Non
     ax : Axes, optional
         Axes to draw into; a new figure with a colour bar when left out.
     truth : (T,) int, optional
-        The true cell at each step, marked by a circle.
+        The true cell at each step: a circle where it is the likeliest, a cross where another one is.
     """
     if ax is None:
         ax = plt.subplots(figsize=(6, 2.6), layout="constrained")[1]
         ax.figure.colorbar(plt.cm.ScalarMappable(cmap="Blues"), ax=ax, label="probability")
     ax.imshow(np.transpose(belief), cmap="Blues", vmin=0, vmax=1, origin="lower", aspect="auto")
     if truth is not None:
-        ax.plot(np.arange(len(belief)), truth, "o", markersize=4, markerfacecolor="none", color="#d55e00")
+        right = np.argmax(belief, axis=1) == truth
+        for chosen, mark, name in (
+            (right, "o", "vehicle, best guess right"),
+            (~right, "x", "vehicle, best guess wrong"),
+        ):
+            where = np.flatnonzero(chosen)
+            ax.plot(where, truth[where], mark, ms=5, mew=1.5, mfc="none", color="#d55e00", label=name)
     ax.set(xlabel="step", ylabel="cell")
     return ax
 
