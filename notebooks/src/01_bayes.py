@@ -13,7 +13,7 @@
 #
 # **Prerequisites.** Lecture [00](00_tour.ipynb), its first stage; a row of numbers times a matrix.
 #
-# **Time.** 74 minutes, of which the computer needs a few seconds.
+# **Time.** 75 minutes, of which the computer needs a few seconds.
 #
 # **Paper.** Section 3.2, for a single cell: prediction by a transition matrix, update by a sensor model, estimate.
 
@@ -25,7 +25,7 @@ from ipywidgets import FloatSlider, interact
 
 from semgrid_edu import plotting
 from worlds.lecture_01_line import bayes_on_a_line, filtered, smoothed
-from worlds.lecture_01_lines import belief_history, probability_lines
+from worlds.lecture_01_lines import belief_history, places_on_ring, probability_lines, ring_road
 
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 
@@ -62,42 +62,21 @@ def trips(steps, **world):
 
 
 places, says_pole = trip(25, np.random.default_rng(152))  # a typical one, as we will see
-AROUND = np.array([(np.sin(angle), np.cos(angle)) for angle in 2 * np.pi * np.arange(N_CELLS) / N_CELLS])  # x, y
-
-
-def ring():
-    """Draw the road and the poles; return what changes: the bars, the circle of the vehicle and the title."""
-    ax = plt.subplots(figsize=(4.6, 4.3), layout="constrained")[1]
-    for radius, style in ((1, "-"), (1.5, ":")):
-        ax.add_patch(plt.Circle((0, 0), radius, fill=False, color="0.6", linestyle=style, zorder=0))
-    ax.text(0, 1.52, "probability 1/2", ha="center", va="bottom", fontsize=9, color="0.3")
-    bars = [ax.plot([], [], color="#0072b2", linewidth=16, solid_capstyle="butt")[0] for _ in range(N_CELLS)]
-    for i, (x, y) in enumerate(AROUND):
-        ax.text(0.84 * x, 0.84 * y, i, ha="center", va="center", fontsize=11)
-    (poles,) = ax.plot(*(0.58 * AROUND[POLES].T), "k^", markersize=10)
-    for letter, at in {"A": (0.32, 0.0), "B": (-0.32, -0.18)}.items():
-        ax.text(*at, letter, fontsize=14, fontweight="bold", ha="center", va="center")
-    (vehicle,) = ax.plot([], [], "o", ms=20, mfc="none", color="#d55e00", mew=3)
-    (key,) = ax.plot([], [], "o", ms=9, mfc="none", color="#d55e00", mew=2)
-    ax.legend([poles, key, bars[0]], ["pole", "vehicle", "belief"], loc="lower left", fontsize=9, frameon=False)
-    ax.legend_.legend_handles[2].set_linewidth(8)
-    ax.set(xlim=(-1.85, 1.85), ylim=(-1.75, 1.75), aspect="equal")
-    ax.set_axis_off()
-    return bars, vehicle, ax.set_title(" ", fontsize=11)
 
 
 # %% jupyter={"source_hidden": true} alt="animation of ten cells in a circle with a bar at each; after three readings of pole the bars gather at A and follow the vehicle; after a false pole at step 4 they run ahead of it; at steps 10 and 11 two readings of pole bring them back"
 def ring_frames():
     """Show the ring twice per step: after the prediction, and after the reading."""
-    bars, vehicle, title = ring()
+    bars, vehicle, title = ring_road(POLES)
+    around = places_on_ring()
     belief = np.full(N_CELLS, 1 / N_CELLS)
     for t, place in enumerate(places[:13]):
-        vehicle.set_data(*0.84 * AROUND[[place]].T)
+        vehicle.set_data(*0.84 * around[[place]].T)
         prior = discrete_bayes.predict(belief, offset=1, kernel=MOVED)
         belief = discrete_bayes.update(P_POLE if says_pole[t] else 1 - P_POLE, prior)
         said = "pole" if says_pole[t] else "nothing"
         for shown, words in ((prior, "predict"), (belief, f'sensor says "{said}"')):
-            for bar, (x, y), b in zip(bars, AROUND, shown, strict=True):
+            for bar, (x, y), b in zip(bars, around, shown, strict=True):
                 bar.set_data([x, x * (1 + b)], [y, y * (1 + b)])
             title.set_text(f"step {t}: {words}")
             yield title.figure
@@ -108,9 +87,9 @@ plotting.animate(ring_frames(), period=0.7, alt="a belief follows a vehicle roun
 
 # %% [markdown]
 # At first all ten bars are alike. Three readings of *pole* in a row fit the pair at A best, so the bars gather there.
-# Then two false *poles*, at steps 4 and 7, make the filter lose the vehicle. At steps 10 and 11 the pair at A brings
-# it back. On the whole trip of 25 steps the highest bar is at the vehicle in 11. That is typical, as we will see. Who
-# guesses blindly is right in one step of ten.
+# Then two false *poles*, at steps 4 and 7, make the filter lose the vehicle. In the next round the pair at A brings it
+# back. On the whole trip the highest bar is at the vehicle in 11 of 25 steps. That is typical: it is the median of a
+# thousand such trips. Who guesses blindly is right in one step of ten.
 #
 # So the filter finds its place, loses it and finds it again, with a sensor that errs and can't tell one pole from
 # another. How, the next two sections show.
@@ -234,8 +213,8 @@ def entropy(belief):
 
 
 # %% [markdown]
-# The **entropy** $-\sum_n b(n) \log_2 b(n)$ counts uncertainty in bits: 0 if one cell has everything, 1 for two cells
-# in balance, 3.3 for ten.
+# The **entropy** $-\sum_i b(i) \log_2 b(i)$ counts uncertainty in bits: none if one cell has everything, one bit for two
+# cells in balance, 3.3 bits for ten.
 #
 # **Predict before you run.** One of the two steps can never lower the entropy on this road. Which one? And is it true
 # that the other can never raise it?
@@ -289,10 +268,10 @@ assert against[raises].all()
 
 # %% [markdown]
 # Above, darker is surer. Below, each prediction (blue) raises the entropy, and most updates (orange) lower it. At the
-# three triangles an update raises it. At steps 4 and 18 the sensor said *pole* where the filter expected none; at step
-# 23 it was silent where the filter expected a pole. In 1000 other trips, too, *every* reading that raised the entropy
-# spoke against the cell that the filter thought likeliest. Two in three were silences. (Play with the dials if you have
-# a running kernel: at which sensor does the filter lose the vehicle?)
+# three triangles an update raises it. At the first two the sensor said *pole* where the filter expected none; at the
+# third it was silent where the filter expected a pole. This is no accident of one trip: in all of the thousand trips, *every*
+# reading that raised the entropy spoke against the cell that the filter thought likeliest. Two in three were silences.
+# (Play with the dials if you have a running kernel: at which sensor does the filter lose the vehicle?)
 
 
 # %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
@@ -340,9 +319,10 @@ print(f"on the three cells with poles: once {one_reading[POLES].sum():.2f}, coun
 #
 # ## Is a zero for ever?
 #
-# Let the filter start certain and wrong: it gives 1 to the cell opposite to the vehicle, and 0 to all others. Zero times
-# anything is zero, so no update can bring it back, whatever the sensor says. But between the readings it predicts. Is
-# that enough? As a control, take a vehicle that always moves by exactly one cell, and a filter that knows this.
+# Let the filter start certain and wrong: it gives everything to the cell opposite to the vehicle, and zero to all others.
+# Zero times anything is zero, so no update can bring it back, whatever the sensor says. But between the readings it
+# predicts. Is that enough? As a control, take a vehicle that always moves by exactly one cell, and a filter that knows
+# this.
 
 
 # %%
@@ -359,25 +339,25 @@ for name, moved in (("moves by 0, 1 or 2", MOVED), ("moves by exactly 1", np.arr
     print(f"{name}: certain and wrong at first {lost:.0%} right, nothing known at first {open_minded:.0%}")
 
 # %% [markdown]
-# With an odometer that errs the filter has nearly forgotten its wrong start after 40 steps: each prediction leaves a
-# little in the cell behind and puts a little into the cell ahead, so after five moves no cell has zero. With an exact
-# odometer it stays wrong for ever, though the sensor is the same.
+# If the moves err, the filter has nearly forgotten its wrong start after 40 steps: each prediction leaves a little in the
+# cell behind and puts a little into the cell ahead, so after five moves no cell has zero. If the moves are exact it stays
+# wrong for ever, though the sensor is the same.
 #
 # So **a zero is for ever unless the prediction leaks into it**. Let it leak a little to everywhere. Computers make zeros
 # of their own, because the product of very many likelihoods is too small for a floating-point number. Normalise at each
-# step, or add logarithms, as lecture 02 will.
+# step, or add logarithms.
 #
 # ## Where this breaks: sure and wrong
 #
 # A filter says how sure it is. Is it right to be? Take all steps at which it gives its best guess about 0.7. If the guess
 # is right in 70 % of them, and likewise for each other number, the filter is called **calibrated**. So sort the steps of
-# 1000 trips by this belief, and count how often the guess is right. Then break one assumption at a time. One filter
+# the thousand trips by this belief, and count how often the guess is right. Then break one assumption at a time. One filter
 # trusts its sensor too much: it thinks that the sensor errs in 1 % of the readings. Another has an old map: somebody
-# has moved the pole from cell 7 to cell 8.
+# has moved the pole at B from cell 7 to the next.
 #
 # That test needs the truth, which no vehicle has on the road. But a vehicle has the next reading. *Before* each reading
-# the filter can say how probable *pole* is: $\sum_i b(i)\, P(\text{pole} \mid i)$. Where it says 0.6, the sensor should
-# say *pole* in 60 % of the steps.
+# the filter can say how probable *pole* is: $\sum_i b(i)\, P(\text{pole} \mid i)$, with $b$ after the prediction. Among
+# all steps with the same number, the sensor should say *pole* in just that share.
 
 
 # %% tags=["claims"]
@@ -398,18 +378,18 @@ filters = {
 
 # %% [markdown]
 # **Predict before you run.** With the truth, both faults show. Which of the two does the test without the truth find?
-# Think of the old map: what does a filter believe that hears *pole* at cell 8?
+# Think of the old map: what does its filter believe when it hears the moved pole?
 #
 # <details><summary>Answer</summary>
 #
 # It finds the sensor that is trusted too much: where that filter expects *pole* with 0.76, it hears *pole* in 49 % of
-# the steps. The old map it hardly finds. The filter takes the pole at cell 8 for the one at cell 7, so it believes to be
-# one cell behind the vehicle. There its map fits, and it hears nearly what it expects.
+# the steps. The old map it hardly finds. It takes the pole at its new place for the one at its old place, so it believes the
+# vehicle one cell behind where it is. There the map fits, and the filter hears nearly what it expects.
 #
 # </details>
 
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="two panels with a dashed diagonal; left, how often the best guess is right against the belief in it: the filter as assumed lies on the diagonal, the two others far below, the one with the old map lowest; right, how often pole is heard against its probability beforehand: as assumed on the diagonal, too much trust far below at high and above at low values, and the old map close to the diagonal"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 def binned(claim, came_true):
     """Return the mean claim and the share that came true, for each tenth with at least 70 steps."""
     tenth = np.minimum((claim * 10).astype(int), 9)
@@ -417,6 +397,20 @@ def binned(claim, came_true):
     return np.transpose(rows)
 
 
+def hears(rows):
+    """Return the mean P("pole") beforehand where it was at least 0.4, and the share of "pole" there."""
+    likely = rows[2] >= 0.4
+    return rows[2][likely].mean(), rows[3][likely].mean()
+
+
+for name, rows in (filters | {"as assumed, but the pole is gone": claims(SENSOR, poles=[2, 3])}).items():
+    one_behind = np.mean(rows[1][rows[0] > 0.8] == 1)
+    print("{:32}: expects {:.2f}, hears {:.2f}".format(name, *hears(rows)), end="; ")
+    print(f"where it is surer than 0.8, one cell behind in {one_behind:.0%}")
+counted_twice, *_ = claims(SENSOR**2)
+assert abs(counted_twice.mean() - filters["trusts its sensor too much"][0].mean()) < 0.05
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="two panels with a dashed diagonal; left, how often the best guess is right against the belief in it: the filter as assumed lies on the diagonal, the two others far below, the one with the old map lowest; right, how often pole is heard against its probability beforehand: as assumed on the diagonal, too much trust far below at high and above at low values, and the old map close to the diagonal"
 fig, axes = plt.subplots(1, 2, figsize=(9, 4.1), layout="constrained")
 curves = {}
 for (name, rows), style in zip(filters.items(), ("o-", "s--", "^:"), strict=True):
@@ -432,6 +426,8 @@ for ax, words in zip(axes, (("with the truth", "belief in the best guess", "the 
 axes[0].legend(fontsize=9, frameon=False, loc="upper left")
 plt.show()
 
+
+# %% jupyter={"source_hidden": true}
 (honest, heard_as_assumed), (too_sure, heard_too_sure), (old_map, heard_old_map) = curves.values()
 for curve in (honest, heard_as_assumed):
     assert abs(curve[0] - curve[1]).max() < 0.05
@@ -440,29 +436,15 @@ assert (old_map[0] - old_map[1])[2:].min() > 0.12
 np.testing.assert_allclose(heard_too_sure[:, -2], [0.76, 0.49], atol=0.005)
 np.testing.assert_allclose(old_map[:, -1], [0.83, 0.24], atol=0.005)
 
-
-def hears(rows):
-    """Return the mean P("pole") beforehand where it was at least 0.4, and the share of "pole" there."""
-    likely = rows[2] >= 0.4
-    return rows[2][likely].mean(), rows[3][likely].mean()
-
-
-pole_removed = claims(SENSOR, poles=[2, 3])
-for name, rows in (filters | {"as assumed, but pole 7 is gone": pole_removed}).items():
-    one_behind = np.mean(rows[1][rows[0] > 0.8] == 1)
-    print("{:30}: expects {:.2f}, hears {:.2f}".format(name, *hears(rows)), end="; ")
-    print(f"where it is surer than 0.8 the vehicle is one ahead in {one_behind:.0%}")
-counted_twice, *_ = claims(SENSOR**2)
-assert abs(counted_twice.mean() - filters["trusts its sensor too much"][0].mean()) < 0.05
 # %% [markdown]
 # Left, the filter with the right model is on the diagonal, and both others claim more than they know. (Counting each
 # reading twice does nearly the same as too much trust.) The surest steps are the worst: where the filter with the old map
 # claims 0.83, it is right in 24 % of them. And *nothing in its belief shows it*.
 #
-# Right, the test without the truth finds the sensor, and hardly the map. Is our explanation true? Of the steps at which
-# the filter with the old map is surer than 0.8, the vehicle is exactly one cell ahead in 49 %, with the right map in 3 %.
-# As a control, take the pole away and put it nowhere, so that nothing can be taken for it. Where this filter expects
-# *pole* with 0.47, it hears it in 33 % of the steps. With the pole moved it was 42 %.
+# Right, the test without the truth finds the sensor, and hardly the map. Is our explanation true? Take the steps at which
+# the filter with the old map is surer than 0.8. In half of them the vehicle is exactly one cell ahead of its guess; with
+# the right map, hardly ever. As a control, take the pole away and put it nowhere, so that nothing can be taken for it. Where
+# this filter expects *pole* with 0.47, it hears it in 33 % of the steps; with the pole moved it was 42 %.
 #
 # So **compare what a filter expects with what it hears: if they differ, the model is wrong; if they agree, the place may
 # still be wrong**.
@@ -480,9 +462,10 @@ assert (history[7].argmax(), places[7], says_pole[7]) == (7, 9, True)
 
 # %% [markdown]
 # The place at step $t$ is $n_t$, the reading there $z_t$. Each place depends on the place before, each reading on its
-# place. Readings are shaded, because we see them. (Such a model is a **hidden Markov model**.) What is $n_2$ *now*? The
-# filter needs only its belief about $n_1$ and the reading $z_2$, because all that the past can tell, it tells through the
-# place before. But what $n_1$ *was* is another question. The reading $z_2$ tells about it, too, against the arrows.
+# place. Readings are shaded, because we see them. (Such a model is a **hidden Markov model**.) What is the place *now*?
+# The filter needs only its belief about the place before, and the reading now, because all that the past can tell, it
+# tells through the place before. But what the place before *was* is another question. The reading now tells about it,
+# too, against the arrows.
 #
 # How? Go back to the first two readings. After the first *pole*, each cell with a pole had 0.26. Then came another one.
 #
@@ -497,8 +480,9 @@ assert (history[7].argmax(), places[7], says_pole[7]) == (7, 9, True)
 #
 # </details>
 #
-# A belief that uses readings before *and* after is called **smoothed**. With $\beta_t(n)$ for the probability of all
-# readings after step $t$ if the vehicle is in cell $i$, and $\beta = 1$ at the last step:
+# A belief that uses readings before *and* after is called **smoothed**. Let $b_t$ be the filter's belief after step $t$, and
+# $\beta_t(i)$ the probability of all readings after step $t$ if the vehicle is in cell $i$, with $\beta = 1$ at the last
+# step. Then:
 #
 # $$ P(n_t = i \mid \text{all } z) \propto b_t(i)\, \beta_t(i), \qquad
 # \beta_{t-1}(i) = \sum_{d} P(d)\; P(z_t \mid i + d)\; \beta_t(i + d) $$
@@ -556,11 +540,11 @@ assert (later[[3, 19]].argmax(axis=1) != places[[3, 19]]).all()
 assert np.median(of_smoother) == of_smoother[152] == 15
 
 # %% [markdown]
-# On this trip the smoother corrects the steps 7 to 9. It isn't always better: it spoils steps 3 and 19. On average over
-# the 1000 trips the filter is right in 43 % of the steps and the smoother in 56 %. (A trivial rule that looks at the last
-# reading alone is right in 17 %.) But a smoother makes the whole trip hang together, so when it errs it may err all the
-# way: in one trip of eleven it is right at most once, which happens to the filter half as often. And the filter isn't wrong. It is exact for its own
-# question, and at the last step both are the same belief.
+# The smoother corrects this step and the next two. It isn't always better: it spoils two others. On average over all
+# trips the filter is right in 43 % of the steps and the smoother in 56 %. (A trivial rule that looks at the last reading
+# alone is right in 17 %.) But the smoother makes the whole trip hang together, so when it errs, it may err all the way:
+# the histogram has a bump at zero. Nor is the filter wrong. It is exact for its own question, and at the last step both
+# are the same belief.
 #
 # So a vehicle that must act now asks the filter, and a map that is made after the drive asks the smoother.
 #
@@ -588,12 +572,12 @@ np.testing.assert_allclose(one_reading @ ten_by_ten, predict(one_reading, MOVED)
 #
 # $$ p_m = p_\infty + (p_0 - p_\infty)\,(1 - a - v)^m $$
 #
-# Here $p_\infty$ is one third, and 0.7 of the difference is left after each scan. (Half a step leaves $\sqrt{0.7}$ of
-# it: $m$ needn't be whole.) So **a transition matrix belongs to its time step**. With $M$ from a LIDAR of 10 scans a
-# second, a LIDAR of 20 would forget a hidden car twice as fast.
+# Here $p_\infty$ is one third, and 0.7 of the difference is left after each scan. The power $m$ needn't be whole: half a
+# step leaves the square root of 0.7. So **a transition matrix belongs to its time step**. A LIDAR that is twice as fast, with
+# the same $M$, would forget a hidden car twice as fast.
 
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="P(OCCUPIED) over two seconds: about 1 while the car is seen for a second, then three falling curves; the right matrices for 10 and for 20 scans a second fall alike, and the old matrix at 20 scans a second falls twice as fast; all end near one third"
+# %% jupyter={"source_hidden": true}
 def follow(scans_per_second, M, seconds=2):
     """Return P(OCCUPIED) of a cell with a return in each scan of the first second, and then out of sight."""
     belief, p = np.array([0.5, 0.5]), []
@@ -608,6 +592,9 @@ def follow(scans_per_second, M, seconds=2):
 kept = np.sqrt(0.7)
 M_half = np.array([[1 - (1 - kept) / 3, (1 - kept) / 3], [(1 - kept) * 2 / 3, 1 - (1 - kept) * 2 / 3]])
 np.testing.assert_allclose(M_half @ M_half, M)  # two half steps are one step
+np.testing.assert_allclose(follow(10, M)[10:] - 1 / 3, (follow(10, M)[9] - 1 / 3) * 0.7 ** np.arange(1, 11))
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="P(OCCUPIED) over two seconds: about 1 while the car is seen for a second, then three falling curves; the right matrices for 10 and for 20 scans a second fall alike, and the old matrix at 20 scans a second falls twice as fast; all end near one third"
 fig, ax = plt.subplots(figsize=(6.8, 3), layout="constrained")
 curves = (("10 scans a second, its M", 10, M, "o", "#0072b2"), ("20 scans a second, its own matrix", 20, M_half, ".", "black"),
           ("20 scans a second, M of 10", 20, M, "x", "#d55e00"))  # fmt: skip
@@ -626,7 +613,6 @@ ax.legend(fontsize=9, frameon=False)
 plt.show()
 assert abs(ends[0] - ends[1]) < 0.02
 assert ends[1] - ends[2] > 0.1
-np.testing.assert_allclose(follow(10, M)[10:] - 1 / 3, (follow(10, M)[9] - 1 / 3) * 0.7 ** np.arange(1, 11))
 
 # %% [markdown]
 # So one cell of a map is filtered like a place on a road. Lecture 02 does it for thousands of cells at once.
@@ -649,5 +635,5 @@ np.testing.assert_allclose(follow(10, M)[10:] - 1 / 3, (follow(10, M)[9] - 1 / 3
 # - Rabiner, *A tutorial on hidden Markov models*, Proceedings of the IEEE, 1989: filter and smoother.
 #
 # [Exercise 01](exercises/01_bayes.ipynb): a sensor that gets stuck, a move on ice, a filter that waits for a few scans, a
-# matrix for any time step, and a map put together from your own functions. Next: lecture [01b](01b_graphical_models.ipynb), what a missing arrow
-# promises. Later: [what to do when a belief has too many states](deeper/time_beliefs.ipynb).
+# matrix for any time step, and a map put together from your own functions. Next: lecture
+# [01b](01b_graphical_models.ipynb), what a missing arrow promises. Later: [what to do when a belief has too many states](deeper/time_beliefs.ipynb).

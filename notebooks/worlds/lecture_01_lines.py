@@ -1,4 +1,4 @@
-"""Figures of beliefs: bars on a line of cells, and over time (filtering by Bayes' rule, section 3.2)."""
+"""Figures of beliefs: bars on a line or a ring of cells, and over time (filtering by Bayes' rule, section 3.2)."""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,6 +6,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from semgrid_edu.plotting.colours import STATE_COLOURS, STATE_NAMES, colour_legend
@@ -54,6 +56,44 @@ def _line(values: NDArray, ax: Axes, title: str, names: Sequence[str] | None, ma
     ax.set_xticks(range(len(values)), [str(cell) for cell in range(len(values))] if names is None else names)
     ax.set_title(title, loc="left", fontsize="medium")
     ax.set(xlim=(-0.6, len(values) - 0.4), xlabel="cell" if names is None else "", ylabel="probability")
+
+
+def places_on_ring(n_cells: int = 10) -> NDArray[np.float64]:
+    """Return x and y of the cells of a ring road of radius 1, clockwise from the top, (N, 2)."""
+    angles = 2 * np.pi * np.arange(n_cells) / n_cells
+    return np.stack([np.sin(angles), np.cos(angles)], axis=1)
+
+
+def ring_road(poles: Sequence[int]) -> tuple[list[Line2D], Line2D, Text]:
+    """Draw a ring road of ten cells with a pair of poles, A, and a single one, B; the rest is empty.
+
+    Returns
+    -------
+    bars : list of Line2D
+        One for each cell; a bar from radius 1 to 1 + b has the length of the probability b.
+    vehicle : Line2D
+        A circle that fits round the number of a cell, at 0.84 of the radius.
+    title : Text
+        The title.
+    """
+    around = places_on_ring()
+    ax = plt.subplots(figsize=(4.6, 4.3), layout="constrained")[1]
+    for radius, style in ((1, "-"), (1.5, ":")):
+        ax.add_patch(plt.Circle((0, 0), radius, fill=False, color="0.6", linestyle=style, zorder=0))
+    ax.text(0, 1.52, "probability 1/2", ha="center", va="bottom", fontsize=9, color="0.3")
+    bars = [ax.plot([], [], color="#0072b2", linewidth=16, solid_capstyle="butt")[0] for _ in around]
+    for cell, (x, y) in enumerate(0.84 * around):
+        ax.text(x, y, cell, ha="center", va="center", fontsize=11)
+    (poles_drawn,) = ax.plot(*(0.58 * around[list(poles)].T), "k^", markersize=10)
+    for letter, (x, y) in {"A": (0.32, 0.0), "B": (-0.32, -0.18)}.items():
+        ax.text(x, y, letter, fontsize=14, fontweight="bold", ha="center", va="center")
+    (vehicle,) = ax.plot([], [], "o", ms=20, mfc="none", color="#d55e00", mew=3)
+    (key,) = ax.plot([], [], "o", ms=9, mfc="none", color="#d55e00", mew=2)
+    (bar,) = ax.plot([], [], color="#0072b2", linewidth=8, solid_capstyle="butt")
+    ax.legend([poles_drawn, key, bar], ["pole", "vehicle", "belief"], loc="lower left", fontsize=9, frameon=False)
+    ax.set(xlim=(-1.85, 1.85), ylim=(-1.75, 1.75), aspect="equal")
+    ax.set_axis_off()
+    return bars, vehicle, ax.set_title(" ", fontsize=11)
 
 
 def belief_history(belief: NDArray, ax: Axes | None = None, truth: NDArray | None = None) -> Axes:

@@ -3,7 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from worlds.lecture_01_lines import belief_history, probability_lines, state_history
+from worlds.lecture_01_lines import belief_history, places_on_ring, probability_lines, ring_road, state_history
 
 from semgrid_edu import plotting
 
@@ -49,6 +49,17 @@ def test_lines_below_each_other_share_their_scale():
 
 def test_lines_of_zeros_have_an_axis_too():
     assert probability_lines({"a": np.zeros(2)}).axes[0].get_ylim()[1] > 0
+
+
+def test_a_ring_goes_clockwise_from_the_top_and_has_a_bar_for_each_cell_and_its_poles():
+    around = places_on_ring(4)
+    np.testing.assert_allclose(around, [[0, 1], [1, 0], [0, -1], [-1, 0]], atol=1e-12)
+    bars, vehicle, title = ring_road([2, 3, 7])
+    ax = vehicle.axes
+    assert len(bars) == 10
+    assert title.axes is ax
+    poles = next(line for line in ax.lines if line.get_marker() == "^")
+    np.testing.assert_allclose(poles.get_xydata(), 0.58 * places_on_ring()[[2, 3, 7]])
 
 
 def test_a_belief_has_a_column_for_each_step_with_cell_0_at_the_bottom_and_a_mark_at_the_truth():
