@@ -119,9 +119,9 @@ plotting.animate(ring_frames(), period=0.7, alt="a belief follows a vehicle roun
 
 # %% tags=["update"] jupyter={"outputs_hidden": true}
 def update(likelihood, prior):
-    """Return the posterior: multiply cell by cell, then divide by the sum (over the last axis, for many trips at once)."""
+    """Return the posterior: multiply cell by cell, then divide by the sum."""
     product = likelihood * prior
-    return product / product.sum(axis=-1, keepdims=True)
+    return product / product.sum(axis=-1, keepdims=True)  # the last axis, so that it works for many trips at once
 
 
 nothing_known = np.full(N_CELLS, 1 / N_CELLS)
@@ -213,17 +213,17 @@ def entropy(belief):
 
 
 # %% [markdown]
-# The **entropy** $-\sum_i b(i) \log_2 b(i)$ counts uncertainty in bits: none if one cell has everything, one bit for two
-# cells in balance, 3.3 bits for ten.
+# The **entropy** $-\sum_i b(i) \log_2 b(i)$ counts uncertainty in bits: none if one cell has everything, one bit for
+# two cells in balance, 3.3 bits for ten.
 #
 # **Predict before you run.** One of the two steps can never lower the entropy on this road. Which one? And is it true
 # that the other can never raise it?
 #
 # <details><summary>Answer</summary>
 #
-# Prediction never lowers it, because each new number is a mean of old ones, so peaks get lower and holes fill up. Update
-# mostly lowers it, but not always: a reading that contradicts what you believed leaves you with two explanations in
-# place of one.
+# Prediction never lowers it, because each new number is a mean of old ones, so peaks get lower and holes fill up.
+# Update mostly lowers it, but not always: a reading that contradicts what you believed leaves you with two
+# explanations in place of one.
 #
 # </details>
 
@@ -269,9 +269,9 @@ assert against[raises].all()
 # %% [markdown]
 # Above, darker is surer. Below, each prediction (blue) raises the entropy, and most updates (orange) lower it. At the
 # three triangles an update raises it. At the first two the sensor said *pole* where the filter expected none; at the
-# third it was silent where the filter expected a pole. This is no accident of one trip: in all of the thousand trips, *every*
-# reading that raised the entropy spoke against the cell that the filter thought likeliest. Two in three were silences.
-# (Play with the dials if you have a running kernel: at which sensor does the filter lose the vehicle?)
+# third it was silent where the filter expected a pole. This is no accident of one trip: in all of the thousand trips,
+# *every* reading that raised the entropy spoke against the cell that the filter thought likeliest. Seven in ten were
+# silences. (Play with the dials if you have a running kernel: at which sensor does the filter lose the vehicle?)
 
 
 # %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
@@ -297,8 +297,8 @@ _ = interact(show, **sliders)
 # multiplication has no order. But why may we multiply at all? Because of an assumption: *given the place, the readings
 # err independently*. If you knew the place, the first reading would tell nothing about the second.
 #
-# **Predict before you run.** A bug delivers the same reading, *pole*, twice. One reading gave the three cells with poles
-# 0.77 together. What does the filter believe of them now?
+# **Predict before you run.** A bug delivers the same reading, *pole*, twice. One reading gave the three cells with
+# poles 0.77 together. What does the filter believe of them now?
 #
 # <details><summary>Answer</summary>
 #
@@ -319,10 +319,10 @@ print(f"on the three cells with poles: once {one_reading[POLES].sum():.2f}, coun
 #
 # ## Is a zero for ever?
 #
-# Let the filter start certain and wrong: it gives everything to the cell opposite to the vehicle, and zero to all others.
-# Zero times anything is zero, so no update can bring it back, whatever the sensor says. But between the readings it
-# predicts. Is that enough? As a control, take a vehicle that always moves by exactly one cell, and a filter that knows
-# this.
+# Let the filter start certain and wrong: it gives everything to the cell opposite to the vehicle, and zero to all
+# others. Zero times anything is zero, so no update can bring it back, whatever the sensor says. But between the
+# readings it predicts. Is that enough? As a control, take a vehicle that always moves by exactly one cell, and a
+# filter that knows this.
 
 
 # %%
@@ -339,21 +339,21 @@ for name, moved in (("moves by 0, 1 or 2", MOVED), ("moves by exactly 1", np.arr
     print(f"{name}: certain and wrong at first {lost:.0%} right, nothing known at first {open_minded:.0%}")
 
 # %% [markdown]
-# If the moves err, the filter has nearly forgotten its wrong start after 40 steps: each prediction leaves a little in the
-# cell behind and puts a little into the cell ahead, so after five moves no cell has zero. If the moves are exact it stays
-# wrong for ever, though the sensor is the same.
+# If the moves err, the filter has nearly forgotten its wrong start after 40 steps: each prediction leaves a little in
+# the cell behind and puts a little into the cell ahead, so after five moves no cell has zero. If the moves are exact
+# it stays wrong for ever, though the sensor is the same.
 #
-# So **a zero is for ever unless the prediction leaks into it**. Let it leak a little to everywhere. Computers make zeros
-# of their own, because the product of very many likelihoods is too small for a floating-point number. Normalise at each
-# step, or add logarithms.
+# So **a zero is for ever unless the prediction leaks into it**. Let it leak a little to everywhere. Computers make
+# zeros of their own, because the product of very many likelihoods is too small for a floating-point number. Normalise
+# at each step, or add logarithms.
 #
 # ## Where this breaks: sure and wrong
 #
-# A filter says how sure it is. Is it right to be? Take all steps at which it gives its best guess about 0.7. If the guess
-# is right in 70 % of them, and likewise for each other number, the filter is called **calibrated**. So sort the steps of
-# the thousand trips by this belief, and count how often the guess is right. Then break one assumption at a time. One filter
-# trusts its sensor too much: it thinks that the sensor errs in 1 % of the readings. Another has an old map: somebody
-# has moved the pole at B from cell 7 to the next.
+# A filter says how sure it is. Is it right to be? Take all steps at which it gives its best guess, the likeliest
+# cell, about 0.7. If the guess is right in 70 % of them, and likewise for each other number, the filter is called
+# **calibrated**. So sort the steps of the thousand trips by this belief, and count how often the guess is right. Then
+# break one assumption at a time. One filter trusts its sensor too much: it thinks that the sensor errs in 1 % of the
+# readings. Another has an old map: somebody has moved the pole at B to the next cell.
 #
 # That test needs the truth, which no vehicle has on the road. But a vehicle has the next reading. *Before* each reading
 # the filter can say how probable *pole* is: $\sum_i b(i)\, P(\text{pole} \mid i)$, with $b$ after the prediction. Among
@@ -372,7 +372,7 @@ def claims(sensor, poles=POLES):
 
 filters = {
     "all as assumed": claims(SENSOR),
-    "trusts its sensor too much": claims(np.where(SENSOR > 0.5, 0.99, 0.01)),
+    "trusts its sensor too much": claims(np.where(SENSOR > 0.5, 0.99, 0.01)),  # in place of 0.8, 0.9 and 0.2, 0.1
     "has an old map": claims(SENSOR, poles=[2, 3, 8]),
 }
 
@@ -383,8 +383,8 @@ filters = {
 # <details><summary>Answer</summary>
 #
 # It finds the sensor that is trusted too much: where that filter expects *pole* with 0.76, it hears *pole* in 49 % of
-# the steps. The old map it hardly finds. It takes the pole at its new place for the one at its old place, so it believes the
-# vehicle one cell behind where it is. There the map fits, and the filter hears nearly what it expects.
+# the steps. The old map it hardly finds. It takes the pole at its new place for the one at its old place, so it
+# believes the vehicle one cell behind where it is. There the map fits, and the filter hears nearly what it expects.
 #
 # </details>
 
@@ -438,16 +438,17 @@ np.testing.assert_allclose(old_map[:, -1], [0.83, 0.24], atol=0.005)
 
 # %% [markdown]
 # Left, the filter with the right model is on the diagonal, and both others claim more than they know. (Counting each
-# reading twice does nearly the same as too much trust.) The surest steps are the worst: where the filter with the old map
-# claims 0.83, it is right in 24 % of them. And *nothing in its belief shows it*.
+# reading twice does nearly the same as too much trust.) The surest steps are the worst: where the filter with the old
+# map claims 0.83, it is right in 24 % of them. And *nothing in its belief shows it*.
 #
-# Right, the test without the truth finds the sensor, and hardly the map. Is our explanation true? Take the steps at which
-# the filter with the old map is surer than 0.8. In half of them the vehicle is exactly one cell ahead of its guess; with
-# the right map, hardly ever. As a control, take the pole away and put it nowhere, so that nothing can be taken for it. Where
-# this filter expects *pole* with 0.47, it hears it in 33 % of the steps; with the pole moved it was 42 %.
+# Right, the test without the truth finds the sensor, and hardly the map. Is our explanation true? Take the steps at
+# which the filter with the old map is surer than 0.8. In half of them the vehicle is exactly one cell ahead of its
+# guess; with the right map, hardly ever. As a control, take the pole away and put it nowhere, so that nothing can be
+# taken for it. Where this filter expects *pole* with 0.47, it hears it in a third of the steps; with the pole moved
+# it was 42 %.
 #
-# So **compare what a filter expects with what it hears: if they differ, the model is wrong; if they agree, the place may
-# still be wrong**.
+# So **compare what a filter expects with what it hears: if they differ, the model is wrong; if they agree, the place
+# may still be wrong**.
 #
 # ## What is it now, and what was it then?
 #
@@ -469,8 +470,8 @@ assert (history[7].argmax(), places[7], says_pole[7]) == (7, 9, True)
 #
 # How? Go back to the first two readings. After the first *pole*, each cell with a pole had 0.26. Then came another one.
 #
-# **Predict before you run.** For each of these cells: if the vehicle was there at the first reading, how probable was the
-# second *pole*? Which cell wins in hindsight?
+# **Predict before you run.** For each of these cells: if the vehicle was there at the first reading, how probable was
+# the second *pole*? Which cell wins in hindsight?
 #
 # <details><summary>Answer</summary>
 #
@@ -480,12 +481,14 @@ assert (history[7].argmax(), places[7], says_pole[7]) == (7, 9, True)
 #
 # </details>
 #
-# A belief that uses readings before *and* after is called **smoothed**. Let $b_t$ be the filter's belief after step $t$, and
-# $\beta_t(i)$ the probability of all readings after step $t$ if the vehicle is in cell $i$, with $\beta = 1$ at the last
-# step. Then:
+# A belief that uses readings before *and* after is called **smoothed**. Let $b_t$ be the filter's belief after step
+# $t$, and $\beta_t(i)$ the probability of all readings after step $t$ if the vehicle is in cell $i$, with $\beta = 1$
+# at the last step. Then:
 #
 # $$ P(n_t = i \mid \text{all } z) \propto b_t(i)\, \beta_t(i), \qquad
 # \beta_{t-1}(i) = \sum_{d} P(d)\; P(z_t \mid i + d)\; \beta_t(i + d) $$
+#
+# The right one is the sum that you have just computed by hand, with what comes later as one more factor.
 
 
 # %% tags=["smooth"] jupyter={"outputs_hidden": true}
@@ -541,10 +544,10 @@ assert np.median(of_smoother) == of_smoother[152] == 15
 
 # %% [markdown]
 # The smoother corrects this step and the next two. It isn't always better: it spoils two others. On average over all
-# trips the filter is right in 43 % of the steps and the smoother in 56 %. (A trivial rule that looks at the last reading
-# alone is right in 17 %.) But the smoother makes the whole trip hang together, so when it errs, it may err all the way:
-# the histogram has a bump at zero. Nor is the filter wrong. It is exact for its own question, and at the last step both
-# are the same belief.
+# trips the filter is right in 43 % of the steps and the smoother in 56 %. (A trivial rule that looks at the last
+# reading alone is right in 17 %.) But the smoother makes the whole trip hang together, so when it errs, it may err
+# all the way: the histogram has a bump at zero. Nor is the filter wrong. It is exact for its own question, and at the
+# last step both are the same belief.
 #
 # So a vehicle that must act now asks the filter, and a map that is made after the drive asks the smoother.
 #
@@ -554,10 +557,10 @@ assert np.median(of_smoother) == of_smoother[152] == 15
 # ask, for **one cell** of the ground: is it FREE or OCCUPIED? Two states in place of ten, and the same two steps. Say
 # that a beam returns from an occupied cell with 0.8 and from a free one with 0.05.
 #
-# Update is the same function. And predict? A cell doesn't move, but its *state* changes, because cars come and go. Say
-# that from one scan to the next a free cell becomes occupied with $a$ = 0.1, and an occupied one free with $v$ = 0.2.
-# These numbers form a **transition matrix** $M$, whose rows say *from* and columns say *to*, so each row sums to one. The
-# prediction is $b M$. By hand, with FREE at 0.6: it becomes 0.6 · 0.9 + 0.4 · 0.2 = 0.62.
+# Update is the same function. And predict? A cell doesn't move, but its *state* changes, because cars come and go.
+# Say that from one scan to the next something appears in a free cell with $a$ = 0.1, and vanishes from an occupied
+# one with $v$ = 0.2. These numbers form a **transition matrix** $M$, whose rows say *from* and columns say *to*, so
+# each row sums to one. The prediction is $b M$. By hand, with FREE at 0.6: it becomes 0.6 · 0.9 + 0.4 · 0.2 = 0.62.
 
 # %% jupyter={"source_hidden": true}
 M = np.array([[0.9, 0.1], [0.2, 0.8]])
@@ -566,15 +569,16 @@ ten_by_ten = predict(np.eye(N_CELLS), MOVED)  # the ring road has such a matrix,
 np.testing.assert_allclose(one_reading @ ten_by_ten, predict(one_reading, MOVED))
 
 # %% [markdown]
-# What happens to a car that gets hidden? With $p$ for the belief in OCCUPIED, one prediction gives
-# $(1 - p)\,a + p\,(1 - v) = a + (1 - a - v)\,p$. This leaves one belief unchanged, $p_\infty = a / (a + v)$. And the
-# difference to it shrinks by the same factor in each step, so after $m$ predictions without a reading:
+# What happens to a car that gets hidden? With $p$ for the belief in OCCUPIED, one prediction gives $(1 - p)\,a +
+# p\,(1 - v) = a + (1 - a - v)\,p$. This leaves one belief unchanged, $p_\infty = a / (a + v)$: what is believed when
+# nothing is known any more. And the difference to it shrinks by the same factor in each step, so after $m$
+# predictions without a reading:
 #
 # $$ p_m = p_\infty + (p_0 - p_\infty)\,(1 - a - v)^m $$
 #
-# Here $p_\infty$ is one third, and 0.7 of the difference is left after each scan. The power $m$ needn't be whole: half a
-# step leaves the square root of 0.7. So **a transition matrix belongs to its time step**. A LIDAR that is twice as fast, with
-# the same $M$, would forget a hidden car twice as fast.
+# Here $p_\infty$ is one third, and 0.7 of the difference is left after each scan. The power $m$ needn't be whole:
+# half a step leaves the square root of 0.7. So **a transition matrix belongs to its time step**. A LIDAR that is
+# twice as fast, with the same $M$, would forget a hidden car twice as fast.
 
 
 # %% jupyter={"source_hidden": true}
@@ -634,6 +638,7 @@ assert ends[1] - ends[2] > 0.1
 # - Thrun, Burgard, Fox, *Probabilistic Robotics*, MIT Press 2005: localisation on a map.
 # - Rabiner, *A tutorial on hidden Markov models*, Proceedings of the IEEE, 1989: filter and smoother.
 #
-# [Exercise 01](exercises/01_bayes.ipynb): a sensor that gets stuck, a move on ice, a filter that waits for a few scans, a
-# matrix for any time step, and a map put together from your own functions. Next: lecture
-# [01b](01b_graphical_models.ipynb), what a missing arrow promises. Later: [what to do when a belief has too many states](deeper/time_beliefs.ipynb).
+# [Exercise 01](exercises/01_bayes.ipynb): a sensor that gets stuck, a move on ice, a filter that waits for a few
+# scans, a matrix for any time step, and a map put together from your own functions. Next: lecture
+# [01b](01b_graphical_models.ipynb), what a missing arrow promises. Later: [what to do when a belief has too many
+# states](deeper/time_beliefs.ipynb).

@@ -41,7 +41,7 @@ def _explain(got, slips):
 # more. Otherwise the reading is fresh: *pole* with probability `hit` beside a pole, and with probability `false_alarm` elsewhere. The first reading is always fresh.
 #
 # Complete `locate`: it returns the belief after all readings. One point is for `stuck=0`, where the readings err independently. The other is for any `stuck` up to 1: then they don't, and you
-# have to ask how probable a reading is given the cell *and the reading before it*. (What must come out if all readings are alike and `stuck=1`?) There may be thousands of readings. Leave `belief` as it is:
+# have to ask how probable a reading is given the cell *and the reading before it*. (What must come out if all readings are alike and `stuck=1`?) There may be no reading, or thousands. Leave `belief` as it is:
 # somebody else may need it.
 
 
