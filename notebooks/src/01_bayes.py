@@ -536,6 +536,8 @@ axes["both"].set(xlabel="steps right of 25", ylabel="trips")
 axes["both"].set_title("1000 trips", fontsize=10)
 axes["both"].legend(fontsize=9, frameon=False, loc="upper left")
 plt.show()
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 last_alone = np.array([update(likelihood, nothing_known) for likelihood in SENSOR])
 blind = np.mean(last_alone[heard.astype(int)].argmax(axis=-1) == at)
 print(

@@ -77,7 +77,7 @@ def ring_road(poles: Sequence[int]) -> tuple[list[Line2D], Line2D, Text]:
         The title.
     """
     around = places_on_ring()
-    ax = plt.subplots(figsize=(4.6, 4.3), layout="constrained")[1]
+    ax = plt.subplots(figsize=(4.2, 4.0), layout="constrained")[1]
     for radius, style in ((1, "-"), (1.5, ":")):
         ax.add_patch(plt.Circle((0, 0), radius, fill=False, color="0.6", linestyle=style, zorder=0))
     ax.text(0, 1.52, "probability 1/2", ha="center", va="bottom", fontsize=9, color="0.3")
