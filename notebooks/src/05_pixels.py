@@ -471,6 +471,19 @@ assert not d_separated(stage.model, "m1", "m3", given=("a3",))
 NEAR, FAR = 1, 2
 near_us = GridSpec(0, 40, spec.y_min, spec.y_max, spec.cell)
 centres, n_rows = near_us.centers(), near_us.shape[0]
+
+
+def read_lifted(frame, height):
+    """Return the true label and depth of each cell's pixel, whether it is in view, and the cell's own depth."""
+    points = np.concatenate([centres, height[..., None]], axis=-1)
+    points = transform_points(frame.camera.T_camera_from_grid, points)
+    pixels, in_view = project(points, frame.camera)
+    cols, rows = np.where(in_view[..., None], pixels, 0).round().astype(int).transpose(2, 0, 1)
+    read = np.where(in_view, frame.labels.image[rows, cols], 255)
+    return read, frame.labels.depth[rows, cols], in_view, points[..., 2]
+
+
+# %% jupyter={"source_hidden": true}
 shares, read, why = {}, {}, {}
 for k in (0, 5, 10, 15, len(drive) - 1):
     labels = drive[k].labels
@@ -479,13 +492,9 @@ for k in (0, 5, 10, 15, len(drive) - 1):
     heights = {"on 0 m": np.zeros(near_us.shape)}
     heights["at its own height"] = NearestNDInterpolator(road[:, :2], road[:, 2])(centres)
     for name, height in heights.items():
-        places = np.concatenate([centres, height[..., None]], axis=-1)
-        points = transform_points(drive[k].camera.T_camera_from_grid, places)
-        pixels, in_view = project(points, drive[k].camera)
-        cols, rows = np.where(in_view[..., None], pixels, 0).round().astype(int).transpose(2, 0, 1)
-        read[name] = np.where(in_view, labels.image[rows, cols], 255)
+        read[name], depth, in_view, Z = read_lifted(drive[k], height)
         is_road, reads_road = in_view & (truth == ROAD), read[name] == ROAD
-        why[name] = np.where(labels.depth[rows, cols] < points[..., 2], NEAR, FAR) * (is_road & ~reads_road)
+        why[name] = np.where(depth < Z, NEAR, FAR) * (is_road & ~reads_road)
         part = [(why[name] == cause)[is_road].mean() for cause in (0, NEAR, FAR)]
         part += [reads_road[is_road & seen].mean(), reads_road[is_road & ~seen].mean()]
         shares.setdefault(name, []).append([*part, (truth == CAR)[read[name] == CAR].mean()])
