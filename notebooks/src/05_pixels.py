@@ -9,13 +9,13 @@
 # - find the pixel of a point by similar triangles, and say what $K$ does to it;
 # - change $K$ when an image is resized or cropped, without losing half a pixel;
 # - read, compose and invert transforms by their names;
-# - compute the pixels of a whole plane, with a mask for what lies behind the camera or outside the image;
+# - compute the pixels of a whole plane, and which of them are in view;
 # - say what a wrong height, a hidden cell and a wrong angle do to the map.
 #
 # **Prerequisites.** Lecture [00](00_tour.ipynb): the grid. Lecture [01b](01b_graphical_models.ipynb), for one graph. A
 # matrix times a vector; a rotation as a matrix.
 #
-# **Time.** 75 minutes; the computer needs less than one.
+# **Time.** 74 minutes; the computer needs less than one.
 #
 # **Paper.** Section 3.3, equation (1).
 
@@ -117,10 +117,10 @@ for point in ([1.5, 1, 10], [3, 2, 20], [0.15, 0.1, 1]):
     print(f"{point!s:<14} -> {pixel(np.array(point), K).round(6).tolist()}")
 
 # %% [markdown]
-# All three points are multiples of one triple. They are on one ray, and have one pixel.
+# All three points are multiples of one triple, so they are on one ray.
 #
-# A real lens also bends straight lines a little. Our images have been straightened beforehand (*rectified*), and for
-# such an image $K$ and one division are enough.
+# A real lens also bends straight lines a little. Our images have been straightened beforehand (*rectified*). For them
+# $K$ and one division are enough.
 #
 # ## What if the image is resized or cropped?
 #
@@ -176,7 +176,7 @@ np.testing.assert_allclose(middle, pixel(place, resize(0.5, 0.5) @ crop(1, 0) @ 
 # ## Where is the camera?
 #
 # Until now points were given in the camera's frame, but the map has its own. In a toy car the LIDAR is two metres above
-# the ground. The camera is half a metre below the LIDAR and looks ahead. Here is the top of a post in three frames:
+# the ground, and half a metre below it a camera looks ahead. Here is the top of a post in three frames:
 #
 # | frame | axes | origin | top of the post |
 # |---|---|---|---|
@@ -388,9 +388,9 @@ axes[2].legend(markerscale=5, fontsize=9, loc="upper right")
 plt.show()
 
 # %% [markdown]
-# A: rays to three points of the car, and the planes at 0 m (solid) and 0.8 m (dashed); crosses mark where the rays reach
-# the ground. B: the ground plane draws the car far behind its true place, and the farther the higher a point is. C: on
-# the plane at 0.8 m, what is lower is drawn too near and what is higher too far.
+# A: rays to three points of the car; the higher the point, the farther its ray reaches. B: so the ground plane draws the
+# car out into a long smear. C: on the plane at 0.8 m (dashed in A), what is lower is drawn too near and what is higher
+# too far.
 #
 # So a thing is drawn in its place only on the plane of its own height. That is why equation (1) has several planes. A
 # network has to find out which one is right for a cell; lecture [08](08_fusion.ipynb) measures how much it gains.
@@ -465,7 +465,7 @@ assert not d_separated(stage.model, "m1", "m3", given=("a3",))
 # We have two causes: a wrong height, and a thing in front. To tell them apart, take the cells that are truly road, up
 # to 40 m ahead, and let each read the true label of its pixel. If it isn't *road*, is the thing nearer than the cell, or
 # farther? Then switch the first cause off: give each cell its *own* height, that of the nearest piece of road in the
-# image. Means over five frames:
+# image. Means of five frames:
 
 # %% jupyter={"source_hidden": true}
 NEAR, FAR = 1, 2
@@ -520,8 +520,8 @@ plt.show()
 # something farther, because the ray passes over the falling road.
 #
 # At their own height road cells read nothing farther, in any frame: the wrong height was the cause. What is nearer stays,
-# because no height lets a camera look through a car. The simulator knows which cells the camera sees. At their own
-# height all cells that are seen wholly read *road*, and no hidden one does. (The rest are seen in part.)
+# because no height lets a camera look through a car. The simulator tells which cells the camera sees. At their own
+# height all that are seen wholly read *road*, and no hidden one does. (The rest are seen in part.)
 #
 # So the streaks stay: of the cells that read *car*, only one in five is car, on 0 m and at the own height. *In view*
 # isn't yet *seen*. The LIDAR measures where the car ends, and that tells its cells from those behind: one reason to use
@@ -635,6 +635,5 @@ plt.show()
 # [The companion](deeper/05_cells_and_slopes.ipynb) asks how many pixels a far cell has, and which planes a road on a
 # slope needs.
 #
-# [Exercise 05](exercises/05_pixels.ipynb): undo a crop, see old returns with the camera of now, what a cell's pixel
-# really shows, a height from a miss on the map, and a calibration with a fault that you find. Next: lecture
-# [06](06_planes.ipynb), reading between pixels.
+# [Exercise 05](exercises/05_pixels.ipynb): undo a crop, bring old returns to the camera of now, say what a pixel really
+# shows, and find a fault. Next: lecture [06](06_planes.ipynb), reading between pixels.
