@@ -63,8 +63,9 @@ ORANGE, SKY = "#d55e00", "#0072b2"
 # </details>
 #
 # On the film the picture is upside down. A camera turns it upright, and so do we: hence plus signs. Count pixels to the
-# right ($u$) and down ($v$), from the first pixel's centre. The camera's axis meets the image at $(c_u, c_v)$, and
-# $f_u, f_v$ are the focal lengths. With $X$ to the right, $Y$ down and $Z$ ahead of the hole, the depth:
+# right ($u$) and down ($v$), from the first pixel's centre. The camera's axis meets the image at the *principal point*
+# $(c_u, c_v)$, and $f_u, f_v$ are the focal lengths. With $X$ to the right, $Y$ down and $Z$ ahead of the hole, the
+# depth:
 #
 # $$ u = c_u + f_u \frac{X}{Z}, \qquad v = c_v + f_v \frac{Y}{Z} $$
 
@@ -84,7 +85,7 @@ poles = ((10, 2.0, "tab:blue", "A"), (20, 2.0, "tab:orange", "B"), (1, 0.2, "tab
 for k, (Z, top, colour, name) in enumerate(poles):
     ax.plot([0, Z], [0, top], color=colour, linewidth=0.8)
     ax.plot([Z, Z], [0, top], color=colour, linewidth=4, solid_capstyle="butt")
-    ax.text(Z + 0.2, top, f"{name}: {top:g} m, {Z} m ahead", color=colour, va="center")
+    ax.text(Z + 0.2, top if top > 1 else -0.14, f"{name}: {top:g} m, {Z} m ahead", color=colour, va="center")
     image.plot([k, k], [48, pinhole(0, -top, Z)[1]], color=colour, linewidth=8, solid_capstyle="butt")
 ax.plot(0, 0, "ko")
 ax.set(xlabel="Z, ahead of the hole [m]", ylabel="up, −Y [m]", ylim=(-0.3, 2.3), xlim=(-0.5, 27))
@@ -519,11 +520,11 @@ plt.show()
 # The maps show the last frame, whose road falls away most. Lines: a road cell reads something nearer. Dots: it reads
 # something farther, because the ray passes over the falling road.
 #
-# At their own height road cells read nothing farther, in any frame: the wrong height was the cause. What is nearer stays,
-# because no height lets a camera look through a car. The simulator tells which cells the camera sees. At their own
-# height all that are seen wholly read *road*, and no hidden one does. (The rest are seen in part.)
+# At its own height hardly a road cell reads something farther, in any frame: the wrong height was the cause. What is
+# nearer stays, because no height lets a camera look through a car. The simulator tells which cells the camera sees. At its own
+# height each one that is seen wholly reads *road*, and no hidden one does. (The rest are seen in part.)
 #
-# So the streaks stay: of the cells that read *car*, only one in five is car, on 0 m and at the own height. *In view*
+# So the streaks stay: of the cells that read *car*, only one in five is car, on 0 m and at its own height. *In view*
 # isn't yet *seen*. The LIDAR measures where the car ends, and that tells its cells from those behind: one reason to use
 # both sensors.
 #
