@@ -171,8 +171,7 @@ middle = np.array([small.sum(axis=0) @ np.arange(160), small.sum(axis=1) @ np.ar
 np.testing.assert_allclose(middle, pixel(place, resize(0.5, 0.5) @ crop(1, 0) @ K), atol=0.02)
 
 # %% [markdown]
-# So scale distances from the image's *edge*, half a pixel before the first centre. Focal lengths only scale, and a cut
-# only shifts.
+# So scale distances from the image's *edge*, half a pixel before the first centre. A cut only shifts.
 #
 # ## Where is the camera?
 #
@@ -218,8 +217,8 @@ print("camera, from the grid:         ", inverse(T_camera_from_grid)[:3, 3] + 0.
 #
 # ## Which pixel belongs to which cell?
 #
-# Now everything in turn. A cell $j$ is a place $(x_j, y_j)$. Give it a height: lift the whole grid, as a flat sheet of
-# cell centres, to the height $\delta_d$. This is plane number $d$, and equation (1) gives a pixel to each of its points:
+# A cell $j$ is a place $(x_j, y_j)$. Give it a height: lift the whole grid, as a flat sheet of cell centres, to the
+# height $\delta_d$. This is plane number $d$, and equation (1) gives a pixel to each of its points:
 #
 # $$ \begin{pmatrix} X \\ Y \\ Z \\ 1 \end{pmatrix} = T_\text{camera←grid}
 #    \begin{pmatrix} x_j \\ y_j \\ \delta_d \\ 1 \end{pmatrix}, \qquad
@@ -521,8 +520,8 @@ plt.show()
 # something farther, because the ray passes over the falling road.
 #
 # At its own height hardly a road cell reads something farther, in any frame: the wrong height was the cause. What is
-# nearer stays, because no height lets a camera look through a car. The simulator tells which cells the camera sees. At its own
-# height each one that is seen wholly reads *road*, and no hidden one does. (The rest are seen in part.)
+# nearer stays, because no height lets a camera look through a car. The simulator tells which cells the camera sees. At
+# its own height each one that is seen wholly reads *road*, and no hidden one does. (The rest are seen in part.)
 #
 # So the streaks stay: of the cells that read *car*, only one in five is car, on 0 m and at its own height. *In view*
 # isn't yet *seen*. The LIDAR measures where the car ends, and that tells its cells from those behind: one reason to use
@@ -530,8 +529,7 @@ plt.show()
 #
 # ## Where this breaks: a camera that nods
 #
-# Equation (1) is exact about a camera that is where you think it is. Let the camera's nose be lower by $\psi$ = 1° than
-# you think.
+# Let the camera's nose be lower by $\psi$ = 1° than you think.
 #
 # **Predict before you run.** The toy camera sees the ground at $x$ in the row that is $300 / x$ below the horizon. The
 # nose goes down by a degree, and the whole image moves up by about $f \tan\psi$ = 3.5 rows. Which ground is now in the
