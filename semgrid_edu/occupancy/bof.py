@@ -127,15 +127,16 @@ def _blocked(
     It can't if the cell is STATIC. What `walls` doubts is that of `Walls.doubt`, for whole planes: a plane shifted the
     other way shows in each cell the value at the place where its mass is at another time.
     """
+    nearby = static_nearby(mixed)
     runs = np.hypot(*velocity.T) > walls.running_speed
     keeps = walls.keeps_pace(velocity, car_velocity, spec.cell)
     before = origins(velocity, spec, walls)
     shortly_before = origins(velocity, spec, walls, walls.second_look)
     open_space = mixed[FREE] + mixed[DYNAMIC]
-    open_to_pace = open_space - mixed[FREE] * static_nearby(mixed)
+    open_to_pace = open_space - mixed[FREE] * nearby
 
     def blocked(k: int) -> NDArray[np.floating]:
-        from_wall = _elsewhere(mixed[STATIC], before[k])
+        from_wall = _elsewhere(nearby if runs[k] else mixed[STATIC], before[k])
         if runs[k]:
             from_wall = np.maximum(from_wall, _elsewhere(mixed[STATIC], shortly_before[k]))
         open_ahead = _elsewhere(open_to_pace if keeps[k] else open_space, -before[k])

@@ -24,10 +24,14 @@ class Walls:
 
     *Walls.* A particle is suspect if there is something STATIC where it was `clearing_time` ago, and the cell where it
     will be after `clearing_time` is not known to be free. Then its arrival in an unseen cell may be only the next piece
-    of the wall. Above `running_speed` the place where it was shortly before counts, too, because nothing drives through
-    a wall: without this, particles that start in front of a parked car fly on inside it, where no beam contradicts
-    them. Slower things may be people, who walk close to walls. A pedestrian who sets off also comes out of a STATIC
-    cell, but walks into free space. And the side of a long vehicle comes out of a cell where the vehicle moves.
+    of the wall. Slow things may be people, who walk close to walls. Above `running_speed` two more places are checked.
+    The cells beside that place count, too, because a wall that crosses the grid at an angle is a staircase of cells.
+    And so does the cell where the particle was shortly before: nothing drives through a wall, but a particle that
+    starts in front of a parked car flies on inside it, where no beam contradicts it. Here the cells beside don't count,
+    because shortly before a car was in its own cells, some of which may still be called STATIC.
+
+    A pedestrian who sets off also comes out of a STATIC cell, but walks into free space. And the side of a long vehicle
+    comes out of a cell where the vehicle moves.
 
     *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. For a particle at that speed a
     cell ahead that borders a STATIC one isn't free space. While the car stands, this doesn't apply.
@@ -45,9 +49,9 @@ class Walls:
         for longer than `clearing_time`, because a thing shows in more cells than it fills: a pedestrian doesn't get
         out of two cells of 0.5 m in half a second.
     running_speed : float
-        Speed above which the past position of a particle is checked a second time, m/s: faster than people walk.
+        Speed above which more of a particle's past is checked, m/s: faster than people walk.
     second_look : float
-        Fraction of `clearing_time` at which it is checked (0.4: two LIDAR revolutions).
+        Fraction of `clearing_time` at which its past position is checked again (0.4: two LIDAR revolutions).
     """
 
     clearing_time: float = 0.5
@@ -135,9 +139,10 @@ class Walls:
             self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
         )
         runs = np.hypot(*particles.velocity.T) > self.running_speed
-        out_of_a_wall = at_cells(mixed[STATIC], before)
+        nearby = static_nearby(mixed)
+        out_of_a_wall = np.where(runs, at_cells(nearby, before), at_cells(mixed[STATIC], before))
         through_a_wall = runs * at_cells(mixed[STATIC], shortly_before)
-        beside_a_wall = keeps * at_cells(mixed[FREE] * static_nearby(mixed), ahead)
+        beside_a_wall = keeps * at_cells(mixed[FREE] * nearby, ahead)
         open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - beside_a_wall
         return np.maximum(out_of_a_wall, through_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)
 
@@ -205,8 +210,9 @@ def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDAr
 def static_nearby(mixed: NDArray) -> NDArray[np.floating]:
     """Return the largest P(STATIC) of each cell and its eight neighbours, (H, W).
 
-    Hedges are ragged and porous, so beams pass through cells of their face, which are hit once the car looks in from
-    another place.
+    A wall that crosses the grid at an angle is a staircase of cells, so a path along it also leads through the cells
+    beside them. And hedges are ragged and porous, so beams pass through cells of their face, which are hit once the car
+    looks in from another place.
 
     Parameters
     ----------

@@ -219,10 +219,11 @@ def _doubt_arrivals(
         vx = velocity[2 * i]
         vy = velocity[2 * i + 1]
         keeps = keeps_pace(vx, vy, car_x, car_y, least)
+        runs = vx * vx + vy * vy > running * running
         wall = np.float32(0)
         if before[i] != OUTSIDE:
-            wall = static[before[i]]
-        if shortly_before[i] != OUTSIDE and vx * vx + vy * vy > running * running:
+            wall = nearby[before[i]] if runs else static[before[i]]
+        if runs and shortly_before[i] != OUTSIDE:
             wall = max(wall, static[shortly_before[i]])
         room = np.float32(0)
         if ahead[i] != OUTSIDE:
