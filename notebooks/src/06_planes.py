@@ -53,8 +53,7 @@ x_cells = spec.centers()[..., 0]
 # is 4, and somebody who knows says that it should be 6. A **loss** is one number that is zero when all is right and grows with
 # the error. Here it is half the squared difference, $\ell = \tfrac12 (s - 6)^2$, which is 2.
 #
-# Which way is better? The derivative of this loss is $s - 6$, which is -2. So if we raise $s$ by a little, the loss
-# falls by twice as much. The rule of **gradient descent** is to go *against* the derivative, by a fixed fraction of it, the **step size**
+# Which way is better? The derivative of this loss is $s - 6$, which is -2. So if we raise $s$, the loss falls. The rule of **gradient descent** is to go *against* the derivative, by a fixed fraction of it, the **step size**
 # $\eta$: $\;s \leftarrow s - \eta\, \partial \ell / \partial s$.
 #
 # ```
@@ -88,12 +87,12 @@ assert [one_step(4, 0.25), one_step(4.5, 0.25), one_step(4, 2.5), one_step(4, 2)
 plt.show()
 
 # %% [markdown]
-# That is all of learning, with one number. With many scores each gets its own derivative. All of them together are the
+# With many scores each gets its own derivative. All of them together are the
 # **gradient**, and each score takes its step at the same time. So the loss says *how wrong*, the gradient says *where to
 # go*, and the step size says *how far*.
 #
-# What is left is to find the derivative of an error on the map in a score of the image. For this we need to know how
-# the map reads the image.
+# What is left is the derivative of an error on the map in a score of the image. For this we need to know how the map
+# reads the image.
 #
 # ## What does a point read between four pixels?
 #
@@ -180,10 +179,7 @@ axes[1].set(xlabel="a = u - m [pixels]", ylabel="k(a)", title="the weight across
 plt.show()
 
 # %% [markdown]
-# On the left the cross is the point, and the red numbers are the weights. On the right is the part that comes from
-# going across: the nearer a column, the larger its weight.
-#
-# On the drive, equation (1) has found the pixels. Here are two small pieces of one image, magnified, with the points
+# The nearer a column or a row, the larger its weight. On the drive, equation (1) has found the pixels. Here are two small pieces of one image, magnified, with the points
 # of the ground plane on them. The right one is magnified five times as much.
 
 # %% jupyter={"source_hidden": true} alt="two magnified pieces of the image with yellow dots and black lines around the pixels: left, 8 m ahead, a piece 25 pixels wide with fifteen dots far apart; right, 45 m ahead, a piece 5 pixels wide, where each column of dots puts about twelve of them into one pixel"
@@ -192,9 +188,10 @@ for ax, ahead, half in zip(axes, (8, 45), (12.5, 2.5), strict=True):
     (row,), (col,), _ = spec.cells(np.array([[ahead, -0.2]]))
     u, v = pixels[0, row, col].round()
     ax.imshow(image, interpolation="nearest")
-    ax.plot(*pixels[0][visible[0]].T, ".", color="yellow", markersize=4, markeredgecolor="black", markeredgewidth=0.4)
+    ax.plot(*pixels[0][visible[0]].T, ".", color="yellow", markersize=7, markeredgecolor="black", markeredgewidth=0.4)
     title = f"{ahead} m ahead, {2 * half:.0f} pixels wide"
     ax.set(xlim=(u - half, u + half), ylim=(v + 0.6 * half, v - 0.6 * half), title=title, xlabel="u [pixels]")
+    ax.yaxis.get_major_locator().set_params(integer=True)
     ax.hlines(np.arange(v - 9.5, v + 10), u - half, u + half, color="black", linewidth=0.3)
     ax.vlines(np.arange(u - 13.5, u + 14), v - half, v + half, color="black", linewidth=0.3)
 axes[0].set_ylabel("v [pixels]")
@@ -251,8 +248,7 @@ print(s_bar)
 
 # %% [markdown]
 # Never trust a gradient that you haven't checked. The check needs no mathematics: nudge one score up, nudge it down, and see
-# by how much the loss changes. This is slow, one pixel at a time, and hard to get wrong. And if the gradient is right, a
-# step against it must lower the loss.
+# by how much the loss changes. This is slow and hard to get wrong.
 
 
 # %%
@@ -323,10 +319,9 @@ np.testing.assert_allclose(planes[0].detach().numpy()[:, *one], literal, atol=1e
 #
 # ## Can pixels learn from the map alone?
 #
-# Forget the network for now: let every score of the image be a free number, zero at first. No pixel has a label. You get
-# the *map*: the class of each cell in which the camera sees something. A cell should read 1 for its true class and 0 for the
-# others, and the loss is half the squared difference, as before. From now on PyTorch goes the way back for us:
-# `torch.autograd.grad` returns the gradient that we have computed by hand.
+# Let every score of the image be a free number, zero at first. No pixel has a label. You get the *map*: the class of each cell in which the camera sees something. A cell should read 1 for its true class and 0 for the
+# others, and the loss is half the squared difference, added up. From now on PyTorch's `torch.autograd.grad` returns
+# the gradient that we have computed by hand.
 #
 # **Predict before you run.** Which pixels of the image get a class? Think of the two magnified pieces. And what
 # will the pixels of a picket fence learn, when the cell *behind* the fence is vegetation?
@@ -382,8 +377,8 @@ print(f"the largest step size that can work is {2 / scores.norm():.2f}")  # 2 ov
 
 # %% [markdown]
 # No pixel was ever labelled. Still, of all pixels that are read 72 % learn their class, and the trivial rule *always
-# road* would get 46 %. But nearly all pixels of the fence have become vegetation. (The step size isn't free. In section
-# one 2 was the limit. Here many cells pull at one pixel, and the limit is 0.21.)
+# road* would get 46 %. But nearly all pixels of the fence have become vegetation. (In section one the limit of the step
+# size was 2. Here many cells pull at one pixel, and the limit is 0.21.)
 #
 # Is occlusion really the cause of the wrong lessons? The camera sees something of each cell, but not always its ground:
 # the roof of a car hides the ground behind it. Switch it off. The simulator knows the depth of each pixel. So leave out
@@ -534,8 +529,8 @@ assert np.isclose(60 - 300 / (5 + at_60), 0.6, atol=0.05)
 #
 # ## What changes if the point moves?
 #
-# So far the scores learnt, and the points stood still. But what if the camera's angle should learn? Then the points move, and
-# the question is how $p$ changes with $u$ and $v$.
+# So far the scores learnt, and the points stood still. But if the camera's angle should learn, the points move. How does
+# $p$ change with $u$ and $v$?
 #
 # **Predict before you run.** Move our first point by a tiny step to the right. How much does $p$ change, per
 # pixel of the step? And down? And to the right, if it reads only its nearest pixel instead of four?
@@ -710,8 +705,8 @@ plt.show()
 # road and sidewalk is near the kerb. But the pitch goes past the truth to -0.3 degrees, and each image alone ends
 # somewhere between -0.5 and +0.1. By lecture 05's rule, a cell 25 m ahead then reads the ground at 23 m.
 #
-# Started at ten degrees, the descent doesn't move. No cell reads road or sidewalk there, all scores around it are zero, and
-# so is the slope. That is why aligning images starts with small, blurred ones, where a slope reaches farther. So a map
+# Started at ten degrees, the descent hardly moves. Hardly a cell reads road or sidewalk there. All scores around a cell
+# are zero, and so is the slope. That is why aligning images starts with small, blurred ones, where a slope reaches farther. So a map
 # can correct a camera's angle, if it is nearly right, to about a third of a degree.
 #
 # ## Where this breaks: what else bends the angle?
@@ -762,9 +757,8 @@ print(
 assert ((-np.diff(together) > 0.23) & (-np.diff(together) < 0.72)).all()
 
 # %% [markdown]
-# The pitch falls by 0.27 degrees for each 10 cm, within what we computed, as if the far cells had the say. Nothing warns
-# us: the descent settles as calmly as before. Lower the ground by 10 cm, and the pitch even ends at the truth. But this
-# doesn't prove that our ground was 10 cm too high, because any error that moves the points alike would do the same. So
+# The pitch falls by 0.27 degrees for each 10 cm, within what we computed, and nothing warns us. Lower the ground by 10 cm,
+# and the pitch even ends at the truth. But this doesn't prove that our ground was 10 cm too high, because any error that moves the points alike would do the same. So
 # **a gradient changes whatever may move**, and the angle bends to make up for whatever is wrong.
 #
 # ## In five lines
@@ -782,7 +776,6 @@ assert ((-np.diff(together) > 0.23) & (-np.diff(together) < 0.72)).all()
 #   gradient in u and v.
 # - Lucas, Kanade, *An iterative image registration technique with an application to stereo vision*, IJCAI 1981:
 #   aligning by the slope of an image, long before networks.
-# - Griewank, Walther, *Evaluating Derivatives*, SIAM 2008: why the transpose, for any program.
 #
 # [Exercise 06](exercises/06_planes.ipynb): four pixels and their weights, a bug in a way back, the slope of a loss in the
 # yaw, which convention a black box has, and your own sampler on two streets. Next: lecture
