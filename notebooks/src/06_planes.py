@@ -41,7 +41,6 @@ camera = frame.camera.resized((96, 320))
 pixels, visible = plane_pixels(spec, [0.0], camera)  # one plane, the ground
 image = resize_image(frame.image, camera.size)
 true_labels = frames.resize_labels(frame.labels.image, camera.size)
-x_cells = spec.centers()[..., 0]
 
 # %% [markdown]
 # ## What is a loss, and what is one step?
@@ -53,8 +52,9 @@ x_cells = spec.centers()[..., 0]
 # is 4, and somebody who knows says that it should be 6. A **loss** is one number that is zero when all is right and grows with
 # the error. Here it is half the squared difference, $\ell = \tfrac12 (s - 6)^2$, which is 2.
 #
-# Which way is better? The derivative of this loss is $s - 6$, which is -2. So if we raise $s$, the loss falls. The rule of **gradient descent** is to go *against* the derivative, by a fixed fraction of it, the **step size**
-# $\eta$: $\;s \leftarrow s - \eta\, \partial \ell / \partial s$.
+# Which way is better? The derivative of this loss is $s - 6$, which is -2. So if we raise $s$, the loss falls. The rule of
+# **gradient descent** is to go *against* the derivative, by a fixed fraction of it, the **step size** $\eta$:
+# $s \leftarrow s - \eta\, \partial \ell / \partial s$.
 #
 # ```
 # step size 0.25:   4 -> 4 + 0.25 · 2 = 4.5    there the derivative is -1.5
@@ -87,12 +87,9 @@ assert [one_step(4, 0.25), one_step(4.5, 0.25), one_step(4, 2.5), one_step(4, 2)
 plt.show()
 
 # %% [markdown]
-# With many scores each gets its own derivative. All of them together are the
-# **gradient**, and each score takes its step at the same time. So the loss says *how wrong*, the gradient says *where to
-# go*, and the step size says *how far*.
-#
-# What is left is the derivative of an error on the map in a score of the image. For this we need to know how the map
-# reads the image.
+# With many scores each gets its own derivative. All of them together are the **gradient**, and each score takes its step at the same time. So the loss says *how wrong*, the gradient says *where to
+# go*, and the step size says *how far*. What is left is the derivative of an error on the map in a score of the image. So
+# how does the map read the image?
 #
 # ## What does a point read between four pixels?
 #
@@ -105,8 +102,8 @@ plt.show()
 # v = 2      4       0       2
 # ```
 #
-# Equation (1) sends a point of a plane to (u, v) = (1.25, 0.5). That is a quarter of the way from the middle column to the
-# right one, and half-way between the two upper rows.
+# Equation (1) sends a point of a plane to (u, v) = (1.25, 0.5), a quarter of the way from the middle column to the right
+# one, and half-way between the two upper rows.
 #
 # **Predict before you run.** Interpolate: first along the top row, then along the row below, then between the two. What
 # does the point read, and how much of it comes from each pixel?
@@ -148,8 +145,6 @@ def read(s, u, v):
 
 s = np.array([[0.0, 4, 8], [2, 6, 0], [4, 0, 2]])
 points = np.array([[1.25, 0.5], [1.0, 1.5]])
-package = sample_planes_naive(s[None], points.reshape(1, 1, 2, 2), np.ones((1, 1, 2), bool))
-np.testing.assert_allclose([read(s, u, v) for u, v in points], package.ravel())
 for u, v in points:
     print(f"u = {u:.2f}, v = {v:.2f}: reads {read(s, u, v):.2f}")
 
@@ -179,8 +174,8 @@ axes[1].set(xlabel="a = u - m [pixels]", ylabel="k(a)", title="the weight across
 plt.show()
 
 # %% [markdown]
-# The nearer a column or a row, the larger its weight. On the drive, equation (1) has found the pixels. Here are two small pieces of one image, magnified, with the points
-# of the ground plane on them. The right one is magnified five times as much.
+# The nearer a column or a row, the larger its weight. Now to the drive. Here are two pieces of one image, magnified, with
+# the points of the ground plane on them. The right one is magnified five times as much.
 
 # %% jupyter={"source_hidden": true} alt="two magnified pieces of the image with yellow dots and black lines around the pixels: left, 8 m ahead, a piece 25 pixels wide with fifteen dots far apart; right, 45 m ahead, a piece 5 pixels wide, where each column of dots puts about twelve of them into one pixel"
 fig, axes = plt.subplots(1, 2, figsize=(7.6, 2.9), layout="constrained")
@@ -266,6 +261,8 @@ np.testing.assert_allclose(nudged, s_bar, atol=1e-9)
 print(f"loss {loss(s):.2f}; after one step of size 0.5, {loss(s - 0.5 * s_bar):.2f}")
 
 # %% jupyter={"source_hidden": true}
+package = sample_planes_naive(s[None], points.reshape(1, 1, 2, 2), np.ones((1, 1, 2), bool))
+np.testing.assert_allclose([read(s, u, v) for u, v in points], package.ravel())
 leaf = torch.tensor(s)[None, None].requires_grad_()
 toy_sampler = PlaneSampler(points.reshape(1, 1, 2, 2), np.ones((1, 1, 2), bool), (3, 3)).double()
 (toy_sampler(leaf)[0, 0, 0, 0] - torch.tensor(wanted)).pow(2).sum().div(2).backward()
@@ -313,15 +310,14 @@ literal = sample_planes_naive(s_some[0].detach().numpy(), pixels[one], visible[o
 np.testing.assert_allclose(planes[0].detach().numpy()[:, *one], literal, atol=1e-4)
 
 # %% [markdown]
-# The package's `fast.PlaneSampler` is this matrix and its transpose for the drive's camera, and passes the same test.
-# It keeps only the weights that aren't zero, at most four a point. So the way back is the same weights read by columns,
-# and needs no new mathematics.
+# The package's `fast.PlaneSampler` is this matrix and its transpose, and passes the same test. So the way back is the same
+# weights read by columns, and needs no new mathematics.
 #
 # ## Can pixels learn from the map alone?
 #
-# Let every score of the image be a free number, zero at first. No pixel has a label. You get the *map*: the class of each cell in which the camera sees something. A cell should read 1 for its true class and 0 for the
-# others, and the loss is half the squared difference, added up. From now on PyTorch's `torch.autograd.grad` returns
-# the gradient that we have computed by hand.
+# Let every score of the image be a free number, zero at first. No pixel has a label. You get the *map*: the class of each
+# cell in which the camera sees something. A cell should read 1 for its true class and 0 for the others, and the loss is
+# half the squared difference, added up. From now on `torch.autograd.grad` returns the gradient that we computed by hand.
 #
 # **Predict before you run.** Which pixels of the image get a class? Think of the two magnified pieces. And what
 # will the pixels of a picket fence learn, when the cell *behind* the fence is vegetation?
@@ -436,9 +432,9 @@ plt.show()
 
 # %% [markdown]
 # A cross is a pixel that has learnt a wrong class. Grey ones weren't read. Without the occluded cells 796 of the 1368
-# wrong pixels fall silent, with random ones 223. So occlusion taught more than half of what was wrong. But just 21 wrong
-# pixels become right. Of the fence 59 pixels are still read instead of 435, and 49 of them learn vegetation. So a map can
-# teach pixels without one label, but leaving out its wrong lessons leads to silence, not to the truth.
+# wrong pixels fall silent, without random ones only 223. So occlusion taught more than half of what was wrong. But just 21
+# wrong pixels become right. Of the fence 59 pixels are still read instead of 435, and 49 of them learn vegetation. So a map
+# can teach pixels without one label, but leaving out its wrong lessons leads to silence, not to the truth.
 #
 # ## What does half a pixel cost?
 #
@@ -449,8 +445,8 @@ plt.show()
 # - *Mixed scales*: PyTorch's `grid_sample` wants places from -1 to 1. With `align_corners=True` these are the centres of
 #   the outermost pixels, and with `False`, the default, their outer edges. The program scales for centres, and calls the default.
 #
-# Half a pixel is too little to see in a picture. And our checks don't help: if both ways have the same wrong weights, they
-# still fit each other. Use a **ramp**: let each pixel's score be its own v. Then the value that is read *is* the place
+# Half a pixel is too little to see in a picture. And our two checks don't help: if both ways have the same wrong weights,
+# they still fit each other. Use a **ramp**: let each pixel's score be its own v. Then the value that is read *is* the place
 # that was read.
 
 
@@ -483,7 +479,7 @@ in_view = visible[0]  # the package's sampler reads the ramp right
 assert np.abs(ground(ramp)[0, 0, 0].numpy() - pixels[0, ..., 1])[in_view].max() < 1e-3
 
 # %% [markdown]
-# All three pass the adjoint test, and only the ramp finds the bugs. Are they worth the trouble? Take a toy camera at
+# All three programs pass the adjoint test, and the ramp finds the bugs. Are they worth the trouble? Take a toy camera at
 # $z_\text{cam}$ = 1.5 m, with a focal length $f_v$ of 200 pixels and its horizon in the middle of the image. A point of the
 # ground $Z$ metres ahead is $f_v\, z_\text{cam} / Z$ pixels below the horizon, by similar triangles. Now read half a pixel
 # lower in the image:
@@ -525,7 +521,7 @@ assert np.isclose(60 - 300 / (5 + at_60), 0.6, atol=0.05)
 # With the corner bug the error grows with the *square* of the distance, because $\partial Z / \partial v = -Z^2 / (f_v\,
 # z_\text{cam})$. Half a pixel is 0.2 m at 10 m, and 5.5 m at 60 m, eleven cells. The mixed scales err by half a pixel,
 # too, but at the bottom of the image, where a pixel is cheap. At 60 m they are off by 0.05 pixels, which is 0.6 m. So what
-# counts is *where* in the image an error is, and only a ramp shows it.
+# counts is *where* in the image an error is, and a ramp shows it.
 #
 # ## What changes if the point moves?
 #
@@ -625,7 +621,7 @@ _ = interact(
 # $$ \frac{\partial \ell}{\partial \psi} = \sum_j \bar p_j \left( \frac{\partial p_j}{\partial u_j} \frac{\partial u_j}{\partial \psi} + \frac{\partial p_j}{\partial v_j} \frac{\partial v_j}{\partial \psi} \right) $$
 #
 # The two slopes of $p$ we have. A camera that looks farther down sees everything higher in the image. So $\partial v_j /
-# \partial \psi$ is about $-f_v$ pixels per radian, which is 3.2 pixels for a degree of this camera, and $u$ hardly changes.
+# \partial \psi$ is about $-f_v$ pixels per radian, 3.2 pixels for a degree of this camera, and $u$ changes much less.
 #
 # The scores are the true labels of five images, so that no network's mistakes get in. The map's cells are road and
 # sidewalk from 8 to 25 m ahead, and a surface through the lowest LIDAR returns gives their heights. The loss is now a
@@ -705,7 +701,7 @@ plt.show()
 #
 # Started at ten degrees, the descent doesn't move. No cell reads road or sidewalk there: all scores around it are zero, and
 # so is the slope. That is why aligning images starts with small, blurred ones, where a slope reaches farther. So a map
-# can correct a camera's angle, if it is nearly right, to about a third of a degree.
+# can correct a camera's angle if it is nearly right, here to about a third of a degree.
 #
 # ## Where this breaks: what else bends the angle?
 #
@@ -756,14 +752,14 @@ assert ((-np.diff(together) > 0.23) & (-np.diff(together) < 0.72)).all()
 
 # %% [markdown]
 # The pitch falls by 0.27 degrees for each 10 cm, within what we computed, and nothing warns us. Lower the ground by 10 cm,
-# and the pitch even ends at the truth. But this doesn't prove that our ground was 10 cm too high, because any error that moves the points alike would do the same. So
-# **a gradient changes whatever may move**, and the angle bends to make up for whatever is wrong.
+# and the pitch even ends at the truth. But this doesn't prove that our ground was 10 cm too high, because any error that
+# moves the points alike would do the same. So **a gradient changes whatever may move**, and the angle bends to make up for whatever is wrong.
 #
 # ## In five lines
 #
 # 1. A loss says how wrong, its gradient where to go, the step size how far.
 # 2. A point reads the four pixels around it. The way back is the transpose: the same weights, added up over readers.
-# 3. Check a gradient with a nudge and a pair of passes with random numbers. Only a ramp finds a wrong convention.
+# 3. Check a gradient with a nudge, and a pair of passes with random numbers. Both miss a wrong convention; a ramp shows it.
 # 4. What a pixel is worth grows with the square of the distance: half a pixel is five metres of ground at sixty.
 # 5. In u and v the gradient is a difference of neighbours. It can correct a camera's angle, but the angle bends to
 #    whatever else is wrong.
