@@ -174,8 +174,8 @@ axes[1].set(xlabel="a = u - m [pixels]", ylabel="k(a)", title="the weight across
 plt.show()
 
 # %% [markdown]
-# The nearer a column or a row, the larger its weight. Now to the drive. Here are two pieces of one image, magnified, with
-# the points of the ground plane on them. The right one is magnified five times as much.
+# The nearer a column or a row, the larger its weight. Here are two pieces of the drive's image with the points of the
+# ground plane. The right one is magnified five times as much.
 
 # %% jupyter={"source_hidden": true} alt="two magnified pieces of the image with yellow dots and black lines around the pixels: left, 8 m ahead, a piece 25 pixels wide with fifteen dots far apart; right, 45 m ahead, a piece 5 pixels wide, where each column of dots puts about twelve of them into one pixel"
 fig, axes = plt.subplots(1, 2, figsize=(7.6, 2.9), layout="constrained")
@@ -317,7 +317,7 @@ np.testing.assert_allclose(planes[0].detach().numpy()[:, *one], literal, atol=1e
 #
 # Let every score of the image be a free number, zero at first. No pixel has a label. You get the *map*: the class of each
 # cell in which the camera sees something. A cell should read 1 for its true class and 0 for the others, and the loss is
-# half the squared difference, added up. From now on `torch.autograd.grad` returns the gradient that we computed by hand.
+# half the squared difference, added up. From now on `torch.autograd.grad` computes the gradient.
 #
 # **Predict before you run.** Which pixels of the image get a class? Think of the two magnified pieces. And what
 # will the pixels of a picket fence learn, when the cell *behind* the fence is vegetation?
@@ -392,6 +392,8 @@ hidden = np.flatnonzero(taught & occluded)
 assert 0.3 < len(hidden) / taught.sum() < 0.36
 wrong = (learnt < 255) & (learnt != true_labels)
 fence = (learnt < 255) & (true_labels == FENCE)
+
+# %% jupyter={"source_hidden": true}
 print(f"with all cells {wrong.sum()} pixels are wrong; of the fence {fence.sum()} are read, ", end="")
 print(f"{(learnt == VEGETATION)[fence].sum()} of them learn vegetation")
 
@@ -513,6 +515,8 @@ axes[1].set(
 )
 axes[1].legend(fontsize=9, loc="upper left")
 plt.show()
+
+# %% jupyter={"source_hidden": true}
 at_60 = off["mixed scales"][torch.argmin((asked - 52.5).abs())].item()  # 5 pixels below the middle, 47.5
 assert np.isclose(at_60, 0.053, atol=5e-4)
 assert np.isclose(60 - 300 / (5 + at_60), 0.6, atol=0.05)
@@ -770,6 +774,5 @@ assert ((-np.diff(together) > 0.23) & (-np.diff(together) < 0.72)).all()
 # - Lucas, Kanade, *An iterative image registration technique with an application to stereo vision*, IJCAI 1981:
 #   aligning by the slope of an image, long before networks.
 #
-# [Exercise 06](exercises/06_planes.ipynb): four pixels and their weights, a bug in a way back, the slope of a loss in the
-# yaw, which convention a black box has, and your own sampler on two streets. Next: lecture
+# [Exercise 06](exercises/06_planes.ipynb): from four weights to your own sampler on two streets. Next: lecture
 # [07](07_segmentation.ipynb), three networks for segmentation.

@@ -499,6 +499,7 @@ def matrix_of(frame):
     return sampling_matrix(pixels.reshape(-1, 2), visible.reshape(-1), 96, 320)
 
 
+# %%
 noted = {}
 
 
@@ -541,7 +542,7 @@ def right_cells():
 # right_cells()
 
 # %% [markdown]
-# Put `import numpy as np`, your `four_pixels` and `sampling_matrix` with its import, and the cell with `matrix_of`, `track` and `sample` into a file `my_stages.py`, and run
+# Put `import numpy as np`, your `four_pixels` and `sampling_matrix` with its import, and the two cells with `matrix_of` and `sample` into a file `my_stages.py`, and run
 #
 #     semgrid-edu demo --stages my_stages.py
 #
