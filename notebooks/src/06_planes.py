@@ -310,8 +310,7 @@ literal = sample_planes_naive(s_some[0].detach().numpy(), pixels[one], visible[o
 np.testing.assert_allclose(planes[0].detach().numpy()[:, *one], literal, atol=1e-4)
 
 # %% [markdown]
-# The package's `fast.PlaneSampler` is this matrix and its transpose, and passes the same test. So the way back is the same
-# weights read by columns, and needs no new mathematics.
+# The package's `fast.PlaneSampler` passes the same test. So the way back is the same weights, read by columns.
 #
 # ## Can pixels learn from the map alone?
 #
@@ -708,8 +707,8 @@ plt.show()
 #
 # ## Where this breaks: what else bends the angle?
 #
-# The descent may only move the angle. What does it do if something else is wrong? Let us make an error of known size: tell
-# it that the ground is 10 cm higher than the LIDAR says.
+# What does the descent do if something else is wrong? Let us make an error of known size: tell it that the ground is 10 cm
+# higher than the LIDAR says.
 #
 # **Predict before you run.** The cells are 8 to 25 m ahead. Seen from the camera, by what angle does a point move up, if it
 # is raised by 10 cm? Which way does the pitch go, and how far?
