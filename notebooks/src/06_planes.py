@@ -243,7 +243,7 @@ print(s_bar)
 
 # %% [markdown]
 # Never trust a gradient that you haven't checked. The check needs no mathematics: nudge one score up, nudge it down, and see
-# by how much the loss changes. This is slow and hard to get wrong.
+# by how much the loss changes.
 
 
 # %%
