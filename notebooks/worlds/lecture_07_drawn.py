@@ -13,6 +13,10 @@ COLOURS = {"down": "#9ecae1", "up": "#fdd0a2", "scores": "#fdae6b", "image": "#d
 """Maps on the way down, on the way up, with a channel for each class, and the image."""
 
 
+MOST = 11
+"""Maps of the longest network; all are drawn to its scale, so that heights can be compared."""
+
+
 class Map(NamedTuple):
     """One map of a network.
 
@@ -109,7 +113,7 @@ def draw_deeplab(net: nn.Module, image: Tensor) -> Drawn:
     maps = [_image(image), Map("conv, stride 2", stem, "down"), Map("pool, conv", layers[0], "down")]
     maps.append(Map("conv, stride 2", layers[1], "down"))
     maps += [Map("conv, rate 2", layers[2], "down"), Map("conv, rate 4", layers[3], "down")]
-    maps.append(Map("4 rates, summed", scored, "scores"))
+    maps.append(Map("rates 2 4 6 8, mean", scored, "scores"))
     maps.append(Map("enlarge x8", (scored[0], *image.shape[2:]), "scores"))
     return Drawn(maps, [], "")
 
@@ -154,6 +158,6 @@ def draw_maps(drawn: Drawn, ax: Axes, title: str) -> None:
     if drawn.over:
         top = 1.05 + 0.22 * len(drawn.over)
         ax.text(sum(drawn.over[0]) / 2, top, drawn.handed, ha="center", va="bottom", fontsize=9, color="tab:red")
-    ax.set(xlim=(-0.5, len(middles) - 0.5), ylim=(-2.55, 1.5 + 0.22 * len(drawn.over)))
+    ax.set(xlim=(-0.5, MOST - 0.5), ylim=(-2.55, 2.4))
     ax.set_title(title, fontsize=10)
     ax.axis("off")

@@ -1,4 +1,4 @@
-"""Pictures of lecture 07: a post in three ways, networks over several seeds, a sign, and what pretraining brings."""
+"""Pictures of lecture 07: posts in three ways, networks over several seeds, a sign, and what pretraining brings."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -20,6 +20,9 @@ SIZE = (96, 320)
 
 SIGNAGE = KITTI_14.index("signage")
 """The class of signs and poles."""
+
+PEDESTRIAN = KITTI_14.index("pedestrian")
+"""The class that the networks see too often."""
 
 SIGN = (slice(10, 82), slice(196, 236))
 """Rows and columns of a sign and a lamp post in frame 14 of the drive."""
@@ -52,72 +55,82 @@ def class_of_each_row(truths: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.array([np.bincount(row[row != IGNORE], minlength=1).argmax() for row in rows], np.uint8)
 
 
-def draw_ways(column: int, width: int) -> Figure:
-    """Draw a bright post, and what indices, skips and atrous kernels make of it.
+def draw_ways(posts: Mapping[int, int]) -> Figure:
+    """Draw bright posts, and what indices, skips and atrous kernels make of them.
 
     Parameters
     ----------
-    column, width : int
-        The post's first column, and how many it has.
+    posts : dict of int to int
+        Each post's first column, and how many it has.
     """
-    post = np.zeros((16, 24))
-    post[2:14, column : column + width] = 1
-    fig, axes = plt.subplots(2, 4, figsize=(8.4, 3.2), layout="constrained", sharex=True, height_ratios=(1, 0.8))
-    ways = {"A: the post": None, "B: indices": "indices", "C: skips": "skips", "D: atrous": "atrous"}
+    picture = np.zeros((16, 32))
+    for column, width in posts.items():
+        picture[2:14, column : column + width] = 1
+    fig, axes = plt.subplots(2, 4, figsize=(9.2, 2.9), layout="constrained", sharex=True, height_ratios=(1, 0.8))
+    ways = {"A: three posts": None, "B: indices": "indices", "C: skips": "skips", "D: atrous": "atrous"}
     for (above, below), (title, way) in zip(axes.T, ways.items(), strict=True):
-        picture = post if way is None else apply_mechanism(post, way)
-        above.imshow(picture, cmap="magma", vmin=0, vmax=1)
+        shown = picture if way is None else apply_mechanism(picture, way)
+        above.imshow(shown, cmap="magma", vmin=0, vmax=1)
         above.set_title(title, fontsize=10)
         above.set(yticks=[])
-        below.bar(range(24), picture.max(axis=0), width=1, color="0.3")
-        below.axvspan(column - 0.5, column + width - 0.5, color="tab:orange", alpha=0.4, linewidth=0)
+        below.bar(range(32), shown.max(axis=0), width=1, color="0.3")
+        for column, width in posts.items():
+            below.axvspan(column - 0.5, column + width - 0.5, color="tab:orange", alpha=0.4, linewidth=0)
         below.set(ylim=(0, 1.05), xlabel="column", yticks=[0, 0.5, 1] if below is axes[1, 0] else [])
     axes[1, 0].set_ylabel("brightness")
     return fig
 
 
-def draw_reached(reached: Mapping[Way, tuple[int, ...]], one_layer: float) -> Figure:
-    """Draw the overlap of each way's networks: a bar for the mean, a dot for each seed.
+def draw_reached(reached: Mapping[Way, tuple[int, ...]], short: Mapping[Way, tuple[int, ...]], alone: float) -> Figure:
+    """Draw each way's overlap: a bar for the mean, a dot for each seed, a diamond for the mean after a short training.
 
     Parameters
     ----------
-    reached : dict of Way to tuple of int
-        Overlaps by seed, per cent.
-    one_layer : float
+    reached, short : dict of Way to tuple of int
+        Overlaps by seed, per cent, after a long and a short training.
+    alone : float
         What a single convolution reaches, per cent.
     """
-    fig, ax = plt.subplots(figsize=(8.4, 3.3), layout="constrained")
+    fig, ax = plt.subplots(figsize=(8.8, 3.5), layout="constrained")
     colours, hatches = {"pooling": "#9ecae1", "strides": "#fdae6b", "atrous": "#d9d9d9"}, {"strides": "//"}
     for k, (way, overlaps) in enumerate(reached.items()):
         mean = np.mean(overlaps)
         ax.bar(k, mean, color=colours[way.down], hatch=hatches.get(way.down), edgecolor="0.3", width=0.7)
-        ax.plot(np.full(len(overlaps), k), overlaps, "o", color="black", markersize=3)
+        ax.plot(np.full(len(overlaps), k), overlaps, "o", color="black", markersize=3,
+                label="one network" if k == 0 else None)  # fmt: skip
+        ax.plot(k, np.mean(short[way]), "D", color="white", markeredgecolor="black", markersize=6,
+                label="mean after a quarter of the steps" if k == 0 else None)  # fmt: skip
         ax.text(
             k, 3, f"{mean:.0f}", ha="center", fontsize=10, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1}
         )
-    ax.axhline(one_layer, color="tab:red", linestyle="--", linewidth=1.2)
-    ax.text(-0.48, one_layer - 8, "one convolution", ha="left", fontsize=9, color="tab:red",
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})  # fmt: skip
+    ax.axhline(alone, color="tab:red", linestyle="--", linewidth=1.2, label="a single convolution")
     ax.set_xticks(range(len(reached)), [f"{way.down}\n{way.up}" for way in reached], fontsize=9)
-    ax.set(ylabel="overlap (IoU) [%]", ylim=(0, 100))
+    ax.set(ylabel="overlap (IoU) [%]", ylim=(0, 103))
+    fig.legend(loc="outside upper center", ncols=3, fontsize=9)
     return fig
 
 
-def draw_signs(truth: NDArray[np.uint8], classes: Mapping[str, NDArray[np.uint8]]) -> Figure:
-    """Draw the true labels of sign and lamp post beside what three networks call them.
+def draw_signs(image: NDArray[np.uint8], truth: NDArray[np.uint8], classes: Mapping[str, NDArray[np.uint8]]) -> Figure:
+    """Draw a sign and a lamp post, and what three networks call them, with the outlines of the true classes.
 
     Parameters
     ----------
+    image : (h, w, 3) uint8
+        The image of frame 14.
     truth : (h, w) uint8
-        The labels of frame 14.
+        Its labels.
     classes : dict of str to (h, w) uint8
         Each network's classes, by its name.
     """
-    pictures = {"truth": truth, **classes}
+    pictures = {"image": image[SIGN]} | {name: KITTI_14.colours(called[SIGN]) for name, called in classes.items()}
     fig, axes = plt.subplots(1, 4, figsize=(7.6, 4.4), layout="constrained")
     for ax, letter, (name, picture) in zip(axes, "ABCD", pictures.items(), strict=True):
-        draw_image(KITTI_14.colours(picture[SIGN]), ax=ax).set_title(f"{letter}: {name}", fontsize=10)
-    plotting.class_legend(axes[0], KITTI_14, np.stack([picture[SIGN] for picture in pictures.values()]))
+        draw_image(picture, ax=ax).set_title(f"{letter}: {name}", fontsize=10)
+        for outlined, style in ((SIGNAGE, "solid"), (PEDESTRIAN, "dashed")):
+            there = (truth[SIGN] == outlined).astype(float)
+            ax.contour(there, levels=[0.5], colors="white", linewidths=2.4)
+            ax.contour(there, levels=[0.5], colors="black", linewidths=1.2, linestyles=style)
+    plotting.class_legend(axes[0], KITTI_14, np.stack([called[SIGN] for called in classes.values()]))
     legend = axes[0].get_legend()
     names = [text.get_text() for text in legend.get_texts()]
     legend.remove()
@@ -126,17 +139,22 @@ def draw_signs(truth: NDArray[np.uint8], classes: Mapping[str, NDArray[np.uint8]
 
 
 def draw_pretrained() -> Figure:
-    """Draw pixel accuracy by what the encoder starts from, for maps as they are and for normalised maps."""
-    fig, axes = plt.subplots(1, 2, figsize=(8.2, 3.3), layout="constrained", sharey=True)
-    names, colours = ("ImageNet", "ImageNet,\nshuffled", "fresh"), ("#9ecae1", "#d9d9d9", "#fdae6b")
-    panels = {"A: maps as they are": pretrained.AS_IT_IS, "B: each map normalised": pretrained.NORMALISED}
-    for ax, (title, reached) in zip(axes, panels.items(), strict=True):
-        bars = ax.bar(names, reached, color=colours, hatch=("", "..", "//"), edgecolor="0.3", width=0.6)
-        ax.bar_label(bars, fmt="%.0f", fontsize=10)
-        ax.axhline(pretrained.ROWS, color="tab:red", linestyle="--", linewidth=1.2)
-        ax.set_title(title, fontsize=10)
-        ax.set(ylim=(0, 100))
-    axes[0].text(-0.40, pretrained.ROWS - 7, "class of each row", fontsize=9, color="tab:red",
-                 bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})  # fmt: skip
-    axes[0].set_ylabel("pixel accuracy on other cameras [%]")
+    """Draw pixel accuracy by what the encoder starts from, on other cameras and on the images it learned from."""
+    fig, ax = plt.subplots(figsize=(6.8, 3.3), layout="constrained")
+    for k, (colour, hatch, reached) in enumerate(
+        zip(("#9ecae1", "#d9d9d9", "#fdae6b"), ("", "..", "//"), pretrained.REACHED.values(), strict=True)
+    ):
+        ax.bar(k, reached.others, color=colour, hatch=hatch, edgecolor="0.3", width=0.6)
+        ends = [[reached.others - reached.low], [reached.high - reached.others]]
+        ax.errorbar(k, reached.others, ends, color="black", capsize=6, linewidth=1.5,
+                    label="other cameras, with interval" if k == 0 else None)  # fmt: skip
+        ax.plot(k, reached.own, "D", color="white", markeredgecolor="black", markersize=8,
+                label="the images learned from" if k == 0 else None)  # fmt: skip
+        ax.text(k, 3, f"{reached.others}", ha="center", fontsize=10,
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1})  # fmt: skip
+        ax.text(k + 0.1, reached.own + 2, f"{reached.own}", fontsize=10)
+    ax.axhline(pretrained.ROWS, color="tab:red", linestyle="--", linewidth=1.2, label="class of each row, no image")
+    ax.set_xticks(range(3), pretrained.REACHED)
+    ax.set(ylim=(0, 100), ylabel="pixel accuracy [%]")
+    fig.legend(loc="outside right upper", fontsize=9)
     return fig

@@ -2,7 +2,7 @@
 # # Exercise 07: three networks for segmentation
 #
 # Each function here asks for more than the lecture gives. You design a chain of layers, take pooling a step further than the lecture's toy, measure three trained
-# networks, find out which mechanism works inside a black box, repair a loss with four mistakes, and answer one question in words. About 100 minutes. The lecture is
+# networks, find out which mechanism works inside a black box, repair a loss, and answer two questions in words. About 100 minutes. The lecture is
 # [07: three networks for segmentation](../07_segmentation.ipynb).
 #
 # | task | about | points |
@@ -11,8 +11,8 @@
 # | 2 | pooling with windows that overlap, and the way back | 1 + 1 + 1 |
 # | 3 | how far must a real street move? | 1 + 2 |
 # | 4 | which mechanism is in the box? | 1 + 2 |
-# | 5 | a loss with four mistakes | 1 + 2 + 1 |
-# | 6 | in your own words | 2 |
+# | 5 | repair a loss | 1 + 2 + 1 |
+# | 6 | in your own words | 1 + 1 |
 #
 # Put your code in place of `raise NotImplementedError()`, and run the test cell below each task. A test that fails tells you how to think, not just that
 # you are wrong. Your instructor's tests use other numbers. Your functions leave their arguments as they are. Before you hand in: *Kernel, Restart Kernel and Run All Cells*.
@@ -37,16 +37,15 @@ def _explain(what, got, slips):
 # %% [markdown]
 # ## Task 1: the shortest chain that sees everything (1 + 2 points)
 #
-# You may build a chain of 3x3 convolutions, all of stride 1, and you may choose the *rate* of each. A customer names the field, an odd number of pixels. She wants a
-# chain
+# You may build a chain of 3x3 convolutions, all of stride 1, and you may choose the *rate* of each. A customer names the receptive field, an odd number of pixels. She
+# wants a chain
 #
 # - that has exactly this field: the output depends on nothing farther away;
 # - without gaps: the output depends on *every* pixel of its field;
 # - with as few layers as possible.
 #
 # Complete `fewest_rates`: it returns the list of rates, first layer first. Three layers of rate 1 have a field of 7 without gaps; three of rate 2 a field of 13 with gaps.
-# One point is for the first two wishes, two are for the third. Ask: if the layers so far see $r$ pixels to either side without a gap, what is the largest rate of the next
-# layer that leaves none?
+# A field of 1 needs no layer, so it gets an empty list. One point is for the first two wishes, two are for the third.
 
 
 # %% nbgrader={"grade": false, "grade_id": "chain", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -93,7 +92,7 @@ def _test():
         assert got == field, f"rates {rates} have a field of {got}, not {field}: {hint}"
         seen = _seen(rates)
         text = f"field {field}, rates {rates}: only {len(seen)} of its pixels count, those at {seen[:9]} ..."
-        assert len(seen) == field, f"{text}, as in the lecture's gridding"
+        assert len(seen) == field, f"{text}, as with the lecture's rates 2, 2, 2"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import segmentation
 
@@ -129,7 +128,7 @@ _test()
 # %% [markdown]
 # ## Task 2: pooling with windows that overlap, and the way back (1 + 1 + 1 points)
 #
-# SegNet pools in windows of 2 x 2, side by side; DeepLab's ResNet in windows of 3 x 3 that begin two pixels apart, so that they overlap. `max_pool(maps, kernel, stride)` takes C maps,
+# SegNet pools in windows of 2 x 2, side by side; DeepLab in windows of 3 x 3 that begin two pixels apart, so that they overlap. `max_pool(maps, kernel, stride)` takes C maps,
 # `(C, h, w)`, in windows of `kernel` x `kernel` pixels. The first stands in the top left corner, the next begins `stride` pixels further on, and only whole windows
 # count: what is left at the right or at the bottom is in none. It returns two arrays, `(C, rows of windows, windows a row)`: the maxima, and of each where it was, as an **index of its
 # channel**, counted row by row from 0: row · w + column. Where the largest number stands twice in a window (after a ReLU, 0 often does), the one with the smaller
@@ -573,7 +572,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 5: a loss with four mistakes (1 + 2 + 1 points)
+# ## Task 5: repair a loss (1 + 2 + 1 points)
 #
 # A colleague's network learns badly. Here is her loss. `scores` has the shape `(C, h, w)`, `truth` the shape `(h, w)`: the class of each pixel, or 255 where it isn't
 # labelled. The function should return the mean of $-\log P(c^*)$ over the labelled pixels (natural logarithm, $P$ the soft-max of the pixel's scores), and the derivative of
@@ -587,8 +586,8 @@ _test()
 #     return -np.log(P[one_hot]).sum() / truth.size, P - one_hot
 # ```
 #
-# It runs on any image and raises no error. Four things are wrong: one in the soft-max, one in what is done with unlabelled pixels, one in the gradient, and one that shows
-# only where scores are large. Write it rightly. The mistakes aren't independent: mending one may show the next. `scores` stays as it is.
+# It runs on any image and raises no error. Look at four places: the soft-max; unlabelled pixels, which spoil the loss and the gradient alike; the gradient of a *mean*; and
+# large scores. Write it rightly. The mistakes aren't independent: mending one may show the next. `scores` stays as it is.
 #
 # For the last point both results must stay right where scores are ten thousands, of either sign, or thousands apart: adding the same to all scores of a pixel changes
 # nothing, so add something that keeps $e^s$ small.
@@ -734,14 +733,19 @@ def _test():
 _test()
 
 # %% [markdown]
-# ## Task 6: in your own words (2 points)
+# ## Task 6: in your own words (1 + 1 points)
 #
-# A dark pole, one pixel wide, stands before a bright sky. What does max-pooling of the *brightness* make of it, and can indices bring it back? SegNet pools
-# after two convolutions, not at once: why does that help? And would a skip, as in FCN, have the same trouble? Five sentences are enough.
+# **a** A dark pole, one pixel wide, stands before a bright sky. What does max-pooling of the *brightness* make of it, and can indices bring it back? SegNet pools
+# after two convolutions, not at once: why does that help? Three sentences are enough.
+#
+# **b** A blog writes: "We trained network A with atrous kernels for 100 epochs and network B with strides for 30, on the same 24 images. On these images A gets 95 % of the
+# pixels right and B 88 %. So strides lose thin things." Name three faults of this argument, each with the control or the number that you would ask for.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "dark-pole", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
-# Every 2 x 2 window of the pole also holds sky, which is brighter: the maximum is sky in all of them, the pole is gone after one pooling, and the indices say where the sky
-# was. A convolution before the pooling can turn "darker than left and right" into a large positive value (the kernel 1 -2 1), so that the maximum of the window is
-# the pole's, and its index the pole's place: what is pooled is an answer, not brightness. A skip adds scores computed from the map before it was pooled further; where that map still shows the pole, its scores can
-# do so whatever the coarse map has lost; but FCN's finest skip is pool3, which has been pooled three times itself. One point for the sky winning the window and
-# that indices can't undo it; one for the learnt answer before pooling, with a word on skips.
+# **a** Every 2 x 2 window of the pole also holds sky, which is brighter: the maximum is sky in all of them, the pole is gone after one pooling, and the indices say where
+# the sky was. A convolution before the pooling can turn "darker than left and right" into a large positive value (the kernel 1 -2 1), so that the maximum of the window is
+# the pole's, and its index the pole's place: what is pooled is an answer, not brightness.
+#
+# **b** (1) The training differs, too: give both the same number of steps, and several seeds each. (2) Judged on the images learned from, both numbers may be memory: ask for
+# images (cameras, streets) that nobody learned from. (3) Pixel accuracy hardly sees thin things, which are few pixels: ask for the IoU of poles, and for that of a baseline. Also
+# right: other things may differ besides the stride (decoder, number of weights, receptive field): change the stride alone.
