@@ -99,7 +99,7 @@ def draw_fcn(net: nn.Module, image: Tensor) -> Drawn:
     """Return FCN as a row of maps. Parameters are those of `shapes_of`."""
     pools = shapes_of(net, image, ["backbone"])
     conv7, score_32, score_16, score_8 = shapes_of(net, image, ["conv7", "score_conv7", "score_pool4", "score_pool3"])
-    maps = [_image(image), *(Map("conv, pool", shape, "down") for shape in pools)]
+    maps = [_image(image), *(Map("convs, pool", shape, "down") for shape in pools)]
     maps += [Map("conv 7x7, 1x1", conv7, "down"), Map("score 1x1", score_32, "scores")]
     maps += [Map("double, add", score_16, "scores"), Map("double, add", score_8, "scores")]
     maps.append(Map("enlarge x8", (score_8[0], *image.shape[2:]), "scores"))
@@ -110,9 +110,9 @@ def draw_deeplab(net: nn.Module, image: Tensor) -> Drawn:
     """Return DeepLab as a row of maps. Parameters are those of `shapes_of`."""
     stem, *layers = shapes_of(net, image, ["backbone.conv1", *(f"backbone.layer{k}" for k in range(1, 5))])
     (scored, *_) = shapes_of(net, image, ["aspp.0"])
-    maps = [_image(image), Map("conv, stride 2", stem, "down"), Map("pool, conv", layers[0], "down")]
-    maps.append(Map("conv, stride 2", layers[1], "down"))
-    maps += [Map("conv, rate 2", layers[2], "down"), Map("conv, rate 4", layers[3], "down")]
+    maps = [_image(image), Map("conv, stride 2", stem, "down"), Map("pool, convs", layers[0], "down")]
+    maps.append(Map("convs, stride 2", layers[1], "down"))
+    maps += [Map("convs, rate 2", layers[2], "down"), Map("convs, rate 4", layers[3], "down")]
     maps.append(Map("rates 2 4 6 8, mean", scored, "scores"))
     maps.append(Map("enlarge x8", (scored[0], *image.shape[2:]), "scores"))
     return Drawn(maps, [], "")
@@ -158,6 +158,6 @@ def draw_maps(drawn: Drawn, ax: Axes, title: str) -> None:
     if drawn.over:
         top = 1.05 + 0.22 * len(drawn.over)
         ax.text(sum(drawn.over[0]) / 2, top, drawn.handed, ha="center", va="bottom", fontsize=9, color="tab:red")
-    ax.set(xlim=(-0.5, MOST - 0.5), ylim=(-2.55, 2.4))
+    ax.set(xlim=(-0.5, MOST - 0.5), ylim=(-2.55, 1.52 + 0.22 * len(drawn.over) if drawn.over else 1.1))
     ax.set_title(title, fontsize=10)
     ax.axis("off")

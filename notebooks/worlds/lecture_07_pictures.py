@@ -147,7 +147,7 @@ def draw_pretrained() -> Figure:
         ax.bar(k, reached.others, color=colour, hatch=hatch, edgecolor="0.3", width=0.6)
         ends = [[reached.others - reached.low], [reached.high - reached.others]]
         ax.errorbar(k, reached.others, ends, color="black", capsize=6, linewidth=1.5,
-                    label="other cameras, with interval" if k == 0 else None)  # fmt: skip
+                    label="other cameras, 95 % interval" if k == 0 else None)  # fmt: skip
         ax.plot(k, reached.own, "D", color="white", markeredgecolor="black", markersize=8,
                 label="the images learned from" if k == 0 else None)  # fmt: skip
         ax.text(k, 3, f"{reached.others}", ha="center", fontsize=10,

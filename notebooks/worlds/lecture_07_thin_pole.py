@@ -57,13 +57,13 @@ SHORT = {
 """Overlap of each way's networks on new images by seed, per cent, after `SHORT_STEPS`."""
 
 REACHED = {
-    Way("pooling", "at once"): (56, 57, 58),
-    Way("strides", "at once"): (44, 45, 45),
-    Way("pooling", "decoder"): (65, 86, 75),
-    Way("strides", "decoder"): (89, 87, 86),
-    Way("pooling", "indices"): (94, 93, 94),
-    Way("strides", "skips"): (98, 98, 98),
-    Way("pooling", "skips"): (98, 98, 98),
+    Way("pooling", "at once"): (56, 57, 58, 55),
+    Way("strides", "at once"): (44, 45, 45, 45),
+    Way("pooling", "decoder"): (65, 86, 75, 82),
+    Way("strides", "decoder"): (89, 87, 86, 86),
+    Way("pooling", "indices"): (94, 93, 94, 91),
+    Way("strides", "skips"): (98, 98, 98, 98),
+    Way("pooling", "skips"): (98, 98, 98, 98),
     Way("atrous", ""): (99, 99, 99),
 }
 """The same after `STEPS`; `python -m worlds.lecture_07_thin_pole` prints both."""
