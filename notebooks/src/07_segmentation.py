@@ -51,8 +51,8 @@ def to_torch(array):
 #
 # A network sees an image smaller and smaller. In the figure below, A shows a road sign and a lamp post of our drive, as
 # the labels have them. The sign's post is one or two pixels wide. Halve the picture twice, and bring it back to full
-# size. In B each value of the small picture fills 4 x 4 pixels; C and D are ways back that you will build. Nothing is
-# learned here. Watch what happens while the street moves to the right, one pixel a step.
+# size. In B each value of the small picture fills 4 x 4 pixels; C and D are ways back that you will build. Watch what
+# happens while the street moves to the right, one pixel a step.
 
 # %% jupyter={"source_hidden": true} alt="animation with four panels: A, a sign on a thin post and a lamp post move to the right; B, halved twice, the posts are wide and move in jumps of four pixels; C, indices, the posts are dotted lines in the right place; D, skips, a sharp post within a faint, wider one"
 thing = (truths[3] == lecture_07_pictures.SIGNAGE).astype(float)
@@ -233,8 +233,8 @@ assert 100 * lecture_07_thin_pole.overlap(called["each pole counted once"], post
 # ## How can a pixel see far?
 #
 # One 3x3 convolution sees three pixels a side: its **receptive field**, or field for short. A second one on top sees
-# five. Now halve the map after the first. Its neighbours are then two image pixels apart, the *jump*, so each later layer adds twice as much. A layer
-# adds (kernel - 1) · rate · jump:
+# five. Now halve the map after the first. Its neighbours are then two image pixels apart, the *jump*, so each later
+# layer adds twice as much. A layer adds (kernel - 1) · rate · jump:
 #
 # ```
 # layer                     adds    field    jump after
@@ -439,7 +439,7 @@ plt.show()
 
 # %% [markdown]
 # Maps that keep their size cost time. So DeepLab compromises: it halves three times and goes atrous for the rest. At
-# its end four kernels of rates 2, 4, 6 and 8 look at one map, and their scores are averaged.
+# its end four kernels of different rates look at one map, and their scores are averaged.
 #
 # Now compare the three ideas on posts of one, two and four pixels, without any learning:
 
@@ -456,10 +456,10 @@ plt.show()
 #
 # By hand a stride lost the post in three columns of four, and max-pooling in none. "So networks should pool." Is that
 # true of *learned* networks? Networks of seven convolutions look for the poles of above. One kind pools twice, another
-# has stride 2 twice. *At once* means: the scores are computed on the small map (8 x 8 here) and interpolated to full
-# size. Then give both the same *decoder*: double, convolve, double, convolve, score. All have the same number of
-# weights. Each was trained five times beforehand, in 1,200 steps, from different weights and on different pictures.
-# (Before each ReLU a map is brought to mean 0 and spread 1, *batch normalisation*, so that larger steps are safe.)
+# has stride 2 twice. *At once*: scores are computed on the small map and interpolated to full size. *Decoder*: double,
+# convolve, double, convolve, score. All have the same number of weights, and each was trained five times beforehand, in
+# 1,200 steps, from different weights and on different pictures. (Before each ReLU a map is brought to mean 0 and spread
+# 1, *batch normalisation*.)
 #
 # **Predict before you run.** Which matters more, pooling or stride, or the decoder?
 #
@@ -469,7 +469,7 @@ plt.show()
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="ALT_REACHED"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="intersection over union of eight kinds of networks, a bar for the mean of five: pooling at once 57, strides at once 45, pooling with decoder 78, strides with decoder 87, pooling with indices 93, strides with skips 98, pooling with skips 98, atrous 99; diamonds for a quarter of the steps are lower, most of all with a decoder alone; a dashed line shows the single convolution at 32"
 lecture_07_pictures.draw_reached(lecture_07_thin_pole.REACHED, lecture_07_thin_pole.SHORT, one_layer)
 plt.show()
 
@@ -488,9 +488,9 @@ assert receptive_field([CONV, (3, 2, 1), (3, 2, 1), CONV])[0] == 17
 # hand only dropped values, whereas a 3x3 kernel with stride 2 still reads every pixel.
 #
 # The bars on the right show what helps most. A decoder that gets indices or skips is told *where*, and with skips it
-# makes no difference whether the network pools or strides. The atrous network, which never halves, is as good. (The
-# diamonds are a warning: a short training makes the gap between decoder and skips look larger than it is.) So it matters less how you halve
-# than what you hand over on the way up.
+# makes no difference whether the network pools or strides. The atrous network, which never halves, is as good. (Compare
+# the diamonds: a short training makes such gaps look larger than they are.) So it matters less how you halve than what
+# you hand over on the way up.
 #
 # ## What have the three learned?
 #
@@ -506,9 +506,9 @@ plt.show()
 
 # %% [markdown]
 # No network draws the sign's thin post, and all three see too much *pedestrian*. How good are they on five whole images?
-# *Pixels* is pixel accuracy. *Classes* is class accuracy, the mean over the classes of their *recall* (what share of a
-# class's true pixels is found). *IoU* is a mean over classes, too. The baseline looks at no image: it knows the most
-# frequent class of each row, even from these very frames.
+# *Pixels* is pixel accuracy. *Classes* is class accuracy: the share of a class's true pixels that is found (its
+# *recall*), averaged over classes. *IoU* is averaged over classes, too. The baseline looks at no image: it knows the most
+# frequent class of each row of these very images.
 
 # %% jupyter={"source_hidden": true}
 PEDESTRIAN = lecture_07_pictures.PEDESTRIAN
@@ -555,10 +555,10 @@ for name, found in scores.items():
         assert (gain[2] > 0) == (change == "log 4 off")
 
 # %% [markdown]
-# In pixel accuracy a network that is blind to pedestrians looks as good as a cured one, or nearly. Class accuracy calls
-# both a loss. IoU rises for the cure and falls for the blindness, because it counts what is missed *and* what is called
-# falsely. (The three networks themselves are too close to be ranked, with one training each.) So a single number has a
-# blind spot; know it before you trust it.
+# In pixel accuracy a network that is blind to pedestrians is about as good as a cured one. Class accuracy calls both a
+# loss. IoU rises for the cure and falls for the blindness, because it counts what is missed *and* what is called falsely.
+# (The three networks are too close to be ranked, with one training each.) So before you trust a score, know what it
+# can't see.
 #
 # ## What do ImageNet weights bring?
 #
@@ -577,11 +577,11 @@ assert lecture_07_pretrained.ADDED == (17, 9, 25)
 
 # %% [markdown]
 # Look at the shuffled network first. On the images that it learned from, 80 % of the pixels are right (diamond). On
-# other cameras it is hardly better than the rule that looks at no image. It has learned 24 images by heart:
+# other cameras it is hardly better than the rule that looks at no image. It has learned its images by heart:
 # **overfitting**. If you judge a network on what it learned from, you measure its memory.
 #
-# The pretrained network, which differs from it in the *order* of its weights alone, reaches 82 %. So ImageNet's
-# knowledge matters. Above fresh weights it gains 17 points, with an interval of 9 to 25 over the six cameras. That is
+# The pretrained network started from the same numbers in their right order, and reaches 82 %. So it is what ImageNet
+# taught that helps. Above fresh weights it gains 17 points, with an interval of 9 to 25 over the six cameras. That is
 # one street and a short training; with more steps fresh weights may catch up.
 #
 # ## Where this breaks
@@ -626,12 +626,12 @@ assert at_border[~along].float().mean() > 0.9 > 0.5 > at_border.float().mean()
 
 # %% [markdown]
 # One in eight of SegNet's labels doesn't move along. The cause is the halving: after a shift of one pixel the windows
-# hold other pixels. Test it: after 16 pixels, the side of SegNet's coarsest cell, all windows hold the same pixels
-# as before, and every label moves along. Indices aren't needed for this to happen: FCN and DeepLab have none. But the
-# number of halvings alone doesn't tell how much is lost: FCN halves most often, and loses least.
+# hold other pixels. Switch it off: after 16 pixels, the side of SegNet's coarsest cell, all windows hold the same pixels
+# before, and every label moves along. Halving is enough, because FCN and DeepLab have no indices. But it doesn't tell
+# how much is lost: FCN halves most often, and loses least.
 #
-# In B the lost labels form thin lines: nine in ten are at a border between two labels. So edges tremble although nothing
-# in the street has moved. That is a reason to believe no single frame, and to filter.
+# In B the lost labels form thin lines: nearly all are at a border between two labels. So edges tremble although the
+# street is the same. That is a reason to believe no single frame, and to filter.
 #
 # ## In five lines
 #

@@ -57,14 +57,14 @@ SHORT = {
 """Overlap of each way's networks on new images by seed, per cent, after `SHORT_STEPS`."""
 
 REACHED = {
-    Way("pooling", "at once"): (56, 57, 58, 55),
-    Way("strides", "at once"): (44, 45, 45, 45),
-    Way("pooling", "decoder"): (65, 86, 75, 82),
-    Way("strides", "decoder"): (89, 87, 86, 86),
-    Way("pooling", "indices"): (94, 93, 94, 91),
-    Way("strides", "skips"): (98, 98, 98, 98),
-    Way("pooling", "skips"): (98, 98, 98, 98),
-    Way("atrous", ""): (99, 99, 99),
+    Way("pooling", "at once"): (56, 57, 58, 55, 57),
+    Way("strides", "at once"): (44, 45, 45, 45, 46),
+    Way("pooling", "decoder"): (65, 86, 75, 82, 84),
+    Way("strides", "decoder"): (89, 87, 86, 86, 87),
+    Way("pooling", "indices"): (94, 93, 94, 91, 91),
+    Way("strides", "skips"): (98, 98, 98, 98, 98),
+    Way("pooling", "skips"): (98, 98, 98, 98, 98),
+    Way("atrous", ""): (99, 99, 99, 99, 99),
 }
 """The same after `STEPS`; `python -m worlds.lecture_07_thin_pole` prints both."""
 
