@@ -111,7 +111,7 @@ def draw_reached(reached: Mapping[Way, tuple[int, ...]], short: Mapping[Way, tup
 
 
 def draw_signs(image: NDArray[np.uint8], truth: NDArray[np.uint8], classes: Mapping[str, NDArray[np.uint8]]) -> Figure:
-    """Draw a sign and a lamp post, and what three networks call them, with the outlines of the true classes.
+    """Draw a sign and a lamp post, and what networks call them, with the outlines of the true classes.
 
     Parameters
     ----------
@@ -120,11 +120,11 @@ def draw_signs(image: NDArray[np.uint8], truth: NDArray[np.uint8], classes: Mapp
     truth : (h, w) uint8
         Its labels.
     classes : dict of str to (h, w) uint8
-        Each network's classes, by its name.
+        Each network's classes, by its name; at most three.
     """
     pictures = {"image": image[SIGN]} | {name: KITTI_14.colours(called[SIGN]) for name, called in classes.items()}
-    fig, axes = plt.subplots(1, 4, figsize=(7.6, 4.4), layout="constrained")
-    for ax, letter, (name, picture) in zip(axes, "ABCD", pictures.items(), strict=True):
+    fig, axes = plt.subplots(1, len(pictures), figsize=(1.9 * len(pictures), 4.4), layout="constrained")
+    for ax, letter, (name, picture) in zip(axes, "ABCD"[: len(pictures)], pictures.items(), strict=True):
         draw_image(picture, ax=ax).set_title(f"{letter}: {name}", fontsize=10)
         for outlined, style in ((SIGNAGE, "solid"), (PEDESTRIAN, "dashed")):
             there = (truth[SIGN] == outlined).astype(float)
@@ -134,7 +134,7 @@ def draw_signs(image: NDArray[np.uint8], truth: NDArray[np.uint8], classes: Mapp
     legend = axes[0].get_legend()
     names = [text.get_text() for text in legend.get_texts()]
     legend.remove()
-    fig.legend(legend.legend_handles, names, loc="outside lower center", ncols=5, fontsize=9)
+    fig.legend(legend.legend_handles, names, loc="outside lower center", ncols=len(pictures) + 1, fontsize=9)
     return fig
 
 
