@@ -2,7 +2,7 @@
 # # 07 · Three networks for segmentation
 #
 # **In one sentence.** To name a pixel, a network must see far around it and still know exactly where it is; you build
-# the parts of SegNet, FCN and DeepLab by hand, each with its own answer to this, and find out what else they need.
+# the parts of SegNet, FCN and DeepLab by hand, each with its own answer to this, and learn how to judge them.
 #
 # **You will be able to**
 # - compute a convolution, a soft-max, a loss and one step of learning by hand;
@@ -50,8 +50,8 @@ def to_torch(array):
 # %% [markdown]
 # ## Why does a thin post disappear?
 #
-# A network sees an image smaller and smaller. In the figure below, A shows a road sign and a lamp post of our drive, as
-# the labels have them. The sign's post is one or two pixels wide. Halve the picture twice, and bring it back to full
+# A network sees an image smaller and smaller. In the figure below, A shows the labels of a road sign and a lamp post of
+# our drive. The sign's post is one or two pixels wide. Halve the picture twice, and bring it back to full
 # size. In B each value of the small picture fills 4 x 4 pixels; C and D are ways back that you will build. Watch what
 # happens while the street moves to the right, one pixel a step.
 
@@ -62,14 +62,16 @@ titles = {"A: truth": None, "B: halved twice": "nearest", "C: with indices": "in
 
 def moving():
     """Yield the figure for each shift of the sign and the post."""
-    fig = plt.figure(figsize=(6.4, 3.2), layout="constrained")
+    fig, axes = plt.subplots(1, 4, figsize=(6.4, 3.2), layout="constrained")
     for shift in range(5):
-        fig.clear()
         picture = np.roll(thing, shift, axis=1)[SIGN]
-        for ax, (title, way) in zip(fig.subplots(1, 4), titles.items(), strict=True):
+        for ax, (title, way) in zip(axes, titles.items(), strict=True):
             shown = picture if way is None else lecture_07_thin_pole.apply_mechanism(picture, way)
-            draw_image(shown, ax=ax, cmap="magma", vmin=0, vmax=1).set_title(title, fontsize=10)
+            if shift == 0:
+                draw_image(shown, ax=ax, cmap="magma", vmin=0, vmax=1).set_title(title, fontsize=10)
+            ax.images[0].set_data(shown)
         yield fig
+        fig.set_layout_engine("none")  # the first frame has found its places
 
 
 plotting.animate(moving(), period=0.6, alt="a thin post moves by single pixels and is brought back in three ways")
@@ -217,8 +219,8 @@ assert max(others) < by_hand < 25 < one_layer < 40
 assert 100 * lecture_07_thin_pole.overlap(called["each pole counted once"], posts) < 15
 
 # %% [markdown]
-# Nobody told it, and yet each row rewards a bright middle and punishes bright neighbours, as our kernel does. Unlike in
-# ours, its numbers sum to more than zero: brightness itself counts, too, and the bias sets how much is needed.
+# Nobody told it, and yet each row rewards a bright middle and punishes bright neighbours, as our kernel does. But its
+# numbers sum to more than zero: brightness counts, too, and the bias sets how much is needed.
 #
 # Judge it by *intersection over union* (IoU): pixels that are pole and called pole, over those that are one or the
 # other. The learned kernel gets a third, ours less. If a pole's pixel counts once only, the layer hardly dares to say
@@ -339,8 +341,8 @@ for image in (by_hand, rng.normal(size=(6, 10))):
     np.testing.assert_allclose(unpool(pooled, indices, image.shape), F.max_unpool2d(values, places, 2)[0, 0])
 
 # %% [markdown]
-# Here is the whole SegNet that this course ships. Each box is a map, with its channels, height and width (the three
-# drawings of this lecture have one scale). A network's way down is called its *encoder*, its way up its *decoder*.
+# Here is the whole SegNet that this course ships. Each box is a map, with its channels, height and width. A network's
+# way down is called its *encoder*, its way up its *decoder*.
 
 # %% jupyter={"source_hidden": true} alt="SegNet as a row of ten boxes: an image of 3 x 96 x 320, maps of 16 x 96 x 320, 32 x 48 x 160, 48 x 24 x 80, 64 x 12 x 40 and 64 x 6 x 20 on the way down, then 48 x 12 x 40, 32 x 24 x 80, 16 x 48 x 160 and scores of 14 x 96 x 320 on the way up; red arrows carry indices from each level down to the same level up"
 fig, ax = plt.subplots(figsize=(9.2, 2.9), layout="constrained")
@@ -448,8 +450,8 @@ plt.show()
 
 # %% [markdown]
 # All three keep the place. Indices leave a dotted line, and not the width: where two pixels of a window are equal, only
-# the first comes back. Skips keep the post, with a faint skirt. Atrous kernels without negative numbers can only blur it.
-# So the place is there each time, and the layers that follow have to learn the rest.
+# the first comes back. Skips keep the post, with a fainter skirt. Atrous kernels without negative numbers can only blur
+# it. So the place is there each time, and the layers that follow have to learn the rest.
 #
 # ## Do strides lose what pooling keeps?
 #
@@ -483,8 +485,8 @@ assert receptive_field([CONV, (3, 2, 1), (3, 2, 1), CONV])[0] == 17
 
 # %% [markdown]
 # At once, both are poor, the strided ones more so. With the same decoder they are no worse than the pooled ones, although
-# they see less: after four convolutions 17 pixels against 26, by our formula. So the stride isn't to blame. Our row by
-# hand only dropped values, whereas a 3x3 kernel with stride 2 still reads every pixel.
+# they see less: after four convolutions 17 pixels against 26. So a stride loses nothing that a decoder
+# can't recover. Our row by hand only dropped values, whereas a 3x3 kernel with stride 2 still reads every pixel.
 #
 # The bars on the right show what helps most. A decoder that gets indices or skips is told *where*, and with skips it
 # makes no difference whether the network pools or strides. The atrous network, which never halves, is as good. (Compare
@@ -527,10 +529,10 @@ for name, m in (marks | {"baseline": judge(np.broadcast_to(rows[:, None], truths
     print(f"{name:<12}{m[0]:6.0f} {m[1]:7.0f} {m[2]:4.0f}     {m[3]:8.1f}")
 
 # %% [markdown]
-# SegNet says *pedestrian* seven times as often as it should. Its loss invites that: a rare class counts up to four
-# times, as our poles did. A weight of 4 multiplies the odds by 4, so take log 4 off the score of *pedestrian*: a cure.
-# (It would help against false calls of any origin, so it proves nothing about the cause.) For comparison, forbid the
-# class altogether: now the network is blind to pedestrians.
+# SegNet says *pedestrian* seven times as often as it should. Its loss may invite that: a rare class counts up to four
+# times, as our poles did. Where two classes are equally likely, the best answer is then 4 to 1 for the rare one. So try
+# a cure: take log 4 off the score of *pedestrian*. For comparison, forbid the class altogether: now the network is blind
+# to pedestrians.
 #
 # **Predict before you run.** Which of the three numbers tell the cure from the blindness?
 #
@@ -572,15 +574,13 @@ _ = interact(show, off=FloatSlider(value=1.4, min=0, max=4, step=0.2))
 # %% [markdown]
 # In pixel accuracy a network that is blind to pedestrians is about as good as a cured one. Class accuracy calls both a
 # loss. IoU rises for the cure and falls for the blindness, because it counts what is missed *and* what is called falsely.
-# (With a running kernel, find out what to take off. The three networks are too close to be ranked, with one training
-# each.) So before you trust a score, know what it
-# can't see.
+# (The three networks, trained once each, are too close to be ranked.) So before you trust a score, know what it can't
+# see.
 #
 # ## What do ImageNet weights bring?
 #
 # The paper doesn't start from random weights. **Pretraining** means: learn another task first, for which labels are
-# plenty, and go on from there. Here the first task was to name what is on a photograph, for over a million of them
-# (*ImageNet*).
+# plenty, and go on from there. Here the first task was to name what is on a photograph (*ImageNet*).
 #
 # We gave a pretrained encoder a fresh decoder, and trained both on 24 labelled images of a real street, in 100 steps.
 # Four of the car's cameras are learned from, and the two others test; three rounds leave out each camera once. The
@@ -598,7 +598,7 @@ assert lecture_07_pretrained.ADDED == (17, 9, 25)
 #
 # The pretrained network started from the same numbers in their right order, and reaches 82 %. So it is what ImageNet
 # taught that helps. Above fresh weights it gains 17 points, with an interval of 9 to 25 over the six cameras. That is
-# one street and a short training; with more steps fresh weights may catch up.
+# one street and a short training, in which fresh weights took larger steps; with more of them they may catch up.
 #
 # ## Where this breaks
 #
@@ -606,7 +606,7 @@ assert lecture_07_pretrained.ADDED == (17, 9, 25)
 
 
 # %%
-def labels_that_move(net, shift, margin=300):
+def labels_that_move(net, shift, margin=200):
     """Return where the label moves along with the image, far from its borders, and the labels: (h, w) both."""
     width = wide.shape[3] - 64
     with torch.inference_mode():
@@ -615,7 +615,7 @@ def labels_that_move(net, shift, margin=300):
     return before == after[:, margin : -margin - shift], before
 
 
-wide = torch.cat(list(x[:4]), dim=2)[None]  # four images side by side, (1, 3, 96, 1280)
+wide = torch.cat(list(x[:3]), dim=2)[None]  # three images side by side, (1, 3, 96, 960)
 moves = {name: labels_that_move(net, 1) for name, net in nets.items()}
 for name, (along, _) in moves.items():
     print(f"moved by 1 pixel: {100 * along.float().mean():.0f} % of the labels of {NAMES[name]} move along")
@@ -642,9 +642,9 @@ assert at_border[~along].float().mean() > 0.9 > 0.5 > at_border.float().mean()
 
 # %% [markdown]
 # One in eight of SegNet's labels doesn't move along. The cause is the halving: after a shift of one pixel the windows
-# hold other pixels. Switch it off: after 16 pixels, the side of SegNet's coarsest cell, all windows hold the same pixels
-# before, and every label moves along. Halving is enough, because FCN and DeepLab have no indices. But it doesn't tell
-# how much is lost: FCN halves most often, and loses least.
+# hold other pixels. Test it: after 16 pixels, the side of SegNet's coarsest cell, all windows hold the same pixels as
+# before, and every label moves along. Indices aren't needed for the loss: FCN and DeepLab have none. And the number of
+# halvings doesn't tell how large it is: FCN halves most often, and loses least.
 #
 # In B the lost labels form thin lines: nearly all are at a border between two labels. So edges tremble although the
 # street is the same. That is a reason to believe no single frame, and to filter.
@@ -656,8 +656,8 @@ assert at_border[~along].float().mean() > 0.9 > 0.5 > at_border.float().mean()
 # 2. To see far, halve: a layer adds (kernel - 1) · rate · jump to the field. What is lost is *where*.
 # 3. Indices put maxima back, skips add what finer maps say, atrous kernels see far without halving.
 # 4. Strides aren't to blame for thin posts: with the same decoder they are no worse than pooling.
-# 5. Pixel accuracy doesn't miss a rare class, class accuracy forgives false calls, IoU sees both; and each of them
-#    measures memory on images that the network learned from.
+# 5. Pixel accuracy forgets rare classes, class accuracy forgives false calls, IoU counts both. On images that the
+#    network learned from, each of them measures memory.
 #
 # ## Further reading and exercise
 #
@@ -666,6 +666,6 @@ assert at_border[~along].float().mean() > 0.9 > 0.5 > at_border.float().mean()
 # - Chen, Papandreou, Kokkinos, Murphy, Yuille, *DeepLab*, PAMI 40(4), 2018: atrous convolution.
 # - Zhang, *Making convolutional networks shift-invariant again*, ICML 2019: labels that don't move along.
 #
-# [Exercise 07](exercises/07_segmentation.ipynb): the shortest chain that sees everything, pooling with overlap and the
-# way back, how far a real street must move, which mechanism a black box has, a loss to repair, and two questions. Next:
+# [Exercise 07](exercises/07_segmentation.ipynb): the shortest chain that sees everything, pooling and the way back, how
+# far a street must move, what is in a black box, a loss to repair, and two questions. Next:
 # lecture [08](08_fusion.ipynb), from planes to the semantic grid.

@@ -73,7 +73,7 @@ def draw_ways(posts: Mapping[int, int]) -> Figure:
         above.imshow(shown, cmap="magma", vmin=0, vmax=1)
         above.set_title(title, fontsize=10)
         above.set(yticks=[])
-        below.bar(range(32), shown.max(axis=0), width=1, color="0.3")
+        below.stairs(shown.max(axis=0), np.arange(33) - 0.5, fill=True, color="0.3")
         for column, width in posts.items():
             below.axvspan(column - 0.5, column + width - 0.5, color="tab:orange", alpha=0.4, linewidth=0)
         below.set(ylim=(0, 1.05), xlabel="column", yticks=[0, 0.5, 1] if below is axes[1, 0] else [])
