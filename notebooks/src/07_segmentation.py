@@ -14,7 +14,7 @@
 # **Prerequisites.** Lecture [06](06_planes.ipynb): a loss, one step of descent, bilinear sampling. You need no deep
 # learning.
 #
-# **Time.** 75 minutes, of which the computer needs less than one.
+# **Time.** 74 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3.1, which names the three networks, and 4.1 for ImageNet.
 
@@ -79,7 +79,7 @@ plotting.animate(moving(), period=0.6, alt="a thin post moves by single pixels a
 # %% [markdown]
 # In B the post is wide and moves in jumps of four pixels: its exact place is lost. C has the right place, but only a
 # dotted line. D has a sharp post within a faint, wider one. C is the idea of SegNet, D that of FCN. DeepLab has a
-# third: it halves less. Why would anybody make the image smaller? First we need to know what a layer sees.
+# third: it halves less. Why halve at all? First we need to know what a layer sees.
 #
 # ## What does a convolution see?
 #
@@ -647,7 +647,7 @@ assert at_border[~along].float().mean() > 0.9 > 0.5 > at_border.float().mean()
 # halvings doesn't tell how large it is: FCN halves most often, and loses least.
 #
 # In B the lost labels form thin lines: nearly all are at a border between two labels. So edges tremble although the
-# street is the same. That is a reason to believe no single frame, and to filter.
+# street is the same: a reason to believe no single frame, and to filter.
 #
 # ## In five lines
 #

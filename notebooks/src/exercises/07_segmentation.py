@@ -748,4 +748,5 @@ _test()
 #
 # **b** (1) The training differs, too: give both the same number of steps, and several seeds each. (2) Judged on the images learned from, both numbers may be memory: ask for
 # images (cameras, streets) that nobody learned from. (3) Pixel accuracy hardly sees thin things, which are few pixels: ask for the IoU of poles, and for that of a baseline. Also
-# right: other things may differ besides the stride (decoder, number of weights, receptive field): change the stride alone.
+# right: other things may differ besides the stride (decoder, number of weights, receptive field): change the stride alone. One point for **a**: the sky wins each window, so
+# that indices can't undo it, and a learned answer before pooling; one for **b**: three faults, each with what to ask for.
