@@ -454,7 +454,7 @@ plt.show()
 #
 # So a thing is drawn in its place only on the plane of its own height. Several planes *offer* several places, and one
 # of them may be nearly right. Nobody says which. Whether a network profits must be measured: in lecture
-# [08](08_fusion.ipynb) twenty planes are hardly better than one.
+# [08](08_fusion.ipynb) twenty planes are not clearly better than one.
 #
 # ## What does the image say of hidden cells?
 #

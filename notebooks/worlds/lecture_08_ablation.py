@@ -29,6 +29,7 @@ from semgrid_edu.pipeline import network_image
 from semgrid_edu.storage.files import shipped_folder, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import median_frequency_weights
+from semgrid_edu.workshop.scoring.statistics import Interval, paired_interval
 from semgrid_edu.workshop.simulation import simulate
 from worlds.lecture_04_scenes import labelled_frame
 from worlds.lecture_08_street import SPEC, Streets, confusions, ground_labels, named, streets, training_streets
@@ -61,6 +62,8 @@ class Variant(NamedTuple):
         Whether classes are weighted by median frequency, within the package's limit of 4.
     frames : str
         What it learns from: "six", the lecture's frames; "6 new" or "40 new", of other streets.
+    width : int
+        Channels of the hidden layers of a network without neighbours; with 448 it has as many weights as one with.
     """
 
     n_planes: int = 20
@@ -68,11 +71,13 @@ class Variant(NamedTuple):
     occupancy: bool = True
     balanced: bool = False
     frames: str = "six"
+    width: int = 64
 
 
 VARIANTS = {
     "ground plane, one cell": Variant(n_planes=1, neighbours=False),
     "20 planes, one cell": Variant(neighbours=False),
+    "20 planes, one cell, wide": Variant(neighbours=False, width=448),
     "ground plane, neighbours": Variant(n_planes=1),
     "20 planes, neighbours": Variant(),
     "20 planes, neighbours, no o": Variant(occupancy=False),
@@ -92,16 +97,17 @@ class OneCell(nn.Module):
         Number of planes.
     n_classes : int
         Number of classes.
+    width : int
+        Channels of its two hidden layers.
     """
 
-    def __init__(self, n_planes: int, n_classes: int) -> None:
+    def __init__(self, n_planes: int, n_classes: int, width: int) -> None:
         super().__init__()
         self.reduce = FusionNet(n_classes, n_planes, n_classes).reduce
-        layers, n_in = [], 16 + N_STATES
-        for width in (64, 64):
+        layers = []
+        for n_in in (16 + N_STATES, width):
             layers += [nn.Conv2d(n_in, width, 1), nn.BatchNorm2d(width), nn.ReLU()]
-            n_in = width
-        self.layers = nn.Sequential(*layers, nn.Conv2d(n_in, n_classes, 1))
+        self.layers = nn.Sequential(*layers, nn.Conv2d(width, n_classes, 1))
 
     def forward(self, planes: Tensor, occupancy: Tensor) -> Tensor:
         """Return the logits. Parameters are those of `FusionNet.forward`."""
@@ -121,7 +127,7 @@ def build(variant: Variant, seed: int) -> nn.Module:
     torch.manual_seed(seed)
     if variant.neighbours:
         return FusionNet(14, variant.n_planes, 14, seed=seed, uses_occupancy=variant.occupancy)
-    return OneCell(variant.n_planes, 14)
+    return OneCell(variant.n_planes, 14, variant.width)
 
 
 def class_weights(truth: Tensor, balanced: bool) -> Tensor:
@@ -240,14 +246,15 @@ def ablation(seeds: int = 3, steps: int = 300, n_streets: int = 20, n_frames: in
     first_six = Streets(*(part[:6] for part in others))
     learn_from = {"six": training_streets(net, camera), "6 new": first_six, "40 new": others}
     tables = by_table(learn_from["six"], new, camera)
-    counts = {name: [confusions(called, new.truth).tolist()] for name, called in tables.items()}
+    counts = {name: [confusions(called, new.truth)] for name, called in tables.items()}
     for name, variant in VARIANTS.items():
-        some, unseen = (s._replace(planes=s.planes[:, :, : variant.n_planes]) for s in (learn_from[variant.frames], new))
+        both, n_planes = (learn_from[variant.frames], new), variant.n_planes
+        some, unseen = (one._replace(planes=one.planes[:, :, :n_planes]) for one in both)
         counts[name] = []
         for seed in range(seeds):
             fusion = build(variant, seed)
             train(fusion, some, class_weights(some.truth, variant.balanced), steps)
-            counts[name].append(confusions(named(fusion, unseen), new.truth).tolist())
+            counts[name].append(confusions(named(fusion, unseen), new.truth))
         print(name, scores(counts[name]).mean(axis=0), f"{(time.perf_counter() - began) / 60:.1f} minutes", flush=True)
     command = "python -m worlds.lecture_08_ablation OUT" + (f" --steps {steps}" if steps != 300 else "")
     return {
@@ -255,7 +262,7 @@ def ablation(seeds: int = 3, steps: int = 300, n_streets: int = 20, n_frames: in
         "steps": steps,
         "streets": [FIRST, FIRST + n_streets],
         "variants": {name: variant._asdict() for name, variant in VARIANTS.items()},
-        "counts": counts,
+        "counts": {name: [written(one) for one in each] for name, each in counts.items()},
         "minutes": round((time.perf_counter() - began) / 60, 1),
         **made_by(command, "numpy", "torch", "numba", "embreex", "trimesh"),
     }
@@ -273,14 +280,43 @@ def scores(counts: ArrayLike) -> NDArray[np.float64]:
     return 100 * np.array([(pixel_accuracy(one), class_accuracy(one)) for one in totals])
 
 
+def written(counts: NDArray[np.int64]) -> list[str]:
+    """Write each street's confusion matrix as one line, row after row.
+
+    Parameters
+    ----------
+    counts : (N, 10, 10) int
+        The matrices.
+    """
+    return [" ".join(map(str, one.ravel())) for one in counts]
+
+
 def read() -> dict[str, NDArray[np.int64]]:
     """Return the measured confusion matrices by method, each (S, N, 10, 10)."""
     text = (shipped_folder("docs") / "results" / RESULT).read_text(encoding="utf-8")
-    return {name: np.array(one) for name, one in json.loads(text)["counts"].items()}
+    size = (-1, N_SEMANTIC, N_SEMANTIC)
+    return {
+        name: np.array([[line.split() for line in lines] for lines in seeds], dtype=np.int64).reshape(len(seeds), *size)
+        for name, seeds in json.loads(text)["counts"].items()
+    }
+
+
+def difference(a: str, b: str) -> dict[str, Interval]:
+    """Return how many points method a scores above b over streets and seeds, with 95 % intervals, by metric.
+
+    Parameters
+    ----------
+    a, b : str
+        The methods.
+    """
+    counts = read()
+    metrics = {"accuracy": pixel_accuracy, "class accuracy": class_accuracy}
+    pairs = {name: paired_interval(counts[a], counts[b], metric) for name, metric in metrics.items()}
+    return {name: Interval(*(100 * end for end in pair)) for name, pair in pairs.items()}
 
 
 def main(out: Path, steps: int = 300) -> None:
-    """Measure, write the result and print the scores.
+    """Measure, and write the result.
 
     Parameters
     ----------
@@ -292,8 +328,6 @@ def main(out: Path, steps: int = 300) -> None:
     torch.set_num_threads(1)
     result = ablation(steps=steps)
     write_json(out, result)
-    for name, counts in result["counts"].items():
-        print("{:<34} accuracy {:.1f}, class accuracy {:.1f}".format(name, *scores(counts).mean(axis=0)))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.labels import KITTI_14
+from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.storage.files import shipped_folder
+from semgrid_edu.workshop.scoring.statistics import Interval, paired_interval
 from worlds.lecture_08_counts import by_camera, counts_of_text
 
 RESULTS = shipped_folder("docs") / "results"
@@ -90,27 +92,47 @@ def _matrix(text: dict[str, list[str]]) -> NDArray[np.int64]:
     return by_camera({camera: counts_of_text(lines) for camera, lines in text.items()})[0].sum(axis=0)
 
 
-def end_to_end() -> dict[str, dict[str, tuple[float, float, float]]]:
-    """Return by how many points end to end exceeds two stages, by labels and metric: lower end, mean, upper end.
+def claim(number: str) -> dict[str, dict[str, tuple[float, float, float]]]:
+    """Return a claim's differences in points, by the labels that judge and by metric: lower end, mean, upper end.
 
     All networks learned from labels that a LIDAR made. They are judged by such labels and by true ones.
+
+    Parameters
+    ----------
+    number : str
+        The claim's number in docs/results/reduced/claims.md.
     """
-    judged = {"LIDAR labels": 0, "true labels": 1}
-    readings = _read("reduced/claims.json")["claims"]["10"]["readings"]
+    readings = _read("reduced/claims.json")["claims"][number]["readings"]
     return {
         name: {
             one["what"].split(":")[0]: tuple(100 * one["value"][key] for key in ("low", "mean", "high"))
             for one in readings[k]["statements"]
         }
-        for name, k in judged.items()
+        for k, name in enumerate(("LIDAR labels", "true labels"))
     }
 
 
-def end_to_end_verdicts() -> set[str]:
-    """Return the verdicts of the project's rule on these numbers."""
-    return {one["verdict"] for one in _read("reduced/claims.json")["claims"]["10"]["readings"][:2]}
+def verdicts(number: str) -> set[str]:
+    """Return the verdicts of the project's rule on a claim. Parameters are those of `claim`."""
+    return {one["verdict"] for one in _read("reduced/claims.json")["claims"][number]["readings"][:2]}
 
 
-def end_to_end_steps() -> int:
+def claim_steps() -> int:
     """Return for how many steps each of these networks was trained after stage one."""
     return _read("reduced/claims.json")["iterations"][1]
+
+
+def image_gain(method: str) -> Interval:
+    """Return how many points of accuracy the image adds to a method, with a 95 % interval over the six cameras.
+
+    Parameters
+    ----------
+    method : str
+        The method without the image, a value of `METHODS`.
+    """
+    counts, long = _read("camera_worth.json")["counts"][UNSEEN], {short: name for name, short in METHODS.items()}
+    pair = []
+    for name in (f"{method}, image", method):
+        cameras = counts[long[name]].items()
+        pair.append(by_camera({camera: counts_of_text(lines) for camera, lines in cameras}))
+    return Interval(*(100 * end for end in paired_interval(*pair, pixel_accuracy)))
