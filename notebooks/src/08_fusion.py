@@ -14,7 +14,7 @@
 # **Prerequisites.** Lectures [06](06_planes.ipynb) (planes, and the way back to pixels) and
 # [07](07_segmentation.ipynb) (accuracy and class accuracy, soft-max, cross-entropy, SegNet). The chain rule.
 #
-# **Time.** 68 minutes, of which the computer needs less than one.
+# **Time.** 71 minutes, of which the computer needs less than one.
 #
 # **Paper.** Sections 3.4 and 4.1, figures 4 and 5.
 
@@ -28,7 +28,7 @@ from ipywidgets import FloatSlider, interact
 from semgrid_edu import fast, labels, networks, plotting, training
 from semgrid_edu.datasets import samples
 from semgrid_edu.plotting.colours import colour_legend
-from worlds import lecture_08_ablation, lecture_08_pictures, lecture_08_street, lecture_08_worth
+from worlds import lecture_08_gains, lecture_08_pictures, lecture_08_street, lecture_08_worth
 
 # %% jupyter={"source_hidden": true}
 plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
@@ -74,7 +74,7 @@ for name, (x, y) in marked.items():
 
 # %% [markdown]
 # The image knows *what*, and takes much of the grass for a fence. It doesn't know *where*, so a car is smeared along its
-# rays: it can't tell cell 2 from cell 3. $o$ knows *where*, and not what: it can't tell cell 1 from cell 4. Together
+# rays: it can't tell cell 2 from 3. $o$ knows *where*, and not what: it can't tell cell 1 from cell 4. Together
 # the four differ.
 #
 # The simplest way to use both is a **table**: for each pair of a label and a state, the most frequent true class in
@@ -89,8 +89,8 @@ for name, (x, y) in marked.items():
 #
 # <details><summary>Answer</summary>
 #
-# Accuracy hardly: 79 %. Most cells are road, sidewalk and vegetation; all three are free, so $o$ can't help.
-# Class accuracy rises to 50 %: $o$ tells a car from the road behind it, and such classes are few among the cells.
+# Class accuracy rises to 50 %: where $o$ is static, the table now finds two of three cells of buildings and of fences,
+# and the label alone found none. These are few, so accuracy hardly notices: 79 %.
 #
 # </details>
 
@@ -117,6 +117,10 @@ called = {
 scores = {name: score(grids, new.truth) for name, grids in called.items()}
 for name, (accuracy, class_accuracy) in scores.items():
     print(f"{name:<16} accuracy {accuracy:3.0f} %, class accuracy {class_accuracy:3.0f} %")
+for c in map(KITTI_14.index, ("building", "fence")):
+    where = new.truth.numpy() == c
+    found = [100 * (called[name][where] == c).mean() for name in ("label alone", "table of both")]
+    print(f"of {where.sum()} cells of {KITTI_14.names[c]}: label alone {found[0]:.0f} %, table {found[1]:.0f} %")
 
 # %% jupyter={"source_hidden": true}
 table = scores["table of both"]
@@ -345,14 +349,15 @@ for by_hand in (0.9, 0.72, 0.486):
 # %% [markdown]
 # Train it. The image network stays as it is (*frozen*), so the planes are computed once. The fusion network starts
 # from random weights and learns from the six frames that the table was counted on. We start small: it gets the ground
-# plane only, so that it knows just what the table knows, and the cells around.
+# plane only, so that of one cell it knows little more than the table.
 #
 # **Predict before you run.** What is the first loss, if the network spreads its belief evenly over 14 classes? And
 # after 60 steps, does it beat the table on the new street?
 #
 # <details><summary>Answer</summary>
 #
-# About $\log 14 = 2.6$. And yes, it beats the table in accuracy and in class accuracy, by a few points each.
+# About $\log 14 = 2.6$; random weights give somewhat more, because they don't spread it evenly. And yes, it beats the
+# table, by about three points each.
 #
 # </details>
 
@@ -369,7 +374,7 @@ curve = np.array([score(grids, new.truth) for _, grids in story])
 print(f"loss {losses[0]:.2f} -> {losses[-1]:.2f}")
 print("network: accuracy {:.0f} %, class accuracy {:.0f} %; table: {:.0f} and {:.0f} %".format(*curve[-1], *table))
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="A, the map of the new street after 5 steps, blotches of few classes; B, after 60 steps, road, sidewalk, vegetation and cars in their places; C, the true map, unobserved areas left white; D, accuracy and class accuracy against the step, which end above the dotted lines of the table"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="A, the map of the new street after 5 steps, nearly all road; B, after 60 steps, road, sidewalk, vegetation and cars in their places; C, the true map, unobserved areas left white; D, accuracy and class accuracy against the step, which end above the dotted lines of the table"
 truth = new.truth[shown].numpy()
 real = truth < KITTI_14.n_semantic
 fig, axes = plt.subplots(1, 4, figsize=(10.4, 3.4), layout="compressed", width_ratios=(1, 1, 1, 1.3))
@@ -381,16 +386,15 @@ for ax, (title, grids) in zip(axes, pictures, strict=False):
         ax.set(ylabel="", yticks=[])
 for k, (name, style) in enumerate((("accuracy", "o-"), ("class accuracy", "s--"))):
     (drawn,) = axes[3].plot([step for step, _ in story], curve[:, k], style, label=name)
-    axes[3].axhline(table[k], linestyle=":", color=drawn.get_color())
-    axes[3].annotate("table", (0, table[k]), (2, 3), textcoords="offset points", fontsize=8, color=drawn.get_color())
+    axes[3].axhline(table[k], linestyle=":", color=drawn.get_color(), label=f"{name}, table")
 axes[3].set(ylim=(0, 100), xlabel="step", ylabel="%", title="D: new street")
-axes[3].legend(loc="lower right", fontsize=8)
+axes[3].legend(loc="upper center", bbox_to_anchor=(0.45, -0.2), ncols=2, fontsize=8)
 plt.show()
 
 # %% jupyter={"source_hidden": true}
 if (PLANES, STEPS) == (1, 60):
-    assert 2.3 < losses[0] < 3.0
-    assert min(curve[-1] - table) > 0.5
+    assert 2.3 < losses[0] < 3.3
+    assert min(curve[-1] - table) > 1.5
 
 # %% [markdown]
 # A map takes shape within seconds. And it beats the table: the neighbours were worth something. But this is one seed on
@@ -411,20 +415,21 @@ if (PLANES, STEPS) == (1, 60):
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="six networks, three dots each, beside a dotted line for the table of both; A, accuracy: the two one-cell networks are near the table, the two with neighbours clearly right of it, without o it falls back, balanced it stays; B, class accuracy: the table is ahead of the one-cell networks and of the one without o; balanced is ahead of the table"
-measured = lecture_08_ablation.read()
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="seven networks, three dots each, beside a dotted line for the table of both; A, accuracy: the three one-cell networks are near the table, the two with neighbours clearly right of it, without o it falls back, balanced it stays; B, class accuracy: the table is ahead of the small one-cell networks and of the one without o; the large one-cell network is level with it; balanced is ahead of the table"
+measured = lecture_08_gains.read()
 shown_rows = {
     "ground plane, one cell": "ground plane, one cell", "20 planes, one cell": "20 planes, one cell",
+    "20 planes, one cell, wide": "20 planes, one cell, large",
     "ground plane, neighbours": "ground plane, neighbours", "20 planes, neighbours": "20 planes, neighbours",
     "20 planes, neighbours, no o": "the same without o", "20 planes, neighbours, balanced": "the same, balanced",
 }  # fmt: skip
 fig, axes = plt.subplots(1, 2, figsize=(9.4, 3.2), layout="constrained", sharey=True)
 for k, (ax, title) in enumerate(zip(axes, ("A: accuracy [%]", "B: class accuracy [%]"), strict=True)):
     for row, name in enumerate(shown_rows):
-        values = lecture_08_ablation.scores(measured[name])[:, k]
+        values = lecture_08_gains.scores(measured[name])[:, k]
         ax.plot(values, np.full(len(values), row), "o", color="0.6", markersize=5)
         ax.plot(values.mean(), row, "d", color="C0", markersize=8)
-    ax.axvline(lecture_08_ablation.scores(measured["table of both"])[0, k], color="C1", linestyle=":")
+    ax.axvline(lecture_08_gains.scores(measured["table of both"])[0, k], color="C1", linestyle=":")
     ax.set(title=title, yticks=range(len(shown_rows)), yticklabels=shown_rows.values())
     ax.grid(axis="y", alpha=0.3)
 axes[0].invert_yaxis()
@@ -445,19 +450,23 @@ pairs = {
     "balancing": ("20 planes, neighbours, balanced", "20 planes, neighbours"),
 }
 print("what it adds, points        accuracy               class accuracy")
-gains = {name: lecture_08_ablation.difference(*pair) for name, pair in pairs.items()}
+gains = {name: lecture_08_gains.difference(*pair) for name, pair in pairs.items()}
 for name, both in gains.items():
     texts = [f"{mean:+.1f} ({low:+.1f} to {high:+.1f})" for low, mean, high in both.values()]
     print(f"{name:<27} {texts[0]:<22} {texts[1]}")
 assert all(gains[name]["accuracy"].low > 0 for name in ("neighbours (ground plane)", "neighbours (20 planes)", "o"))
-for name in ("20 planes (neighbours)", "20 planes (one cell)", "more weights (one cell)"):
+for name in ("20 planes (neighbours)", "20 planes (one cell)"):
     assert all(low < 0 < high for low, _, high in gains[name].values())
+larger = gains["more weights (one cell)"]
+assert larger["accuracy"].low < 0 < larger["class accuracy"].low
 
 # %% [markdown]
 # In brackets are 95 % intervals over streets and seeds. An interval that holds zero says: we can't tell.
 #
 # **Neighbours** are worth three points of accuracy, with one plane and with twenty. Is it only that such a network has
-# more weights? The control is a one-cell network that is as large: it gains nothing.
+# more weights? The control is a one-cell network that is as large. It gains no accuracy, but three points of class
+# accuracy; it has become as good as the table. So neighbours earn accuracy. What they add to class accuracy, size alone
+# adds, too.
 #
 # **Planes**: we can't tell, in either pair. The sum that we did by hand is possible, but here it doesn't pay: six
 # frames may be too few to learn it, or the neighbours say the same.
@@ -537,10 +546,17 @@ accuracy, by_class = map(lecture_08_worth.by_method, ("pixel accuracy", "class a
 print(f"{'':<28} accuracy   class accuracy")
 for name, (_, mean, _) in accuracy.items():
     print(f"{name:<28} {mean:5.0f} %   {by_class[name][1]:5.0f} %")
-for name in ("network: o", "network: o, heights", "forest: o, heights"):
-    low, mean, high = lecture_08_worth.image_gain(name)
-    print(f"the image adds to {name:<20} {mean:+.1f} ({low:+.1f} to {high:+.1f})")
-    assert low < 0 < high
+ahead = {
+    (what, over): lecture_08_worth.advantage(f"{over}, {what}", over)
+    for what, over in (
+        ("heights", "network: o"), ("image", "network: o"), ("image", "network: o, heights"),
+        ("image", "forest: o, heights"),
+    )
+}  # fmt: skip
+for (what, over), (low, mean, high) in ahead.items():
+    print(f"{what:<8} added to {over:<20} {mean:+.1f} ({low:+.1f} to {high:+.1f})")
+assert ahead["image", "network: o"].low > 0
+assert all(low < 0 < high for (what, over), (low, _, high) in ahead.items() if "heights" in over)
 assert abs(accuracy["height rule"][1] - accuracy["network: o, heights"][1]) < 0.5
 
 # %% [markdown]
@@ -549,12 +565,12 @@ assert abs(accuracy["height rule"][1] - accuracy["network: o, heights"][1]) < 0.
 # A *forest* is a vote of many decision trees; it looks at one cell. The others are fusion networks. Each learns from
 # what its name says.
 #
-# What does the image add to the same learner? The last lines say it, with intervals over the six cameras: all hold
-# zero. One street corner can't tell what the camera is worth.
+# What does the image add to the same learner? The last lines say it, with intervals over the six cameras. Without
+# heights it adds between nothing and three points. Beside heights we can't tell: both intervals hold zero.
 #
-# It does tell how strong the LIDAR is alone. In accuracy, a rule with two thresholds comes as far as the best network.
-# In class accuracy it doesn't, because it knows three classes only. And heights are worth four points to a network that
-# has only $o$.
+# And the LIDAR alone is strong. In accuracy, a rule with two thresholds comes as far as the best network. In class
+# accuracy it doesn't, because it knows three classes only. Heights add more to a network with only $o$ than the image
+# does, though six cameras at one corner leave wide intervals.
 #
 # Why? $o$ says *that* something is there, not how high it is. **$o$ forgets height.** If that is a reason, methods with
 # $o$ alone must take buildings for cars, and with heights this error must go:

@@ -4,7 +4,6 @@ In the folder notebooks, `python -m worlds.lecture_08_ablation ../docs/results/f
 networks of lecture 08, trained by its loop on its six frames, and its table, on simulated streets.
 """
 
-import json
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +12,7 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 import typer
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from torch import Tensor, nn
 from tqdm.auto import tqdm
 
@@ -22,16 +21,15 @@ from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.samples import sample_drive, sample_image_stage
 from semgrid_edu.fast import load_net, track_drive
 from semgrid_edu.labels import IGNORE, KITTI_14
-from semgrid_edu.metrics import class_accuracy, pixel_accuracy
 from semgrid_edu.networks import FusionNet, SemanticGridNet
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.pipeline import network_image
-from semgrid_edu.storage.files import shipped_folder, write_json
+from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import median_frequency_weights
-from semgrid_edu.workshop.scoring.statistics import Interval, paired_interval
 from semgrid_edu.workshop.simulation import simulate
 from worlds.lecture_04_scenes import labelled_frame
+from worlds.lecture_08_gains import N_SEMANTIC, scores, written
 from worlds.lecture_08_street import SPEC, Streets, confusions, ground_labels, named, streets, training_streets
 
 FIRST = 700
@@ -39,12 +37,6 @@ FIRST = 700
 
 FRAMES_BEFORE = 4
 """Scans that the filter sees before the labelled frame of a street."""
-
-N_SEMANTIC = KITTI_14.n_semantic
-"""The classes that count: *unknown* is forbidden as an answer, and its cells aren't scored."""
-
-RESULT = "fusion_ablation.json"
-"""The file in docs/results."""
 
 
 class Variant(NamedTuple):
@@ -266,53 +258,6 @@ def ablation(seeds: int = 3, steps: int = 300, n_streets: int = 20, n_frames: in
         "minutes": round((time.perf_counter() - began) / 60, 1),
         **made_by(command, "numpy", "torch", "numba", "embreex", "trimesh"),
     }
-
-
-def scores(counts: ArrayLike) -> NDArray[np.float64]:
-    """Return accuracy and class accuracy of each seed over all streets, (S, 2) per cent.
-
-    Parameters
-    ----------
-    counts : (S, N, 10, 10) int
-        The confusion matrices of seeds and streets.
-    """
-    totals = np.sum(counts, axis=1)
-    return 100 * np.array([(pixel_accuracy(one), class_accuracy(one)) for one in totals])
-
-
-def written(counts: NDArray[np.int64]) -> list[str]:
-    """Write each street's confusion matrix as one line, row after row.
-
-    Parameters
-    ----------
-    counts : (N, 10, 10) int
-        The matrices.
-    """
-    return [" ".join(map(str, one.ravel())) for one in counts]
-
-
-def read() -> dict[str, NDArray[np.int64]]:
-    """Return the measured confusion matrices by method, each (S, N, 10, 10)."""
-    text = (shipped_folder("docs") / "results" / RESULT).read_text(encoding="utf-8")
-    size = (-1, N_SEMANTIC, N_SEMANTIC)
-    return {
-        name: np.array([[line.split() for line in lines] for lines in seeds], dtype=np.int64).reshape(len(seeds), *size)
-        for name, seeds in json.loads(text)["counts"].items()
-    }
-
-
-def difference(a: str, b: str) -> dict[str, Interval]:
-    """Return how many points method a scores above b over streets and seeds, with 95 % intervals, by metric.
-
-    Parameters
-    ----------
-    a, b : str
-        The methods.
-    """
-    counts = read()
-    metrics = {"accuracy": pixel_accuracy, "class accuracy": class_accuracy}
-    pairs = {name: paired_interval(counts[a], counts[b], metric) for name, metric in metrics.items()}
-    return {name: Interval(*(100 * end for end in pair)) for name, pair in pairs.items()}
 
 
 def main(out: Path, steps: int = 300) -> None:

@@ -122,17 +122,17 @@ def claim_steps() -> int:
     return _read("reduced/claims.json")["iterations"][1]
 
 
-def image_gain(method: str) -> Interval:
-    """Return how many points of accuracy the image adds to a method, with a 95 % interval over the six cameras.
+def advantage(method: str, over: str) -> Interval:
+    """Return how many points of accuracy a method is ahead, with a 95 % interval over the six cameras.
 
     Parameters
     ----------
-    method : str
-        The method without the image, a value of `METHODS`.
+    method, over : str
+        The methods, values of `METHODS`.
     """
     counts, long = _read("camera_worth.json")["counts"][UNSEEN], {short: name for name, short in METHODS.items()}
     pair = []
-    for name in (f"{method}, image", method):
+    for name in (method, over):
         cameras = counts[long[name]].items()
         pair.append(by_camera({camera: counts_of_text(lines) for camera, lines in cameras}))
     return Interval(*(100 * end for end in paired_interval(*pair, pixel_accuracy)))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 import torch
-from worlds import lecture_08_ablation as ablation
-from worlds.lecture_08_ablation import VARIANTS, build, class_weights, scores, train
+from worlds import lecture_08_gains as gains
+from worlds.lecture_08_ablation import VARIANTS, build, class_weights, train
 from worlds.lecture_08_street import Streets, confusions, named
 
 from semgrid_edu.labels import IGNORE, KITTI_14
@@ -49,12 +49,12 @@ def test_unknown_and_unlabelled_cells_are_not_scored():
     truth = torch.tensor([[[road, road, car, hidden, IGNORE]]])
     counts = confusions(np.array([[[road, car, car, car, car]]]), truth)
     assert counts.sum() == 3
-    np.testing.assert_allclose(scores(counts[None]), [[200 / 3, 75]])
+    np.testing.assert_allclose(gains.scores(counts[None]), [[200 / 3, 75]])
 
 
 def test_counts_come_back_from_their_text():
-    counts = ablation.read()
+    counts = gains.read()
     assert {len(of_streets) for of_streets in counts["table of both"]} == {20}
     assert all(len(counts[name]) == 3 for name in VARIANTS)
-    text = ablation.written(counts["table of both"][0])
+    text = gains.written(counts["table of both"][0])
     assert [int(n) for n in text[0].split()] == counts["table of both"][0, 0].ravel().tolist()
