@@ -53,7 +53,7 @@ end_to_end = lecture_08_street.rescored(shipped, drive.camera, new)  # the same 
 # on the ground falls on; where the camera sees no ground, the map is white. The image network learned the labels of
 # pixels; call this *stage one*. B: the occupancy grid $o$. C: what is really there.
 
-# %% jupyter={"source_hidden": true} alt="three maps of the same 32 m with four marked cells: A, the image's classes on the ground, in which cars are smeared into long fans away from the camera and the grass on the right is called fence; B, the occupancy states, sharp outlines of things, a free road, and shadows behind things; C, the true classes, compact cars beside a road, and unobserved areas behind them. Cell 1 is on the road, 2 on the near side of a car, 3 in the shadow behind it, 4 on the sidewalk"
+# %% jupyter={"source_hidden": true} alt="three maps of the same 32 m with four marked cells: A, the image's classes on the ground, in which cars and the fence on the right are smeared into long fans away from the camera; B, the occupancy states, sharp outlines of things, a free road, and shadows behind things; C, the true classes, compact cars beside a road, and unobserved areas behind them. Cell 1 is on the road, 2 on the near side of a car, 3 in the shadow behind it, 4 on the sidewalk"
 label = lecture_08_street.ground_labels(new.scores, drive.camera)
 state = new.o.argmax(dim=1).numpy()
 marked = {"1": (14.25, 1.25), "2": (19.75, 9.75), "3": (24.25, 10.75), "4": (13.25, -3.75)}
@@ -73,9 +73,9 @@ for name, (x, y) in marked.items():
     print(f"{name:<6} {image:<16} {plotting.STATE_NAMES[state[shown, row, col]]:<9} {true}")
 
 # %% [markdown]
-# The image knows *what*, and takes much of the grass for a fence. It doesn't know *where*, so a car is smeared along its
-# rays: it can't tell cell 2 from 3. $o$ knows *where*, and not what: it can't tell cell 1 from cell 4. Together
-# the four differ.
+# The image knows *what*. It doesn't know *where*, so cars, and the fence on the right, are smeared along their rays: it
+# can't tell cell 2 from cell 3. $o$ knows *where*, and not what: it can't tell cell 1 from cell 4. Together the four
+# differ.
 #
 # The simplest way to use both is a **table**: for each pair of a label and a state, the most frequent true class in
 # six training frames. It learns nothing but counts.
