@@ -136,10 +136,9 @@ def _blocked(
     open_to_pace = open_space - mixed[FREE] * nearby
 
     def blocked(k: int) -> NDArray[np.floating]:
-        static = nearby if runs[k] else mixed[STATIC]
-        from_wall = _elsewhere(static, before[k])
-        if keeps[k]:
-            from_wall = np.maximum(from_wall, _elsewhere(static, shortly_before[k]))
+        from_wall = _elsewhere(nearby if runs[k] else mixed[STATIC], before[k])
+        if runs[k]:
+            from_wall = np.maximum(from_wall, _elsewhere(mixed[STATIC], shortly_before[k]))
         open_ahead = _elsewhere(open_to_pace if keeps[k] else open_space, -before[k])
         return mixed[STATIC] + from_wall * (1 - open_ahead) * unseen
 

@@ -24,14 +24,17 @@ class Walls:
 
     *Walls.* A particle is suspect if there is something STATIC where it was `clearing_time` ago, and the cell where it
     will be after `clearing_time` is not known to be free. Then its arrival in an unseen cell may be only the next piece
-    of the wall. Above `running_speed` the cells beside that place count, too, because a wall that crosses the grid at
-    an angle is a staircase of cells. Slower things may be people, who walk close to walls. A pedestrian who sets off
-    also comes out of a STATIC cell, but walks into free space. And the side of a long vehicle comes out of a cell where
-    the vehicle moves.
+    of the wall. Slow things may be people, who walk close to walls. Above `running_speed` two more places are checked.
+    The cells beside that place count, too, because a wall that crosses the grid at an angle is a staircase of cells.
+    And so does the cell where the particle was shortly before: nothing drives through a wall, but a particle that
+    starts in front of a parked car flies on inside it, where no beam contradicts it. Here the cells beside don't count,
+    because shortly before a car was in its own cells, some of which may still be called STATIC.
 
-    *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. A particle at that speed is
-    suspect if a cell on its recent path was STATIC, or if the cell ahead borders one. While the car stands, none of
-    this applies.
+    A pedestrian who sets off also comes out of a STATIC cell, but walks into free space. And the side of a long vehicle
+    comes out of a cell where the vehicle moves.
+
+    *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. For a particle at that speed a
+    cell ahead that borders a STATIC one isn't free space. While the car stands, this doesn't apply.
 
     *Wakes.* One thing can't be in two places. So what a moving particle occupied `clearing_time` ago is free now, even
     if no scan sees it.
@@ -46,11 +49,9 @@ class Walls:
         for longer than `clearing_time`, because a thing shows in more cells than it fills: a pedestrian doesn't get
         out of two cells of 0.5 m in half a second.
     running_speed : float
-        Speed above which a thing comes out of a wall also if it comes out of a cell beside one, m/s: faster than people
-        walk.
+        Speed above which more of a particle's past is checked, m/s: faster than people walk.
     second_look : float
-        Fraction of `clearing_time` at which the past position of a particle at the car's speed is checked a second
-        time (0.4: two LIDAR revolutions).
+        Fraction of `clearing_time` at which its past position is checked again (0.4: two LIDAR revolutions).
     """
 
     clearing_time: float = 0.5
@@ -65,7 +66,7 @@ class Walls:
         check_fields(self, "a finite number, not negative", not_negative, *names)
 
     def displacement(self, velocity: NDArray, cell: float, fraction: float = 1.0) -> NDArray[np.float64]:
-        """Return how far things move in a fraction of `clearing_time`, but at least `clearing_cells`, (N, 2) metres.
+        """Return how far things move in `clearing_time`, but at least `clearing_cells`, (N, 2) metres.
 
         Parameters
         ----------
@@ -74,12 +75,12 @@ class Walls:
         cell : float
             Side of a cell, metres.
         fraction : float
-            Which fraction of the time; negative for the past.
+            Which fraction of this way; negative for the past.
         """
-        path = fraction * self.clearing_time * velocity.astype(np.float64)
+        path = self.clearing_time * velocity.astype(np.float64)
         length = np.linalg.norm(path, axis=1, keepdims=True)
         least = self.clearing_cells * cell
-        return path * np.maximum(1, ratio(np.full_like(length, least), length))
+        return fraction * path * np.maximum(1, ratio(np.full_like(length, least), length))
 
     def keeps_pace(self, velocity: NDArray, car_velocity: NDArray, cell: float) -> NDArray[np.bool_]:
         """Return which things move at the car's own speed, (N,).
@@ -137,12 +138,13 @@ class Walls:
         before, shortly_before, ahead = (
             self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
         )
-        static = static_nearby(mixed)
         runs = np.hypot(*particles.velocity.T) > self.running_speed
-        out_of_a_wall = np.where(runs, at_cells(static, before), at_cells(mixed[STATIC], before))
-        past_a_wall = keeps * np.where(runs, at_cells(static, shortly_before), at_cells(mixed[STATIC], shortly_before))
-        open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - keeps * at_cells(mixed[FREE] * static, ahead)
-        return np.maximum(out_of_a_wall, past_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)
+        nearby = static_nearby(mixed)
+        out_of_a_wall = np.where(runs, at_cells(nearby, before), at_cells(mixed[STATIC], before))
+        through_a_wall = runs * at_cells(mixed[STATIC], shortly_before)
+        beside_a_wall = keeps * at_cells(mixed[FREE] * nearby, ahead)
+        open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - beside_a_wall
+        return np.maximum(out_of_a_wall, through_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)
 
     def clear_wakes(
         self, posterior: NDArray, particles: Particles, cells: NDArray, hidden: NDArray, spec: GridSpec

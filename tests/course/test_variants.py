@@ -73,4 +73,4 @@ def test_the_guides_private_variant_passes_with_its_answer_and_not_with_the_publ
         exec(cell.source, public)
     assert passes(cells, names, "")
     assert not passes(cells, public, "locate-test")
-    assert passes(cells, public, "locate-nothing-test")  # the guide says so
+    assert not passes(cells, public, "locate-stuck-test")  # the guide says so

@@ -104,16 +104,30 @@ def test_a_cell_that_has_only_been_left_counts_as_unseen(predicted):
 
 
 @TWINS
-@pytest.mark.parametrize("driven", [-1.0, 0.0, 0.4, 0.6, 1.0, 4.0])
-def test_what_comes_past_a_porous_hedge_is_doubted_if_it_keeps_pace_with_the_vehicle(predicted, driven):
-    """Out of a gap, past something that stands, at 10 m/s: doubtful where the vehicle drives at 5 m/s or more.
+@pytest.mark.parametrize(("running_speed", "dynamic"), [(9.0, 0.0), (11.0, 0.5)])
+def test_what_flies_fast_through_something_that_stands_is_doubted(predicted, running_speed, dynamic):
+    """Something stands between origin and target; the particle flies at 10 m/s.
 
-    By hand, with a = 0.5, u = 1 and b = 0 or 0.5, P(DYNAMIC) = (a - b) / (1 - b).
+    By hand, with a = 0.5, u = 1 and b = 0.5 or 0, P(DYNAMIC) = (a - b) / (1 - b).
     """
-    state, world = flying(0.0, UNKNOWN), replace(STILL, walls=Walls(clearing_cells=2.0))
+    walls = Walls(clearing_cells=2.0, running_speed=running_speed)
+    state = flying(0.0, UNKNOWN)
     state.probability[:, PASSED, 0] = 0, 1, 0, 0
-    given = predicted(state, ROW, world, 0.1, np.random.default_rng(0), (driven, 0.0))
-    np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], 0.0 if driven > 0.5 else 0.5, atol=1e-6)
+    given = predicted(state, ROW, replace(STILL, walls=walls), 0.1, np.random.default_rng(0))
+    np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], dynamic, atol=1e-6)
+
+
+@TWINS
+@pytest.mark.parametrize(("row", "dynamic"), [(ORIGIN, 0.0), (PASSED, 0.5)])
+def test_a_cell_beside_counts_as_origin_but_not_on_the_way(predicted, row, dynamic):
+    """A wall at an angle is a staircase; but a car was in its own cells shortly before. By hand as above."""
+    spec = GridSpec(0, 16, -1, 2, 1)
+    state = flying(0.0, UNKNOWN)
+    probability = np.repeat(state.probability, 3, axis=2)
+    probability[:, row, 0] = 0, 1, 0, 0
+    state = replace(state, probability=probability, newborn=np.zeros(spec.shape, np.float32))
+    given = predicted(state, spec, STILL, 0.1, np.random.default_rng(0))
+    np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 1], dynamic, atol=1e-6)
 
 
 @TWINS

@@ -46,7 +46,14 @@ def test_forward_messages_are_filterpys_recursion(readings):
 
 
 def test_forward_messages_are_lecture_01s_recursion():
-    lecture = {"np": np, "discrete_bayes": discrete_bayes, "POLES": [2, 3, 7], "N_CELLS": 10, "P_POLE": P_POLE}
+    lecture = {
+        "np": np,
+        "discrete_bayes": discrete_bayes,
+        "POLES": [2, 3, 7],
+        "N_CELLS": 10,
+        "P_POLE": P_POLE,
+        "MOVED": MOVED,
+    }
     exec(lecture_cell("update"), lecture)
     exec(lecture_cell("predict"), lecture)
     readings = [1, 1, 0, 0, 0, 1, 0, 1]

@@ -3,7 +3,7 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from worlds.lecture_01_lines import belief_history, probability_lines, state_history
+from worlds.lecture_01_lines import belief_history, places_on_ring, probability_lines, ring_road, state_history
 
 from semgrid_edu import plotting
 
@@ -26,10 +26,10 @@ def test_a_bar_is_as_high_as_its_probability_and_has_its_number():
     assert ax.get_title(loc="left") == "belief"
 
 
-def test_a_triangle_marks_the_right_cell_and_only_when_it_is_known():
+def test_triangles_mark_the_cells_that_are_asked_for():
     line = {"belief": np.full(4, 0.25)}
-    (mark,) = probability_lines(line, truth=2).axes[0].lines
-    assert mark.get_xdata() == [2]
+    (marks,) = probability_lines(line, marked=[0, 2]).axes[0].lines
+    np.testing.assert_array_equal(marks.get_xdata(), [0, 2])
     assert not probability_lines(line).axes[0].lines
 
 
@@ -39,7 +39,7 @@ def test_a_long_line_has_no_numbers_over_its_bars():
 
 def test_lines_below_each_other_share_their_scale():
     lines = {"prior": np.full(2, 0.5), "likelihood": np.array([0.9, 0.3]), "posterior": np.array([0.75, 0.25])}
-    figure = probability_lines(lines, truth=0)
+    figure = probability_lines(lines, marked=[0])
     assert [ax.get_title(loc="left") for ax in figure.axes] == list(lines)
     assert len({ax.get_ylim() for ax in figure.axes}) == 1
     assert [ax.get_xlabel() for ax in figure.axes] == ["", "", "cell"]
@@ -51,13 +51,26 @@ def test_lines_of_zeros_have_an_axis_too():
     assert probability_lines({"a": np.zeros(2)}).axes[0].get_ylim()[1] > 0
 
 
-def test_a_belief_has_a_column_for_each_step_with_cell_0_at_the_bottom_and_a_circle_at_the_truth():
+def test_a_ring_goes_clockwise_from_the_top_and_has_a_bar_for_each_cell_and_its_poles():
+    around = places_on_ring(4)
+    np.testing.assert_allclose(around, [[0, 1], [1, 0], [0, -1], [-1, 0]], atol=1e-12)
+    bars, vehicle, title = ring_road([2, 3, 7])
+    ax = vehicle.axes
+    assert len(bars) == 10
+    assert title.axes is ax
+    poles = next(line for line in ax.lines if line.get_marker() == "^")
+    np.testing.assert_allclose(poles.get_xydata(), 0.58 * places_on_ring()[[2, 3, 7]])
+
+
+def test_a_belief_has_a_column_for_each_step_with_cell_0_at_the_bottom_and_a_mark_at_the_truth():
     belief = np.array([[0.2, 0.7, 0.1], [0.0, 0.2, 0.8]])
-    ax = belief_history(belief, truth=np.array([1, 2]))
+    ax = belief_history(belief, truth=np.array([1, 0]))
     np.testing.assert_array_equal(ax.images[0].get_array(), belief.T)
     bottom, top = ax.get_ylim()
     assert bottom < top
-    np.testing.assert_array_equal(ax.lines[0].get_xydata(), [[0, 1], [1, 2]])
+    circles, crosses = ax.lines
+    np.testing.assert_array_equal(circles.get_xydata(), [[0, 1]])
+    np.testing.assert_array_equal(crosses.get_xydata(), [[1, 0]])
     assert not belief_history(belief).lines
 
 

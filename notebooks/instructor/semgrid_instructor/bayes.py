@@ -12,43 +12,70 @@ from semgrid_edu.workshop.course.answers import answer_array, answer_number
 from semgrid_instructor import asked_in_any_order, close, generator, hidden, in_any_order, keeping
 
 
-def _check_locate(locate: Callable, says_pole: bool) -> None:
-    """Longer roads, other sensors, poles as an array, and a cell that is impossible.
+def _beside(n_cells: int, poles: np.ndarray, hit: float, false_alarm: float) -> np.ndarray:
+    """Return P("pole" | cell), (N,)."""
+    return np.where(np.isin(np.arange(n_cells), poles), hit, false_alarm)
 
-    Silence is judged by what the answer itself makes of a sensor that says "pole" as often as this one says nothing.
-    """
-    for n_cells in in_any_order((5, 30)):
-        rng = generator(1100 + n_cells)
-        belief = rng.dirichlet(np.ones(n_cells))
-        belief[2] = 0
-        belief /= belief.sum()
-        poles = rng.choice(n_cells, size=3, replace=False)
-        hit, false_alarm = rng.uniform(0.6, 0.95), rng.uniform(0.05, 0.3)
-        got = answer_array(locate(belief.copy(), says_pole, poles.copy(), hit, false_alarm))
-        assert got.shape == belief.shape, "another shape"
-        if says_pole:
-            assert got[2] == 0, "what was impossible must stay impossible"
-            expected = discrete_bayes.update(np.where(np.isin(np.arange(n_cells), poles), hit, false_alarm), belief)
-        else:
-            expected = answer_array(locate(belief.copy(), True, poles.copy(), 1 - hit, 1 - false_alarm))
-            elsewhere = answer_array(locate(belief.copy(), False, (poles + 1) % n_cells, hit, false_alarm))
-            assert not close(got, elsewhere), "it doesn't matter where the poles are"
-            as_pole = answer_array(locate(belief.copy(), True, poles.copy(), hit, false_alarm))
-            assert not close(got, as_pole), "it doesn't matter what the sensor says"
-        assert close(got, expected), "wrong after a reading with three poles"
+
+def _road(n_cells: int) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Return a belief with a cell that is impossible, three poles as an array, and a sensor."""
+    rng = generator(1100 + n_cells)
+    belief = rng.dirichlet(np.ones(n_cells))
+    belief[2] = 0
+    return (
+        belief / belief.sum(),
+        rng.choice(n_cells, size=3, replace=False),
+        rng.uniform(0.6, 0.95),
+        rng.uniform(0.05, 0.3),
+    )
+
+
+def _balanced(number: int, hit: float, false_alarm: float) -> list[bool]:
+    """Return readings that together speak neither for a pole nor against it: each number stays far from zero."""
+    readings, for_a_pole = [], 0.0
+    for _ in range(number):
+        says = for_a_pole < 0
+        for_a_pole += np.log(hit / false_alarm) if says else np.log((1 - hit) / (1 - false_alarm))
+        readings.append(bool(says))
+    return readings
 
 
 @hidden
 @keeping
-def check_locate_pole(locate: Callable) -> None:
-    """Let the sensor say "pole"."""
-    _check_locate(locate, says_pole=True)
+def check_locate_fresh(locate: Callable) -> None:
+    """Longer roads, other sensors, no readings, and thousands."""
+    for n_cells, n_readings in in_any_order(((5, 0), (5, 6), (30, 5), (30, 3000))):
+        belief, poles, *sensor = _road(n_cells)
+        readings = _balanced(n_readings, *sensor)
+        if n_readings < 10:
+            readings = [bool(says) for says in generator(1200 + n_readings).random(n_readings) < 0.4]
+        got = answer_array(locate(belief.copy(), list(readings), poles.copy(), *sensor))
+        assert got.shape == belief.shape, "another shape"
+        assert np.isfinite(got).all(), "NaN after many readings: unnormalised products end at zero"
+        assert got[2] == 0, "what was impossible must stay impossible"
+        p_pole, expected = _beside(n_cells, poles, *sensor), belief
+        for says in readings:
+            expected = discrete_bayes.update(p_pole if says else 1 - p_pole, expected)
+        assert close(got, expected), "wrong with three poles and another number of readings"
 
 
 @hidden
-def check_locate_nothing(locate: Callable) -> None:
-    """Let the sensor say "nothing"."""
-    _check_locate(locate, says_pole=False)
+@keeping
+def check_locate_stuck(locate: Callable) -> None:
+    """Sum over all ways in which the sensor may have been stuck: 2^7 for eight readings."""
+    for n_cells, stuck, alike in in_any_order(((5, 0.3, False), (30, 0.85, False), (30, 1.0, True), (5, 0.6, True))):
+        belief, poles, *sensor = _road(n_cells)
+        readings = [False] * 8 if alike else [bool(says) for says in generator(1250 + n_cells).random(8) < 0.5]
+        got = answer_array(locate(belief.copy(), list(readings), poles.copy(), *sensor, stuck=stuck))
+        assert got.shape == belief.shape, "another shape"
+        p_pole, total = _beside(n_cells, poles, *sensor), np.zeros(n_cells)
+        for was_stuck in product((False, True), repeat=7):
+            way = p_pole if readings[0] else 1 - p_pole
+            for old, new, held in zip(readings[:-1], readings[1:], was_stuck, strict=True):
+                fresh = p_pole if new else 1 - p_pole
+                way = way * (stuck * (old == new) if held else (1 - stuck) * fresh)
+            total += way
+        assert close(got, discrete_bayes.update(total, belief)), "wrong for another `stuck`, or for eight readings"
 
 
 def _moved(belief: np.ndarray, moved: np.ndarray) -> np.ndarray:

@@ -54,14 +54,14 @@ def check_cut(what_was_done: Callable) -> None:
 
 
 @hidden
-def check_now_from_before(now_from_before: Callable) -> None:
+def check_camera_from_before(camera_from_before: Callable) -> None:
     """Random poses in three dimensions; all must lead to one place in the world."""
     rng = generator(53)
     for _ in range(5):
-        now, before = (rigid_transform(Rotation.random(rng=rng).as_matrix(), rng.uniform(-50, 50, 3)) for _ in range(2))
-        got = answer_array(now_from_before(now.copy(), before.copy()))
+        given = tuple(rigid_transform(Rotation.random(rng=rng).as_matrix(), rng.uniform(-50, 50, 3)) for _ in range(3))
+        got = answer_array(camera_from_before(*(T.copy() for T in given)))
         assert got.shape == (4, 4), "another shape"
-        wanted = invert_rigid(now) @ before
+        wanted = given[0] @ invert_rigid(given[1]) @ given[2]
         assert close(got[:3, :3], wanted[:3, :3]), "wrong rotation (a car also pitches and rolls)"
         assert close(got, wanted), "wrong shift"
 
@@ -73,11 +73,11 @@ def _camera(rng: np.random.Generator) -> Camera:
 
 
 def _first_walls(x: NDArray, top: NDArray, z_cam: float, delta: float) -> tuple[list[int], float]:
-    """Return the first wall on each cell's ray, one ray at a time, and by how much the closest call was decided."""
+    """Return the first wall on each cell's ray, up to a millimetre below it, and by how much it was decided."""
     firsts, closest = [], np.inf
     for goal in x:
         sinks = (z_cam - delta) / goal
-        above = top - (z_cam - sinks * x)
+        above = top + 0.001 - (z_cam - sinks * x)
         closest = min(closest, np.abs(above).min())
         firsts.append(next((wall for wall, height in enumerate(above) if height > 0), len(x)))
     return firsts, closest
@@ -93,19 +93,21 @@ def _row(rng: np.random.Generator) -> tuple[NDArray, NDArray, float]:
 @hidden
 @keeping
 def check_shown(shown: Callable) -> None:
-    """Judge roads that rise and fall, things of all heights, planes below the ground and above the camera."""
+    """Judge roads that rise and fall, things of all heights, planes below the ground, at a top, above the camera."""
     rng, judged = generator(54), 0
     while judged < 30:
         (x, top, z_cam), delta = _row(rng), rng.uniform(-1.2, 3.0)
+        if judged % 3 == 0:  # a plane at the top of a wall
+            delta = top[judged % len(x)]
         wanted, closest = _first_walls(x, top, z_cam, delta)
-        if closest < 1e-3:
+        if closest < 1e-4:
             continue
         judged += 1
         got = answer_array(shown(x, top, z_cam, delta))
         assert got.shape == (len(x),), "another shape"
         which = "above" if delta > z_cam else "below"
         assert np.array_equal(got, wanted), (
-            "a wrong wall, on a plane " + which + " the camera (walls may be higher than it)"
+            "a wrong wall, on a plane " + which + " the camera (walls may be higher than it, rays may end at a top)"
         )
 
 
@@ -118,7 +120,7 @@ def check_best_plane(best_plane: Callable) -> None:
         (x, top, z_cam), heights = _row(rng), rng.permutation(np.linspace(-1.1, 0.7, 10))
         found = [_first_walls(x, top, z_cam, delta) for delta in heights]
         in_place = [np.sum(np.array(walls) == np.arange(len(x))) for walls, _ in found]
-        if min(closest for _, closest in found) < 1e-3 or len(x) < 3:
+        if min(closest for _, closest in found) < 1e-4 or len(x) < 3:
             continue
         judged += 1
         got = answer_array(best_plane(x, top, z_cam, heights)).ravel()

@@ -104,17 +104,6 @@ def _boxes(rng: np.random.Generator, kind: int, h: int, w: int, n: int) -> tuple
 
 
 @hidden
-def check_is_pair(is_pair: Callable) -> None:
-    """Judge images of other sizes, higher than wide and wider than high, with few points and with many."""
-    rng = generator(64)
-    for h, w, n in ((7, 5, 12), (3, 9, 2), (6, 4, 30)):
-        for kind in in_any_order(range(4)):
-            told = answer_array(is_pair(*_boxes(rng, kind, h, w, n), h, w, n)).ravel()
-            assert told.shape == (1,), "it doesn't return True or False"
-            assert bool(told[0]) == (kind == 0), "wrong about boxes with another image and other points"
-
-
-@hidden
 def check_which_kind(which_kind: Callable) -> None:
     """Judge other images and points, each kind more than once."""
     rng = generator(65)

@@ -335,7 +335,7 @@ N_CELLS, POLES, MOVED = 10, [2, 3, 7], [0.1, 0.8, 0.1]
 P_POLE = np.where(np.isin(np.arange(N_CELLS), POLES), 0.8, 0.1)
 SENSOR = np.array([1 - P_POLE, P_POLE])
 assert round(P_POLE.sum() ** 2 / np.sum(P_POLE**2), 1) == 4.8  # ten particles, by hand
-READINGS = np.isin(np.arange(25), [2, 3, 4, 9, 15, 18, 23, 24]).astype(int)  # the trip of lecture 01
+READINGS = np.isin(np.arange(25), [2, 3, 4, 9, 15, 18, 23, 24]).astype(int)  # a trip on lecture 01's ring road
 
 
 def particle_filter(n, rng, resample=True):
@@ -504,7 +504,7 @@ def show(n, ax=None):
 
 _ = interact(lambda n: (show(n), plt.show())[1], n=IntSlider(value=30, min=2, max=300))
 
-# %% jupyter={"source_hidden": true} alt="three tables of belief over 25 steps: with 5 particles a few dark cells that jump; with 50 the diagonal stripes appear with noise; with 5000 they are smooth, as in lecture 01"
+# %% jupyter={"source_hidden": true} alt="three tables of belief over 25 steps: with 5 particles a few dark cells that jump; with 50 the diagonal stripes appear with noise; with 5000 they are smooth"
 fig, axes = plt.subplots(1, 3, figsize=(10, 2.5), sharey=True, layout="constrained")
 for ax, n in zip(axes, (5, 50, 5000), strict=True):
     show(n, ax)

@@ -1,12 +1,12 @@
 # %% [markdown]
 # # Exercise 01: Bayes' rule on a line
 #
-# Six small functions: one reading on a map, a move on ice, a filter that waits before it answers, a matrix from what was counted and its half-life,
+# Six small functions: a sensor that gets stuck, a move on ice, a filter that waits before it answers, a matrix from what was counted and its half-life,
 # and a map put together from them. Then one question to answer in words. About 90 minutes. The lecture is [01: Bayes' rule on a line](../01_bayes.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | update: one reading on a map | 1 + 1 |
+# | 1 | update: readings that repeat themselves | 1 + 1 |
 # | 2 | predict: a move where the road is slippery, on a ring and before a wall | 2 + 1 |
 # | 3 | a filter, and a smoother that waits for a few scans | 1 + 2 |
 # | 4 | a transition matrix from counts, for any time step; its half-life | 2 + 1 |
@@ -34,46 +34,67 @@ def _explain(got, slips):
 
 
 # %% [markdown]
-# ## Task 1: one reading on a map (1 + 1 points)
+# ## Task 1: a sensor that gets stuck (1 + 1 points)
 #
-# A vehicle is in one of N cells: `belief`, shape `(N,)`, sums to 1. `poles` lists the cells that have a pole beside them (the first cell is 0). A sensor says *pole* with
-# probability `hit` where there is one and with probability `false_alarm` where there is none; otherwise it says *nothing*.
+# A vehicle *stands still* in one of N cells: `belief`, shape `(N,)`, sums to 1. `poles` lists the cells that have a pole beside them (the first cell is 0). A sensor is read several
+# times: `readings` is a list with `True` for *pole* and `False` for *nothing*. The sensor's electronics are old. With probability `stuck` it doesn't look at all, and delivers its last reading once
+# more. Otherwise the reading is fresh: *pole* with probability `hit` beside a pole, and with probability `false_alarm` elsewhere. The first reading is always fresh.
 #
-# Complete `locate`: it returns the belief after one reading. One point is for *pole* (`says_pole` is `True`), one for *nothing* (`False`). Leave `belief` as it is: somebody else may need it.
+# Complete `locate`: it returns the belief after all readings. One point is for `stuck=0`, where the readings err independently. The other is for any `stuck` up to 1: then they don't, and you
+# have to ask how probable a reading is given the cell *and the reading before it*. (What must come out if all readings are alike and `stuck=1`?) There may be no reading, or thousands. Leave `belief` as it is:
+# somebody else may need it.
 
 
 # %% nbgrader={"grade": false, "grade_id": "locate", "locked": false, "schema_version": 3, "solution": true, "task": false}
-def locate(belief, says_pole, poles, hit, false_alarm):
-    """Return the belief (N,) after one reading."""
+def locate(belief, readings, poles, hit, false_alarm, stuck=0.0):
+    """Return the belief (N,) of a vehicle that stands still, after several readings."""
     ### BEGIN SOLUTION
-    likelihood = np.full(len(belief), false_alarm)
-    likelihood[list(poles)] = hit
-    if not says_pole:
-        likelihood = 1 - likelihood
-    product = likelihood * belief
-    return product / product.sum()
+    p_pole = np.full(len(belief), false_alarm)
+    p_pole[list(poles)] = hit
+    last = None
+    for says_pole in readings:
+        likelihood = p_pole if says_pole else 1 - p_pole
+        if last is not None:
+            likelihood = (1 - stuck) * likelihood + stuck * (says_pole == last)
+        belief = likelihood * belief
+        belief = belief / belief.sum()
+        last = says_pole
+    return belief
     ### END SOLUTION
 
 
 # %% nbgrader={"grade": true, "grade_id": "locate-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     belief = np.array([0.4, 0.3, 0.2, 0.1])
-    before = belief.copy()
-    got = answer_array(locate(belief, True, poles=[1, 3], hit=0.8, false_alarm=0.1), "locate")
+    before, readings = belief.copy(), [True, False, True]
+    got = answer_array(locate(belief, readings, poles=[1, 3], hit=0.8, false_alarm=0.1), "locate")
     assert np.array_equal(belief, before), "locate changed its argument `belief`: make a new array (no *=, no /=)"
     assert got.shape == (4,), f"expected one number for each of the 4 cells, shape (4,), got {got.shape}"
     slips = {
-        (0.0556, 0.4444, 0.0556, 0.4444): "you forget what was believed before: multiply the prior in",
-        (0.1786, 0.3929, 0.1071, 0.3214): "you add prior and likelihood: Bayes' rule multiplies them",
-        (0.6154, 0.0577, 0.3077, 0.0192): "that moves belief away from the poles: `hit` belongs to cells with a pole",
+        (0.1053, 0.6316, 0.0526, 0.2105): "one reading is missing: multiply by the likelihood of *each* reading",
+        (
+            0.0153,
+            0.7328,
+            0.0076,
+            0.2443,
+        ): "the sensor said *nothing*, you learnt nothing: its silence is evidence against poles",
+        (0.0019, 0.7478, 0.001, 0.2493): "the sensor said *nothing*, and you count it as *pole*",
+        (0.0328, 0.4672, 0.0328, 0.4672): "you forget what was believed before: multiply the prior in",
+        (
+            0.1361,
+            0.8166,
+            0.017,
+            0.0302,
+        ): "the first belief is in it three times: each reading goes on from the last belief",
     }
     _explain(got, slips)
-    assert np.isclose(got.sum(), 1), f"the belief sums to {got.sum():.2f}: divide by the sum of the products"
-    np.testing.assert_allclose(got, np.array([4, 24, 2, 8]) / 38, err_msg="by hand: 0.04, 0.24, 0.02, 0.08")
+    assert np.isclose(got.sum(), 1), f"the belief sums to {got.sum():.4f}: divide by the sum of the products"
+    expected = np.array([0.0036, 0.0384, 0.0018, 0.0128])
+    np.testing.assert_allclose(got, expected / expected.sum(), err_msg="by hand: beside a pole 0.8 * 0.2 * 0.8")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import bayes
 
-    complaint = bayes.check_locate_pole(locate)
+    complaint = bayes.check_locate_fresh(locate)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 
@@ -81,26 +102,34 @@ def _test():
 _test()
 
 
-# %% nbgrader={"grade": true, "grade_id": "locate-nothing-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
+# %% nbgrader={"grade": true, "grade_id": "locate-stuck-test", "locked": true, "points": 1, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
     belief, poles = np.array([0.4, 0.3, 0.2, 0.1]), [1, 3]
-    got = answer_array(locate(belief.copy(), False, poles, hit=0.8, false_alarm=0.1), "locate")
+    got = answer_array(locate(belief.copy(), [True, True, False], poles, 0.8, 0.1, stuck=0.5), "locate")
     assert got.shape == (4,), f"expected one number for each of the 4 cells, shape (4,), got {got.shape}"
-    says_pole = answer_array(locate(belief.copy(), True, poles, hit=0.8, false_alarm=0.1), "locate")
-    swapped = answer_array(locate(belief.copy(), True, poles, hit=0.1, false_alarm=0.8), "locate")
     slips = {
-        (0.4, 0.3, 0.2, 0.1): "the sensor said *nothing*, you learnt nothing: its silence is evidence against poles",
-        tuple(says_pole): "the sensor said *nothing*, and you count it as *pole*: use `says_pole`",
-        tuple(swapped): "you swap the two; P(nothing | cell) = 1 - P(pole | cell) instead",
+        (0.0636, 0.6784, 0.0318, 0.2261): "`stuck` isn't used: a repeated reading may bring nothing new",
+        (0.3051, 0.4068, 0.1525, 0.1356): "a repeated reading may be a fresh one: it brings less, not nothing",
+        (
+            0.1024,
+            0.6348,
+            0.0512,
+            0.2116,
+        ): "the third reading differs from the second, so it isn't a repetition: no `stuck` there",
+        (0.4773, 0.213, 0.2387, 0.071): "the first reading repeats nothing: it is fresh",
+        (0.1869, 0.5398, 0.0934, 0.1799): "a reading is fresh with probability 1 - stuck only: that factor is missing",
     }
     _explain(got, slips)
-    # Silence is like the word of a sensor that says it with 1 - hit and 1 - false_alarm.
-    by_hand = answer_array(locate(belief.copy(), True, poles, hit=1 - 0.8, false_alarm=1 - 0.1), "locate")
-    np.testing.assert_allclose(got, by_hand, err_msg="by hand: 0.36, 0.06, 0.18, 0.02, divided by 0.62")
+    expected = np.array([0.0099, 0.0216, 0.00495, 0.0072])
+    by_hand = "beside a pole 0.8, then 0.5 * 0.8 + 0.5, then 0.5 * 0.2"
+    np.testing.assert_allclose(got, expected / expected.sum(), err_msg=by_hand)
+    once = answer_array(locate(belief.copy(), [False], poles, 0.8, 0.1), "locate")
+    alike = answer_array(locate(belief.copy(), [False] * 3, poles, 0.8, 0.1, stuck=1.0), "locate")
+    np.testing.assert_allclose(alike, once, err_msg="with stuck=1 three readings are worth one")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import bayes
 
-    complaint = bayes.check_locate_nothing(locate)
+    complaint = bayes.check_locate_stuck(locate)
     assert not complaint, complaint
     ### END HIDDEN TESTS
 

@@ -518,6 +518,7 @@ def _test():
         assert mine >= other + 2, f"{told}: what does it not know? Give height to your features in pieces"
         print(told)
     right, road = (got == new_truth).mean(), (new_truth == 0).mean()
+    print(f"road: {100 * (truth == 0).mean():.0f} % of the far cells, {100 * road:.0f} % of the near ones")
     told = f"{100 * right:.0f} % of the cells are right, and always road gets {100 * road:.0f} %"
     assert right > road, f"{told}: the weights of rare classes may be too large"
     print(told)

@@ -184,23 +184,22 @@ def doubt_arrivals(
     car_velocity : (2,) float
         Velocity of the vehicle along the axes of the map, m/s.
     """
-    before = cells_at(particles, cells, spec, -walls.clearing_time, walls.clearing_cells)
-    ahead = cells_at(particles, cells, spec, walls.clearing_time, walls.clearing_cells)
     since = float(walls.second_look * walls.clearing_time)
     least = walls.clearing_cells * spec.cell / since if since > 0 else np.inf
-    now = particles.position.ravel(), particles.velocity.ravel(), particles.weight, cells
-    fields = before, ahead, mixed[FREE], mixed[DYNAMIC], mixed[STATIC], static_nearby(mixed[STATIC])
+    times = -walls.clearing_time, -since, walls.clearing_time
+    fewest = walls.clearing_cells * np.array([1, walls.second_look, 1])
+    other_cells = (cells_at(particles, cells, spec, *path) for path in zip(times, fewest, strict=True))
+    fields = mixed[FREE], mixed[DYNAMIC], mixed[STATIC], static_nearby(mixed[STATIC])
     speeds = *map(float, car_velocity), float(least), float(walls.running_speed)
-    return _doubt_arrivals(*now, *fields, *speeds, since, spec.shape, *spec.corner)
+    return _doubt_arrivals(particles.velocity.ravel(), particles.weight, *other_cells, *fields, *speeds)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _doubt_arrivals(
-    xy,
     velocity,
     weight,
-    cells,
     before,
+    shortly_before,
     ahead,
     free,
     dynamic,
@@ -210,18 +209,13 @@ def _doubt_arrivals(
     car_y,
     least,
     running,
-    since,
-    shape,
-    x_max,
-    y_max,
-    cell,
 ):
     doubted = np.empty_like(weight)
     free = free.ravel()
     dynamic = dynamic.ravel()
     nearby = nearby.ravel()
     static = static.ravel()
-    for i in range(len(cells)):
+    for i in range(len(weight)):
         vx = velocity[2 * i]
         vy = velocity[2 * i + 1]
         keeps = keeps_pace(vx, vy, car_x, car_y, least)
@@ -229,10 +223,8 @@ def _doubt_arrivals(
         wall = np.float32(0)
         if before[i] != OUTSIDE:
             wall = nearby[before[i]] if runs else static[before[i]]
-        if keeps:
-            shortly = cell_of(xy[2 * i] - since * vx, xy[2 * i + 1] - since * vy, shape, x_max, y_max, cell)
-            if shortly != OUTSIDE and shortly != cells[i]:
-                wall = max(wall, nearby[shortly] if runs else static[shortly])
+        if runs and shortly_before[i] != OUTSIDE:
+            wall = max(wall, static[shortly_before[i]])
         room = np.float32(0)
         if ahead[i] != OUTSIDE:
             beside = nearby[ahead[i]] if keeps else np.float32(0)
