@@ -405,7 +405,7 @@ assert 205 < people.sum() < 215
 assert (people & labelled).sum() < 20
 
 # %% [markdown]
-# All ten are found: a recall of 100 %. But the map calls 210 cells *pedestrian*, an area of fifty
+# All ten are found: a recall of 100 %. But the map calls 211 cells *pedestrian*, an area of fifty
 # square metres. In the image you find two or three people. Almost all of these cells have no label, so neither pixel
 # accuracy nor recall nor IoU counts them. **A score over labelled cells can't see what a map invents elsewhere.**
 #
@@ -413,7 +413,7 @@ assert (people & labelled).sum() < 20
 # smeared along their rays, like the cars on the planes. Switch that off. Paint every person out: each pixel that the
 # network calls *pedestrian*, and some around it, gets the scores of its nearest other neighbour.
 #
-# **Predict before you run.** Of the 210 cells, how many are still called pedestrian: almost none, half, or almost
+# **Predict before you run.** Of the 211 cells, how many are still called pedestrian: almost none, half, or almost
 # all? And of the ten true ones? What if you paint out the trees instead?
 #
 # <details><summary>Answer</summary>
@@ -558,7 +558,7 @@ assert abs(moved).max() < 0.25  # less than half a cell, so it is the same place
 # 2. A network scores pixels. Each point of twenty planes takes the scores of its pixel, so they know what, not where.
 # 3. A second network fuses both into classes, and a CRF makes neighbours agree.
 # 4. An accuracy needs a lazy rival beside it, such as *always road*.
-# 5. A score over labelled cells can't see inventions: 210 cells are called pedestrian, ten are labelled so.
+# 5. A score over labelled cells can't see inventions: 211 cells are called pedestrian, ten are labelled so.
 #
 # ## Further reading and exercise
 #
