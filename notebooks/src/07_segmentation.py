@@ -538,7 +538,7 @@ for name, m in (marks | {"baseline": judge(np.broadcast_to(rows[:, None], truths
 #
 # <details><summary>Answer</summary>
 #
-# Only IoU. Pixel accuracy rises in both cases, because false calls vanish and pedestrians are few. Class accuracy falls
+# Only IoU. Pixel accuracy falls in neither case, because false calls vanish and pedestrians are few. Class accuracy falls
 # in both, because recall doesn't count false calls.
 #
 # </details>
