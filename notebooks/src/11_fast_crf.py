@@ -50,8 +50,8 @@ CAR, ROAD = KITTI_14.index("car"), KITTI_14.index("road")
 # The first map shows which classes a street really has, the second what a network finds. The third is the second after
 # the CRF of lecture 10. The occupancy grid tells the CRF where things end.
 
-# %% jupyter={"source_hidden": true} alt="four maps of one street: the true classes, the network's with ragged edges, the refined ones with smoother regions, and the occupancy grid; beside A single wrong cells vanish, beside B a car that the network found in part is gone after the CRF"
-LETTERS = {"A": (-7, 44), "B": (13, 23)}
+# %% jupyter={"source_hidden": true} alt="four maps of one street: the true classes, the network's with ragged edges, the refined ones with smoother regions, and the occupancy grid; left of A wrong cells vanish, right of B a car that the network found in part is gone after the CRF"
+LETTERS = {"A": (-6, 60), "B": (13, 23)}
 
 
 def note(ax):
@@ -61,20 +61,21 @@ def note(ax):
         ax.text(*place, letter, ha="center", va="center", fontsize=9, bbox=circle)
 
 
-fig, axes = plt.subplots(1, 4, figsize=(10, 4), layout="compressed", sharey=True)
+fig, axes = plt.subplots(1, 4, figsize=(10, 5.4), layout="compressed", sharey=True)
 maps = {"truth": truth, "network": by_network, "after the CRF": refined}
 for ax, (title, labels) in zip(axes, maps.items(), strict=False):
-    plotting.grid_labels(spec, labels, KITTI_14, ax=ax, legend=False).set(title=title, ylim=(0, 50), xlim=(15, -12))
-plotting.class_legend(axes[0], KITTI_14, np.stack(list(maps.values())))
-plotting.occupancy(spec, o, ax=axes[3]).set(title="occupancy grid", ylim=(0, 50), xlim=(15, -12))
+    plotting.grid_labels(spec, labels, KITTI_14, ax=ax, legend=False).set(title=title, ylim=(0, 66), xlim=(15, -12))
+below = {"loc": "upper left", "bbox_to_anchor": (0, -0.17), "ncols": 5, "columnspacing": 1.2}
+plotting.class_legend(axes[0], KITTI_14, np.stack(list(maps.values())), **below)
+plotting.occupancy(spec, o, ax=axes[3]).set(title="occupancy grid", ylim=(0, 66), xlim=(15, -12))
 for ax in axes:
     ax.set_ylabel("x, forward [m]" if ax is axes[0] else "")
     note(ax)
 plt.show()
 
 # %% [markdown]
-# Beside A, single cells of other classes vanish. Right of B there is a car, and the network found a part of it. After
-# the CRF it is gone. Remember B: at the end we ask who is to blame.
+# Left of A, wrong cells vanish. Right of B there is a car, and the network found a part of it. After the CRF it is gone.
+# Remember B: at the end we ask who is to blame.
 #
 # What does "to hear" mean? Take three cells in a row and one class, car. The network gives them 0.9, 0.5 and 0.1. A
 # cell counts itself with weight 1, a neighbour with 0.6, a cell two places away with 0.1. Each cell adds up kernel
@@ -95,16 +96,15 @@ plt.show()
 #
 # </details>
 #
-# Look at the three lines again. Each cell computes a
-# weighted sum, with the largest weight at its own place. A photo editor does the same when it blurs an image. The
-# probabilities of one class are such an image. In the field's words, **message passing is filtering**. With $Q_i(l)$
+# Look at the three lines again. Each cell computes a weighted sum, with the largest weight at its own place. A photo
+# editor does the same when it blurs an image: **message passing is filtering**. With $Q_i(l)$
 # the probability of class $l$ in cell $i$, $\phi_i(l)$ the network's price and $k_{ij}$ the kernel, an update of
 # lecture 10 is
 #
 # $$ \log Q_i(l) \leftarrow -\phi_i(l) + \underbrace{\sum_{j} k_{ij}\, Q_j(l)}_{\text{blurred map}}
 #    - \underbrace{k_{ii}\, Q_i(l)}_{\text{the cell itself}} + \text{const.} $$
 #
-# (Lecture 10 wrote $-\sum_j k_{ij}\,(1 - Q_j(l))$. The difference is the same for all classes, so it cancels.)
+# (Lecture 10 wrote $1 - Q_j(l)$ with a minus. The difference is the same for all classes, so it cancels.)
 
 
 # %% tags=["filters"]
@@ -172,14 +172,13 @@ print(f"products for each cell: all pairs {car.size}, two passes {sum(car.shape)
 #
 # The *bilateral* kernel also compares occupancy. Take two neighbouring cells, one certainly FREE, one certainly STATIC.
 # The two lists of four probabilities are $\sqrt 2$ apart. With the width $\sigma_\beta = 0.2$ the kernel falls to
-# $e^{-25}$: the two don't hear each other. So this blur must stop at the edge of a wall. It has another shape around
-# each cell. Two passes with the same weights everywhere can't do that.
+# $e^{-25}$: the two don't hear each other. So this blur has another shape around each cell, and two passes with the same
+# weights everywhere can't do that.
 #
 # Here is the trick. Give each cell more coordinates: its row, its column and its four probabilities, each divided by
 # its width. We call them the **features** $f$ of the cell. In this space the kernel is $\exp(-|f_i - f_j|^2 / 2)$. It
-# depends on the distance and on nothing else. The wall is still there: it has become a gap that no cell is in. (The
-# four probabilities sum to 1, so three numbers are enough. A change of basis keeps all distances, and `d = 5`
-# features remain.)
+# depends on the distance and on nothing else. The wall has become a gap that no cell is in. (The four probabilities sum
+# to 1, so three numbers have the same distances, and `d = 5` features remain.)
 
 # %%
 features = lattice.bilateral_features(o, params)  # (N, 5)
@@ -190,22 +189,19 @@ np.testing.assert_allclose(
 )
 
 # %% [markdown]
-# In five dimensions we can't visit every place, because most of the space is empty. So we put vertices around the
-# cells only. Each cell gives its value to the vertices around it, values are blurred between vertices, and each cell
-# reads the result back. How many vertices surround a cell? A square has four corners, a cube in five dimensions 32. A
+# Most of this space is empty, so we put vertices around the cells only. Each cell gives its value to the vertices around
+# it, vertices blur among themselves, and each cell reads the result back. How many vertices surround a cell? A square has four corners, a cube in five dimensions 32. A
 # triangle has three corners, a tetrahedron four: these shapes are **simplices**. In five dimensions a simplex has only
 # six. So the features stop the blur at the wall, and simplices make it cheap.
 #
 # ## Which triangle is a point in?
 #
-# We begin with two features, so simplices are triangles. The **permutohedral lattice** fills the plane with
-# equal triangles, in such a way that the triangle around a point is found by rounding and sorting. For this, a
-# point is written as three numbers that sum to zero:
+# With two features, simplices are triangles. The **permutohedral lattice** fills the plane with equal triangles, and
+# the one around a point is found by rounding and sorting. For this, a point is written as three numbers that sum to zero:
 #
 # $$ z = \left(\sqrt 3\, f_1 + f_2,\;\; -\sqrt 3\, f_1 + f_2,\;\; -2 f_2\right) $$
 #
-# (Their sum is zero whatever $f$ is. The factors decide how large the triangles are; two sections further down we see
-# that these are right.) A vertex is a $z$ of three **integers that have the same remainder modulo 3**. So `(3, 0, -3)`
+# (The factors decide how large the triangles are. Two sections further down we see that these are right.) A vertex is a $z$ of three **integers that have the same remainder modulo 3**. So `(3, 0, -3)`
 # is a vertex, with remainder zero, and so is `(4, 1, -5)`, with remainder one. But `(2, 0, -2)` isn't. A *step* adds 1
 # to two of the numbers and takes 2 from the third. It leads to a neighbour.
 #
@@ -258,7 +254,7 @@ plt.show()
 lecture_11_lattice.code_of(crf.enclosing_simplices)
 
 # %% [markdown]
-# So the triangle costs a rounding and a sort, and no cell needs another cell for it.
+# So the triangle costs a rounding and a sort.
 #
 # ## How do cells talk through the vertices?
 #
@@ -309,15 +305,14 @@ def pictures(points, values):
     lecture_11_lattice.draw_triangles((-1.4, -1.4), (10.2, 6.4), ax)
     ax.set(xlabel="place in the row / 4 cells", ylabel="P(FREE) / 0.2")
     fig.colorbar(ScalarMappable(cmap="cividis"), ax=ax, label="P(road)", pad=0.02)
-    story = list(lecture_11_lattice.lattice_story(points, values, between=1))
-    for frame in story:
+    for frame in lecture_11_lattice.lattice_story(points, values):
         for marks in ax.collections[1:]:
             marks.remove()
         lecture_11_lattice.draw_lattice_frame(frame, ax)
         yield fig
 
 
-plotting.animate(pictures(*row(5)), period=0.7, alt="36 points splat onto triangles, blur, and slice back")
+plotting.animate(pictures(*row(5)), period=1.2, alt="36 points splat onto triangles, blur, and slice back")
 
 # %% [markdown]
 # The larger a mark, the more it holds. Within each group the colours even
@@ -360,17 +355,16 @@ assert np.mean(errors["by place and occupancy"]) < 0.6 * np.mean(errors["by plac
 # three blurs   each moves a quarter by a forward and a quarter by a back,
 #               a²/4 + a²/4 along its direction; 60° apart, three give any axis 3/2      3a²/4
 # slice         splat backwards                                                          a²/8
+# all                                                                                    a²
 # ```
 #
 # Splat needs a thought. Take the middle of the triangle as the origin. All three corners have the squared distance
-# $a^2/3$ from it. The weighted mean of the corners is the point $x$ itself, so the squared distance from $x$ to the
+# $a^2/3$ from it, and their weighted mean is the point $x$ itself. So the squared distance from $x$ to the
 # corners is $a^2/3 - |x|^2$ on weighted average. Over a triangle, $|x|^2$ is $a^2/12$ on average. What is left is
-# `a²/4`, half of it along each axis. All three lines together must be 1:
+# `a²/4`, half of it along each axis.
 #
-# $$ \frac{a^2}{8} + \frac{3a^2}{4} + \frac{a^2}{8} = a^2 = 1 $$
-#
-# So **the sides are exactly one width long**. In $z$, the step `(1, 1, -2)` has the length $\sqrt 6$. And the formula of
-# $z$ stretches the plane by $\sqrt 6$: $f = (1, 0)$ becomes $(\sqrt 3, -\sqrt 3, 0)$.
+# All together must be 1, so **the sides are exactly one width long**. In $z$, the step `(1, 1, -2)` has the length
+# $\sqrt 6$. And the formula of $z$ stretches the plane by $\sqrt 6$: $f = (1, 0)$ becomes $(\sqrt 3, -\sqrt 3, 0)$.
 #
 # How high is the kernel? Slice reads a vertex with weight 1 at its own place, and with less and less towards its six
 # neighbours. Drawn over the plane, these weights are a pyramid of height 1 on six triangles. Its volume is a third of
@@ -428,7 +422,7 @@ plt.show()
 
 # %% [markdown]
 # The cross is the place of the 1, and the area of a mark shows how much a vertex holds. So sides of one width give the
-# Gaussian's variance, and the factor gives its integral. The shape needn't be the Gaussian's.
+# Gaussian's variance, and the factor its integral. The shape needn't be right.
 #
 # ## What does a cell tell itself?
 #
@@ -478,11 +472,10 @@ axes[2].legend(fontsize=9, frameon=False)
 plt.show()
 
 # %% [markdown]
-# The kernel follows the Gaussian, but it is a little hexagonal or triangular, and its height depends on where a cell is
-# in its triangle. So we must subtract what *this* filter gives back at *this* cell, its **self-response**. Does it
-# matter? Run the CRF of the street in three ways: with the lattice's self-response subtracted, with nothing in its
-# place, and with the Gaussian's 1. (A filter that adds a part of $Q$ undoes that part of the subtraction, and nothing
-# else changes.)
+# The kernel follows the Gaussian, but its height depends on where a cell is in its triangle. So we must subtract what
+# *this* filter gives back at *this* cell, its **self-response**. Does it matter? Run the CRF of the street with the
+# lattice's self-response, then with nothing in its place, then with a Gaussian's 1. (A filter that adds a part of $Q$
+# undoes that part of the subtraction. Nothing else changes.)
 
 # %% tags=["nbval-ignore-output", "self-response"]
 bilateral = crf.bilateral_kernel(o, params)
@@ -497,11 +490,12 @@ for way, undone in (("nothing", bilateral.diagonal), ("1", bilateral.diagonal - 
     other = mean_field_by_filters(-log_g, [bilateral, spatial, lambda Q, part=undone: part[:, None] * Q], own)
     changed = (other.argmax(axis=0) != Q.argmax(axis=0)).ravel()
     print(f"{way} subtracted: {changed.sum()} of {changed.size} labels change, {changed[lonely].sum()} in lonely cells")
+    assert changed[lonely].mean() > 4 * changed[~lonely].mean()
 print(f"lonely: {100 * lonely.mean():.0f} % of all cells")
 
 # %% [markdown]
-# Few labels change, because in most cells many others drown what a cell tells itself. It matters in lonely cells, whose
-# occupancy is unlike that of their neighbours: they would confirm their own opinion.
+# It matters little, because in most cells many others drown what a cell tells itself. Nearly half of the changed labels
+# are in the few *lonely* cells, whose occupancy is unlike their neighbours': they would confirm their own opinion.
 #
 # ## What is different in five dimensions?
 #
@@ -529,16 +523,13 @@ assert np.median(normalised) < 0.6 * np.median(as_it_is)
 #
 # ## Where this breaks: who lost the car at B?
 #
-# There are three suspects besides the model. Don't mix them up:
+# There are three suspects besides the model. On 60 x 40 cells around B each can be switched off:
 #
-# - the **kernel error**: another kernel, the same number of iterations;
-# - the **convergence error**: the same kernel, stopped before it settles;
-# - the **error of mean field** itself, which no filter removes.
-#
-# Each can be switched off on 60 x 40 cells around B. There all pairs can still be written down, which removes the kernel
-# error. Twenty iterations instead of ten remove most of the other. And mean field can be replaced by drawing maps from
-# the model: draw each cell's label in turn, given the labels of all others. After many rounds each label is drawn as
-# often as the CRF's own probabilities say. This is called *Gibbs sampling*.
+# - the **kernel error**: another kernel than equation (4)'s. There all pairs can be written down.
+# - the **convergence error**: stopped before it settles. We can do twenty iterations instead of ten.
+# - the **error of mean field** itself, which no filter removes. We can draw maps from the model: each cell's label in
+#   turn, given the labels of all others. After many rounds each label is drawn as often as the CRF's own
+#   probabilities say. This is called *Gibbs sampling*.
 #
 # **Predict before you run.** Seven cars are in the crop. The CRF with the lattice finds fewer of their cells than the
 # network. Which of the three switches brings them back?
@@ -572,7 +563,7 @@ assert max(abs(n - pairs) for n in (lattice_way, longer, drawn)) <= 6
 assert pairs < 0.8 * network
 
 # %% [markdown]
-# *Other labels* counts the cells in which a row differs from mean field with all pairs. The CRF changes many labels,
+# *Other labels* counts where a row differs from mean field with all pairs. The CRF changes many labels,
 # and the lattice is to blame for few of these. All rows but the first lose the cars. So **the model itself doesn't want
 # them**, and on this crop it makes the map worse. What does the lattice save?
 
@@ -581,15 +572,14 @@ products = (2 * bilateral.shares.nnz + sum(blur.nnz for blur in bilateral.blurs)
 print(f"products for a cell and a class: all pairs {o[0].size}, lattice {products:.0f}, two passes {sum(spec.shape)}")
 
 # %% [markdown]
-# It needs a few hundred times fewer products than all pairs. The two passes need more than the lattice does. On the
-# paper's grid both together take about a tenth of a second for ten iterations
-# ([measured](../benchmarks/README.md)), as long as one turn of the LIDAR.
+# Hundreds of times fewer products than all pairs; rows and columns even need more than the lattice. On the paper's grid
+# both together take about a tenth of a second ([measured](../benchmarks/README.md)), as long as one turn of the LIDAR.
 #
 # ## Why does the model not want the car?
 #
-# A car is four cells wide. Is it too thin, like the strip at the end of lecture 10? Then no car could survive, but
-# three of the seven do. So look at one cell. With the default weights it hears nearly 4 + 3 = 7 in all from the two
-# normalised kernels. Its neighbours share this among the classes.
+# A car is four cells wide. Is it too thin, like the strip in lecture 10? Then no car could survive, but three of the
+# seven do. So look at one cell. With the default weights it hears nearly 4 + 3 = 7 in all from the two normalised
+# kernels. Its neighbours share this among the classes.
 #
 # **Predict before you run.** The network gives a cell 0.7 for car and 0.2 for road. Of what it hears, a quarter says
 # car and a half says road. Which class leads after an update? What if the network gives 0.95 and 0.02?
@@ -601,10 +591,10 @@ print(f"products for a cell and a class: all pairs {o[0].size}, lattice {product
 #
 # </details>
 #
-# So a car should live if its patch is large, if the network is sure of it, or if cells of other classes aren't heard.
-# Not heard are cells with another occupancy. Is this right? Then *the same cars* must live or die when only these three
+# So a car should live if its patch is large, if the network is sure of it, or if cells of other classes aren't heard,
+# because their occupancy is another. Is this right? Then *the same cars* must live or die when only these three
 # change. We write the network's answer ourselves: a part of each car gets `p` for car, the rest hardly any. Then we
-# give the cars an occupancy that no other cell has.
+# give the cars an occupancy of their own.
 
 # %% tags=["patches"] jupyter={"source_hidden": true}
 cars, n_cars = label(is_car)  # numbers the patches of true car cells
@@ -662,14 +652,14 @@ assert all((survives > 0.8) == (share > 0.5) for share, survives in fates.values
 #
 # ## Are weaker neighbours better, then?
 #
-# The vote is weaker when the bilateral kernel has less weight, or when it reaches less far. Try both on five
-# frames of the drive, cars and all cells side by side:
+# The vote is weaker when the bilateral kernel has less weight, or when it reaches less far. Try both on five frames:
+
 
 # %% tags=["trade"] jupyter={"source_hidden": true}
-def score(answers):
+def score(answers, frames=street):
     """Return the shares of car cells and of all cells that are right, over all frames."""
-    right = np.array([answer == s.truth for answer, s in zip(answers, street, strict=True)])
-    return right[np.array([s.truth for s in street]) == CAR].mean(), right.mean()
+    right = np.array([answer == s.truth for answer, s in zip(answers, frames, strict=True)])
+    return right[np.array([s.truth for s in frames]) == CAR].mean(), right.mean()
 
 
 def refine_all(**changes):
@@ -677,9 +667,12 @@ def refine_all(**changes):
     return [fast.mean_field(-s.log_g, s.o, replace(params, **changes)).argmax(axis=0) for s in street]
 
 
-alone = score([s.log_g.argmax(axis=0) for s in street])
-weights = {w: score(refine_all(w_bilateral=w)) for w in (4.0, 2.0, 1.0, 0.0)}
-reaches = {reach: score(refine_all(sigma_alpha=reach)) for reach in (1.2, 2.0, 3.2, 8.0)}
+networks, crfs = [s.log_g.argmax(axis=0) for s in street], refine_all()
+alone, default = score(networks), score(crfs)
+gains = [np.subtract(score([b], [s]), score([a], [s])) for a, b, s in zip(networks, crfs, street, strict=True)]
+print("frames in which the CRF gains: cars {}, all cells {} of 5".format(*(np.array(gains) > 0).sum(axis=0)))
+weights = {4: default} | {w: score(refine_all(w_bilateral=float(w))) for w in (2, 1, 0)}
+reaches = {1.2: score(refine_all(sigma_alpha=1.2)), 3.2: default, 8.0: score(refine_all(sigma_alpha=8.0))}
 
 # %% jupyter={"source_hidden": true} alt="right cells against right car cells on five frames: less weight or less reach of the bilateral kernel gives more cars and fewer right cells, along nearly the same line; a longer reach loses cars and wins no cells; the network alone has many cars and the fewest right cells"
 fig, ax = plt.subplots(figsize=(6.6, 3.6), layout="constrained")
@@ -698,14 +691,13 @@ by_weight, by_reach = (np.array(list(curve.values())) for curve in (weights, rea
 assert (np.diff(by_weight[:, 0]) > 0).all()  # less weight: more cars, fewer cells
 assert (np.diff(by_weight[:, 1]) < 0).all()
 assert by_reach[0, 0] > by_reach[1, 0] > by_reach[2, 0]
-assert by_reach[0, 1] < by_reach[1, 1] < by_reach[2, 1]
-assert by_reach[3, 0] < by_reach[2, 0]
-assert by_reach[3, 1] < by_reach[2, 1] + 0.001
+assert by_reach[0, 1] < by_reach[1, 1]
+assert by_reach[2, 1] < by_reach[1, 1] + 0.001
 
 # %% [markdown]
-# It is a trade, whichever knob we turn. Neighbours that speak louder repair more cells and lose more cars. A reach
-# beyond the default loses cars and wins nothing. No better filter changes this. The companion
-# [the CRF, measured](deeper/11_crf_measured.ipynb) shows the trade on many more streets.
+# It is a trade, whichever knob we turn: louder neighbours repair more cells and lose more cars. A reach beyond the default
+# loses cars and wins nothing. No better filter changes this. The companion
+# [the CRF, measured](deeper/11_crf_measured.ipynb) shows many more streets.
 #
 # ## In five lines
 #
