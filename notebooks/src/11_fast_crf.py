@@ -7,16 +7,14 @@
 # **You will be able to**
 # - rewrite a sum over all pairs as a filter, and say what it saves;
 # - find the triangle of the permutohedral lattice around a point, and the point's weights, by hand;
-# - derive how far apart its vertices must be, and how high the filter's peak is;
-# - subtract what a cell tells itself;
+# - derive how far apart its vertices must be, and subtract what a cell tells itself;
 # - find out whether an approximation or the model is to blame for a bad map.
 #
 # **Prerequisites.** Lecture [10](10_crf.ipynb): equations (3) and (4), mean field with damping, normalisation.
 #
 # **Time.** 75 minutes, of which the computer needs less than one.
 #
-# **Paper.** Section 3.5, equation (4) at full size. Its inference is that of Krähenbühl and Koltun (2011), with the
-# lattice of Adams, Baek and Davis (2010).
+# **Paper.** Section 3.5, equation (4) at full size.
 
 # %% jupyter={"source_hidden": true}
 from dataclasses import replace
@@ -47,8 +45,8 @@ CAR, ROAD = KITTI_14.index("car"), KITTI_14.index("road")
 # %% [markdown]
 # ## How can each cell hear all others?
 #
-# The first map shows which classes a street really has, the second what a network finds. The third is the second after
-# the CRF of lecture 10. The occupancy grid tells the CRF where things end.
+# Compare the true classes of a street with what a network finds, before and after the CRF of lecture 10. The occupancy
+# grid tells the CRF where things end.
 
 # %% jupyter={"source_hidden": true} alt="four maps of one street: the true classes, the network's with ragged edges, the refined ones with smoother regions, and the occupancy grid; left of A wrong cells vanish, right of B a car that the network found in part is gone after the CRF"
 LETTERS = {"A": (-6, 60), "B": (13, 23)}
@@ -61,12 +59,14 @@ def note(ax):
         ax.text(*place, letter, ha="center", va="center", fontsize=9, bbox=circle)
 
 
-fig, axes = plt.subplots(1, 4, figsize=(10, 5.4), layout="compressed", sharey=True)
+fig, axes = plt.subplots(1, 4, figsize=(10, 5.6), layout="compressed", sharey=True)
 maps = {"truth": truth, "network": by_network, "after the CRF": refined}
 for ax, (title, labels) in zip(axes, maps.items(), strict=False):
     plotting.grid_labels(spec, labels, KITTI_14, ax=ax, legend=False).set(title=title, ylim=(0, 66), xlim=(15, -12))
-below = {"loc": "upper left", "bbox_to_anchor": (0, -0.17), "ncols": 5, "columnspacing": 1.2}
-plotting.class_legend(axes[0], KITTI_14, np.stack(list(maps.values())), **below)
+legend = plotting.class_legend(axes[0], KITTI_14, np.stack(list(maps.values()))).get_legend()
+legend.remove()
+names = [text.get_text() for text in legend.get_texts()]
+fig.legend(legend.legend_handles, names, loc="outside lower center", ncols=6, fontsize=9, frameon=False)
 plotting.occupancy(spec, o, ax=axes[3]).set(title="occupancy grid", ylim=(0, 66), xlim=(15, -12))
 for ax in axes:
     ax.set_ylabel("x, forward [m]" if ax is axes[0] else "")
@@ -127,7 +127,7 @@ np.testing.assert_allclose(ours, crf.mean_field_naive(-log_g[small], o[small], p
 
 # %% [markdown]
 # The last line says: if the blur is a product with the matrix, this is lecture 10's mean field. So each cell can hear
-# all others if we have a fast blur. We need one for each kernel of equation (4).
+# all others if we have a fast blur for each kernel of equation (4).
 #
 # ## Can we blur the rows first, then the columns?
 #
@@ -267,8 +267,7 @@ lecture_11_lattice.code_of(crf.enclosing_simplices)
 #
 # Write the weights as a matrix $S$, with one row per cell and one column per vertex. Splat is a product with
 # $S^\top$, slice is a product with $S$, and each blur is a matrix with ½ on its diagonal and ¼ where two
-# vertices are neighbours. All of them are nearly empty. Here is the rest of the book's code; with what you
-# saw above these are some thirty lines:
+# vertices are neighbours. All of them are nearly empty. Here is the rest of the book's code:
 
 # %% jupyter={"source_hidden": true} tags=["splat-blur-slice"]
 Lattice = crf.PermutohedralLattice
@@ -276,8 +275,8 @@ lecture_11_lattice.code_of(Lattice.build.__func__, lattice._blur, Lattice.__call
 
 # %% [markdown]
 # Only vertices around cells are numbered, so empty space costs nothing. What a blur would move to a vertex that isn't
-# there is lost. (Is that an error? The exercise measures it.) Watch the filter work on a row of 36 cells. The left half
-# is FREE, the right half STATIC. The network gives *road* about 0.75 on the left and 0.25 on the right, with much
+# there is lost. (Is that an error? The exercise measures it.) Watch the filter work on a row of cells. The left half
+# is FREE, the right half STATIC. The network finds *road* likely on the left and unlikely on the right, with much
 # noise. Each cell is a point: to the right its place in the row, upwards its P(FREE).
 
 
@@ -347,8 +346,8 @@ assert np.mean(errors["by place and occupancy"]) < 0.6 * np.mean(errors["by plac
 #
 # ## How far apart must the vertices be?
 #
-# Large triangles blur widely, small ones hardly. We want the Gaussian's variance, 1 along each axis. Call the side of
-# a triangle $a$ and follow one value through the filter:
+# Large triangles blur widely. We want the Gaussian's variance, 1 along each axis. Call the side of a triangle $a$ and
+# follow one value through the filter:
 #
 # ```
 # splat         moves it to the corners of its triangle                                  a²/8
@@ -366,17 +365,13 @@ assert np.mean(errors["by place and occupancy"]) < 0.6 * np.mean(errors["by plac
 # All together must be 1, so **the sides are exactly one width long**. In $z$, the step `(1, 1, -2)` has the length
 # $\sqrt 6$. And the formula of $z$ stretches the plane by $\sqrt 6$: $f = (1, 0)$ becomes $(\sqrt 3, -\sqrt 3, 0)$.
 #
-# How high is the kernel? Slice reads a vertex with weight 1 at its own place, and with less and less towards its six
+# How high is the kernel? Slice reads a vertex fully at its own place, and less and less towards its six
 # neighbours. Drawn over the plane, these weights are a pyramid of height 1 on six triangles. Its volume is a third of
 # base times height, `√3/2`. Splat and blur keep the sum. So a value of 1 comes out with the integral `√3/2`,
-# and a Gaussian of height 1 has `2π`. The filter must be multiplied by
-#
-# ```
-# 2π / (√3 / 2) = 4π / √3 = 7.26
-# ```
+# and a Gaussian of height 1 has `2π`. The filter must be multiplied by `2π / (√3 / 2) = 7.26`.
 #
 # The book's `elevation(d)` and `peak(d)` do this for $d$ features. Are they right? Put a 1 at many places of a
-# dense cloud, one after the other, and measure the variance after each part of the filter:
+# dense cloud, and measure the variance after each part of the filter:
 
 # %% tags=["spacing"]
 cloud = np.stack(np.meshgrid(*[np.arange(-5, 5, 0.1)] * 2), axis=-1).reshape(-1, 2)
@@ -428,8 +423,8 @@ plt.show()
 #
 # The filter adds up all cells, the listening one included. A cell is no pair with itself, so $k_{ii}\, Q_i$ must be
 # subtracted. For a Gaussian $k_{ii}$ is 1. What is it for the lattice? Put a 1 on one vertex and blur three
-# times. The vertex keeps (½)³. One step forward along each of the three directions leads back to it, and so does one
-# step backward along each. A neighbour is one step away, or one step backward along each of the two other directions:
+# times. The vertex keeps (½)³. One step forward along each direction leads back to it, and so does one
+# backward along each. A neighbour is one step away, or one step backward along each of the two other directions:
 #
 # ```
 # the vertex itself   1/2 · 1/2 · 1/2 + 1/4 · 1/4 · 1/4 + 1/4 · 1/4 · 1/4  =  10/64
@@ -497,9 +492,7 @@ print(f"lonely: {100 * lonely.mean():.0f} % of all cells")
 # It matters little, because in most cells many others drown what a cell tells itself. Nearly half of the changed labels
 # are in the few *lonely* cells, whose occupancy is unlike their neighbours': they would confirm their own opinion.
 #
-# ## What is different in five dimensions?
-#
-# The street has five features and no dense cloud: there are more vertices than cells. Is the filter still right?
+# The street differs from the cloud: it has five features, and more vertices than cells. Is the filter still right?
 # Compare what some cells hear with the exact sums:
 
 # %% tags=["five"]
@@ -646,9 +639,8 @@ assert (np.diff([curve[:3] for curve in curves.values()], axis=0) < 0).all()
 assert all((survives > 0.8) == (share > 0.5) for share, survives in fates.values())
 
 # %% [markdown]
-# A car without a dot wasn't found at all. Each of the three switches brings cars back. So **a patch that is small or
-# unsure is outvoted by cells of like occupancy**. B's patch is small, and most cells of that car look like the
-# roadside: STATIC or UNKNOWN.
+# Each of the three switches brings cars back. So **a patch that is small or unsure is outvoted by cells of like
+# occupancy**. B's patch is small, and most cells of that car are STATIC or UNKNOWN, like the roadside.
 #
 # ## Are weaker neighbours better, then?
 #
