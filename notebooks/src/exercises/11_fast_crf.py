@@ -102,7 +102,7 @@ _test()
 # ## Task 2: is losing an error? (3 points)
 #
 # The lecture's blur loses what would go to a vertex that doesn't exist. One could also let a vertex **keep** what it can't give away, so that the sum over all vertices stays the same.
-# Which is nearer to the Gaussian? Build both. `simplices` is a list with one pair for each of N points: `corners`, an
+# Build both, and compare. `simplices` is a list with one pair for each of N points: `corners`, an
 # integer array `(d + 1, d + 1)`, one row per corner, and `weights`, `(d + 1,)`. `values` is `(N, K)`. The filter
 #
 # 1. *splats*: a vertex gets the sum of `weight * value` of all points around it. Only vertices that are a corner of some point exist;
@@ -187,7 +187,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# Now ask your filter. With its peak it should give each cell the sum over all others that the Gaussian gives. Run the next cell, and keep its numbers for task 5.
+# Which is nearer to the Gaussian? The next cell multiplies your filter by the lattice's peak and compares both with the sums over all pairs. You need its numbers in task 5.
 
 
 # %% nbgrader={"grade": false, "grade_id": "exact-sums", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
@@ -456,7 +456,7 @@ def _test():
     assert not np.allclose(large, log_g), "refine gave log_g back: this point is for a map that was refined"
     assert not np.allclose(large, np.exp(log_g)), "refine gave the network's probabilities back, not refined ones"
     assert megabytes < 30, (
-        f"3120 cells took {megabytes:.0f} MB: you write all pairs down; the paper's grid would take 24 GB"
+        f"1950 cells took {megabytes:.0f} MB: you write all pairs down; the paper's grid would take 24 GB"
     )
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import fast_crf
@@ -486,7 +486,7 @@ _test()
 # something else loses the cars? Name what each run switches off. Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "three-errors", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
-# The quarter was on its way to a place in the space of features where no cell is. Most of it should go, because nobody is there to hear it; a small part would have reached cells further on. A vertex that keeps it
+# The quarter was on its way to a place in the space of features where no cell is. So a part of it should go, because nobody is there to hear it. Another part would have reached cells further on: with the empty vertices around, the sums come nearer to the exact ones, at several times as many vertices. A vertex that keeps it
 # gives it to the cells that are there already. They hear each other too loudly: in five dimensions the sums are about three times the exact ones, and the error of a row is larger than with the loss. A map suffers little, because equation (4) is
 # normalised: each kernel is divided by its own sums, and a common factor cancels. Only the shape counts. To find the cause, count the true car cells that are found by the network, by the lattice, by all pairs (no kernel error), by all
 # pairs with more iterations (no convergence error) and by Gibbs sampling with all pairs (no error of mean field). If the last four lose about as many, it is the model: change its weight, or the occupancy of the cars, and count again.
