@@ -22,6 +22,7 @@ from itertools import islice
 
 import matplotlib.pyplot as plt
 import numpy as np
+from ipywidgets import FloatSlider, interact
 from matplotlib.cm import ScalarMappable
 from scipy.ndimage import label
 from scipy.spatial.distance import cdist
@@ -246,15 +247,35 @@ ax.set(xlabel="first feature [widths]", ylabel="second feature [widths]")
 plt.show()
 
 # %% [markdown]
-# The two triangles share the corner `(3, 0, -3)`. When a point moves out of its triangle, the weight of the opposite
-# corner has become zero, so nothing jumps. With $d$ features the recipe is the same: $d + 1$ numbers that sum
+# The two triangles share the corner `(3, 0, -3)`. With $d$ features the recipe is the same: $d + 1$ numbers that sum
 # to zero, multiples of $d + 1$, a sort, $d + 1$ corners. Here is the book's code. It does all points at once:
 
 # %% jupyter={"source_hidden": true}
 lecture_11_lattice.code_of(crf.enclosing_simplices)
 
 # %% [markdown]
-# So the triangle costs a rounding and a sort.
+# **Play with it.** Move a point. When does a weight become zero?
+
+
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
+def show(first, second):
+    """Draw the triangle around a point."""
+    _, ax = plt.subplots(figsize=(5, 4), layout="constrained")
+    lecture_11_lattice.draw_triangles((-1.3, -1.2), (2.3, 2.2), ax)
+    lecture_11_lattice.draw_simplex(np.array([first, second]), ax)
+    ax.set(xlabel="first feature [widths]", ylabel="second feature [widths]")
+    plt.show()
+
+
+_ = interact(
+    show,
+    first=FloatSlider(value=0.3, min=-0.5, max=1.5, step=0.2),
+    second=FloatSlider(value=0.5, min=-0.5, max=1.5, step=0.2),
+)
+
+# %% [markdown]
+# It becomes zero where the point leaves the triangle on the opposite side, so nothing jumps. And the triangle costs
+# only a rounding and a sort.
 #
 # ## How do cells talk through the vertices?
 #
@@ -583,12 +604,14 @@ print(f"products for a cell and a class: all pairs {o[0].size}, lattice {product
 #
 # </details>
 #
-# So a car should live if its patch is large, if the network is sure of it, or if cells of other classes aren't heard,
+# ## What saves a patch?
+#
+# A car should live if its patch is large, if the network is sure of it, or if cells of other classes aren't heard,
 # because their occupancy is another. Is this right? Then *the same cars* must live or die when only these three
 # change. We write the network's answer ourselves: a part of each car gets `p` for car, the rest hardly any. Then we
 # give the cars an occupancy of their own.
 
-# %% tags=["patches"] jupyter={"source_hidden": true}
+# %% jupyter={"source_hidden": true}
 cars, n_cars = label(is_car)  # numbers the patches of true car cells
 others = np.where(np.arange(len(unary))[:, None, None] == CAR, 0, np.exp(-unary))
 others /= others.sum(axis=0)  # what the network says besides car
@@ -606,6 +629,7 @@ def kept(share, p, occupancy, order):
     return (fast.mean_field(-np.log(g), occupancy, params).argmax(axis=0) == CAR)[is_car & (p_car == p)].mean()
 
 
+# %% jupyter={"source_hidden": true} tags=["patches"]
 shares = np.array([0.25, 0.5, 0.75, 1.0])
 curves = {
     name: [np.mean([kept(share, p, occupancy, order) for order in (1, -1)]) for share in shares]  # far or near part

@@ -198,10 +198,8 @@ def _compare(name, features):
     for keep in (False, True):
         kernel = lattice.peak(features.shape[1]) * lattice_filter(simplices, np.eye(len(features)), keep)
         sums, exact_sums = kernel.sum(axis=1, keepdims=True), exact.sum(axis=1, keepdims=True)
-        error = np.abs(kernel / sums - exact / exact_sums).sum(axis=1).mean()
-        print(
-            f"{name}, keep={keep!s:<5}  sums / exact sums {np.median(sums / exact_sums):.2f}, error when both are divided by their sums {error:.3f}"
-        )
+        ratio, error = np.median(sums / exact_sums), np.abs(kernel / sums - exact / exact_sums).sum(axis=1).mean()
+        print(f"{name}, keep={keep!s:<5}  sums / exact sums {ratio:.2f}, error of the normalised sums {error:.2f}")
 
 
 def _row_and_street():
@@ -354,9 +352,7 @@ def refine(log_g, o):
 
 
 # %% nbgrader={"grade": false, "grade_id": "all-pairs", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
-def _all_pairs(
-    log_g, o, w=(4, 3), widths=(3.2, 0.2, 1.2), own=(1, 1), root=0.5, sign=1, rounds=10, keep=0, log=True, part=1
-):
+def _all_pairs(log_g, o, w=(4, 3), widths=(3.2, 0.2, 1.2), own=(1, 1), root=0.5, rounds=10, keep=0, log=True, part=1):
     """Do the same with a matrix of all pairs; other keywords make mistakes."""
     place, flat, K, diagonal = np.indices(o.shape[1:]).reshape(2, -1).T, log_g.reshape(len(log_g), -1), 0, 0
     for weight, subtract, f in (
@@ -370,7 +366,7 @@ def _all_pairs(
     log_Q, part = flat, 1 / (1 + diagonal / 2) if part == "p" else part
     for _ in range(rounds + 1):
         Q = np.exp(log_Q - log_Q.max(axis=0)) / np.exp(log_Q - log_Q.max(axis=0)).sum(axis=0)
-        log_Q = log_Q + part * (flat + keep * (log_Q - flat) + sign * Q @ K - log_Q)
+        log_Q = log_Q + part * (flat + keep * (log_Q - flat) + Q @ K - log_Q)
     return Q.reshape(log_g.shape)
 
 
@@ -389,7 +385,7 @@ _REFINE_SLIPS = {
     "what a cell tells itself through rows and columns isn't subtracted: both kernels have a diagonal": {"own": (1, 0)},
     "the kernels aren't normalised: D^-1/2 K D^-1/2": {"root": 0},
     "you divide by the row sums twice: scale by 1 / sqrt(D) before and after the filter": {"root": 1},
-    "the sign of the sum is wrong: agreeing neighbours raise log Q": {"sign": -1},
+    "the sign of the sum is wrong: agreeing neighbours raise log Q": {"w": (-4, -3)},
     "the two weights are swapped: 4 is that of the bilateral kernel": {"w": (3, 4)},
     "the bilateral kernel is missing": {"w": (0, 3)},
     "the spatial kernel is missing": {"w": (4, 0)},
