@@ -172,7 +172,7 @@ print(f"products for each cell: all pairs {car.size}, two passes {sum(car.shape)
 # ## How can a blur stop at a wall?
 #
 # The *bilateral* kernel also compares occupancy. Take two neighbouring cells, one certainly FREE, one certainly STATIC.
-# The two lists of four probabilities are $\sqrt 2$ apart. With the width $\sigma_\beta = 0.2$ the kernel falls to
+# The two lists of probabilities are $\sqrt 2$ apart. With the width $\sigma_\beta = 0.2$ the kernel falls to
 # $e^{-25}$: the two don't hear each other. So this blur has another shape around each cell, and two passes with the same
 # weights everywhere can't do that.
 #
@@ -219,8 +219,8 @@ np.testing.assert_allclose(
 #    of the first                            what is missing to 1, 0.33
 # ```
 #
-# These are **barycentric weights**: the weighted mean of the corners is the point. Check
-# the first number: `0.33 · 3 + 0.13 · 4 + 0.53 · 5 = 4.2`.
+# These are **barycentric weights**: the weighted mean of the corners is the point. Check the first number:
+# `0.33 · 3 + 0.13 · 4 + 0.53 · 5 = 4.2`.
 #
 # **Predict before you run.** Now `z = (1.7, 1.6, -3.3)`. Rounding gives `(3, 3, -3)`. The sum isn't zero, so this is no
 # vertex. Which number do you round the other way?
@@ -371,8 +371,8 @@ assert np.mean(errors["by place and occupancy"]) < 0.6 * np.mean(errors["by plac
 #
 # ```
 # splat         moves it to the corners of its triangle                                  a²/8
-# three blurs   each moves a quarter by a forward and a quarter by a back,
-#               a²/4 + a²/4 along its direction; 60° apart, three give any axis 3/2      3a²/4
+# three blurs   each moves a quarter by a forward and a quarter by a back: a²/2 along
+#               its direction; three directions, 60° apart, give any axis half of each   3a²/4
 # slice         splat backwards                                                          a²/8
 # all                                                                                    a²
 # ```
@@ -591,23 +591,23 @@ print(f"products for a cell and a class: all pairs {o[0].size}, lattice {product
 # ## Why does the model not want the car?
 #
 # A car is four cells wide. Is it too thin, like the strip in lecture 10? Then no car could survive, but three of the
-# seven do. So look at one cell. With the default weights it hears nearly 4 + 3 = 7 in all from the two normalised
-# kernels. Its neighbours share this among the classes.
+# seven do. So look at one cell. It hears nearly the sum of the two kernels' weights, 7, because they are normalised. Its
+# neighbours share this among the classes.
 #
 # **Predict before you run.** The network gives a cell 0.7 for car and 0.2 for road. Of what it hears, a quarter says
-# car and a half says road. Which class leads after an update? What if the network gives 0.95 and 0.02?
+# car and a half says road. Which class leads after an update? How could the other win?
 #
 # <details><summary>Answer</summary>
 #
-# The network's lead for car is log(0.7 / 0.2) = 1.25. The neighbours' is 7 · (0.25 - 0.5) = -1.75. Road wins. With 0.95
-# and 0.02 the network's lead is 3.9, and car wins.
+# The network's lead for car is log(0.7 / 0.2) = 1.25. The neighbours' is 7 · (0.25 - 0.5) = -1.75. Road wins. Car wins if
+# the network is surer, or if more of what the cell hears says car.
 #
 # </details>
 #
 # ## What saves a patch?
 #
 # A car should live if its patch is large, if the network is sure of it, or if cells of other classes aren't heard,
-# because their occupancy is another. Is this right? Then *the same cars* must live or die when only these three
+# because their occupancy is another. If this is right, *the same cars* must live or die when only these three
 # change. We write the network's answer ourselves: a part of each car gets `p` for car, the rest hardly any. Then we
 # give the cars an occupancy of their own.
 
@@ -719,18 +719,15 @@ assert by_reach[2, 1] < by_reach[1, 1] + 0.001
 #
 # 1. Mean field needs a sum over all pairs; that sum is a blur, so a filter can compute it.
 # 2. The spatial kernel is separable: rows, then columns, nothing lost.
-# 3. The bilateral kernel is a Gaussian of features. Splat, blur, slice: each cell talks to the corners of its simplex,
-#    which rounding and sorting find.
+# 3. The bilateral kernel is a Gaussian of features. Splat, blur, slice: rounding and sorting find the corners of a cell.
 # 4. The filter counts the cell itself; subtract what this filter gives back at this cell.
-# 5. The lattice's kernel is only nearly Gaussian, and the map hardly shows it. Small or unsure patches of cars vanish
+# 5. The lattice isn't quite Gaussian, and the map hardly shows it. Small or unsure patches of cars vanish
 #    because the model outvotes them: all pairs and Gibbs sampling lose them, too.
 #
 # ## Further reading and exercise
 #
 # - Krähenbühl, Koltun, *Efficient inference in fully connected CRFs with Gaussian edge potentials*, NIPS 2011.
 # - Adams, Baek, Davis, *Fast high-dimensional filtering using the permutohedral lattice*, Eurographics 2010.
-# - Paris, Durand, *A fast approximation of the bilateral filter using a signal processing approach*, ECCV 2006: cubes,
-#   before simplices.
 #
 # [Exercise 11](exercises/11_fast_crf.ipynb): a blur over gaps, a blur that keeps what yours loses, the self-response of
 # many cells at once; and a CRF of your own that refines the drive. Next: lecture [12](12_experiments.ipynb), what the
