@@ -98,8 +98,7 @@ plt.show()
 # </details>
 #
 # Look at the three lines again. Each cell computes a weighted sum, with the largest weight at its own place. A photo
-# editor does the same when it blurs an image: **message passing is filtering**. With $Q_i(l)$
-# the probability of class $l$ in cell $i$, $\phi_i(l)$ the network's price and $k_{ij}$ the kernel, an update of
+# editor does the same when it blurs an image: **message passing is filtering**. With $Q_i(l)$ the probability of class $l$ in cell $i$, $\phi_i(l)$ the network's price and $k_{ij}$ the kernel, an update of
 # lecture 10 is
 #
 # $$ \log Q_i(l) \leftarrow -\phi_i(l) + \underbrace{\sum_{j} k_{ij}\, Q_j(l)}_{\text{blurred map}}
@@ -516,7 +515,7 @@ print(f"lonely: {100 * lonely.mean():.0f} % of all cells")
 # Compare what some cells hear with the exact sums:
 
 # %% tags=["five"]
-some = np.arange(0, len(features), 20)
+some = np.arange(0, len(features), 40)
 exact = np.exp(-0.5 * cdist(features[some], features, "sqeuclidean"))  # one row for each of these cells
 ones = np.zeros((len(features), len(some)))
 ones[some, np.arange(len(some))] = 1
@@ -585,8 +584,9 @@ products = (2 * bilateral.shares.nnz + sum(blur.nnz for blur in bilateral.blurs)
 print(f"products for a cell and a class: all pairs {o[0].size}, lattice {products:.0f}, two passes {sum(spec.shape)}")
 
 # %% [markdown]
-# Hundreds of times fewer products than all pairs; rows and columns even need more than the lattice. On the paper's grid
-# both together take about a tenth of a second ([measured](../benchmarks/README.md)), as long as one turn of the LIDAR.
+# The lattice needs hundreds of times fewer products than all pairs, and rows and columns need more than the lattice. On
+# the paper's grid both kernels together take about a tenth of a second ([measured](../benchmarks/README.md)), as long as
+# one turn of the LIDAR.
 #
 # ## Why does the model not want the car?
 #
@@ -687,7 +687,7 @@ networks, crfs = [s.log_g.argmax(axis=0) for s in street], refine_all()
 alone, default = score(networks), score(crfs)
 gains = [np.subtract(score([b], [s]), score([a], [s])) for a, b, s in zip(networks, crfs, street, strict=True)]
 print("frames in which the CRF gains: cars {}, all cells {} of 5".format(*(np.array(gains) > 0).sum(axis=0)))
-weights = {4: default} | {w: score(refine_all(w_bilateral=float(w))) for w in (2, 1, 0)}
+weights = {4: default} | {w: score(refine_all(w_bilateral=float(w))) for w in (1, 0)}
 reaches = {1.2: score(refine_all(sigma_alpha=1.2)), 3.2: default, 8.0: score(refine_all(sigma_alpha=8.0))}
 
 # %% jupyter={"source_hidden": true} alt="right cells against right car cells on five frames: less weight or less reach of the bilateral kernel gives more cars and fewer right cells, along nearly the same line; a longer reach loses cars and wins no cells; the network alone has many cars and the fewest right cells"
@@ -712,7 +712,7 @@ assert by_reach[2, 1] < by_reach[1, 1] + 0.001
 
 # %% [markdown]
 # It is a trade, whichever knob we turn: louder neighbours repair more cells and lose more cars. A reach beyond the default
-# loses cars and wins nothing. No better filter changes this. The companion
+# loses cars and wins nothing. No better filter changes this, because the model asks for it. The companion
 # [the CRF, measured](deeper/11_crf_measured.ipynb) shows many more streets.
 #
 # ## In five lines

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 
 def frequencies(
-    unary: NDArray, weights: NDArray, sweeps: int = 80, burn_in: int = 30, seed: int = 0
+    unary: NDArray, weights: NDArray, sweeps: int = 60, burn_in: int = 20, seed: int = 0
 ) -> NDArray[np.float64]:
     """Draw each cell's label in turn, given all others, and count how often each label is drawn.
 
