@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from semgrid_edu.labels import KITTI_14
@@ -27,8 +28,8 @@ def six_rays() -> Figure:
     fig, ax = plt.subplots(figsize=(8.2, 2.6), layout="constrained")
     ax.fill([NEAR, FAR, FAR, NEAR], [0, 0, ROOF, ROOF], color=np.divide(KITTI_14.rgb[3], 255), alpha=0.35)
     ax.text((NEAR + FAR) / 2, 0.6, "the car", ha="center")
-    for x, name in zip((6, 10, 14), "abc", strict=True):
-        ax.text(x, -0.35, f"cell {name}", ha="center")
+    for x, name in zip((6, 10, 14), ("before", "in", "behind"), strict=True):
+        ax.text(x, -0.35, name, ha="center")
         for z in (0.0, ROOF):
             called, x_end, z_end = where_ray_ends(x, z)
             colour = np.divide(KITTI_14.rgb[KITTI_14.index(called)], 255)
@@ -40,6 +41,24 @@ def six_rays() -> Figure:
     ax.hlines([0, ROOF], 0, 20, color="0.6", linestyle=":", zorder=0)
     ax.set(xlim=(-0.5, 18), ylim=(-0.5, 2.1), xlabel="x, forward [m]", ylabel="z, up [m]")
     return fig
+
+
+def mark(axes: Sequence[Axes], places: dict[str, tuple[float, float]]) -> None:
+    """Mark places of maps by their names, with a ring.
+
+    Parameters
+    ----------
+    axes : sequence of Axes
+        The maps.
+    places : dict of str to (float, float)
+        x and y of each place, by its name.
+    """
+    for ax in axes:
+        for name, (x, y) in places.items():
+            ax.plot(y, x, "o", markersize=7, markerfacecolor="none", markeredgecolor="black", markeredgewidth=2.4)
+            ax.plot(y, x, "o", markersize=7, markerfacecolor="none", markeredgecolor="white", markeredgewidth=1)
+            ax.annotate(name, (y, x), (6, 3), textcoords="offset points", fontsize=9,
+                        bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "black"})  # fmt: skip
 
 
 def map_sizes(net: FusionNet, n_rows: int, n_cols: int) -> list[tuple[str, str, int]]:
@@ -59,13 +78,13 @@ def map_sizes(net: FusionNet, n_rows: int, n_cols: int) -> list[tuple[str, str, 
     stages = list(zip(net.conv_deconv.encoder, net.conv_deconv.decoder, strict=True))
     for level, (encode, _) in enumerate(stages):
         sizes += [
-            (f"conv{' x2' * (len(encode) > 1)}", str(_width(encode)), level),
+            (f"3x3{' x2' * (len(encode) > 1)}", str(_width(encode)), level),
             ("pool", str(_width(encode)), level + 1),
         ]
     for level, (_, decode) in reversed(list(enumerate(stages))):
         sizes += [
             ("unpool\n+ skip", str(_first_width(decode)), level),
-            (f"conv{' x2' * (len(decode) > 1)}", str(_width(decode)), level),
+            (f"3x3{' x2' * (len(decode) > 1)}", str(_width(decode)), level),
         ]
     return [(what, f"{channels}\n{n_rows >> level} x {n_cols >> level}", level) for what, channels, level in sizes]
 
@@ -95,7 +114,7 @@ def fusion_network(net: FusionNet, n_rows: int, n_cols: int) -> Figure:
         ax.bar(x, height, 0.5, bottom=-1.7 * level, color=colour, edgecolor="0.3")
         ax.text(x, -1.7 * level + height + 0.08, what, ha="center", va="bottom", fontsize=8.5)
         ax.text(x, -1.7 * level - 0.1, size, ha="center", va="top", fontsize=8)
-    down = {level: x for x, (what, _, level) in enumerate(maps) if what.startswith("conv") and x < len(maps) // 2 + 1}
+    down = {level: x for x, (what, _, level) in enumerate(maps) if what.startswith("3x3") and x < len(maps) // 2 + 1}
     up = {level: x for x, (what, _, level) in enumerate(maps) if what.startswith("unpool")}
     for level, x in up.items():
         y = -1.7 * level + 0.35
