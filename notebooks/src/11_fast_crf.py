@@ -700,6 +700,7 @@ for curve, name, colour, line, marker, offset in (
     for value, at in curve.items():
         ax.annotate(f"{value:g}", 100 * np.array(at), offset, textcoords="offset points", fontsize=9, color=colour)
 ax.plot(*100 * np.array(alone), "*", color="black", markersize=12, label="network, no CRF")
+ax.margins(0.08, 0.1)
 ax.set(xlabel="car cells right [%]", ylabel="all cells right [%]")
 ax.legend(fontsize=9, frameon=False)
 plt.show()
