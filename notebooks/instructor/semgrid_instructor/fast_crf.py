@@ -1,5 +1,6 @@
 """Hidden tests of exercise 11, the fast CRF: sums over all pairs and the package's simplices are the reference."""
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -30,31 +31,31 @@ def check_blur_known(blur_known: Callable) -> None:
     assert megabytes < 20, "a map of 60 x 50 cells took far more memory than passes along rows and columns need"
 
 
-def _blurred(vertices: dict[tuple[int, ...], NDArray], direction: int) -> dict[tuple[int, ...], NDArray]:
-    """Return the vertices after each has given away what its neighbours along a direction can take."""
+def _blurred(vertices: dict[tuple[int, ...], NDArray], direction: int, keep: bool) -> dict[tuple[int, ...], NDArray]:
+    """Return the vertices after each has given a quarter away on both sides; without a taker it is lost or kept."""
     new = dict.fromkeys(vertices, 0.0)
     for vertex, value in vertices.items():
-        kept = value
+        kept = value / 2
         for sign in (1, -1):
             other = tuple(c + sign * (1 - len(vertex) * (i == direction)) for i, c in enumerate(vertex))
             if other in new:
                 new[other] = new[other] + value / 4
-                kept = kept - value / 4
+            elif keep:
+                kept = kept + value / 4
         new[vertex] = new[vertex] + kept
     return new
 
 
 @hidden
 def check_lattice_filter(lattice_filter: Callable) -> None:
-    """Clouds in one, two, three and five dimensions, with vertices that are missing."""
-    for d in (1, 2, 3, 5):
+    """Clouds in one, two, three and five dimensions, with missing vertices: what is for them is lost or kept."""
+    for d, keep in itertools.product((1, 2, 3, 5), (False, True)):
         rng = generator(117 + d)
         points = rng.normal(0, 4, (25, d + 1))
         corners, weights = enclosing_simplices(points - points.mean(axis=1, keepdims=True))
         values = rng.random((25, 3))
-        got = answer_array(
-            lattice_filter([(c.copy(), w.copy()) for c, w in zip(corners, weights, strict=True)], values.copy())
-        )
+        handed = [(c.copy(), w.copy()) for c, w in zip(corners, weights, strict=True)]
+        got = answer_array(lattice_filter(handed, values.copy(), keep))
         simplices = [(list(map(tuple, c.tolist())), w) for c, w in zip(corners, weights, strict=True)]
         assert got.shape == values.shape, "another shape"
         vertices = {}
@@ -62,7 +63,7 @@ def check_lattice_filter(lattice_filter: Callable) -> None:
             for corner, weight in zip(corners, weights, strict=True):
                 vertices[corner] = vertices.get(corner, 0) + weight * value
         for direction in range(d + 1):
-            vertices = _blurred(vertices, direction)
+            vertices = _blurred(vertices, direction, keep)
         wanted = [sum(w * vertices[c] for c, w in zip(*simplex, strict=True)) for simplex in simplices]
         assert close(got, wanted), (
             "wrong in another number of dimensions: is each of the d + 1 directions blurred once?"
