@@ -38,7 +38,7 @@ def _classes(story: CellStory) -> dict[str, str | None]:
 
 
 def _fault(story: CellStory) -> str:
-    if story.fault == "none":
+    if story.fault == "none" or story.names[story.truth].startswith("unknown"):
         return ""
     words = _classes(story)
     words["for_refined"] = f"{story.messages[story.refined]:.1f}"

@@ -81,8 +81,15 @@ async function tell(k) {
 
 function heading(cell, read) {
   const [, , refined, truth] = read("classes", cell), row = Math.floor(cell / story.grid.cols);
-  const known = truth === 255 ? frames[shown()].images.truth ? "Nobody labelled this cell." : "Nobody labelled this frame." : truth === refined ? "This is right." : `The truth is <b>${escaped(story.names[truth])}</b>.`;
-  return `<p><b>${place(centre(story.grid, cell))}</b> (row ${row}, column ${cell % story.grid.cols}): the refined grid says ${swatch(refined)}. ${known}</p>${sentences(story, read, cell).map((sentence) => `<p>${escaped(sentence)}</p>`).join("")}`;
+  return `<p><b>${place(centre(story.grid, cell))}</b> (row ${row}, column ${cell % story.grid.cols}): the refined grid says ${swatch(refined)}. ${truthOf(truth, refined)}</p>${sentences(story, read, cell).map((sentence) => `<p>${escaped(sentence)}</p>`).join("")}`;
+}
+
+// What is known of a cell: the kinds of unknown are the filter's own states, where nobody gave a label.
+function truthOf(truth, refined) {
+  if (truth === 255) return `Nobody labelled this ${frames[shown()].images.truth ? "cell" : "frame"}.`;
+  const name = escaped(story.names[truth]);
+  if (isUnknown(story, truth)) return truth === refined ? "This agrees with the filter; nobody labelled it." : `Nobody labelled it; to the filter it is <b>${name}</b>.`;
+  return truth === refined ? "This is right." : `The truth is <b>${name}</b>.`;
 }
 
 function swatch(label) { const name = escaped(story.names[label]); return `<span class="class" data-texture="${name}" style="--swatch:${rgb(story.colours.classes[label])}">${name}</span>`; }
