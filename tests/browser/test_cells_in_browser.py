@@ -205,11 +205,11 @@ class TestStory:
         click(page, "refined", cells[name])
         heading = page.locator("#telling > p").first
         assert heading.locator(".class").inner_text() == story.names[story.refined]
-        truth = story.names[story.truth]
-        if story.refined == story.truth:
-            told = "This agrees with the filter; nobody labelled it." if truth.startswith("unknown") else "This is right."
+        truth, right = story.names[story.truth], story.refined == story.truth
+        if truth.startswith("unknown"):
+            told = "This agrees with the filter; nobody labelled it." if right else f"to the filter it is {truth}."
         else:
-            told = f"to the filter it is {truth}." if truth.startswith("unknown") else f"The truth is {truth}."
+            told = "This is right." if right else f"The truth is {truth}."
         assert told in heading.inner_text()
         assert page.locator("#where").text_content().endswith(f": {story.names[story.refined]}.")
         why = page.locator("#telling h3", has_text="and not")
