@@ -38,7 +38,7 @@ def _classes(story: CellStory) -> dict[str, str | None]:
 
 
 def _fault(story: CellStory) -> str:
-    if story.fault == "none" or story.names[story.truth].startswith("unknown"):
+    if story.fault == "none":
         return ""
     words = _classes(story)
     words["for_refined"] = f"{story.messages[story.refined]:.1f}"
@@ -62,9 +62,8 @@ def _occupancy_here(story: CellStory) -> str:
     state = State(int(story.steps["shown"].argmax()))
     if state == State.UNKNOWN:
         return SENTENCES["occupancy_here"]["unknown"]
-    truth = story.names[story.truth]
-    semantic = not truth.startswith("unknown")
-    case = "wrong" if semantic and (truth in KITTI_14.flat) != (state == State.FREE) else "right"
+    wrong = (story.names[story.truth] in KITTI_14.flat) != (state == State.FREE)
+    case = "wrong" if wrong else "right"
     return SENTENCES["occupancy_here"][case].format(state=state.name)
 
 

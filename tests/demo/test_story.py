@@ -14,6 +14,7 @@ from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.occupancy import CmcdotParams, SensorModel, scan_evidence, update
 from semgrid_edu.occupancy.state import FilterState, Particles
@@ -23,6 +24,7 @@ from semgrid_edu.workshop.demo.contributions import contributions
 from semgrid_edu.workshop.demo.evidence import VERDICTS, place_history, scan_maps
 from semgrid_edu.workshop.demo.neighbours import neighbour_pull
 from semgrid_edu.workshop.demo.stories import frame_story
+from semgrid_edu.workshop.demo.what_if import FAULTS
 
 PARAMS = CmcdotParams(n_particles=5000)
 SPEC = GridSpec.compact()
@@ -210,3 +212,11 @@ class TestStory:
         story = cell_story(plain, (90, 30), net)
         assert list(story.steps) == ["shown"]
         assert (story.truth, story.fault) == (None, "none")
+
+    def test_no_stage_is_charged_where_nobody_labelled_the_cell(self, told, net):
+        """There the truth is the filter's own state, so an answer may differ from it and be no mistake."""
+        maps = frame_story(told[-1], net)
+        unlabelled = maps.truth >= KITTI_14.n_semantic
+        assert (unlabelled & (maps.refined != maps.truth)).any()
+        assert (maps.fault[unlabelled] == FAULTS.index("none")).all()
+        assert (maps.fault[~unlabelled] != FAULTS.index("none")).any()

@@ -88,7 +88,7 @@ function heading(cell, read) {
 function truthOf(truth, refined) {
   if (truth === 255) return `Nobody labelled this ${frames[shown()].images.truth ? "cell" : "frame"}.`;
   const name = escaped(story.names[truth]);
-  if (isUnknown(story, truth)) return truth === refined ? "This agrees with the filter; nobody labelled it." : `Nobody labelled it; to the filter it is <b>${name}</b>.`;
+  if (name.startsWith("unknown")) return truth === refined ? "This agrees with the filter; nobody labelled it." : `Nobody labelled it; to the filter it is <b>${name}</b>.`;
   return truth === refined ? "This is right." : `The truth is <b>${name}</b>.`;
 }
 

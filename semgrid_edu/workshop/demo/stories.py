@@ -132,9 +132,10 @@ def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[
     params = CrfParams.for_cells(spec.cell)
     before_last_update = mean_field(unary_from_probability(result.grid), o, params, UPDATES - 1)
     otherwise = what_if(result, net)
+    n_semantic = LABEL_SETS[architecture.label_set].n_semantic
+    labelled = np.where(truth < n_semantic, truth, IGNORE)  # the kinds of unknown are the filter's own states
     sight = None
     if result.remembered is not None:
-        n_semantic = LABEL_SETS[architecture.label_set].n_semantic
         sight = last_sight([*past, (result.frame, label)], spec, n_semantic)
     return FrameStory(
         states={**result.belief.steps, "shown": o},
@@ -150,7 +151,7 @@ def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[
         why=parts.versus(label, rival),
         neighbours=neighbour_pull(before_last_update, refined, o, params),
         otherwise=otherwise,
-        fault=faults(label, refined, truth, otherwise),
+        fault=faults(label, refined, labelled, otherwise),
         sight=sight,
     )
 

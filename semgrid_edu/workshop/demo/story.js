@@ -27,9 +27,6 @@ function states(story, read, name, cell) {
   return read("states", cell).slice(start, start + 4).map((byte) => byte / 255);
 }
 
-// Whether a class of the truth is a state of the filter, because nobody labelled the cell.
-function isUnknown(story, truth) { return truth < story.names.length && story.names[truth].startsWith("unknown"); }
-
 // The parts of the difference of two scores, and how many times as probable the one class is as the other.
 function parts(story, read, cell) {
   const scaled = (values, zero) => values.map((value) => (value - zero) * story.steps.part);
@@ -59,7 +56,7 @@ function sentences(story, read, cell) {
   const image = filled(seen.length ? said.image.some : said.image.none, points), partly = read("shown", cell).some((c, i) => called[i] !== 255 && c >= story.names.length);
   const here = { image_here: imageHere(story, called, read("shown", cell)), occupancy_here: truth === 255 ? "" : occupancyHere(story, states(story, read, "shown", cell), story.names[truth]) };
   return [
-    isUnknown(story, truth) ? "" : filled(said.fault[story.faults[read("fault", cell)[0]]], { ...names, ...weights, ...here, all_true: otherwise["both true"] }),
+    filled(said.fault[story.faults[read("fault", cell)[0]]], { ...names, ...weights, ...here, all_true: otherwise["both true"] }),
     seen.length && shows ? `${image} ${filled(partly ? said.image.partly : said.image.shown, { shows })}` : image,
     story.layout.memory ? memory(story, read, cell) : "",
     filled(said.otherwise.removed, { no_image: otherwise["no image"], no_occupancy: otherwise["no occupancy"] }),
@@ -83,7 +80,7 @@ function imageHere(story, called, shown) {
 function occupancyHere(story, probabilities, truth) {
   const state = probabilities.indexOf(Math.max(...probabilities)), said = story.sentences.occupancy_here;
   if (state === 3) return said.unknown;
-  const wrong = !truth.startsWith("unknown") && story.flat.includes(truth) !== (state === 0);
+  const wrong = story.flat.includes(truth) !== (state === 0);
   return filled(wrong ? said.wrong : said.right, { state: ["FREE", "STATIC", "DYNAMIC"][state] });
 }
 
