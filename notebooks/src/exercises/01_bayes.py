@@ -40,7 +40,7 @@ def _explain(got, slips):
 # times: `readings` is a list with `True` for *pole* and `False` for *nothing*. The sensor's electronics are old. With probability `stuck` it doesn't look at all, and delivers its last reading once
 # more. Otherwise the reading is fresh: *pole* with probability `hit` beside a pole, and with probability `false_alarm` elsewhere. The first reading is always fresh.
 #
-# Complete `locate`: it returns the belief after all readings. One point is for `stuck=0`, where the readings err independently. The other is for any `stuck` up to 1: then they don't, and you
+# Complete `locate`: it returns the belief after all readings. One point is for `stuck=0`, where the readings err independently. The other is for any `stuck` up to 1 under which the readings are possible: then they don't, and you
 # have to ask how probable a reading is given the cell *and the reading before it*. (What must come out if all readings are alike and `stuck=1`?) There may be no reading, or thousands. Leave `belief` as it is:
 # somebody else may need it.
 
