@@ -52,8 +52,6 @@ class Variant(NamedTuple):
         Whether it sees the occupancy grid.
     balanced : bool
         Whether classes are weighted by median frequency, within the package's limit of 4.
-    frames : str
-        What it learns from: "six", the lecture's frames; "6 new" or "40 new", of other streets.
     width : int
         Channels of the hidden layers of a network without neighbours; with 448 it has as many weights as one with.
     """
@@ -62,7 +60,6 @@ class Variant(NamedTuple):
     neighbours: bool = True
     occupancy: bool = True
     balanced: bool = False
-    frames: str = "six"
     width: int = 64
 
 
@@ -74,8 +71,6 @@ VARIANTS = {
     "20 planes, neighbours": Variant(),
     "20 planes, neighbours, no o": Variant(occupancy=False),
     "20 planes, neighbours, balanced": Variant(balanced=True),
-    "6 new frames": Variant(frames="6 new"),
-    "40 new frames": Variant(frames="40 new"),
 }
 """What is compared, by name."""
 
@@ -212,7 +207,7 @@ def simulated_streets(net: SemanticGridNet, camera: Camera, first: int, n_street
     return streets(net, camera, *(torch.from_numpy(np.stack(part)) for part in (image, belief, truth)))
 
 
-def ablation(seeds: int = 3, steps: int = 300, n_streets: int = 20, n_frames: int = 40) -> dict:
+def ablation(seeds: int = 3, steps: int = 300, n_streets: int = 20) -> dict:
     """Train every variant and score it, with the tables, on new streets.
 
     Parameters
@@ -223,8 +218,6 @@ def ablation(seeds: int = 3, steps: int = 300, n_streets: int = 20, n_frames: in
         Number of steps of each.
     n_streets : int
         Number of streets to score.
-    n_frames : int
-        Number of other streets that "40 new" learns from, and "6 new" from the first six of.
 
     Returns
     -------
@@ -234,14 +227,11 @@ def ablation(seeds: int = 3, steps: int = 300, n_streets: int = 20, n_frames: in
     began, camera = time.perf_counter(), sample_drive().camera
     net = load_net(sample_image_stage(), camera).requires_grad_(False)
     new = simulated_streets(net, camera, FIRST, n_streets)
-    others = simulated_streets(net, camera, FIRST + n_streets, n_frames)
-    first_six = Streets(*(part[:6] for part in others))
-    learn_from = {"six": training_streets(net, camera), "6 new": first_six, "40 new": others}
-    tables = by_table(learn_from["six"], new, camera)
+    six = training_streets(net, camera)
+    tables = by_table(six, new, camera)
     counts = {name: [confusions(called, new.truth)] for name, called in tables.items()}
     for name, variant in VARIANTS.items():
-        both, n_planes = (learn_from[variant.frames], new), variant.n_planes
-        some, unseen = (one._replace(planes=one.planes[:, :, :n_planes]) for one in both)
+        some, unseen = (one._replace(planes=one.planes[:, :, : variant.n_planes]) for one in (six, new))
         counts[name] = []
         for seed in range(seeds):
             fusion = build(variant, seed)

@@ -24,14 +24,14 @@ class Walls:
 
     *Walls.* A particle is suspect if there is something STATIC where it was `clearing_time` ago, and the cell where it
     will be after `clearing_time` is not known to be free. Then its arrival in an unseen cell may be only the next piece
-    of the wall. Slow things may be people, who walk close to walls. Above `running_speed` two more places are checked.
-    The cells beside that place count, too, because a wall that crosses the grid at an angle is a staircase of cells.
-    And so does the cell where the particle was shortly before: nothing drives through a wall, but a particle that
-    starts in front of a parked car flies on inside it, where no beam contradicts it. Here the cells beside don't count,
-    because shortly before a car was in its own cells, some of which may still be called STATIC.
+    of the wall. A pedestrian who sets off also comes out of a STATIC cell, but walks into free space. And the side of a
+    long vehicle comes out of a cell where the vehicle moves.
 
-    A pedestrian who sets off also comes out of a STATIC cell, but walks into free space. And the side of a long vehicle
-    comes out of a cell where the vehicle moves.
+    Above `running_speed` more is checked; slower things may be people, who walk close to walls. First, the cells beside
+    that place count like the place, because a wall that crosses the grid at an angle is a staircase of cells. Second,
+    nothing drives through a wall, so the cell where the particle was shortly before counts, too. Without this, particles
+    that start in front of a parked car fly on inside it, where no beam contradicts them. (Here the cells beside don't
+    count, because shortly before a car was in its own cells, some of which may still be called STATIC.)
 
     *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. For a particle at that speed a
     cell ahead that borders a STATIC one isn't free space. While the car stands, this doesn't apply.
