@@ -29,7 +29,7 @@ class Walls:
 
     Above `running_speed` more is checked; slower things may be people, who walk close to walls. First, the cells beside
     that place count like the place, because a wall that crosses the grid at an angle is a staircase of cells. Second,
-    nothing drives through a wall, so the cell where the particle was shortly before counts, too. Without this, particles
+    nothing drives through a wall, so the cell where a particle was shortly before counts, too. Without this, particles
     that start in front of a parked car fly on inside it, where no beam contradicts them. (Here the cells beside don't
     count, because shortly before a car was in its own cells, some of which may still be called STATIC.)
 
