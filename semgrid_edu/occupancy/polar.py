@@ -24,7 +24,8 @@ def beams_of(x: NDArray, y: NDArray, beams: int) -> NDArray[np.int64]:
     beams : int
         Number of beams in a turn, B. Beam 0 begins straight behind the vehicle, and the beams go counter-clockwise.
     """
-    azimuth = np.arctan2(y, x).astype(np.float64)
+    # A scanner's columns may lie on the borders between beams. In single precision, each processor rounds them its way.
+    azimuth = np.arctan2(y, x, dtype=np.float64)
     beam = (azimuth + np.pi) * (beams / (2 * np.pi))
     return np.minimum(beam.astype(np.int64), beams - 1)  # an azimuth of exactly pi closes the last beam
 

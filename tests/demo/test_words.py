@@ -71,7 +71,10 @@ def test_correcting_what_is_right_changes_nothing(told, net):
     result = told[-1]
     labels = replace(result.frame.labels, image=result.scores.argmax(axis=0).astype(np.uint8))
     same = replace(result, frame=replace(result.frame, labels=labels))
-    np.testing.assert_array_equal(what_if(same, net)["true image"], result.grid.argmax(axis=0))
+    second, first = np.sort(result.grid, axis=0)[-2:]
+    decided = first - second > 1e-3  # where two classes are as good as equal, rounding decides
+    assert decided.mean() > 0.9
+    np.testing.assert_array_equal(what_if(same, net)["true image"][decided], result.grid.argmax(axis=0)[decided])
 
 
 @pytest.mark.parametrize(

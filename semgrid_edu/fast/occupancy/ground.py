@@ -22,7 +22,7 @@ def beam_of(x, y, beams):
     beams : int
         Number of beams in a turn, B.
     """
-    return min(int((np.arctan2(y, x) + np.pi) * (beams / (2 * np.pi))), beams - 1)
+    return min(int((np.arctan2(np.float64(y), np.float64(x)) + np.pi) * (beams / (2 * np.pi))), beams - 1)
 
 
 @njit(cache=True, inline="always", error_model="numpy")
