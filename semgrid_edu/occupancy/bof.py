@@ -13,7 +13,7 @@ from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_aroun
 from semgrid_edu.occupancy.sensor import Evidence, evidence_of, take_scan
 from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State, ratio, slow_down
 from semgrid_edu.occupancy.steps import mix, strike_out, transition_matrix, update
-from semgrid_edu.occupancy.walls import Walls, static_nearby, strike_out_wakes, velocity_of
+from semgrid_edu.occupancy.walls import SURE, Walls, largest_nearby, strike_out_wakes, velocity_of
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -127,7 +127,8 @@ def _blocked(
     It can't if the cell is STATIC. What `walls` doubts is that of `Walls.doubt`, for whole planes: a plane shifted the
     other way shows in each cell the value at the place where its mass is at another time.
     """
-    nearby = static_nearby(mixed)
+    wall = mixed[STATIC] ** SURE
+    nearby = largest_nearby(wall)
     runs = np.hypot(*velocity.T) > walls.running_speed
     keeps = walls.keeps_pace(velocity, car_velocity, spec.cell)
     before = origins(velocity, spec, walls)
@@ -138,7 +139,7 @@ def _blocked(
     def blocked(k: int) -> NDArray[np.floating]:
         from_wall = _elsewhere(nearby if runs[k] else mixed[STATIC], before[k])
         if runs[k]:
-            from_wall = np.maximum(from_wall, _elsewhere(mixed[STATIC], shortly_before[k]))
+            from_wall = np.maximum(from_wall, _elsewhere(wall, shortly_before[k]))
         open_ahead = _elsewhere(open_to_pace if keeps[k] else open_space, -before[k])
         return mixed[STATIC] + from_wall * (1 - open_ahead) * unseen
 

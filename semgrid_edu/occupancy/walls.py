@@ -17,6 +17,9 @@ from semgrid_edu.occupancy.state import CERTAIN, OUTSIDE, Particles, State, at_c
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
+SURE = 4
+"""Power of P(STATIC) by which a cell is a wall to something fast: 0.9 counts as 0.66, 0.5 as 0.06."""
+
 
 @dataclass(frozen=True)
 class Walls:
@@ -30,8 +33,8 @@ class Walls:
     Above `running_speed` more is checked; slower things may be people, who walk close to walls. First, the cells beside
     that place count like the place, because a wall that crosses the grid at an angle is a staircase of cells. Second,
     nothing drives through a wall, so the cell where a particle was shortly before counts, too. Without this, particles
-    that start in front of a parked car fly on inside it, where no beam contradicts them. (Here the cells beside don't
-    count, because shortly before a car was in its own cells, some of which may still be called STATIC.)
+    that start in front of a parked car fly on inside it, where no beam contradicts them. Both looks meet cells of the
+    moving car itself, and some of these are half STATIC. So only what is nearly certain is a wall: P(STATIC)^4.
 
     *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. For a particle at that speed a
     cell ahead that borders a STATIC one isn't free space. While the car stands, this doesn't apply.
@@ -139,9 +142,10 @@ class Walls:
             self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
         )
         runs = np.hypot(*particles.velocity.T) > self.running_speed
-        nearby = static_nearby(mixed)
+        wall = mixed[STATIC] ** SURE
+        nearby = largest_nearby(wall)
         out_of_a_wall = np.where(runs, at_cells(nearby, before), at_cells(mixed[STATIC], before))
-        through_a_wall = runs * at_cells(mixed[STATIC], shortly_before)
+        through_a_wall = runs * at_cells(wall, shortly_before)
         beside_a_wall = keeps * at_cells(mixed[FREE] * nearby, ahead)
         open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - beside_a_wall
         return np.maximum(out_of_a_wall, through_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)
@@ -207,8 +211,8 @@ def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDAr
     return np.stack([posterior[FREE] + (s - static), static, posterior[DYNAMIC], posterior[UNKNOWN]])
 
 
-def static_nearby(mixed: NDArray) -> NDArray[np.floating]:
-    """Return the largest P(STATIC) of each cell and its eight neighbours, (H, W).
+def largest_nearby(wall: NDArray) -> NDArray[np.floating]:
+    """Return the largest value of each cell and its eight neighbours, (H, W).
 
     A wall that crosses the grid at an angle is a staircase of cells, so a path along it also leads through the cells
     beside them. And hedges are ragged and porous, so beams pass through cells of their face, which are hit once the car
@@ -216,7 +220,7 @@ def static_nearby(mixed: NDArray) -> NDArray[np.floating]:
 
     Parameters
     ----------
-    mixed : (4, H, W) float
-        The four states.
+    wall : (H, W) float
+        How much each cell is a wall, 0 to 1.
     """
-    return maximum_filter(mixed[STATIC], size=3, mode="constant")
+    return maximum_filter(wall, size=3, mode="constant")

@@ -67,9 +67,9 @@ TWINS = pytest.mark.parametrize("predicted", [predict, fast.predict], ids=["book
 
 @TWINS
 @pytest.mark.parametrize("ahead", [UNKNOWN, STATIC])
-@pytest.mark.parametrize(("static", "dynamic"), [(0.0, 0.5), (0.6, 0.2 / 0.7), (1.0, 0.0)])
+@pytest.mark.parametrize(("static", "dynamic"), [(0.0, 0.5), (0.6, (0.5 - 0.0648) / (1 - 0.0648)), (1.0, 0.0)])
 def test_along_a_wall_into_a_cell_nobody_has_seen_the_origin_counts(predicted, static, dynamic, ahead):
-    """By hand: a = 0.5, b = 0.5 static, u = 1, so P(DYNAMIC) = (a - b) / (1 - b)."""
+    """By hand: a = 0.5, b = 0.5 static^4, u = 1, so P(DYNAMIC) = (a - b) / (1 - b)."""
     state = predicted(flying(static, UNKNOWN, ahead), ROW, STILL, 0.1, np.random.default_rng(0))
     np.testing.assert_allclose(state.probability[:, TARGET, 0], [0, 0, dynamic, 1 - dynamic], atol=1e-6)
     np.testing.assert_allclose(state.particles.weight, [dynamic], atol=1e-6)
@@ -104,15 +104,17 @@ def test_a_cell_that_has_only_been_left_counts_as_unseen(predicted):
 
 
 @TWINS
-@pytest.mark.parametrize(("running_speed", "dynamic"), [(9.0, 0.0), (11.0, 0.5)])
-def test_what_flies_fast_through_something_that_stands_is_doubted(predicted, running_speed, dynamic):
+@pytest.mark.parametrize(
+    ("running_speed", "static", "dynamic"), [(9.0, 1.0, 0.0), (11.0, 1.0, 0.5), (9.0, 0.5, 0.46875 / 0.96875)]
+)
+def test_what_flies_fast_through_something_that_stands_is_doubted(predicted, running_speed, static, dynamic):
     """Something stands between origin and target; the particle flies at 10 m/s.
 
-    By hand, with a = 0.5, u = 1 and b = 0.5 or 0, P(DYNAMIC) = (a - b) / (1 - b).
+    By hand, with a = 0.5, u = 1 and b = P(STATIC)^4 a or 0, P(DYNAMIC) = (a - b) / (1 - b).
     """
     walls = Walls(clearing_cells=2.0, running_speed=running_speed)
     state = flying(0.0, UNKNOWN)
-    state.probability[:, PASSED, 0] = 0, 1, 0, 0
+    state.probability[:, PASSED, 0] = 1 - static, static, 0, 0
     given = predicted(state, ROW, replace(STILL, walls=walls), 0.1, np.random.default_rng(0))
     np.testing.assert_allclose(given.probability[DYNAMIC, TARGET, 0], dynamic, atol=1e-6)
 
@@ -131,9 +133,9 @@ def test_a_cell_beside_counts_as_origin_but_not_on_the_way(predicted, row, dynam
 
 
 @TWINS
-@pytest.mark.parametrize(("driven", "dynamic"), [(0.0, 0.5), (0.4, 0.5), (1.0, 0.2 / 0.7)])
+@pytest.mark.parametrize(("driven", "dynamic"), [(0.0, 0.5), (0.4, 0.5), (1.0, (0.5 - 0.0648) / (1 - 0.0648))])
 def test_a_place_beside_what_stands_is_no_open_space_to_what_keeps_pace_with_the_vehicle(predicted, driven, dynamic):
-    """By hand: a = 0.5, u = 1, and b = 0.6 a because the cell beside it stands with this probability."""
+    """By hand: a = 0.5, u = 1, and b = 0.6^4 a because the cell beside it stands with probability 0.6."""
     state = flying(1.0, UNKNOWN, FREE)
     state.probability[:, AHEAD - 1, 0] = 0.4, 0.6, 0, 0
     given = predicted(

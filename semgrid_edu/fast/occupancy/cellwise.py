@@ -87,20 +87,20 @@ def mix(probability, newborn, going, M):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def static_nearby(static):
-    """Return the largest P(STATIC) of each cell and its eight neighbours, (H, W).
+def largest_nearby(wall):
+    """Return the largest value of each cell and its eight neighbours, (H, W).
 
     Parameters
     ----------
-    static : (H, W) float32
-        P(STATIC) of each cell.
+    wall : (H, W) float32
+        How much each cell is a wall, 0 to 1.
     """
-    height, width = static.shape
-    across = static.copy()
+    height, width = wall.shape
+    across = wall.copy()
     for r in range(height):
         for c in range(1, width):
-            across[r, c] = max(across[r, c], static[r, c - 1])
-            across[r, c - 1] = max(across[r, c - 1], static[r, c])
+            across[r, c] = max(across[r, c], wall[r, c - 1])
+            across[r, c - 1] = max(across[r, c - 1], wall[r, c])
     nearby = across.copy()
     for r in range(1, height):
         for c in range(width):

@@ -11,11 +11,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from semgrid_edu.fast.occupancy.cells import cell_of
-from semgrid_edu.fast.occupancy.cellwise import DYNAMIC, FREE, STATIC, static_nearby
+from semgrid_edu.fast.occupancy.cellwise import DYNAMIC, FREE, STATIC, largest_nearby
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import OUTSIDE, Particles
-from semgrid_edu.occupancy.walls import Walls
+from semgrid_edu.occupancy.walls import SURE, Walls
 
 SLOW = np.float32(16)
 """exp(-16) is negligible beside 1 in single precision, so smaller exponentials needn't be computed."""
@@ -189,7 +189,8 @@ def doubt_arrivals(
     times = -walls.clearing_time, -since, walls.clearing_time
     fewest = walls.clearing_cells * np.array([1, walls.second_look, 1])
     other_cells = (cells_at(particles, cells, spec, *path) for path in zip(times, fewest, strict=True))
-    fields = mixed[FREE], mixed[DYNAMIC], mixed[STATIC], static_nearby(mixed[STATIC])
+    wall = mixed[STATIC] ** SURE
+    fields = mixed[FREE], mixed[DYNAMIC], mixed[STATIC], wall, largest_nearby(wall)
     speeds = *map(float, car_velocity), float(least), float(walls.running_speed)
     return _doubt_arrivals(particles.velocity.ravel(), particles.weight, *other_cells, *fields, *speeds)
 
@@ -204,6 +205,7 @@ def _doubt_arrivals(
     free,
     dynamic,
     static,
+    wall,
     nearby,
     car_x,
     car_y,
@@ -213,23 +215,24 @@ def _doubt_arrivals(
     doubted = np.empty_like(weight)
     free = free.ravel()
     dynamic = dynamic.ravel()
-    nearby = nearby.ravel()
     static = static.ravel()
+    wall = wall.ravel()
+    nearby = nearby.ravel()
     for i in range(len(weight)):
         vx = velocity[2 * i]
         vy = velocity[2 * i + 1]
         keeps = keeps_pace(vx, vy, car_x, car_y, least)
         runs = vx * vx + vy * vy > running * running
-        wall = np.float32(0)
+        suspect = np.float32(0)
         if before[i] != OUTSIDE:
-            wall = nearby[before[i]] if runs else static[before[i]]
+            suspect = nearby[before[i]] if runs else static[before[i]]
         if runs and shortly_before[i] != OUTSIDE:
-            wall = max(wall, static[shortly_before[i]])
+            suspect = max(suspect, wall[shortly_before[i]])
         room = np.float32(0)
         if ahead[i] != OUTSIDE:
             beside = nearby[ahead[i]] if keeps else np.float32(0)
             room = (1 - beside) * free[ahead[i]] + dynamic[ahead[i]]
-        doubted[i] = weight[i] * wall * (1 - room)
+        doubted[i] = weight[i] * suspect * (1 - room)
     return doubted
 
 
