@@ -18,6 +18,7 @@ from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, per
 from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.drive import PERIOD
 from semgrid_edu.workshop.simulation.sensors.rig import HDL64E, Lidar, Rig
+from semgrid_edu.workshop.workplace import workplace
 from worlds.lecture_04_cell_scores import BANKS, CellScores, Estimate, share
 from worlds.lecture_04_scenes import known_scenes
 
@@ -57,7 +58,12 @@ def compare_filters(
         "scores" by LIDAR, grid and filter (see `CellScores.summary`), and all that made them; JSON can hold it.
     """
     began = perf_counter()
-    scores = {lidar: {grid: _score(seed, drives, frames, lidar, grid) for grid in grids} for lidar in LIDARS}
+    with workplace() as place:
+        tasks = {
+            lidar: {grid: place.executor.submit(_score, seed, drives, frames, lidar, grid) for grid in grids}
+            for lidar in LIDARS
+        }
+        scores = {lidar: {grid: task.result() for grid, task in of.items()} for lidar, of in tasks.items()}
     command = f"python -m worlds.lecture_04_filters OUT --seed {seed} --drives {drives}"
     return {
         "scores": scores,
