@@ -13,6 +13,7 @@ from semgrid_edu.datasets.samples import (
     sample_frames,
     sample_image_stage,
     sample_weights,
+    samples_dir,
     samples_problems,
     trained_segmenters,
 )
@@ -21,6 +22,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.fast import TrainingSet
 from semgrid_edu.networks import load_net
 from semgrid_edu.storage.files import write_bytes
+from semgrid_edu.storage.provenance import provenance_problems
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +33,11 @@ def excerpt(tmp_path_factory):
         patch.setattr(training_cache, "WORKERS", 1)  # processes take seconds to start
         write_excerpt(root, 2, samples / "frames")
     return root, samples / "frames"
+
+
+@pytest.mark.parametrize("name", sorted(path.parent.name for path in samples_dir().glob("*/provenance.json")))
+def test_what_ships_is_as_it_was_made(name):
+    assert provenance_problems(samples_dir() / name) == []
 
 
 def test_an_excerpt_holds_the_frames_of_the_training_set_bit_for_bit(excerpt):

@@ -29,6 +29,12 @@ REMEMBERED = (
 )
 """Added to the table of metrics if a map with memory is scored."""
 
+LEARNED = " on frames from which it has learned"
+"""Added to the heading of the metrics if they aren't those of new frames."""
+
+CRF_COSTS = "The CRF makes this map worse: {:.1f} % class accuracy over semantic cells without it, {:.1f} % with it."
+"""Said above the metrics if the refined map is worse."""
+
 GAPS = " White cells are left out: they are in view, but nobody labelled what is there."
 """Added to the caption of the truth if its labels have gaps."""
 
@@ -68,6 +74,7 @@ def page_html(
     expected: str = "",
     credit: str = "",
     switch: str = "",
+    learned: bool = False,
 ) -> str:
     """Write the page.
 
@@ -95,6 +102,8 @@ def page_html(
         Whose data the page shows, in plain text.
     switch : str
         What leads to another page, as HTML.
+    learned : bool
+        Whether the network has learned from this drive; its scores then say nothing of new streets.
 
     Returns
     -------
@@ -135,7 +144,7 @@ def page_html(
         grids="\n".join(_single_or_pair(panel, record, camera) for panel in shown),
         states=_swatches(zip(STATE_NAMES, STATE_COLOURS, strict=True)),
         classes=_swatches(record.classes()),
-        metrics=_metrics(record) if record.labelled else "",
+        metrics=_metrics(record, learned) if record.labelled else "",
         times=_times(record),
         frames=_json([vars(frame) for frame in record.views]),
     )
@@ -213,14 +222,24 @@ def _lead(record: Record, title: str, choice: str) -> str:
     )
 
 
-def _metrics(record: Record) -> str:
+def _metrics(record: Record, learned: bool) -> str:
     """Return the table of metrics, in per cent."""
     metrics = record.metrics()
+    where = LEARNED if learned else ""
     head = "".join(f"<th>{escape(column)}</th>" for column in metrics)
     cells = {row: [f"<td>{100 * values[row]:.1f}</td>" for values in metrics.values()] for row in metrics["FmIoU"]}
     rows = "".join(f"<tr><th>{_breakable(row)}</th>{''.join(values)}</tr>" for row, values in cells.items())
     compared = (COMPARED if record.comparison else "") + (REMEMBERED if "remember" in record.stages else "")
-    return _filled("metrics.html", labelled=record.labelled, compared=compared, head=head, rows=rows)
+    crf = _crf_costs(metrics["class accuracy"])
+    return _filled(
+        "metrics.html", where=where, crf=crf, labelled=record.labelled, compared=compared, head=head, rows=rows
+    )
+
+
+def _crf_costs(class_accuracy: dict[str, float]) -> str:
+    """Return a sentence if the CRF makes the package's map worse, else nothing."""
+    without, refined = (class_accuracy.get(f"semantic cells, {row}") for row in ("network", "network + CRF"))
+    return CRF_COSTS.format(100 * without, 100 * refined) if refined is not None and refined < without else ""
 
 
 def _times(record: Record) -> str:

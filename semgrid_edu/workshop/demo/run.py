@@ -98,7 +98,11 @@ class ChosenFrames(NamedTuple):
 
 
 CARD = "card.json"
-"""A model card beside weights; its "other_streets" says how well the network does on other real streets."""
+"""A model card beside weights.
+
+Its "other_streets" says how well the network does on other real streets, its "learned_drives" from which drives it has
+learned, by the names of their folders.
+"""
 
 POOR = (
     "Expect poor semantics here. The truth is not known for this drive, and no card beside the weights says how well "
@@ -164,7 +168,8 @@ def write_demo(
     """
     chosen = ChosenFrames.of(len(drive), frames)
     net = load_net(weights, drive.camera)
-    known = _said_by_card(weights)
+    card = _card_beside(weights)
+    known = str(card.get("other_streets", ""))
     page, picture = _check_page(out, force)
     first = first_sound(drive.__getitem__, chosen.run if skipped else chosen.run[:1])
     if first.image is None:
@@ -194,7 +199,7 @@ def write_demo(
     save_overview(record, picture, " ".join(filter(None, words.values())))
     story = story_data(net, drive.camera, record.layout) | {"start": record.start}
     words |= {"choice": chosen.told(len(drive)), "broken": str(broken or ""), "switch": switch}
-    words["left_out"] = left_out
+    words |= {"left_out": left_out, "learned": drive.folder.name in card.get("learned_drives", [])}
     html = page_html(record, drive.folder.name, drive.camera, net.architecture.image_size, story, **words)
     write_text(page, html)
     if broken:
@@ -276,10 +281,10 @@ def _check_page(out: str | Path, force: bool | None) -> tuple[Path, Path]:
     return files
 
 
-def _said_by_card(weights: str | Path) -> str:
-    """Return what the card beside the weights says about other streets; nothing without a card."""
+def _card_beside(weights: str | Path) -> dict[str, object]:
+    """Return the card beside the weights; empty without one."""
     card = Path(weights).with_name(CARD)
-    return str(read_json(card).get("other_streets", "")) if card.is_file() else ""
+    return read_json(card) if card.is_file() else {}
 
 
 def _record_all(results: Iterable[tuple[FrameResult, ...]], record: Record) -> DataError | None:
