@@ -125,7 +125,7 @@ def draw_story(
     """
     fig = plt.figure(figsize=(9, 6), layout="constrained")
     axes = fig.subplot_mosaic([["image", "image"], ["states", "answers"]], height_ratios=[1, 0.8])
-    draw_image(frame.image // 8 * 8, axes["image"]).set_title("A  where the camera sees the cell", fontsize=10)
+    draw_image(frame.image // 8 * 8, axes["image"]).set_title("A  the points of the cell in the image", fontsize=10)
     axes["image"].plot(*pixels_of(frame, column).T, "o", color="white", markeredgecolor="#d81b60", markersize=4)
     rows = dict(zip([f"{time:.1f} s" for time in times], states.T, strict=True))
     _bars(axes["states"], rows, STATE_COLOURS)
