@@ -145,8 +145,8 @@ _test()
 # %% [markdown]
 # ## Task 3: the laser corrects the memory (3 points)
 #
-# The lecture's ghosts are cells that the memory calls *car* though the car has left. The package lets the laser speak of cars, people and bicycles; here it speaks of
-# all that stands. `p` is what the memory says of C classes, `(C, H, W)`; it sums to
+# The lecture's ghosts are cells that the memory calls *car* though the car has left. The package lets the laser speak of cars, people and bicycles, and takes off half of P(UNKNOWN),
+# too; here the laser speaks of all that stands, and an UNKNOWN cell takes nothing off. `p` is what the memory says of C classes, `(C, H, W)`; it sums to
 # 1 in each cell. `o` is the occupancy grid, `(4, H, W)`, in the order FREE, STATIC, DYNAMIC, UNKNOWN. `standing` lists the numbers of the classes that stand up, such as car
 # and building. A standing thing can't be in a free cell, so its probability is multiplied by 1 - P(FREE); a class of the ground keeps its own. Then each cell is divided by
 # its sum.
@@ -209,7 +209,7 @@ _test()
 # occupancy grid, and `view.frame.T_world_from_lidar` the pose. What you yield has the shape of `view.grid` and sums to 1 in each cell.
 #
 # It must do two things. In cells that the camera sees now, at most half a point may be lost against one frame. In cells that it saw before and doesn't see now, at least 12
-# points more must be right on this real street, where the vehicle stands, and 30 on a simulated one, where it drives. A way that works: the part of a cell's probability that one frame gives to the unknown classes goes to
+# points more must be right on this real street, where the vehicle stands, and 30 on a simulated one, where it drives (a small test of a vehicle that drives is below, too). A way that works: the part of a cell's probability that one frame gives to the unknown classes goes to
 # what earlier frames said of this place, as far as they saw it. To look up an earlier map where the vehicle is now:
 #
 #     motion = PlanarMotion.from_poses(earlier.frame.T_world_from_lidar, view.frame.T_world_from_lidar)
@@ -270,6 +270,26 @@ def _right(called, truth, cells):
     return 100 * (called == truth)[cells].mean()
 
 
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "drives", "locked": true, "schema_version": 3, "solution": false, "task": false}
+def _test_that_drives(frame, spec):
+    """Check the place of a building, 20 m ahead in the first frame, after 3 m; the second frame sees nothing at all."""
+    ahead = np.eye(4)
+    ahead[0, 3] = 3
+    frames = [frame, _replace(frame, T_world_from_lidar=frame.T_world_from_lidar @ ahead, time=frame.time + 0.1)]
+    x, y = np.moveaxis(spec.centers(), -1, 0)
+    o = np.zeros((2, 4, *spec.shape), np.float32)
+    o[:, UNKNOWN] = 1
+    grids = np.zeros((2, 14, *spec.shape), np.float32)
+    there = (abs(x - 20) < 2) & (abs(y) < 2)
+    grids[0, 0], grids[0, 6], grids[0, 13] = 0.9 * ~there, 0.9 * there, 0.1
+    grids[1, 13] = 1
+    later = answer_array(maps(_copy(frames), o.copy(), grids.copy(), spec), "maps").astype(int)[1]
+    nearer, where_it_was = (abs(x - 17) < 0.8) & (abs(y) < 0.8), (abs(x - 21) < 0.8) & (abs(y) < 0.8)
+    hint = "look each earlier map up where the vehicle is now"
+    assert (later[where_it_was] != 6).all(), f"the vehicle drove 3 m, and a building hasn't come 3 m nearer: {hint}"
+    assert (later[nearer] == 6).all(), f"the vehicle drove 3 m; a building that was 20 m ahead isn't 17 m ahead: {hint}"
+
+
 # %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "remember-test", "locked": true, "points": 3, "schema_version": 3, "solution": false, "task": false}
 def _test():
     given, truth, seen, before = _street()
@@ -286,6 +306,7 @@ def _test():
     hint = "does the unknown part of a cell go to what earlier frames said of it?"
     assert now > was + 12, f"seen before {now:.1f} % are right, and {was:.1f} % with one frame: {hint}"
     print(f"seen before: one frame {was:.1f} %, yours {now:.1f} %")
+    _test_that_drives(given[0][0], given[3])
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import memory
 
@@ -310,4 +331,4 @@ _test()
 # frame, so 600 frames of one view are worth little more than one. I would give each further frame an exponent below 1, measured from how frequently errors repeat, or limit what
 # all frames together may be worth. My memory keeps what earlier frames said where the camera doesn't look: a car that stood there and drove away out of view stays as a ghost. I
 # would score cells seen before by themselves, by class and by the time since they were seen, and compare with the occupancy grid: cells that are FREE and remembered as car.
-# One point for the shared errors with the exponent or limit, one for a situation with a fitting measurement.
+# One point for the shared errors with an exponent, a limit or softened frames, one for a situation with a fitting measurement.
