@@ -74,8 +74,9 @@ def legend_of_round(fig: Figure) -> None:
     """Add the legend of `draw_round` below its panels."""
     shown = [State.FREE, State.DYNAMIC, State.UNKNOWN]
     named = colour_patches([plotting.STATE_NAMES[k] for k in shown], [plotting.STATE_COLOURS[k] for k in shown])
+    named += colour_patches(("scan: hit", "scan: passed"), ((26, 26, 26), (244, 165, 130)))
     named += colour_patches(("particle that flies our way",), HEADING_COLOURS[:1])
-    fig.legend(handles=named, loc="outside lower center", ncols=4, fontsize=9, frameon=False)
+    fig.legend(handles=named, loc="outside lower center", ncols=6, fontsize=9, frameon=False)
 
 
 def draw_error(error: SamplingError) -> None:
@@ -127,11 +128,22 @@ def draw_luck(ax: Axes, luck: dict[int, NDArray]) -> None:
             )
         means = [shares[:, thing].mean() for shares in luck.values()]
         ax.plot(numbers * aside, means, marker + "-", color=colour, ms=8, label=f"{name}, mean")
-    ax.set(xscale="log", ylim=(-3, 103), xlabel="particles", ylabel="cells that are DYNAMIC [%]")
+    ax.set(
+        xscale="log", ylim=(-3, 118), yticks=range(0, 101, 20), xlabel="particles", ylabel="cells that are DYNAMIC [%]"
+    )
     ax.set_title("24 seeds", fontsize=10)
     ax.set_xticks(numbers, [f"{number:,}" for number in numbers])
     ax.xaxis.minorticks_off()
-    ax.legend(frameon=False, loc="lower right", fontsize=9)
+    ax.legend(frameon=False, loc="upper left", fontsize=9)
+
+
+def draw_late(ax: Axes, times: Sequence[float], shares: dict[str, NDArray]) -> None:
+    """Draw how much of the car F each filter of `DRIVES_AWAY`, and the control, calls DYNAMIC, scan by scan."""
+    styles = ("o-", "0.2"), ("^-", "#1b7837"), ("s-", VIOLET), ("D-", ORANGE), ("x--", "0.45")
+    for (name, found), (style, colour) in zip(shares.items(), styles, strict=True):
+        ax.plot(times, found, style, color=colour, ms=5, label=name)
+    ax.set(xticks=np.arange(0, 1.9, 0.2), xlabel="time [s]", ylabel="cells of F that are DYNAMIC [%]", ylim=(-2, 80))
+    ax.legend(frameon=False, loc="upper left", fontsize=9)
 
 
 def draw_street(ax: Axes, spec: GridSpec, belief: Belief, title: str, legend: bool) -> None:

@@ -4,13 +4,16 @@ from unittest.mock import patch
 
 import numpy as np
 from worlds.lecture_04_crossing import (
+    CAR,
     DRIVES_AWAY,
+    ONE_CHANGE,
     WIDE,
     arrivals,
     borders,
     drives_away,
     dynamic_shares,
     luck,
+    luck_of_one_change,
     mean_dynamic,
     measure_arrivals,
     measure_drives_away,
@@ -25,7 +28,10 @@ from semgrid_edu.occupancy import CmcdotParams, State
 
 
 def test_the_table_of_seeds_is_what_a_run_measures():
-    np.testing.assert_allclose(measure_luck(300, seeds=[3])[0], luck()[300][3], atol=6)
+    np.testing.assert_allclose(measure_luck(300, range(6)).mean(axis=0), luck()[300][:6].mean(axis=0), atol=12)
+    for name, (scene, thing) in ONE_CHANGE.items():
+        measured = measure_luck(3000, range(2), scene)[:, thing - CAR]
+        np.testing.assert_allclose(measured.mean(), luck_of_one_change()[name][:2].mean(), atol=12, err_msg=name)
 
 
 def test_the_mean_over_seeds_rises_with_the_number_of_particles_and_the_scatter_falls():
@@ -53,7 +59,7 @@ def test_the_tables_of_causes_are_what_a_run_measures():
         np.testing.assert_allclose(shares[0], arrivals()[name][2], atol=6, err_msg=name)
     frames = [real_drive()[k] for k in range(10)]
     for name, shares in measure_drives_away(frames, seeds=[1]).items():
-        np.testing.assert_allclose(shares[0], drives_away()[name][1], atol=14, err_msg=name)
+        np.testing.assert_allclose(shares[0], drives_away()[name], atol=14, err_msg=name)  # two of 15 cells
     assert borders().keys() == DRIVES_AWAY.keys()
 
 

@@ -335,12 +335,16 @@ def maps(frames, spec, draws=stratified):
 
 # %% jupyter={"source_hidden": true} nbgrader={"grade": true, "grade_id": "track-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false}
 def _test():
+    calls = []
+
     def draws(weight, count, offsets):  # each index by itself, wherever its offset lies on the whole line
+        calls.append((count, np.ptp(weight) > 0, np.shape(offsets) == (count,)))
         ends = np.cumsum(weight)
         return np.searchsorted(ends, np.sort(offsets) * ends[-1], side="right")
 
     spec = GridSpec(x_min=0, x_max=30, y_min=-10, y_max=10, cell=0.5)
     for drive in (sample_drive(), real_drive()):
+        calls.clear()
         *_, usual = track_drive([drive[k] for k in range(3)], spec, CmcdotParams(n_particles=20_000), seed=0)
         got = answer_array(maps([drive[k] for k in range(3)], spec, draws), "maps")
         assert got.shape == (3, *spec.shape), (
@@ -348,6 +352,11 @@ def _test():
         )
         change = np.abs(got[-1] - usual.probability[DYNAMIC]).max()
         assert change > 1e-4, "that is the package's own resampling: hand yours over as `resampling` of CmcdotParams"
+        assert calls, "your `draw` never called `draws`: a test hands over a function of its own"
+        assert all(offsets for _, _, offsets in calls), "one offset for each tooth: rng.random(count)"
+        assert all(differ for _, differ, _ in calls), "the weights are all equal: hand on those that `draw` is given"
+        number = sum(count for count, _, _ in calls[-2:])  # the filter draws twice a scan, old particles and new ones
+        assert number == 20_000, f"the filter has {number:,} particles, not 20,000: set `n_particles`"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import cmcdot
 
@@ -367,8 +376,8 @@ _test()
 # ## Task 6: in your own words (2 points)
 #
 # You get a LIDAR that turns twice as fast: 20 scans a second instead of 10, each as good as before. A colleague's filter multiplies the belief by
-# one fixed transition matrix at every step; yours takes M = exp(R dt). What goes wrong in your colleague's filter? And name one thing that
-# changes in yours too, though nothing in the world has changed. Five sentences are enough.
+# one fixed transition matrix at every step; yours takes M = exp(R dt), where R holds the rates of change per second. What goes wrong in your colleague's
+# filter? And name one thing that changes in yours too, though nothing in the world has changed. Five sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "twice-as-fast", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # The fixed matrix is applied twice as often, so in the colleague's world everything happens twice as fast: free space out of sight is forgotten in half the
