@@ -15,7 +15,7 @@
 # **Prerequisites.** Lectures [05](05_pixels.ipynb) (equation (1)) and [04](04_cmcdot.ipynb) (the four occupancy
 # states). For d-separation: lecture [01b](01b_graphical_models.ipynb).
 #
-# **Time.** 64 minutes, of which the computer needs less than one.
+# **Time.** 67 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 4, the paragraph "KITTI Dataset": how its ground truth is made.
 
@@ -26,8 +26,8 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from ipywidgets import Dropdown, IntSlider, interact
-from matplotlib.patches import Rectangle
+from ipywidgets import Checkbox, Dropdown, IntSlider, interact
+from matplotlib.patches import Ellipse, Patch, Rectangle
 from scipy.ndimage import binary_closing, distance_transform_edt
 from scipy.spatial.transform import Rotation
 
@@ -50,6 +50,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.occupancy import State
 from worlds import lecture_09_votes
+from worlds.lecture_09_boxes import beliefs_of_boxes
 from worlds.lecture_09_counts import COUNTED, TruthCounts, counts_of
 from worlds.lecture_09_label import LabelWorld, lidar_label_stage, wrong_label
 from worlds.lecture_09_pictures import DIFFERENCES, difference_kinds, truth_difference
@@ -74,8 +75,8 @@ ten = range(0, len(frames), 2)
 #
 # Below are the true map of one instant of the sample drive, what such a recipe makes, and where they differ. Follow the
 # letters. **A**: grass behind the fence is labelled *fence*. **B**: from 38 m on, wedges of road have no label.
-# **C**: cells beside and below the image have a label, although the camera can't see them. **D**: most cells of the
-# cars on the left are labelled *road*, or not at all.
+# **C**: cells beside and below the image have a label, although the camera can't see them. **D**: fewer than half of the
+# cells of the cars on the left are labelled *car*.
 
 # %% jupyter={"source_hidden": true} alt="three maps: the true classes, the classes made from LIDAR and image labels, and where they differ; letters mark grass called fence, unlabelled wedges of road beyond 38 m, a labelled ring near the vehicle, and cars with road in them"
 made = lidar_truth(frame, o, spec)
@@ -84,7 +85,7 @@ circle = {"ha": "center", "va": "center", "bbox": {"boxstyle": "circle", "fc": "
 for ax in fig.axes[1:]:
     for letter, place in {"A": (-8, 13), "B": (0, 64.5), "C": (6, 7)}.items():
         ax.annotate(letter, place, **circle)
-    ax.annotate("D", (8.8, 31), (2, 31), arrowprops={"arrowstyle": "->"}, **circle)
+    ax.annotate("D", (8.6, 36), (2, 36), arrowprops={"width": 2, "headwidth": 8, "fc": "w"}, **circle)
 plt.show()
 
 # %% jupyter={"source_hidden": true}
@@ -94,17 +95,20 @@ right, other, none = (
 )
 print(f"of the cells that the camera sees: {right:.0%} right label, {other:.0%} another label, {none:.0%} no label")
 assert 0.5 < right < 0.7
+cars_left = (truth == CAR) & (spec.centers()[..., 1] > 5)
+assert 0.4 < (made[cars_left] == CAR).mean() < 0.5
 
 # %% [markdown]
 # Only three cells in five get their right label, although here the image labels and the calibration are *perfect*. So the
-# recipe makes these errors. We follow a label on its way into the map, and look for the step that makes each of them.
+# recipe makes these errors. We follow a label on its way into the map, and come back to each letter.
 #
 # ## Which return belongs to a pixel?
 #
 # A pixel has a label, but no depth. A LIDAR return has a place, but no label. By equation (1) each return falls on a
 # pixel, and takes its label. But the LIDAR is on the roof, and the camera is below it. So the LIDAR looks over things
-# that block the camera's view. Here is such a street from the side. The camera is 1.23 m high, has a focal length of 100
-# pixels, and sees the horizon on row 50. A point at height $z$ and distance $x$ falls on row $50 + 100\,(1.23 - z) / x$.
+# that block the camera's view. Here is such a street from the side. It exaggerates: its camera is half a metre below
+# the LIDAR, that of the drive only 8 cm. The toy's camera is 1.23 m high, has a focal length of 100 pixels, and sees
+# the horizon on row 50. A point at height $z$ and distance $x$ falls on row $50 + 100\,(1.23 - z) / x$.
 #
 # | return | where | row |
 # |---|---|---|
@@ -161,6 +165,8 @@ ax.plot(0, 1.23, ">", color="#d95f02", markersize=9)
 ax.annotate("LIDAR (grey rays)", (0, 1.73), xytext=(8, 8), textcoords="offset points")
 ax.text(-0.8, 0.65, "camera\n(dashed)")
 ax.text(12, 0.3, "car", ha="center")
+ax.text(6, 0.9, "row 52", color="#b04a00")
+ax.text(14.3, 1.0, "row 51", color="#b04a00")
 ax.text(30.7, 1.9, "wall")
 ax.set(xlim=(-1, 33), ylim=(0, 2.35), xlabel="x, forward [m]", ylabel="height [m]")
 plt.show()
@@ -211,8 +217,9 @@ plt.show()
 
 # %% [markdown]
 # The rule drops only one hidden return in thirty, because two returns seldom share a pixel. Many of the red crosses are
-# at the fence on the right. The LIDAR looks between the pickets onto the grass, and the pixel shows a picket. That is the
-# patch **A**. So the closest return of each pixel isn't enough to know what a pixel shows.
+# at the fence on the right. The LIDAR looks between the pickets onto the grass, and the pixel shows a picket. No roof
+# is needed for that: the two sensors are also a few centimetres apart sideways, so they look through different gaps. So
+# the closest return of each pixel isn't enough to know what a pixel shows.
 #
 # ## Who wins the vote in a cell?
 #
@@ -249,10 +256,11 @@ assert [vote(classes, "majority") for classes in toy_cells] == [ROAD, SIDEWALK, 
 assert [vote(classes, "standing") for classes in toy_cells] == [CAR, SIDEWALK, None]
 
 # %% [markdown]
-# Which rule is better? Suppose that each return of a road cell says *car* with probability 0.1, by itself. Of three
-# returns, a majority is wrong if two or three are: $3 \cdot 0.1^2 \cdot 0.9 + 0.1^3 = 0.028$. By *what stands wins* one
-# is enough: $1 - 0.9^3 = 0.271$. For a car cell it is the other way round. So *what stands wins* keeps what is thin, and
-# pays on the road. The true maps of this course follow it, so we use it for one scan.
+# Which rule is better? Suppose that each return brings the wrong one of *road* and *car* with probability 0.1, by itself.
+# Of three returns, a majority is wrong if two or three are: $3 \cdot 0.1^2 \cdot 0.9 + 0.1^3 = 0.028$. By *what stands
+# wins* one wrong return spoils a road cell: $1 - 0.9^3 = 0.271$. A car cell is lost only if all three are wrong: 0.001. So
+# *what stands wins* keeps what is thin, and pays on the road. The true maps of this course follow it, so we use it for one
+# scan. Which rule is right more often, a table below will tell.
 #
 # ## Which errors can a vote remove?
 #
@@ -267,8 +275,8 @@ assert d_separated(graph.model, "x1", "x2", given=("m", "c"))
 assert not d_separated(graph.model, "x1", "x2", given=("m",))
 
 # %% [markdown]
-# $m$ is what is in the cell, $x_k$ is the class that return $k$ brings, and $y$ is the label. Given $m$ *and* $\kappa$ the
-# returns are independent. Given $m$ alone they aren't: the path $x_1 - \kappa - x_2$ is open.
+# $m$ is what is in the cell, $x_k$ is the class that return $k$ brings, and $y$ is the label. In this model the returns
+# are independent given $m$ *and* $\kappa$. Given $m$ alone they aren't: the path $x_1 - \kappa - x_2$ is open.
 #
 # **Predict before you run.** Let each return be right by itself, but let the calibration be off with probability 0.1, so
 # that all returns of the cell bring the class beside it. How often is a majority of three wrong? Of nine?
@@ -296,37 +304,55 @@ np.testing.assert_allclose(wrong_label(LabelWorld(3, shared=0, vote="standing"),
 #
 # And is the camera's error hard to outvote *because it is shared*? We switch that off. In the last run each return gets
 # a camera of its own, with an error of the same size.
+#
+# In a third of these cells the returns bring several classes even without any error, because an outline passes through
+# the cell. We draw these cells by themselves.
 
-# %% jupyter={"source_hidden": true} alt="share of cells whose majority is changed by an error, against the number of votes from one to nine; errors of each return by itself fall from ten per cent to between one and two; with one camera off it falls from ten to six, with a camera for each return from nine to five; outlines drawn off stay near two"
+# %% jupyter={"source_hidden": true} alt="share of cells whose majority is changed by an error, against the number of votes from one to nine, in two charts; left, cells whose returns all bring one class: errors of each return by itself fall from ten per cent to none, the other errors start below three per cent and fall; right, cells of several classes: one camera off falls from 22 to 17 per cent, a camera for each return from 21 to 14, errors of each return by itself from nine to five, and outlines drawn off rise from five to six"
 found = {name: lecture_09_votes.count_votes(frames[::5], spec, name) for name in lecture_09_votes.KINDS}
-fig, ax = plt.subplots(figsize=(7, 3.4), layout="constrained")
-for (name, votes), style in zip(list(found.items())[:4], ("^-", "D-", "o-", "o:"), strict=True):
-    ax.plot(lecture_09_votes.COUNTS, 100 * votes.changed, style, label=name)
-ax.set(xlabel="returns that vote", ylabel="cells with a changed label [%]", ylim=(0, None), xticks=(1, 3, 5, 9))
+fig, axes = plt.subplots(1, 2, figsize=(9.6, 3.4), layout="constrained", sharey=True)
+for ax, where, kind in zip(axes, ("cells of one class", "cells of several classes"), (0, 1), strict=True):
+    for (name, votes), style in zip(found.items(), ("^-", "D-", "o-", "o:"), strict=True):
+        ax.plot(lecture_09_votes.COUNTS, 100 * votes.changed[kind], style, label=name if kind else None)
+    ax.set(title=where, xlabel="returns that vote", ylim=(0, 24), xticks=(1, 3, 5, 9))
+axes[0].set_ylabel("cells with a changed label [%]")
 fig.legend(loc="outside right upper", frameon=False)
 plt.show()
 
-# %%
+# %% jupyter={"source_hidden": true}
+print(f"{'':24}wrong returns [%]         changed labels of all cells [%]")
+print(f"{'':24}one class  several       1 vote  9 votes")
 for name, votes in found.items():
-    print(f"{name:<25} a return is wrong: {votes.one:.2f}; another one of its cell, given one: {votes.another:.2f}")
-one, outlines, camera, own, anew = found.values()
-assert one.changed[-1] < 0.2 * one.changed[0]
-assert 0.5 < own.changed[-1] / own.changed[0] < camera.changed[-1] / camera.changed[0] < 0.75
-assert outlines.another > 6 * outlines.one > 3 * anew.one
-assert 2 * anew.one < anew.another < 0.65 * outlines.another
+    print(f"{name:<24}{100 * votes.wrong[0]:9.0f}{100 * votes.wrong[1]:9.0f}", end="")
+    print(f"{100 * votes.changed[2, 0]:13.0f}{100 * votes.changed[2, -1]:9.0f}")
+alone, outlines, camera, own = (votes.changed for votes in found.values())
+assert alone[0, -1] < 0.001 < 0.4 * alone[1, 0] < alone[1, -1] < 0.6 * alone[1, 0]
+assert alone[2, -1] < 0.2 * alone[2, 0]
+assert 0.5 < own[2, -1] / own[2, 0] < 0.6 < camera[2, -1] / camera[2, 0] < 0.75
+assert outlines[1, -1] > outlines[1, 0]
+assert outlines[2, -1] > outlines[2, 0]
+assert found["the camera off"].wrong[1] > 7 * found["the camera off"].wrong[0]
 
 # %% [markdown]
-# If each return errs by itself, nine votes remove five errors in six. Of the camera's errors they remove only a third.
-# The control is the surprise: with a camera *for each return* they still remove less than half. So sharing the camera is
-# only a part of the reason. The other part is the **place**. The first line has as many errors, scattered over all cells.
-# A camera's errors gather where an outline passes: there every return of the cell falls near a pixel of another class,
-# whichever camera looks.
+# Left, as in the toy: where all returns bring one class, nine votes remove every error that hits returns by themselves.
+# Right, where an outline passes, they remove half of these, a fifth of the camera's, and none of the outlines'. And
+# that is where real errors gather: a camera that is off spoils eight times as many returns there as elsewhere.
 #
-# Outlines drawn by hand don't behave like the toy either. One return in fifty is wrong, but beside a wrong one it is about
-# one in seven. Whoever draws a line too far to the left does so for some length. The last line of the print switches this
-# off: with an error drawn anew for each pixel it is about half of that. The rest is the place again.
+# The control is the surprise. With a camera *for each return*, nine votes still leave two thirds of the changed labels
+# on the right. So sharing the camera is only a part of the reason. The other is the **place**, and our graph has no node
+# for it. We add $b$: does an outline pass through the cell?
+
+# %% tags=["graph-outline"] jupyter={"source_hidden": true} alt="the same graph with one more node at the top, outline here, which points to each of the three classes that returns bring"
+better = lidar_label_stage(outline=0.36)
+better.draw(plt.subplots(figsize=(6.4, 3.4), layout="constrained")[1], highlight=("b",))
+plt.show()
+assert not d_separated(better.model, "x1", "x2", given=("m", "c"))
+assert d_separated(better.model, "x1", "x2", given=("m", "c", "b"))
+
+# %% [markdown]
+# Now the path $x_1 - b - x_2$ is open, even if the calibration is known.
 #
-# So votes remove errors that hit returns by themselves, and the errors of real labels mostly don't.
+# So votes remove errors that hit returns by themselves. Real errors mostly don't.
 #
 # ## What fills the gaps?
 #
@@ -363,12 +389,12 @@ def vote_map(cells, classes, o):
 
 
 # %% tags=["clean-up"]
-def clean_up(votes, cell):
-    """Let the ground spread by up to 3 m, and close what stands with a reach of 1 m."""
+def clean_up(votes, cell, ground_reach=3):
+    """Let the ground spread by up to so many metres, and close what stands with a reach of 1 m."""
     flat = [KITTI_14.index(name) for name in KITTI_14.flat]
     free_to_take = (votes >= N_SEMANTIC) & (votes != UNKNOWN_OF_STATE[State.UNKNOWN])
     distance, nearest = distance_transform_edt(~np.isin(votes, flat), sampling=cell, return_indices=True)
-    made = np.where(free_to_take & (distance <= 3), votes[tuple(nearest)], votes)
+    made = np.where(free_to_take & (distance <= ground_reach), votes[tuple(nearest)], votes)
     reach = round(1 / cell)
     for label in set(range(N_SEMANTIC)) - set(flat):
         mask = np.pad(votes == label, reach)
@@ -405,8 +431,8 @@ plotting.class_legend(axes[-1], KITTI_14, np.stack(list(maps.values())))
 plt.show()
 
 # %% [markdown]
-# The clean-up fills the road between the rings. It also spreads out of the image (**C**), and into cars (**D**). In
-# the paper a person looks at each map in the end and corrects it. No function can do that for us.
+# The clean-up fills the road between the rings. It also spreads out of the image, and into cars. In the paper a person
+# looks at each map in the end and corrects it. No function can do that for us.
 #
 # So gaps are filled by a guess: what is nearest.
 #
@@ -475,18 +501,23 @@ print(f"trivial clean-up, road in all of its cells: {all_road / labelled['clean-
 
 # %% [markdown]
 # "Three wrong labels in four come from the clean-up!" That is true, and misleading. The clean-up makes seven in ten of
-# *all* labels. Compare **rates**: of its labels 24 % are wrong, of the voted ones 18 %. A guess from the neighbourhood is a
+# *all* labels. Compare **rates**: of its labels 23 % are wrong, of the voted ones 18 %. A guess from the neighbourhood is a
 # little worse than a vote, and much better than the trivial clean-up.
 #
-# What makes the votes wrong, and what the clean-up? Two suspects, and each can be switched off. The simulator can remove
-# the **hidden returns**. And it can hand **right votes** to the clean-up.
+# What makes the votes wrong, and what the clean-up? The simulator can switch off three suspects. It can remove the
+# **hidden returns**. It can remove their mirror image too, the **nearer returns**: the LIDAR hits a picket or a leaf,
+# and the camera looks past it, so the pixel shows the wall behind. And it can hand **right votes** to the clean-up.
 
 
 # %% jupyter={"source_hidden": true}
-def without_hidden(frame):
-    """Remove the hidden returns: only a simulator can do that."""
+def without_hidden(frame, nearer=False):
+    """Remove the hidden returns, and if wanted those half a metre nearer than what their pixel shows."""
     numbers, uv = all_in_view(frame)
-    return replace(frame, points=frame.points[numbers[~hidden_returns(frame, numbers, uv)]])
+    gone = hidden_returns(frame, numbers, uv)
+    if nearer:
+        Z = transform_points(frame.camera.T_camera_from_lidar, frame.points[numbers, :3])[:, 2]
+        gone |= Z - frame.labels.depth[uv[:, 1], uv[:, 0]] < -0.5
+    return replace(frame, points=frame.points[numbers[~gone]])
 
 
 def without_as_many(frame):
@@ -534,48 +565,87 @@ def errors_by_distance(right_votes):
 
 
 # %% jupyter={"source_hidden": true}
-votes_wrong = {
-    name: vote_errors(change) for name, change in (("all returns", None), ("no hidden returns", without_hidden))
+suspects = {
+    "all returns": None,
+    "no hidden returns": without_hidden,
+    "no nearer ones either": lambda frame: without_hidden(frame, nearer=True),
 }
+votes_wrong = {name: vote_errors(change) for name, change in suspects.items()}
 gaps_wrong = {name: errors_by_distance(given) for name, given in (("votes as they are", False), ("right votes", True))}
 shown = [c for c in np.argsort(votes_wrong["all returns"][0]) if np.isfinite(votes_wrong["all returns"][0][c])]
 
-# %% jupyter={"source_hidden": true} alt="left, bars of wrong votes by class: of signage, fence and bicycle about seven in ten are wrong, and without hidden returns few are, except of signage; right, wrong labels of the clean-up by the distance from the vote that they come from: they rise from 17 to 33 per cent; with right votes they rise from 5 to 31"
+# %% jupyter={"source_hidden": true} alt="left, bars of wrong votes by class: of signage, fence and bicycle about seven in ten are wrong; without hidden returns few are, except of signage and building; without nearer returns either one in five of building is; right, wrong labels of the clean-up by the distance from the vote that they come from: they rise from 16 to 31 per cent; with right votes they rise from 5 to 29"
 fig, axes = plt.subplots(1, 2, figsize=(9.6, 3.8), layout="constrained")
-style = [{"color": "0.35", "edgecolor": "k"}, {"color": "0.8", "edgecolor": "k", "hatch": "//"}]
+style = [
+    {"color": "0.35", "edgecolor": "k"},
+    {"color": "0.8", "edgecolor": "k", "hatch": "//"},
+    {"color": "w", "edgecolor": "k"},
+]
 for k, (name, (by_class, _)) in enumerate(votes_wrong.items()):
-    axes[0].barh(np.arange(len(shown)) + 0.2 - 0.4 * k, by_class[shown], 0.4, label=name, **style[k])
+    axes[0].barh(np.arange(len(shown)) + 0.27 - 0.27 * k, by_class[shown], 0.27, label=name, **style[k])
 axes[0].set_yticks(range(len(shown)), [KITTI_14.names[c] for c in shown])
 axes[0].set(xlabel="wrong votes [%]", title="cells with a vote")
 for k, (name, (by_distance, _)) in enumerate(gaps_wrong.items()):
     axes[1].bar(np.arange(len(steps)) - 0.2 + 0.4 * k, by_distance, 0.4, label=name, **style[k])
-axes[1].set_xticks(range(len(steps)), ["0.5", "to 1", "to 2", "to 3"])
+axes[1].set_xticks(range(len(steps)), ["to 0.5", "to 1", "to 2", "to 3"])
 axes[1].set(xlabel="distance of the vote [m]", ylabel="wrong labels [%]", title="labels of the clean-up")
 for ax in axes:
     ax.legend(frameon=False)
 plt.show()
 
 # %%
-as_it_is, no_hidden = (all_classes for _, all_classes in votes_wrong.values())
+as_it_is, no_hidden, neither = (all_classes for _, all_classes in votes_wrong.values())
 print(
-    f"wrong votes: {as_it_is:.1f} %; without hidden returns {no_hidden:.1f}; without as many others {vote_errors(without_as_many)[1]:.1f}"
+    f"wrong votes: {as_it_is:.0f} %; without hidden returns {no_hidden:.0f}, nor nearer ones {neither:.0f}; without as many others {vote_errors(without_as_many)[1]:.0f}"
 )
 as_they_are, with_right = (everywhere for _, everywhere in gaps_wrong.values())
-print(f"wrong labels of the clean-up: {as_they_are:.1f} %; from right votes {with_right:.1f}")
-assert [round(100 * wrong[source] / n) for source, n in labelled.items()] == [18, 24]
+print(f"wrong labels of the clean-up: {as_they_are:.0f} %; from right votes {with_right:.0f}")
+assert [round(100 * wrong[source] / n) for source, n in labelled.items()] == [18, 23]
 assert no_hidden < 0.52 * as_it_is
 assert with_right > 0.65 * as_they_are
-fence = KITTI_14.index("fence")
-assert votes_wrong["all returns"][0][fence] > 65 > 15 > votes_wrong["no hidden returns"][0][fence]
+fence, building, signage = (KITTI_14.index(name) for name in ("fence", "building", "signage"))
+by_all, by_open, by_same = (by_class for by_class, _ in votes_wrong.values())
+assert by_all[fence] > 65 > 15 > by_open[fence]
+assert by_open[building] > 50 > 25 > by_same[building]
+assert 30 < by_same[signage] < by_open[signage] < 40
 
 # %% [markdown]
 # Hidden returns make half of the wrong votes. As many other returns could be removed without any effect. The left
 # chart shows where: seven in ten votes for *fence* are wrong, and without hidden returns one in ten is. The label of a
-# thin thing falls on everything behind it. (*Building* has another cause, which this test doesn't find.)
+# thin thing falls on everything behind it. *Building* suffers from nearer returns: without them one vote in five is
+# wrong, not one in two. For *signage*, poles and their plates, something else remains; we haven't found it.
 #
 # The clean-up inherits some errors, but even from right votes 17 % of its labels are wrong. The right chart says why: the
-# farther the vote, the worse the guess. So *thin things are wrong mostly because of hidden returns, and the gaps because
-# the nearest vote is far*.
+# farther the vote, the worse the guess.
+#
+# Now the four letters. What is each, and what is left if we switch its step off?
+
+# %% tags=["letters"] jupyter={"source_hidden": true}
+there, (ours, votes) = frame.labels.birdseye_on(spec), make_truth(frame, o, spec)
+no_hidden_map, _ = make_truth(without_hidden(frame), o, spec)
+far_off = (truth == ROAD) & (ours >= N_SEMANTIC) & (spec.centers()[..., 0] > 38)
+outside = (truth >= N_SEMANTIC) & (ours < N_SEMANTIC)
+called_fence = [((labels == fence) & (there != fence)).sum() for labels in (ours, no_hidden_map)]
+unlabelled = [far_off.sum(), (far_off & (clean_up(votes, spec.cell, ground_reach=6) >= N_SEMANTIC)).sum()]
+no_vote = (cars_left & (votes >= N_SEMANTIC)).sum()
+print(f"A  {called_fence[0]} cells called fence by mistake; without hidden returns {called_fence[1]}")
+print(f"B  {unlabelled[0]} cells of far road without a label; if the ground spreads by 6 m, {unlabelled[1]}")
+print(
+    f"C  {outside.sum()} labels where the camera sees nothing; {(outside & (ours == there)).sum() / outside.sum():.0%} of them right"
+)
+print(
+    f"D  {cars_left.sum()} car cells on the left, {no_vote} of them without a vote; car after the clean-up {(cars_left & (ours == CAR)).sum()}"
+)
+
+# %% [markdown]
+# - **A** is made by hidden returns: without them hardly a cell is left.
+# - **B** is made by the limit of the clean-up: the far rings are farther apart than the ground may spread. With twice the
+#   reach seven in ten of these cells get a label. Most of the others the LIDAR hasn't observed.
+# - **C** comes from the clean-up too. It doesn't ask whether the camera sees a cell. Most of these labels are right, so C
+#   is a risk rather than an error.
+# - **D** is the LIDAR's. It hits only the sides of a car that face it, so six in ten car cells have no vote.
+#
+# So *hidden returns spoil votes, and gaps are wrong because the nearest vote is far*.
 #
 # ## One scan or many?
 #
@@ -595,7 +665,7 @@ assert votes_wrong["all returns"][0][fence] > 65 > 15 > votes_wrong["no hidden r
 # <details><summary>Answer</summary>
 #
 # At 11.6 m, 11.8 m and 12 m: a smear of 0.4 m instead of 2 m. A car that counts as STATIC isn't touched, so carving and
-# carrying leave the whole smear. What the filter gets wrong is now wrong in the truth.
+# carrying leave the whole smear.
 #
 # </details>
 
@@ -612,37 +682,65 @@ earlier, ago = np.array([10.0, 11.0]), np.array([0.2, 0.1])
 for policy in ("smeared", "carved", "carried"):
     print(f"{policy:<9}", np.append(treat_movers(earlier, True, 8.0, ago, policy), 12.0))
 
-# %% jupyter={"source_hidden": true} alt="four maps of the first 60 m: the truth, and nineteen scans with moving things smeared, carved and carried; smeared cars are long streaks, carving removes some, and carrying strews single cells of car"
+# %% [markdown]
+# What the filter gets wrong is now wrong in the truth. On the drive we can switch the filter off: in the last of these
+# maps, states and velocities come from the simulator's boxes, and nothing else changes. Each map has nineteen scans, each
+# with its own labelled image.
+
+# %% jupyter={"source_hidden": true} alt="four maps of the first 60 m with wrong labels in red: nineteen scans smeared, carved, carried with the filter's velocities, and carried with those of boxes; in a rectangle, the lane of oncoming cars, which is red in the first three maps and mostly right in the last; in a ring, a car that overtakes, smeared into a red streak in the first"
 window = TruthPolicy(9, 9, "own", vote="majority")
 moments = [Moment(*pair) for pair in zip(frames, beliefs, strict=True)]
+exact = beliefs_of_boxes(drive, beliefs, spec)
+exact[NOW] = beliefs[NOW]  # what is unknown now is the filter's in all maps
+of_boxes = [Moment(*pair) for pair in zip(frames, exact, strict=True)]
 of_19 = {
     movers: drive_truth(moments, NOW, spec, replace(window, movers=movers))
     for movers in ("smeared", "carved", "carried")
 }
-fig, axes = plt.subplots(1, 4, figsize=(11.5, 5.4), layout="compressed", sharey=True)
-for ax, (title, grid) in zip(axes, {"truth": truth, **of_19}.items(), strict=True):
-    plotting.grid_labels(spec, grid, KITTI_14, ax, legend=False).set(title=title, ylabel="", ylim=(0, 60))
+of_19["carried by boxes"] = drive_truth(of_boxes, NOW, spec, replace(window, movers="carried"))
+palette = np.array([*DIFFERENCES.values()], np.uint8)
+fig, axes = plt.subplots(1, 4, figsize=(11.5, 5.2), layout="constrained", sharey=True)
+for ax, (title, grid) in zip(axes, of_19.items(), strict=True):
+    kinds = difference_kinds(np.where(truth < N_SEMANTIC, truth, there), grid, N_SEMANTIC)
+    plotting.grids.draw_map(spec, palette[kinds], ax).set(title=title, ylabel="", ylim=(0, 60))
+    ax.add_patch(Rectangle((8.6, 19), -3.6, 39, fill=False, edgecolor="k", linewidth=1.2))
+    ax.add_patch(Ellipse((3, 8), 4.4, 16, fill=False, edgecolor="k", linewidth=1.2, linestyle="--"))
 axes[0].set_ylabel("x, forward [m]")
-plotting.class_legend(axes[-1], KITTI_14, np.stack([truth, *of_19.values()]))
+colours = dict(zip(("right label", "another label", "no label"), palette[1:4] / 255, strict=True))
+handles = [Patch(facecolor=colour, edgecolor="k", label=name) for name, colour in colours.items()]
+fig.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
 plt.show()
 
-# %% [markdown]
-# In these maps of nineteen scans, each with its own labelled image, the car that overtakes us leaves a streak when it is
-# smeared. Carving removes the streak, and the car with it. Carrying leaves a patch where the car is, and strews single
-# cells of car elsewhere.
-#
-# One instant proves little. Here are five policies on 20 other drives with errors in the data: camera, outlines,
-# overlooked small things, and a scanner that turns while the vehicle moves. With nineteen scans a cell has many returns,
-# so the majority decides. To compare fairly, one scan is there with both rules of voting.
+# %% jupyter={"source_hidden": true}
+lane = (np.abs(spec.centers() - (38.5, 6.8)) < (19.5, 1.8)).all(axis=-1)
+print(f"{'':26}wrong labels   in the lane: labelled car   rightly   (there: {(lane & (there == CAR)).sum()})")
+wrong_19 = {}
+for title, grid in {"one scan, majority": lidar_truth(frame, o, spec, TruthPolicy(vote="majority")), **of_19}.items():
+    cars = lane & (grid == CAR)
+    wrong_19[title] = 100 * TruthCounts.of_frame(grid, truth, there, spec, KITTI_14).shares(axis=(0, 1))["wrong"]
+    print(f"{title:<26}{wrong_19[title]:10.0f} %{cars.sum():26d}{(cars & (there == CAR)).sum():10d}")
+assert wrong_19["carried by boxes"] + 4 < min(wrong_19["carved"], wrong_19["carried"], wrong_19["one scan, majority"])
 
-# %% tags=["laboratory"] jupyter={"source_hidden": true}
+# %% [markdown]
+# Smeared, the car that overtakes (ring) and the oncoming cars (rectangle) leave streaks. Carving removes the first
+# streak, and the car with it. In the lane most of the streak stays, carved or carried, because the filter is wrong
+# about many of its cells. With boxes in place of the filter the streak is gone, nearly all right car cells are still
+# there, and wrong labels fall from 23 to 16 %. So carrying is right, and needs a better source than our filter.
+#
+# One instant proves little. Here are six policies on 20 other drives, with the filter and with errors in the data:
+# camera, outlines, overlooked small things, and a scanner that turns while the vehicle moves. With nineteen scans a
+# cell has many returns, so the majority decides. *Observed only*: a cell loses its label if the filter calls it
+# UNKNOWN.
+
+# %% jupyter={"source_hidden": true}
 result = json.loads(Path("../docs/results/truth_policies.json").read_text(encoding="utf-8"))
-FIVE = {
+SIX = {
     "one scan (our reading)": "one scan (our reading)",
     "one scan, majority": "one scan, majority of returns",
     "19 scans, smeared": "9 before and after, own labels, movers smeared",
     "19 scans, carved": "9 before and after, own labels, movers carved",
     "19 scans, carried": "9 before and after, own labels, movers carried",
+    "carved, observed only": "9 before and after, own labels, movers carved, visible to LIDAR",
 }
 
 
@@ -651,55 +749,81 @@ def share_of(name, share):
     return 100 * counts_of(result, name).shares(axis=(0, 1))[share]
 
 
-seen = counts_of(result, FIVE["one scan, majority"]).cells[COUNTED.index("seen")].sum(axis=0)
-print(f"{'per cent':<26}found  wrong")
-print(f"{'always road, in view':<26}{100 * seen[ROAD] / seen.sum():5.1f}{100 - 100 * seen[ROAD] / seen.sum():7.1f}")
-for title, name in FIVE.items():
-    print(f"{title:<26}{share_of(name, 'found'):5.1f}{share_of(name, 'wrong'):7.1f}")
+def more_wrong(name, other="one scan, majority", draws=5000):
+    """Return 95 % interval of how much larger a share of wrong labels is, in points, by drawing the drives anew."""
+    n = np.array([[drive[SIX[one]][3:5] for drive in result["drives"].values()] for one in (name, other)])
+    n = n[:, np.random.default_rng(0).integers(0, n.shape[1], (draws, n.shape[1]))].sum(axis=2)
+    wrong = 100 * (1 - n[..., 1] / n[..., 0])
+    return np.percentile(wrong[0] - wrong[1], [2.5, 97.5])
+
+
+# %% tags=["laboratory"] jupyter={"source_hidden": true}
+seen = counts_of(result, SIX["one scan, majority"]).cells[COUNTED.index("seen")].sum(axis=0)
+print(f"{'per cent':<26}found  wrong   more wrong than one scan, majority (95 %)")
+print(f"{'always road, in view':<26}{100 * seen[ROAD] / seen.sum():5.0f}{100 - 100 * seen[ROAD] / seen.sum():7.0f}")
+for title, name in SIX.items():
+    low, high = more_wrong(title)
+    apart = f"{low:+.1f} to {high:+.1f}" if title != "one scan, majority" else "-"
+    print(f"{title:<26}{share_of(name, 'found'):5.0f}{share_of(name, 'wrong'):7.0f}   {apart}")
 
 # %% jupyter={"source_hidden": true}
-found_, wrong_ = ({title: share_of(name, share) for title, name in FIVE.items()} for share in ("found", "wrong"))
-many = [title for title in FIVE if title.startswith("19")]
+found_, wrong_ = ({title: share_of(name, share) for title, name in SIX.items()} for share in ("found", "wrong"))
+many = [title for title in SIX if title.startswith("19")]
 assert all(9.5 < found_[title] - found_["one scan, majority"] < 10.5 for title in many)
-assert all(0.5 < wrong_[title] - wrong_["one scan, majority"] < 4.1 for title in many)
-assert max(FIVE, key=wrong_.get) == "19 scans, carried"
+assert max(SIX, key=wrong_.get) == "19 scans, carried"
+assert more_wrong("one scan (our reading)")[0] > 0.5 > 0 > more_wrong("19 scans, carved")[0] > -1
+assert found_["carved, observed only"] - found_["one scan, majority"] > 5
+assert more_wrong("carved, observed only")[1] < 0.2
 perfect = share_of("one scan, no errors in the data", "wrong")
-assert (round(perfect), round(wrong_["one scan (our reading)"])) == (18, 22)
-on_points = json.loads(Path("../docs/results/point_labels.json").read_text(encoding="utf-8"))
-by_box, smeared = (
-    100 * counts_of(on_points, f"9 before and after{more}").shares(axis=(0, 1))["wrong"]
-    for more in ("", ", movers smeared")
-)
-assert (round(by_box), round(smeared)) == (5, 16)
+assert 0.8 < perfect / wrong_["one scan (our reading)"] < 0.87
+by_class = {
+    name: counts_of(result, SIX[name]).shares(axis=0) for name in ("one scan (our reading)", "one scan, majority")
+}
+for share in ("found", "wrong"):
+    standing, majority = (shares[share] for shares in by_class.values())
+    assert all(standing[c] > majority[c] for c in map(KITTI_14.index, ("bicycle", "fence", "pedestrian")))
 
 # %% [markdown]
-# By the same rule of voting, nineteen scans find ten points more than one, whatever is done with what moves. None of them
-# has a smaller share of wrong labels. And *carried*, the cleverest, is the most wrong. Is carrying a bad idea, or
-# is the filter's velocity to blame? Switch the filter off. PandaSet has boxes that people drew around each moving
-# thing, and labels on the LIDAR points themselves. On simulated streets with such boxes and labels, smearing makes 16 %
-# wrong and carrying 5 %. So carrying is right, and needs a better source than our filter.
+# Which rule of voting? The majority: it finds more, and is less often wrong. *What stands wins* finds more bicycles,
+# fences and pedestrians, but its labels of each are more often wrong.
 #
-# And the errors in the data? Without any of them, one scan in our reading has 18 % wrong labels instead of 22. So most
-# errors are the recipe's. Play with it: what is the smallest share of wrong labels with which you still find half?
+# One scan or many? Nineteen scans find ten points more. Carved, they are about as wrong as one scan: the 95 % interval of
+# the difference contains zero. Observed only, they still find five points more, and nearly all of the interval is below
+# zero. Carried with the filter's velocities is the most wrong.
+#
+# And the errors in the data? Without any of them, one scan in our reading still has five in six of its wrong labels. So
+# most errors are the recipe's.
+#
+# Play with the sample drive: what is the smallest share of wrong labels with which you still find half?
+#
+# <details><summary>Answer</summary>
+#
+# About 16 %: six scans before and after, carved, without a clean-up, observed only.
+#
+# </details>
 
 
 # %% jupyter={"source_hidden": true}
-standing = frame.labels.birdseye_on(spec)
 
 
-def play(reach, movers, cleanup, visible_to):
+def play(reach, movers, clean, observed_only):
     """Draw where the policy's map differs from the truth, and write its shares below."""
     grid = drive_truth(
         moments,
         NOW,
         spec,
-        TruthPolicy(reach, reach, "own", movers, vote="majority", visible_to=visible_to, cleanup=cleanup),
+        replace(
+            window,
+            past=reach,
+            future=reach,
+            movers=movers,
+            visible_to="lidar" if observed_only else "any",
+            cleanup="close" if clean else "none",
+        ),
     )
     _, ax = plt.subplots(figsize=(6.4, 5.6), layout="compressed")
-    plotting.grids.draw_map(
-        spec, np.array([*DIFFERENCES.values()], np.uint8)[difference_kinds(truth, grid, N_SEMANTIC)], ax
-    )
-    shares = TruthCounts.of_frame(grid, truth, standing, spec, KITTI_14).shares(axis=(0, 1))
+    plotting.grids.draw_map(spec, palette[difference_kinds(truth, grid, N_SEMANTIC)], ax)
+    shares = TruthCounts.of_frame(grid, truth, there, spec, KITTI_14).shares(axis=(0, 1))
     ax.set_title(f"{2 * reach + 1} scan(s): found {shares['found']:.0%}, wrong {shares['wrong']:.0%}")
     plotting.colours.colour_legend(ax, DIFFERENCES, DIFFERENCES.values())
     plt.show()
@@ -710,18 +834,18 @@ _ = interact(
     play,
     reach=IntSlider(value=0, min=0, max=9, description="before, after"),
     movers=Dropdown(options=["smeared", "carved", "carried"]),
-    cleanup=Dropdown(options=["close", "none", "spread"]),
-    visible_to=Dropdown(options=["any", "camera", "lidar"]),
+    clean=Checkbox(value=True, description="clean-up"),
+    observed_only=Checkbox(value=False, description="observed only"),
 )
 
 # %% [markdown]
 # ## Where this breaks
 #
 # **One degree of calibration.** Turn the camera by 1° to the side. A label 20 m ahead moves by 0.35 m.
-# Now let it nod by 1°. From a height of 1.65 m you see that ground at an angle of 4.7°, and at 3.7° you see the ground at
-# $1.65 / \tan 3.7° = 25.4$ m. The label has moved by more than 5 m.
+# Now let it nod by 1°. From a height of 1.65 m you see that ground 4.72° below the horizon, and at 3.72° you see the
+# ground at $1.65 / \tan 3.72° = 25.4$ m. The label has moved by more than 5 m. The other way it moves by 3.5 m.
 #
-# So is nodding always worse? On five frames, with labels from a pixel above the right one, or from a pixel below:
+# Which of them spoils most? On five frames, with labels from a place one degree above the right one, or one degree below:
 
 
 # %% tags=["one-degree"] jupyter={"source_hidden": true}
@@ -732,20 +856,19 @@ def turned(f, yaw=0.0, pitch=0.0):
 
 
 def spoilt(repaired=None, **angles):
-    """Return the share of wrong labels, per cent; a kind of returns, ground or not, may keep its right labels."""
-    n = np.zeros(2)
+    """Return wrong votes, and wrong labels in the end, per cent; returns on the ground, or others, may keep their labels."""
+    n = np.zeros((2, 2))
     for f, belief in ((frames[k], beliefs[k]) for k in ten[::2]):
-        numbers, there = closest_returns(f)[0], f.labels.birdseye_on(spec)
+        numbers, is_there = closest_returns(f)[0], f.labels.birdseye_on(spec)
         exact, classes = (lecture_09_votes.shown(one, numbers) for one in (f, turned(f, **angles)))
         ground = np.isin(exact, [KITTI_14.index(name) for name in KITTI_14.flat])
         classes = classes if repaired is None else np.where(ground == (repaired == "ground"), exact, classes)
         rows, cols, inside = spec.cells(f.points_grid[numbers])
         cells = (rows * spec.shape[1] + cols)[inside]
-        grid = close_and_spread(
-            carry_labels(classes[inside], np.arange(len(cells)), cells, belief.probability), spec.cell
-        )
-        n += [((grid < N_SEMANTIC) & (grid != there)).sum(), (grid < N_SEMANTIC).sum()]
-    return 100 * n[0] / n[1]
+        alone = carry_labels(classes[inside], np.arange(len(cells)), cells, belief.probability)
+        for counted, grid in zip(n, (alone, close_and_spread(alone, spec.cell)), strict=True):
+            counted += [((grid < N_SEMANTIC) & (grid != is_there)).sum(), (grid < N_SEMANTIC).sum()]
+    return 100 * n[:, 0] / n[:, 1]
 
 
 # %% jupyter={"source_hidden": true}
@@ -757,16 +880,18 @@ off = {
     "from above, ground repaired": spoilt("ground", pitch=1),
     "from above, the rest repaired": spoilt("rest", pitch=1),
 }
-for name, labels_wrong in off.items():
-    print(f"{name:<30} wrong labels {labels_wrong:3.0f} %")
-assert off["from above"] > 2 * off["exact"] > 1.7 * off["from below"]
-assert off["from above, the rest repaired"] > 1.6 * off["from above, ground repaired"]
+print(f"{'per cent':<30} wrong votes  after the clean-up")
+for name, (of_votes, of_labels) in off.items():
+    print(f"{name:<30}{of_votes:9.0f}{of_labels:14.0f}")
+assert abs(off["to the side"] - off["from below"])[0] < 3 < 8 < (off["from above"] - off["from below"])[0]
+assert off["from above"][1] > 2 * off["exact"][1]
+assert off["from above, the rest repaired"][1] > 1.6 * off["from above, ground repaired"][1]
 
 # %% [markdown]
-# It depends on the sign. If returns take the label of a pixel *above* their own, wrong labels more than double. If it is a pixel
-# *below*, little happens, although the shift is as large. Why? Above the ground there is what stands on it, and below
-# the ground there is more ground. The control agrees: if only the returns on the ground get their right labels
-# back, most of the damage is gone. If all others do, hardly any is.
+# For the votes, labels from *below* cost as much as labels from the side. Labels from *above* cost more, and the clean-up
+# spreads the damage: nearly half of all labels are wrong. Above the ground there is what stands on it. The control agrees:
+# if only the returns on the ground get their right labels back, most of the damage is gone. If all others do, hardly any
+# is.
 #
 # **What no policy can know.** What is behind something, unless the vehicle drives past it. How fast something moves,
 # before the filter has seen it move. Its own calibration: a made truth can look consistent although the camera is off.
@@ -779,13 +904,13 @@ assert off["from above, the rest repaired"] > 1.6 * off["from above, ground repa
 #
 # 1. Truth on a grid is made: the closest return of each pixel, a vote in each cell, unknown by occupancy state, and a
 #    clean-up that the paper doesn't specify.
-# 2. Compare rates. The clean-up makes three in four wrong labels because it makes seven in ten labels: 24 % of its
+# 2. Compare rates. The clean-up makes three in four wrong labels because it makes seven in ten labels: 23 % of its
 #    labels are wrong, and 18 % of the voted ones.
-# 3. Votes remove errors that hit each return by itself. Real errors gather at outlines and share a camera, so nine votes
-#    remove a third.
-# 4. Hidden returns make half of the wrong votes, and most of those of thin things. The farther a vote, the worse the
-#    clean-up's guess.
-# 5. By the same vote, nineteen scans find ten points more and are no less wrong. Carrying what moves needs to know how fast it moves.
+# 3. Nine votes remove five in six errors of single returns, a third of the camera's, and none of the outlines'. Real
+#    errors gather where an outline passes.
+# 4. Hidden returns make half of the wrong votes. The farther a vote, the worse the clean-up's guess.
+# 5. Nineteen scans find ten points more than one, and if carved are about as wrong. To carry what moves, one needs better
+#    velocities than our filter's.
 #
 # ## Further reading and exercise
 #

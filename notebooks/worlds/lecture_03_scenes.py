@@ -1,6 +1,7 @@
 """The scenes of lecture 03: a belief that is sheared, boxes that move, a bus; and how they are drawn."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, cached_property
 
 import numpy as np
@@ -21,6 +22,7 @@ from semgrid_edu.occupancy import (
     WorldModel,
     bof_predict,
     bof_update,
+    smear_area,
 )
 from semgrid_edu.occupancy.bof_state import whole_cells
 from semgrid_edu.occupancy.planar_motion import shift
@@ -28,6 +30,26 @@ from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 STEADY = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=0, walls=None)
 """A world in which things move, and that is all."""
+
+PAPER = WorldModel(walls=None)
+"""What BOF assumes, without the package's rules for walls and for places that moving things have left."""
+
+STANDS = (0.952, 0.048, 0.0)
+"""First sight in a world in which nothing moves."""
+
+NOTHING_MOVES = WorldModel(
+    rates=tuple((*row[:2], 0.0, row[3]) for row in WorldModel.rates), first_sight=STANDS, walls=None
+)
+"""A world in which things stand, appear, vanish and are forgotten, but never move."""
+
+KEEPS_MOVING = WorldModel(rates=(*WorldModel.rates[:2], (0.0,) * 4, WorldModel.rates[3]), stop_rate=0, walls=None)
+"""A world in which what moves goes on moving: it doesn't stop, doesn't vanish and isn't forgotten."""
+
+
+def unchanging(world: WorldModel) -> WorldModel:
+    """Return the same world, in which nothing starts, stops, appears, vanishes or is forgotten."""
+    return replace(world, rates=STEADY.rates, stop_rate=0)
+
 
 BUS = GridSpec(x_min=0, x_max=26, y_min=0, y_max=4, cell=0.5)
 """The cells beside our lane, where a bus passes."""
@@ -78,9 +100,7 @@ def watch(scans: list[Evidence], spec: GridSpec, params: BofParams, predict: Cal
     return states
 
 
-def pass_by(
-    columns: int, first: float = 0.0, first_sight: tuple[float, float, float] = WorldModel.first_sight
-) -> tuple[NDArray, NDArray]:
+def pass_by(columns: int, first: float = 0.0, world: WorldModel = PAPER, mend: str = "") -> tuple[NDArray, NDArray]:
     """Let the bus pass: return the times of the scans (T,) and the four states along its flank, (4, T, H).
 
     Parameters
@@ -89,13 +109,33 @@ def pass_by(
         Directions of the scanner in its half circle.
     first : float
         When the filter is switched on, seconds.
-    first_sight : (float, float, float)
-        Probabilities of FREE, STATIC and DYNAMIC when a cell is first seen.
+    world : WorldModel
+        What the filter assumes.
+    mend : str
+        What to change in cells that the flank covers: with "free" those that look free tell nothing, with "hit" all of
+        them are hit, with "" nothing changes.
     """
     times, scans = _bus_scans(columns, first)
-    states = watch(scans, BUS, BofParams(VelocityLattice(8, spacing=2), WorldModel(first_sight=first_sight)))
-    _, (col,), _ = BUS.cells(np.array([[1.0, FLANK]]))
+    (_,), (col,), _ = BUS.cells(np.array([[1.0, FLANK]]))
+    if mend:
+        scans = [_mended(scan, t, col, mend) for t, scan in zip(times, scans, strict=True)]
+    states = watch(scans, BUS, BofParams(VelocityLattice(8, spacing=2), world))
     return times, np.stack([state.probability[:, ::-1, col] for state in states], axis=1)
+
+
+def _mended(scan: Evidence, t: float, col: int, mend: str) -> Evidence:
+    """Return a scan in which cells that the flank covers don't look free ("free"), or are all hit ("hit")."""
+    occupied, free = scan.occupied.copy(), scan.free.copy()
+    x = BUS.centers()[:, col, 0]
+    covered = np.zeros(BUS.shape, bool)
+    covered[:, col] = (x > 24 - 8 * t) & (x < 36 - 8 * t)
+    sensor = WorldModel().sensor
+    if mend == "free":
+        change, to = covered & (occupied < free), (1.0, 1.0)
+    else:
+        change, to = covered & (occupied <= free), (sensor.p_hit_occupied, sensor.p_hit_free)
+    occupied[change], free[change] = to
+    return Evidence(occupied, free)
 
 
 class OnlyTheBus(VelocityLattice):
@@ -160,7 +200,9 @@ def _walk_scans(speed: float, start: float, spec: GridSpec) -> list[Evidence]:
     return scans_of(lambda t: _person(t, speed, start), spec, WALK, columns=100, field=60)
 
 
-def walker(speed: float, spacing: float, leaks: bool, start: float = 15.2, cell: float = 0.5) -> NDArray[np.float64]:
+def walker(
+    speed: float, spacing: float, world: WorldModel = PAPER, start: float = 15.2, cell: float = 0.5
+) -> NDArray[np.float64]:
     """Return P(DYNAMIC) of a person who walks towards us, after each scan of `WALK`, (41,).
 
     Parameters
@@ -169,22 +211,45 @@ def walker(speed: float, spacing: float, leaks: bool, start: float = 15.2, cell:
         Speed of the person, m/s.
     spacing : float
         Spacing of the velocities of the lattice, which ends at 2 m/s.
-    leaks : bool
-        Whether what moves may stop or be forgotten.
+    world : WorldModel
+        What the filter assumes.
     start : float
         Where the person is at first, metres ahead.
     cell : float
         Side of a cell, metres.
     """
     lane = GridSpec(x_min=4, x_max=18, y_min=-2, y_max=2, cell=cell)
-    rates = WorldModel.rates
-    world = WorldModel() if leaks else WorldModel(rates=(*rates[:2], (0.0,) * 4, rates[3]), stop_rate=0)
     states = watch(_walk_scans(speed, start, lane), lane, BofParams(VelocityLattice(2, spacing), world))
     told = []
     for t, state in zip(WALK, states, strict=True):
         here = cells_in(_person(t, speed, start)[0], lane, margin=0.5) & (state.occupied.sum(axis=0) > 0.5)
         told.append(state.probability[State.DYNAMIC, here].mean())
     return np.array(told)
+
+
+def smear_and_found(
+    held: NDArray, spec: GridSpec, boxes_at: Callable[[float], list[Box]], scan: int
+) -> tuple[float, float, float]:
+    """Return three areas, m²: what boxes have left and still seems occupied, what is found of them, and their own.
+
+    Parameters
+    ----------
+    held : (H, W) float
+        P(occupied) after the scan.
+    spec : GridSpec
+        The cells.
+    boxes_at : callable
+        Returns the boxes of the world at a time, seconds; all but the first move.
+    scan : int
+        Number of the scan, from 0; there are ten a second.
+    """
+    now = boxes_at(scan / 10)
+    smear = 0.0
+    for box in range(1, len(now)):
+        been = np.any([cells_in(boxes_at(t / 10)[box], spec) for t in range(scan + 1)], axis=0)
+        smear += smear_area(held, been & ~cells_in(now[box], spec, margin=0.5), spec)
+    here = np.any([cells_in(box, spec) for box in now[1:]], axis=0)
+    return smear, (here & (held > 0.5)).sum() * spec.cell**2, here.sum() * spec.cell**2
 
 
 def outline(ax: Axes, boxes: list[Box]) -> list[Line2D]:
@@ -208,6 +273,11 @@ def draw_flank(ax: Axes, times: NDArray, states: NDArray, title: str) -> None:
     picture = plotting.occupancy_colours(states)
     extent = (BUS.x_min, BUS.x_max, times[0] - 0.05, times[-1] + 0.05)
     ax.imshow(picture, extent=extent, origin="lower", aspect="auto", interpolation="nearest")
+    if times[0] > 0:
+        ax.axhspan(0, times[0] - 0.05, facecolor="white", edgecolor="0.75", hatch="///", linewidth=0)
+        ax.text(
+            1, times[0] / 2, "not yet switched on", fontsize=9, va="center", bbox={"facecolor": "white", "linewidth": 0}
+        )
     span = np.array([0, 3])
     for end, style in ((24, "-"), (36, "--")):
         ax.plot(end - 8 * span, span, style, color="#c000c0", linewidth=2)
@@ -244,26 +314,24 @@ def sheared() -> list[tuple[str, NDArray, int | None]]:
     return [(caption, belief.occupied[rows, ::-1, 0], cell) for caption, belief, cell in story]
 
 
-def sheared_frames(story: list[tuple[str, NDArray, int | None]]) -> Iterator[Figure]:
-    """Draw the story of `sheared`: the joint distribution, its sum over velocities, and the return."""
+def draw_sheared(story: list[tuple[str, NDArray, int | None]]) -> None:
+    """Draw the story of `sheared` as a strip: the joint distribution, its sum over velocities, and the returns."""
     from matplotlib import pyplot as plt
 
-    fig, (top, low) = plt.subplots(2, 1, figsize=(6.6, 3.9), layout="constrained", sharex=True, height_ratios=[3, 1.2])
+    fig, axes = plt.subplots(
+        2, len(story), figsize=(12.5, 4), layout="constrained", sharex=True, sharey="row", height_ratios=[3, 1.2]
+    )
     style = {"cmap": "Blues", "norm": PowerNorm(0.5, 0, 1), "origin": "lower", "extent": (0, 20, -4.5, 4.5)}
-    picture = top.imshow(np.zeros((9, 40)), aspect="auto", **style)
-    top.set(ylabel="velocity [m/s]", yticks=range(-4, 5, 2))
-    low.set(xlabel="place [m]", ylabel="P(occupied)", ylim=(0, 1.25), yticks=(0, 0.5, 1))
-    fig.colorbar(picture, ax=(top, low), label="probability", ticks=(0, 0.1, 0.3, 1), shrink=0.65, anchor=(0, 1))
-    bars = low.bar(np.arange(0.25, 20, 0.5), np.zeros(40), width=0.5, color="tab:blue")
-    (arrow,) = low.plot([], [], "v", color="#c04000", markersize=9)
-    for caption, joint, cell in story:
-        picture.set_data(joint)
-        for bar, height in zip(bars, joint.sum(axis=0), strict=True):
-            bar.set_height(height)
-        arrow.set_data(*(([], []) if cell is None else ([cell / 2 + 0.25], [1.12])))
-        top.set_title(caption, loc="left", fontsize=11)
-        yield fig
-        fig.set_layout_engine("none")  # only the first frame is laid out
+    for (top, low), (caption, joint, cell) in zip(axes.T, story, strict=True):
+        picture = top.imshow(joint, aspect="auto", **style)
+        top.set_title(caption, loc="left", fontsize=10)
+        low.bar(np.arange(0.25, 20, 0.5), joint.sum(axis=0), width=0.5, color="tab:blue")
+        if cell is not None:
+            low.plot(cell / 2 + 0.25, 1.12, "v", color="#c04000", markersize=8)
+        low.set(xlabel="place [m]", xlim=(5, 15), xticks=(6, 8, 10, 12, 14))
+    axes[0, 0].set(ylabel="velocity [m/s]", yticks=range(-4, 5, 2))
+    axes[1, 0].set(ylabel="P(occupied)", ylim=(0, 1.25), yticks=(0, 0.5, 1))
+    fig.colorbar(picture, ax=axes, label="probability", ticks=(0, 0.1, 0.3, 1), shrink=0.65)
 
 
 def flank_legend(fig: Figure) -> None:

@@ -29,16 +29,17 @@ class Votes(NamedTuple):
 
     Parameters
     ----------
-    one : float
-        Probability that a return brings another class than without the error.
-    another : float
-        Probability that another return of its cell does, too, if it does.
-    changed : (len(COUNTS),) float64
-        Share of the cells whose majority is another one than without the error, by the number of votes.
+    several : float
+        Share of the cells whose returns bring several classes even without the error, because an outline passes.
+    wrong : (2,) float64
+        Probability that a return brings another class than without the error, in cells of one class and of several.
+    changed : (3, len(COUNTS)) float64
+        Share of the cells whose majority is another one than without the error, by the number of votes: of cells of one
+        class, of cells of several, and of all.
     """
 
-    one: float
-    another: float
+    several: float
+    wrong: NDArray[np.float64]
     changed: NDArray[np.float64]
 
 
@@ -56,11 +57,6 @@ def outlines_off(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> ND
     """Return the classes, if outlines are drawn a little off: neighbouring pixels are shifted alike."""
     labels = flawed_labels(frame.labels.image, KITTI_14, OUTLINES, rng)
     return shown(replace(frame, labels=replace(frame.labels, image=labels)), numbers)
-
-
-def outlines_anew(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> NDArray:
-    """Return the classes, if the shift of an outline, equally large, were drawn anew for each pixel."""
-    return _at(frame, _homogeneous(frame, numbers), OUTLINES.outline * rng.standard_normal((len(numbers), 2)))
 
 
 def one_camera_off(frame: Frame, numbers: NDArray, rng: np.random.Generator) -> NDArray:
@@ -81,10 +77,9 @@ KINDS: dict[str, tuple[Spoil, int]] = {
     "outlines drawn off": (outlines_off, 4),
     "the camera off": (one_camera_off, 6),
     "a camera for each return": (own_camera_off, 6),
-    "outlines, each pixel anew": (outlines_anew, 6),
 }
 """The kinds of error by name, and how often each is drawn; outlines differ in each frame, so four draws are enough.
-The last two kinds are controls that no data have: nothing is shared."""
+The last kind is a control that no data have: nothing is shared."""
 
 
 def shown(frame: Frame, numbers: NDArray) -> NDArray:
@@ -105,10 +100,14 @@ def count_votes(frames: Sequence[Frame], spec: GridSpec, kind: str) -> Votes:
         A key of `KINDS`. All frames share a camera, as those of a day do.
     """
     exact, spoilt = (np.concatenate(part) for part in zip(*_drawn(frames, spec, *KINDS[kind]), strict=True))
-    wrong = (exact != spoilt).sum(axis=1)
-    another = (wrong * (wrong - 1)).sum() / max((wrong * (MOST - 1)).sum(), 1)
-    changed = [(_majority(exact[:, :n]) != _majority(spoilt[:, :n])).mean() for n in COUNTS]
-    return Votes(float(wrong.mean() / MOST), float(another), np.array(changed))
+    several = (exact != exact[:, :1]).any(axis=1)
+    changed = np.stack([_majority(exact[:, :n]) != _majority(spoilt[:, :n]) for n in COUNTS])
+    kinds = ~several, several, np.ones_like(several)
+    return Votes(
+        float(several.mean()),
+        np.array([(exact != spoilt)[kind].mean() for kind in kinds[:2]]),
+        np.stack([changed[:, kind].mean(axis=1) for kind in kinds]),
+    )
 
 
 def _drawn(frames: Sequence[Frame], spec: GridSpec, spoil: Spoil, seeds: int) -> Iterator[tuple[NDArray, NDArray]]:
@@ -132,13 +131,10 @@ def _homogeneous(frame: Frame, numbers: NDArray) -> NDArray:
     return transform_points(frame.camera.T_camera_from_lidar, frame.points[numbers, :3]) @ frame.camera.K.T
 
 
-def _at(frame: Frame, uvw: NDArray, shift: NDArray | float = 0.0) -> NDArray:
-    """Return the class at the nearest pixel of homogeneous image points, or at the image's rim if it is outside.
-
-    `shift`, (N, 2), moves that pixel by whole pixels, as `flawed_labels` does.
-    """
+def _at(frame: Frame, uvw: NDArray) -> NDArray:
+    """Return the class at the nearest pixel of homogeneous image points, or at the image's rim if it is outside."""
     height, width = frame.camera.size
-    u, v = (np.rint(uvw[:, :2] / uvw[:, 2:]) + np.rint(shift)).astype(int).T
+    u, v = np.rint(uvw[:, :2] / uvw[:, 2:]).astype(int).T
     return frame.labels.image[v.clip(0, height - 1), u.clip(0, width - 1)]
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from worlds.lecture_03_scenes import late, walker
+from worlds.lecture_03_scenes import KEEPS_MOVING, PAPER, late, pass_by, unchanging, walker
 
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import (
@@ -25,12 +25,24 @@ from semgrid_edu.occupancy import (
     ],
 )  # fmt: skip
 def test_a_walker_who_starts_elsewhere_is_found_or_missed_for_the_same_causes(speed, spacing, leaks, found):
-    told = walker(speed, spacing, leaks, start=15.0)[-10:].mean()
+    told = walker(speed, spacing, PAPER if leaks else KEEPS_MOVING, start=15.0)[-10:].mean()
     assert told > 0.6 if found else told < 0.45
 
 
 def test_the_slower_walker_is_found_in_cells_half_as_wide():
-    assert walker(1.0, 1, True, cell=0.25)[-10:].mean() > 0.7
+    assert walker(1.0, 1, cell=0.25)[-10:].mean() > 0.7
+
+
+def test_a_world_without_change_keeps_its_first_sight():
+    world = unchanging(PAPER)
+    assert not np.any(world.rates)
+    assert world.stop_rate == 0
+    assert world.first_sight == PAPER.first_sight
+
+
+def test_a_bus_with_all_returns_moves_whatever_the_scanner():
+    _, states = pass_by(300, mend="hit")
+    assert states[State.DYNAMIC, 22, 26:36].min() > 0.9  # 13 to 18 m
 
 
 def test_strike_out_squares_the_odds_where_nothing_is_spread():

@@ -31,7 +31,7 @@ warnings.filterwarnings("ignore")  # a warning costs no points; a wrong number d
 # ## Task 1: one velocity flies (2 points)
 #
 # The grid is a map seen from above: row 0 is the farthest ahead, column 0 the leftmost. `mass` (H, W) is what one velocity of the lattice holds in each cell: P(occupied, and moving with this velocity). All of it flies the same way:
-# from (r, c) to (r + `down`, c + `right`). Both are integers of any sign.
+# from (r, c) to (r + `down`, c + `right`). Both are integers of any sign, and may be larger than the map.
 #
 # Complete `shift`: it returns the mass after the flight. Nothing is known of what enters the map, so that is 0, and what leaves the map is lost.
 # Leave the argument as it is.
@@ -405,6 +405,7 @@ _test()
 # cell turns out to be at first sight, and now and then something that starts to move. Its lattice has velocities 5 m/s apart, so that everything moves by
 # whole cells of 0.5 m in a tenth of a second. First its steps, on a map that is fixed to the ground. Read `predicted`: all that moves leaves its cell, so what a
 # cell holds by itself before anything arrives is FREE, STATIC or UNKNOWN, and arrivals from several cells add up.
+# (So of your two pairs only the one with STATIC acts here.)
 
 
 # %% nbgrader={"grade": false, "grade_id": "steps", "locked": true, "schema_version": 3, "solution": false, "task": false}
@@ -491,20 +492,21 @@ def light_up():
 #
 #     semgrid-edu demo --stages my_stages.py
 #
-# Then the semantic grid of both streets is built upon your filter, beside that of the package. Where do they differ, and which of your four functions makes the difference?
+# Then the semantic grid of both streets is built upon your filter, beside that of the package. Where do they differ?
+# None of your four functions makes the difference on the real street. The package has rules against walls that seem to move, and it forgets; `track` does neither. Look at the cars that drive ahead of us to the left.
 #
 # ## Task 6: in your own words (2 points)
 #
 # A train of small cars passes you on your left at 20 m/s. Each car carries one thin post, and the posts follow each other at a distance of exactly 2 m. Your
 # scanner turns ten times a second and sees the posts alone. The lattice has velocities 5 m/s apart, up to 20 m/s. Among the posts that have been in view from
 # the beginning, what will the filter say of their velocity? Which velocities of the lattice explain all scans of them alike, and which parts of the filter decide between these? The first
-# post of the train drives into free road, where the filter sees that it moves: what does BOF forget, so that this doesn't help the posts behind it?
+# post of the train drives into free road, where the filter sees that it moves: what does BOF forget, so that this helps the posts behind it late or not at all?
 # And name one change to the scanner that would help. Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "posts", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # In a tenth of a second each post moves by 2 m, to where the next one was. So each scan looks like the one before, and the antecedents of a post's cell hold a post for 0 m/s,
 # for 20 m/s and for 20 m/s the other way. All three explain the scans alike, so the filter's own steps decide. First sight is for STATIC, and STATIC is one velocity, while DYNAMIC is
 # spread over 48, of which only two fit. So STATIC leads, and the strike-out makes the lead certain: the posts are STATIC. (In a simulation so are they with even odds at first sight, and with reversed ones: the spread is enough.
-# The other velocities, 5 to 15 m/s, lead from a gap to a post and are refuted.) The first post arrives in cells that were free, so it is DYNAMIC. (In the simulation
-# a few posts behind it are, too.) But the filter keeps each cell by itself and forgets what ties it to the others. So what is known of the first post says nothing about those far behind it. A scanner with another rate would help, 15 scans a second say: then standing and driving predict different places, and in the simulation all posts are DYNAMIC. So would one that measures velocity (Doppler).
+# The other velocities, 5 to 15 m/s, lead from a gap to a post and are refuted.) The first post arrives in cells that were free, so it is DYNAMIC. But the filter keeps each cell by itself and forgets what ties it to the others.
+# So what is known of the first post says nothing at once about those behind it. It only travels back from post to post: in the simulation two posts are DYNAMIC after eleven scans, four after eighteen. A scanner with another rate would help, 15 scans a second say: then standing and driving predict different places, and in the simulation all posts are DYNAMIC. So would one that measures velocity (Doppler).
 # One point for 0 and 20 m/s (either way) together with a lead of STATIC (first sight or the spread), one for cells kept by themselves and a change that helps.

@@ -409,7 +409,7 @@ def _test():
 _test()
 
 # %% [markdown]
-# When the test has passed, ask your rule: what is its price on `sample_drive()[10]` with a reach of 0, 2, 4 and 8 pixels and a gap of 0.5 m? Up to which reach is it cheaper than chance?
+# When the test has passed, ask your rule: what is its price on `sample_drive()[10]` with a reach of 0, 2 and 4 pixels and a gap of 0.5 m? Is it cheaper than chance? And how many right labels does it leave: would you use it?
 #
 # ## Task 6: in your own words (2 points)
 #
