@@ -13,7 +13,7 @@
 #
 # **Prerequisites.** Lecture [01](01_bayes.ipynb): predict, update, smoothing. Conditional probability; numpy.
 #
-# **Time.** 74 minutes, of which the computer needs a few seconds.
+# **Time.** 77 minutes, of which the computer needs a few seconds.
 #
 # **Paper.** Its parts as graphs: section 3.2 (a cell over time), section 3.5 (the CRF), figure 2 (the whole system).
 
@@ -43,15 +43,16 @@ def any_model(parents):
 # %% [markdown]
 # ## Does one thing tell about another?
 #
-# A beam comes back from somewhere ahead. What does it tell about the cell behind, which it never reached? And about the
-# same cell a second later? We could answer all such questions if we knew how probable each map is. But the paper's grid
-# has 55,025 cells. If each is free or occupied, there are $2^{55025}$ maps, and nobody can store a number for each.
+# A beam comes back from a cell ahead. What does it tell about the same cell a second later? And about the cell beside
+# it, which it never reached? We could answer if we knew how probable each map is. But the paper's
+# grid has 55,025 cells. If each is free or occupied, there are $2^{55025}$ maps, and nobody can store a number for
+# each.
 #
 # So each stage of the system stores something smaller, for example one number per cell. It can do so only because it
 # assumes that some things tell nothing about others. In code such assumptions are hard to find. A graph shows them.
 # Each unknown or reading is a circle, grey if we have seen its value. Two circles are linked if they depend on each
 # other *directly*: by an arrow if one comes first and acts on the other, and by a black square if neither does. The
-# square is a small table that the two share; you will soon see what is in it.
+# square is a small table over the circles that it is linked to; you will soon see what is in it.
 
 # %% jupyter={"source_hidden": true} alt="three graphs of three variables: a chain of arrows from before to now to after; arrows from two cells m1 and m2 to one shaded beam z; three cells in a row, linked by black squares and without arrows"
 CHAIN = {"now": ("before",), "after": ("now",)}
@@ -73,10 +74,11 @@ plt.show()
 # - **Middle**: two cells on the way of one beam $z$, which comes back or doesn't. We see which, so it is grey. No
 #   edge links the cells: before any beam, one tells nothing about the other.
 # - **Right**: three neighbours that tend to agree, because walls are long. None of them comes first, so there are no
-#   arrows. (The middle graph promises the contrary about neighbours. A graph is a model, and one may choose.)
+#   arrows. (The middle graph has no such edge between neighbours. A graph is a model, and we choose it.)
 #
-# So an edge says that two things may depend on each other, and **an edge that isn't there is a promise**. This lecture
-# teaches you to read such promises.
+# So an edge says that two things may depend on each other directly. **An edge that isn't there is a promise**: there is
+# something that you can know, and once you know it, the two are independent. On the left this is *now*, on the right
+# $m_2$. In the middle you needn't know anything. This lecture teaches you to read such promises.
 #
 # ## How do small tables make a large one?
 #
@@ -105,10 +107,11 @@ print("P(z) =", joint.sum("m").table.round(3), "  P(m | return) =", joint.given(
 
 # %% [markdown]
 # For many variables nobody can invent such a table. It is easier to tell a story, one small table after the other.
-# First comes the world: two cells, each occupied with probability 0.2. Then comes the beam: it returns if at
-# least one of them is occupied, and this time it never errs. Each variable has one table. It is given the variables
-# that act on it directly, its **parents**, and an arrow leads from each of them. The joint distribution is the product
-# of the tables, $P(m_1)\,P(m_2)\,P(z \mid m_1, m_2)$. Such a model is called **directed**, or a Bayesian network.
+# First comes the world: two cells, each occupied with probability 0.2. Then comes the beam: it returns if at least one
+# of them is occupied, and this time it never errs. Each variable has one table. It says how probable each state is for
+# each combination of the variables that act on it directly, its **parents**. An arrow leads from each parent. The joint
+# distribution is the product of the tables, $P(m_1)\,P(m_2)\,P(z \mid m_1, m_2)$. Such a model is called **directed**,
+# or a Bayesian network.
 #
 # **Predict before you run.** The beam returns. How probable is it now that $m_2$ is occupied? Then another sensor
 # reports that $m_1$ *is* occupied. Does the probability of $m_2$ go up, go down, or stay?
@@ -133,7 +136,7 @@ for seen in ({}, {"z": 1}, {"z": 1, "m1": OCCUPIED}, {"z": 1, "m1": FREE}):
 
 # %% [markdown]
 # This is called **explaining away**. `enumerate_marginals` does what we did by hand: it goes through all combinations
-# and adds up. Look at what happened. Before the beam, the cells told nothing about each other. *Seeing the beam has
+# and adds up. Before the beam, the cells told nothing about each other. *Seeing the beam has
 # coupled them*: if $m_1$ is free, $m_2$ must be occupied.
 #
 # So small tables, multiplied along a story, make a large one. And what is seen can couple what was independent.
@@ -170,7 +173,7 @@ plt.show()
 # %% tags=["d-separation"] jupyter={"outputs_hidden": true}
 for title, (parents, (one, middle, other), _) in PATTERNS.items():
     answers = [d_separated(any_model(parents), one, other, given=known) for known in ((), middle)]
-    print(f"{title:<9} independent: {answers[0]!s:<6} once {middle} is known: {answers[1]}")
+    print(f"{title:<9} independence promised: {answers[0]!s:<6} once {middle} is known: {answers[1]}")
 
 # %% [markdown]
 # `d_separated` looks at the graph and at no number. Its rule for large graphs: follow every path from one variable to
@@ -179,44 +182,49 @@ for title, (parents, (one, middle, other), _) in PATTERNS.items():
 # - a collider that is *not* known, and nothing further down its arrows is known either.
 #
 # If every path is blocked, the two are **d-separated**, and then they are independent *whatever the numbers are*. If
-# one path is open, they may depend on each other. Here are two larger graphs. On the left a noisy scan sees the cell
-# at each time. On the right $r$ says which of the cells reflected, and we see a noisy range $z$.
+# one path is open, the graph promises nothing: they may depend on each other. Here are two larger graphs. On the left a
+# noisy scan sees the cell at each time. On the right $r$ says which of the cells reflected, and we see a noisy range
+# $z$.
 
-# %% jupyter={"source_hidden": true} alt="left, before, now and after in a row, each with an arrow down to its shaded scan z1, z2, z3, with now ringed; right, cells m1 and m2 point to r, and r points to the shaded z"
+# %% jupyter={"source_hidden": true} alt="left, before, now and after in a row, each with an arrow down to its shaded scan z1, z2, z3; right, cells m1 and m2 point to r, and r points to the shaded z"
 CELL_IN_TIME = {"now": ("before",), "after": ("now",), "z1": ("before",), "z2": ("now",), "z3": ("after",)}
 NOISY_RANGE = {"r": ("m1", "m2"), "z": ("r",)}
 ROWS = in_rows(["before", None, "now", None, "after"], ["z1", None, "z2", None, "z3"])
 fig, axes = plt.subplots(1, 2, figsize=(8, 2.6), layout="constrained")
-draw(any_model(CELL_IN_TIME), axes[0], observed=("z1", "z2", "z3"), positions=ROWS, highlight=["now"])
+draw(any_model(CELL_IN_TIME), axes[0], observed=("z1", "z2", "z3"), positions=ROWS)
 draw(any_model(NOISY_RANGE), axes[1], observed="z", positions=in_rows(["m1", "m2"], ["r"], ["z"]))
+for ax, title in zip(axes, ("one cell, scanned three times", "two cells, one noisy range"), strict=True):
+    ax.set_title(title, fontsize=10)
 plt.show()
 
 # %%
 in_time, noisy_range = any_model(CELL_IN_TIME), any_model(NOISY_RANGE)
+BLOCKED = "none, all are blocked"
 print("open path:", why_dependent(in_time, "before", "after", given=("z1", "z2", "z3")))
-print("open path:", why_dependent(in_time, "before", "after", given="now"))
+print("open path:", why_dependent(in_time, "before", "after", given="now") or BLOCKED)
 print("open path:", why_dependent(noisy_range, "m1", "m2", given="z"))
-blanket = ("before", "after", "z2")
-assert d_separated(in_time, "now", ("z1", "z3"), given=blanket)
 
 # %% [markdown]
 # - A scan of *now* isn't *now*. It may be wrong, so the chain stays open.
 # - If *now* is known, nothing is open. A filter never knows *now*, it only has a belief about it. But the promise holds
-#   for either state of *now*, so the filter may predict *after* from each state and weigh the two by its belief. The
-#   old scans enter through these two weights alone, and once they are in there the filter may forget them.
+#   for either state of *now*. So the filter keeps two numbers, P(free) and P(occupied) now. All that the old scans
+#   can still tell about *after* is in these two, so it may throw the scans away.
 # - The range $z$ is below the collider $r$ and tells something about it. So $r$ is open.
 #
-# And what must you know so that nothing else tells about *now* (ringed)? Its parent *before*, its child *after*, and
-# its scan. This set is called the **Markov blanket**: a variable's parents, its children, and its children's other
-# parents, because of explaining away.
-#
-# So the missing edges tell what is independent of what. Known middles block, and known colliders open.
+# So the missing edges tell what is independent of what. Known middles block, and known colliders open. The beam of the
+# beginning tells about the same cell a second later, as long as *now* isn't known.
 #
 # ## What if nothing comes first?
 #
-# Neighbouring cells tend to agree, because walls are long. Which of two neighbours should get the arrow? Neither. So give each
-# pair a factor $\psi$ that is 3 if they agree and 1 if they don't. These numbers are no probabilities. They only say
-# what is more plausible. Multiply them, and divide by whatever makes the sum one:
+# Neighbouring cells tend to agree, because walls are long. Which way should the arrows go? In a row it hardly matters:
+# draw them all to the right, and they promise the same. But try a square of four cells, each linked with two. The
+# arrows mustn't run in a circle, so two of them meet in some cell. It is a collider, and when it is known, it links the
+# two cells beside it. No choice of arrows promises for *both* pairs of opposite cells that they are independent once
+# the other two are known.
+#
+# So draw no arrows. Give each pair of neighbours a factor $\psi$ that is 3 if they agree and 1 if they don't. These
+# numbers are no probabilities. They only say what is more plausible. Multiply them, and divide by whatever makes the
+# sum one:
 #
 # $$ P(m_1, m_2, m_3) = \frac{\psi(m_1, m_2)\; \psi(m_2, m_3)}{Z}, \qquad
 #    Z = \sum_{\text{all maps}} \psi(m_1, m_2)\; \psi(m_2, m_3) $$
@@ -238,11 +246,13 @@ assert d_separated(in_time, "now", ("z1", "z3"), given=blanket)
 ends = enumerate_marginals(row, ("m1", "m3"))
 print(f"Z = {ends.table.sum():.0f}; the ends agree with probability {np.trace(ends.normalised().table):.3f}")
 for known in ((), ("m2",)):
-    print(f"m1 and m3 independent, given {known}: {d_separated(row, 'm1', 'm3', given=known)}")
+    print(f"m1 and m3: independence promised, given {known}: {d_separated(row, 'm1', 'm3', given=known)}")
 
 # %% [markdown]
-# Independence is simpler here. What is known always blocks, and there are no colliders. The cost is $Z$, a sum over
-# all maps.
+# Independence is simpler here. What is known always blocks, and there are no colliders. Once a cell's neighbours are
+# known (its **Markov blanket**), nothing else tells about it. In this row the beam of the beginning also tells about
+# the cell beside it, because the model links them. The cost is $Z$. It is defined as a sum over all maps. In a row it
+# is cheap all the same, in a large square it isn't; the next section shows why.
 #
 # Can we forget the arrows of a directed model? Yes, its tables are factors like any others. Then it is drawn as a
 # **factor graph**, with a black square for each table, linked to the variables in it:
@@ -259,15 +269,27 @@ assert d_separated(one_of_you, "m1", "m2")
 assert not d_separated(without_arrows, "m1", "m2")
 
 # %% [markdown]
-# The numbers are the same, but the drawing promises less. Both cells are in one table now, so the right graph can't say
-# that they are independent before the beam is seen. So keep the arrows as long as you ask about independence, and
-# forget them when you compute.
+# The numbers are the same, but the drawing promises less. Before the beam is seen, the cells are independent because
+# the table of $z$ sums to one over $z$. The square no longer says which variable is the child, so nobody can see that.
+# Spoil just this sum, and look at $m_2$ again:
+
+# %%
+spoilt = returns * Factor(("m1", "m2"), [[1, 1], [1, 0.5]])  # if both are occupied, it sums to 0.5
+for text, table in (("sums to one", returns), ("is spoilt", spoilt)):
+    joint = product([*cells, table]).sum("z")
+    m2 = [joint.given(m1=state).normalised().table[OCCUPIED] for state in (FREE, OCCUPIED)]
+    print(f"z's table {text:<12} P(m2 occupied) if m1 is free {m2[0]:.2f}, if m1 is occupied {m2[1]:.2f}")
+
+# %% [markdown]
+# With the right sum $m_1$ tells nothing about $m_2$, and without it it does. So keep the arrows as long as you ask
+# about independence, and forget them when you compute.
 #
 # ## What does an answer cost?
 #
 # So far we summed over all combinations. Thirty cells have a billion. How can the same sum be cheaper? Take the chain,
-# with lecture 01's matrix $M$ of a free or occupied cell, and P(*before*) one half. To get $P(\text{after})$ we sum over
-# *before* and *now*. But one table doesn't contain *before*, and may move out of its sum, as in $ab + ac = a(b + c)$:
+# with lecture 01's matrix $M$ of a free or occupied cell, and P(*before*) one half. To get $P(\text{after})$ we sum
+# over *before* and *now*. But one table doesn't contain *before*, and may move out of its sum, as in
+# $ab + ac = a(b + c)$:
 #
 # $$ P(\text{after}) = \sum_{\text{now}} P(\text{after} \mid \text{now})
 #    \underbrace{\sum_{\text{before}} P(\text{before})\; P(\text{now} \mid \text{before})}_{\text{a table over now alone}} $$
@@ -295,43 +317,42 @@ np.testing.assert_allclose(after.table, eliminate(chain, "after").table)  # the 
 np.testing.assert_allclose(after.table, START.table @ M @ M)  # lecture 01's prediction, twice
 
 # %% [markdown]
-# The last line says that elimination on a chain is lecture 01's prediction: a vector times a matrix, once per step.
-# Does the order matter? Let the kind of street decide how full six cells are:
+# So elimination on a chain is lecture 01's prediction: a vector times a matrix, once per step. (The last line of the
+# code checks it.)
+# Does the order matter? Let the kind of street decide how full six cells are. A beam has come back from each of them,
+# and so each tells something about the street, and about the other cells:
 
-# %% jupyter={"source_hidden": true} alt="a circle named street with an arrow to each of six cells, m1 to m6"
+# %%
 street = Factor("street", [0.5, 0.5])  # motorway, market place
 six = [Factor(("street", f"m{k}"), [[0.95, 0.05], [0.7, 0.3]]) for k in range(1, 7)]
-star = GraphicalModel([street, *six], parents={f"m{k}": ("street",) for k in range(1, 7)})
-fig, ax = plt.subplots(figsize=(5, 1.7), layout="constrained")
-draw(star, ax, positions=in_rows(["street"], [f"m{k}" for k in range(1, 7)]))
-plt.show()
+six_returns = [Factor(f"m{k}", [0.05, 0.8]) for k in range(1, 7)]
 
 # %% [markdown]
-# **Predict before you run.** We want $P(m_1)$. How many entries has the largest table if you sum out *street* first?
-# And if you sum out the other five cells first, and *street* last?
+# **Predict before you run.** We want $P(m_1 \mid \text{six returns})$. How many entries has the largest table if you
+# sum out *street* first? And if you sum out the other five cells first, and *street* last?
 #
 # <details><summary>Answer</summary>
 #
-# Street first: all seven tables contain it, so their product has seven axes, 2<sup>7</sup> = 128 entries. Cells first:
-# each cell is in one table only, which has two axes, so 4 entries each time.
+# Street first: seven tables contain it, and their product has seven axes, so 128 entries. Cells first:
+# a cell is in two tables, its own and that of its return. Together they have two axes, so 4 entries each time.
 #
 # </details>
 
 # %% jupyter={"outputs_hidden": true}
 others = [f"m{k}" for k in range(2, 7)]
 for order in (["street", *others], [*others, "street"]):
-    m1, sizes = sum_in_order([street, *six], order)
-    print(f"{order[0]:<7}first: P(m1) = {m1.table.round(3)}, largest table {max(sizes)}")
+    m1, sizes = sum_in_order([street, *six, *six_returns], order)
+    print(f"{order[0]:<7}first: P(m1 occupied) = {m1.normalised().table[OCCUPIED]:.2f}, largest table {max(sizes)}")
 
 # %% [markdown]
-# The answer is the same, and the cost isn't. **To sum a variable out is to link all its neighbours**: each cell hints at
-# the street, and so at every other cell.
+# The answer is the same, and the cost isn't. **To sum a variable out is to link all its neighbours**: each cell hints
+# at the street, and so at every other cell.
 #
 # Is there always a cheap order? Take a square of cells, each with a table for every neighbour, and sum it out row by
 # row (left, below):
 
 
-# %% jupyter={"source_hidden": true} alt="left, a square of four by four cells linked through black squares; five cells are gone and have left a square that is linked to the four cells after them; these and the fifth have thick outlines, and the first is called next; right, entries on a logarithmic scale against the side of the square: all maps rise to 10 to the 30, the largest table of the row-by-row order to about 2,000"
+# %% jupyter={"source_hidden": true} alt="left, a square of four by four cells linked through black squares; five cells are gone and have left a square that is linked to the four cells after them; these and the fifth have thick outlines, and the first is marked with a cross; right, entries on a logarithmic scale against the side of the square: all maps rise to 10 to the 30, the largest table of the row-by-row order to about 2,000"
 def square(n):
     """Return n x n cells, each linked with its neighbours to the right and below."""
     below = [((r, c), (r + 1, c)) for r in range(n - 1) for c in range(n)]
@@ -347,7 +368,7 @@ left = [name for name in by_row[4] if name not in by_row[4][:5]]
 untouched = [f for f in square(4).factors if set(f.names) <= set(left)]
 rest = GraphicalModel([Factor(left[:4], np.ones([2] * 4)), *untouched])  # what the five cells leave behind links four
 PLACES = {name: (int(name[3]), -int(name[1])) for name in left} | {f"f({', '.join(left[:4])})": (0.9, -0.05)}
-words = dict.fromkeys(left, "") | {left[0]: "next"}
+words = dict.fromkeys(left, "") | {left[0]: "×"}
 draw(rest, axes[0], positions=PLACES, labels=words, highlight=left[:5])
 axes[0].set_title("five cells are summed out", fontsize=10)
 axes[1].semilogy(sides, 2.0 ** (sides**2), "s--", color="0.4", label="all maps, $2^{n^2}$")
@@ -359,14 +380,15 @@ np.testing.assert_array_equal(largest, 2 ** (sides + 1))
 
 # %% [markdown]
 # Left: five cells are summed out, and have left one table that links the next four (the black square above them). Now
-# the cell *next* is summed out. The table for this has five axes, the cells with thick outlines: one more than the
-# square has cells on a side. So ten by ten cells need tables of 2<sup>11</sup> = 2,048 entries, in
-# place of 2<sup>100</sup> maps. That is as good as it gets: in an $n$ by $n$ square *every* order meets a table with at
-# least $n$ + 1 axes. (A theorem: the square's *treewidth* is $n$, Diestel, chapter 12.) The paper's grid has 155 cells
-# on its shorter side, and its CRF links even every cell with every other.
+# the cell marked × is summed out. The table for this has five axes, the cells with thick outlines: one more than the
+# square has cells on a side. So ten by ten cells need tables of 2,048 entries, in place
+# of 2<sup>100</sup> maps. That is as good as it gets: in an $n$ by $n$ square *every* order meets a table with at least
+# $n$ + 1 axes. (A theorem: the square's *treewidth* is $n$, see Diestel below.) The paper's grid has 155 cells
+# on its shorter side. That makes 2<sup>156</sup> entries, about 10<sup>47</sup>. And its CRF links even every cell with
+# every other.
 #
-# So an answer costs as much as its largest table. On a chain that is little. On a grid it is too much, and **this is
-# why the course needs approximations**.
+# So elimination costs as much as its largest table. On a chain that is little. On a large grid no order helps, and
+# **this is why the course needs approximations**.
 #
 # ## How do we get all answers at once?
 #
@@ -384,8 +406,8 @@ PLACES = in_rows(["before", None, None, "now", None, None, "after"])
 PLACES |= {f"f({name})" + (" #2" if name == "before" else ""): (PLACES[name][0], -0.62) for name in TIMES}
 tables = {"f(before)": "prior", "f(before, now)": "$M$", "f(now, after)": "$M$"}
 draw(scanned, ax, positions=PLACES | {"f(before)": (-0.75, 0)}, equations=tables)
-for name in TIMES:
-    ax.text(PLACES[name][0] + 0.14, -0.62, "scan", va="center", fontsize=10)
+for number, name in enumerate(TIMES, start=1):
+    ax.text(PLACES[name][0] + 0.14, -0.62, rf"scan, $\lambda_{number}$", va="center", fontsize=10)
 for x in (1.5, 4.5):
     for y, shift, text, colour in ((0.4, 0.75, "forward", "#0072b2"), (-0.3, -0.75, "backward", "#d55e00")):
         style = {"arrowstyle": "->", "color": colour, "lw": 1.8}
@@ -404,13 +426,13 @@ plt.show()
 #    \;\cdot\; \underbrace{\lambda_2}_{\text{own scan}} \;\cdot\; \underbrace{M\, \lambda_3}_{\text{from the right}} $$
 #
 # **Predict before you run.** When the return arrives, the filter believes with 0.82 that the cell is occupied *now*.
-# The third scan speaks against it. In hindsight, does the 0.82 rise or fall? And the belief about *before*, which was
-# 0.17?
+# The third scan speaks against it. In hindsight, does this belief rise or fall? And the belief about *before*, which
+# was 0.17?
 #
 # <details><summary>Answer</summary>
 #
-# The 0.82 falls to 0.65: perhaps the return was an error. The 0.17 rises to 0.42: a return came right after, and what
-# is somewhere now was mostly there before.
+# The 0.82 falls to 0.65: perhaps the return was an error. The 0.17 rises to 0.42. The return alone would lift it to
+# 0.52, because what is somewhere now was mostly there before. The third scan takes a part of this back.
 #
 # </details>
 
@@ -424,7 +446,8 @@ all_answers = sum_product(scanned)  # the package: every message once in each di
 np.testing.assert_allclose(all_answers.marginals["now"], now / now.sum())
 np.testing.assert_allclose(all_answers.marginals["before"], before / before.sum())
 print(f"now: filter {(filtered / filtered.sum())[OCCUPIED]:.2f}, all scans {(now / now.sum())[OCCUPIED]:.2f}")
-print(f"before: all scans {(before / before.sum())[OCCUPIED]:.2f}")
+two = START.table * NOTHING * (M @ RETURN)  # before, without the third scan
+print(f"before: two scans {(two / two.sum())[OCCUPIED]:.2f}, all scans {(before / before.sum())[OCCUPIED]:.2f}")
 
 # %% jupyter={"source_hidden": true}
 first = START.table * NOTHING
@@ -434,19 +457,20 @@ np.testing.assert_allclose(all_answers.messages["now", "f(now, after)"], filtere
 # %% [markdown]
 # Each message serves several questions, so one sweep in each direction gives *all* answers. This is the
 # **forward-backward algorithm**. Compare it with lecture 01: **the Bayes filter is the forward half of message
-# passing.** The filter isn't wrong for lack of the other half. It answers another question: what is the cell now, from
-# what has been seen until now?
+# passing.** The message from the right, $M \lambda_3$, is lecture 01's $\beta$. So all three factors together are its
+# smoother.
 #
-# On any graph without loops two sweeps are enough, because each message holds what is on one side of an edge, and the
-# two sides have nothing in common. With a maximum in place of each sum, messages find the most probable sequence as a
-# whole: the algorithm of **Viterbi**.
+# A **loop** is a way along the links that comes back to its start. On any graph without loops two sweeps are enough,
+# because each message holds what is on one side of an edge, and the two sides have nothing in common. With a maximum in
+# place of each sum, messages find the most probable sequence as a whole: the algorithm of **Viterbi**.
 #
 # ## Which graphs does this course use?
 #
-# Three. You know the first: one cell over time, with a scan each time (lectures 02 to 04). It is there once for each
-# cell of the grid, and no edge links two cells, so each is filtered by itself. Here are the other two:
+# Three. You know the first: one cell over time, with a scan each time. Lecture 02 uses it once for each cell, and lets
+# the cell stay what it is. In lectures 03 and 04 things move, so arrows come from *other* cells of the past. Each cell
+# of the present is then updated by itself, as if nothing linked it with its neighbours. Here are the other two:
 
-# %% tags=["stages"] jupyter={"source_hidden": true} alt="left, four cells at the corners of a square, each pair linked through a black square, and one more square at each cell; right, two columns, t-1 and t: the world w with an arrow to the next w, arrows from w to the grey readings l and i; l to o, o and i to g; o has an arrow to the next o, and a dashed arrow leads from g to the next g"
+# %% tags=["stages"] jupyter={"source_hidden": true} alt="left, four cells at the corners of a square, each pair linked through a black square, and one more square at each cell; right, two columns, t-1 and t: the world w with an arrow to the next w, arrows from w to the grey readings l and i; l to the grey o, o and i to g; o has an arrow to the next o, and a dashed arrow marked deleted leads from g to the next g"
 fig, axes = plt.subplots(1, 2, figsize=(9.4, 3.2), layout="constrained", width_ratios=(1, 2.2))
 CORNERS = {"x1": (0, 0), "x2": (1.8, 0), "x3": (1.8, -1.8), "x4": (0, -1.8)}
 pairs = [(one, other) for one in CORNERS for other in CORNERS if one < other]
@@ -463,30 +487,37 @@ system = any_model(SYSTEM)
 draw(
     system,
     axes[1],
-    observed=("l0", "l1", "i0", "i1"),
+    observed=("l0", "l1", "i0", "i1", "o0", "o1"),
     positions=WHERE,
     labels={f"{name}{t}": f"${name}_{{{'t' if t else 't-1'}}}$" for name in COLUMN for t in (0, 1)},
     equations={"w1": "world", "l1": "LIDAR", "i1": "image", "o1": "occupancy", "g1": "semantic grid"},
-    dashed=[Dashed(("g0", "g1"))],
+    dashed=[Dashed(("g0", "g1"), "deleted")],
 )
 axes[1].set_title("the whole system", fontsize=10)
 plt.show()
 
+# %% [markdown]
+# **The CRF**. Each circle is the class of a cell. It has a table of its own, what the network says
+# of it, and one with every other cell that rewards agreement. There are loops everywhere and no cheap order, so lecture
+# 10 takes an approximation, *mean field*.
+#
+# **The whole system**. The world $w$ goes on from one instant to the next. LIDAR $l$ and image $i$ see it.
+# Further down an arrow means *is computed from*: the occupancy $o$ from the scans, and the semantic grid $g$ from
+# occupancy and image. So $o$ is known, too, and grey. The system deletes one arrow, from $g$ to the next $g$.
+#
+# What does the system lose by it? Ask the graph without this arrow, and with it:
+
 # %%
-print("the earlier image and the map, given o and i:  ", why_dependent(system, "i0", "g1", given=("o1", "i1")))
-print("the earlier image and the world, given o and i:", why_dependent(system, "i0", "w1", given=("o1", "i1")))
+kept = any_model(SYSTEM | {"g1": ("o1", "i1", "g0")})  # the arrow is put back
+known = ("l0", "l1", "o0", "o1", "i1")  # what is grey, but for the earlier image
+print("earlier image and map, arrow deleted:", why_dependent(system, "i0", "g1", given=known) or BLOCKED)
+print("earlier image and map, arrow kept:   ", why_dependent(kept, "i0", "g1", given=known))
+print("earlier image and world:             ", why_dependent(system, "i0", "w1", given=known))
 
 # %% [markdown]
-# **The CRF** (lectures 10 and 11). Each cell has a table of its own, what the network says of it, and one with every
-# other cell that rewards agreement. There are loops everywhere and no cheap order.
-#
-# **The whole system** (lecture 00). The world $w$ goes on from one instant to the next. LIDAR $l$ and image $i$ see it.
-# The occupancy $o$ comes from the scans. It is fused with what a network reads in the image to the semantic grid $g$.
-# An edge that the system deletes is dashed: here the one from $g$ to the next $g$.
-#
-# What does the system lose by it? Ask the graph. The map $g_t$ can't hear of the earlier image: given $o_t$ and $i_t$
-# every path is blocked. About the *world* that image *may* have something to tell, because a path is open. How much, no
-# graph can say. An open path promises nothing. Lecture 14 puts the edge back and measures.
+# Without the arrow the map can't hear of the earlier image. With it the path from $i_{t-1}$ over $g_{t-1}$ is open.
+# The path to the *world* is open, too, so there may be something to carry. How much, no graph can say. Lecture 14
+# puts the arrow back and measures.
 #
 # So a graph tells what a stage can't know. What that costs must be measured.
 #
@@ -495,30 +526,30 @@ print("the earlier image and the world, given o and i:", why_dependent(system, "
 # Messages are exact as long as there is no loop. Close the row of three neighbours to a triangle. Only $m_1$ has been
 # scanned, and the scan says: occupied with probability 0.8.
 #
-# **Predict before you run.** What is the exact probability of $m_1$: more than 0.8, less, or 0.8? And what do messages
-# say that go round the triangle?
+# **Predict before you run.** What is the exact probability of $m_1$: more than that, less, or just that? And what do
+# messages say that go round the triangle?
 #
 # <details><summary>Answer</summary>
 #
-# Exactly 0.8. The neighbours have seen nothing, so they can't add anything. But $m_1$ hears from $m_3$ that it is
+# Exactly 0.8. The table treats free and occupied alike, so the unscanned neighbours weigh both states of $m_1$ the
+# same. But $m_1$ hears from $m_3$ that it is
 # probably occupied, and takes for news what is the echo of its own opinion. It becomes too sure: 0.85.
 #
 # </details>
 
 
 # %% jupyter={"outputs_hidden": true}
-def neighbours(agreement, scan, closed=True):
-    """Return three cells that like to agree; the first is scanned. A row, or a triangle if `closed`."""
+def neighbours(table, scan, closed=True):
+    """Return three cells with one table a pair; the first is scanned. A row, or a triangle if `closed`."""
     pairs = [("m1", "m2"), ("m2", "m3"), ("m1", "m3")][: 3 if closed else 2]
-    return GraphicalModel(
-        [Factor("m1", [1 - scan, scan]), *(Factor(pair, [[agreement, 1], [1, agreement]]) for pair in pairs)]
-    )
+    return GraphicalModel([Factor("m1", [1 - scan, scan]), *(Factor(pair, table) for pair in pairs)])
 
 
-for closed, name in ((False, "row"), (True, "triangle")):
-    model = neighbours(agreement=3, scan=0.8, closed=closed)
+MORE_FREE = [[5, 1], [1, 3]]  # as AGREE, but two free neighbours are more plausible than two occupied ones
+for closed, table, name in ((False, AGREE, "row"), (True, AGREE, "triangle"), (False, MORE_FREE, "row, more free")):
+    model = neighbours(table, scan=0.8, closed=closed)
     exact, passed = eliminate(model, "m1").normalised().table, sum_product(model).marginals["m1"]
-    print(f"{name:<9}P(m1 occupied): exact {exact[OCCUPIED]:.2f}, messages {passed[OCCUPIED]:.2f}")
+    print(f"{name:<15}P(m1 occupied): exact {exact[OCCUPIED]:.2f}, messages {passed[OCCUPIED]:.2f}")
 
 
 # %% jupyter={"source_hidden": true}
@@ -529,10 +560,10 @@ def echo(scan, ax):
         (True, "o-", "#d55e00", "messages in the triangle"),
         (False, "-", "0.4", "exact, and messages in the row"),
     ):
-        models = [neighbours(pull, scan, closed) for pull in pulls]
+        models = [neighbours([[pull, 1], [1, pull]], scan, closed) for pull in pulls]
         found = [sum_product(model, iterations=500).marginals["m1"][OCCUPIED] for model in models]
         ax.plot(pulls, found, style, color=colour, label=label)
-    np.testing.assert_allclose(found, eliminate(neighbours(3, scan), "m1").normalised().table[OCCUPIED])
+    np.testing.assert_allclose(found, eliminate(neighbours(AGREE, scan), "m1").normalised().table[OCCUPIED])
     ax.set(xlabel=r"$\psi$ of two cells that agree", ylabel="P($m_1$ occupied)", ylim=(0.45, 1.02))
     ax.legend(fontsize=9, frameon=False, loc="lower right")
 
@@ -540,7 +571,7 @@ def echo(scan, ax):
 # %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, three cells in a triangle of squares, the scan's square beside m1, and an orange arrow from each cell to the next one round the triangle; right, P(m1 occupied) against the factor of agreement: the exact answer stays at 0.8, messages in the triangle rise from 0.8 to 0.95"
 fig, axes = plt.subplots(1, 2, figsize=(7.6, 3), layout="constrained", width_ratios=(1, 1.4))
 TRIANGLE = {"m1": (0, 0), "m2": (1.9, 0), "m3": (0.95, 1.45)}
-draw(neighbours(3, 0.8), axes[0], positions=TRIANGLE | {"f(m1)": (-0.6, 0)})
+draw(neighbours(AGREE, 0.8), axes[0], positions=TRIANGLE | {"f(m1)": (-0.6, 0)})
 axes[0].text(-0.6, 0.2, "scan", ha="center", fontsize=10)
 centre = np.mean(list(TRIANGLE.values()), axis=0)
 for one, other in (("m1", "m2"), ("m2", "m3"), ("m3", "m1")):
@@ -565,7 +596,10 @@ _ = interact(show, scan=FloatSlider(value=0.8, min=0.5, max=0.99, step=0.01))
 # %% [markdown]
 # The arrows show the way of the echo; it goes round the other way, too. The loop is the cause: take one factor of the
 # triangle away, and the messages are exact again. With the loop, the stronger the agreement, the louder the echo. (The
-# dial works with a running kernel. Why is there no echo at 0.5?)
+# dial works with a running kernel. At 0.5 there is no echo, because an undecided cell sends both states alike.)
+#
+# The third line of the output shows why the exact answer didn't move. With a table that prefers *free*, neighbours
+# without any scan do pull $m_1$, down to 0.68.
 #
 # And no method repairs a wrong graph. If two beams share an error, and the graph has no circle for it, even exact
 # inference is too sure. Lecture [02](02_grids.ipynb) shows that.
@@ -573,10 +607,10 @@ _ = interact(show, scan=FloatSlider(value=0.8, min=0.5, max=0.99, step=0.01))
 # ## In five lines
 #
 # 1. A factor is a table with named axes. Multiply, sum out, slice, divide: that gives every probability.
-# 2. Missing edges are promises. A known middle blocks a chain or a fork. A collider opens when it, or something below
-#    it, is known.
+# 2. A missing edge promises that something can be known that makes the two independent. A known middle blocks a chain
+#    or a fork. A collider opens when it, or something below it, is known.
 # 3. Without arrows, factors say what is plausible, $Z$ makes the sum one, and what is known always blocks.
-# 4. An answer costs as much as its largest table, and the order decides. On a chain two sweeps of messages give all
+# 4. Elimination costs as much as its largest table, and the order decides. On a chain two sweeps of messages give all
 #    answers; the forward one is the filter.
 # 5. In a loop of cells that like to agree, messages hear their own echo and become too sure.
 #
@@ -590,6 +624,6 @@ _ = interact(show, scan=FloatSlider(value=0.8, min=0.5, max=0.99, step=0.01))
 # - Diestel, *Graph Theory*, Springer, chapter 12: treewidth, and that of a square grid (an exercise there).
 # - Pearl, *Probabilistic Reasoning in Intelligent Systems*, Morgan Kaufmann 1988: d-separation, by its inventor.
 #
-# [Exercise 01b](exercises/01b_graphical_models.ipynb): tables with named axes, reports that aren't certain, independence
-# read off a graph, messages along a chain, and a question. Next: lecture [02](02_grids.ipynb), thousands of cells
-# side by side.
+# [Exercise 01b](exercises/01b_graphical_models.ipynb): tables with named axes, reports that aren't certain,
+# independence read off a graph, messages along a chain, and a question. Next: lecture [02](02_grids.ipynb), thousands
+# of cells side by side.

@@ -77,7 +77,9 @@ def claim_picture(readings: Sequence[dict]) -> Figure:
     ends = {one["what"].partition(": ")[2] for one in judged(readings[0])}
     common = ends.pop() if len(ends) == 1 else ""
     rows, size = len(judged(readings[0])), (2.4 + 2.3 * len(readings), 2 + 0.42 * len(judged(readings[0])))
-    figure, axes = plt.subplots(1, len(readings), figsize=size, sharey=True, layout="constrained", squeeze=False)
+    figure, axes = plt.subplots(
+        1, len(readings), figsize=size, sharex=True, sharey=True, layout="constrained", squeeze=False
+    )
     for ax, reading in zip(axes[0], readings, strict=True):
         draw_statements(ax, judged(reading))
         learned, by = (LABELS[reading[key]] for key in ("trained", "judged"))
@@ -86,6 +88,6 @@ def claim_picture(readings: Sequence[dict]) -> Figure:
         names = [in_words(one["what"].removesuffix(": " + common)) for one in judged(readings[0])]
         axes[0, 0].set_yticks(range(rows), names)
     for ax in axes[0]:
-        ax.set_xlabel(f"{in_words(common)}\n[points]".strip(), fontsize=9)
+        ax.set_xlabel(f"{in_words(common)}\n[points]" if common else "difference [points]", fontsize=9)
     figure.legend(*legend_entries(axes[0, 0]), loc="outside lower center", ncols=5, fontsize=8, frameon=False)
     return figure

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from semgrid_edu.workshop.scoring.statistics import EstimatedMean
 from worlds.lecture_12_pictures import RESULTS
 
 HIT, MISS = "#1f4e79", "#c0392b"
@@ -134,8 +135,8 @@ def some_drives(rng: np.random.Generator, n: int, share: float) -> NDArray[np.in
     return np.array([[a, x], [y, b]]).transpose(2, 0, 1)
 
 
-def held(share: float, interval: Callable, metric: Callable, n: int = 20, trials: int = 200) -> float:
-    """Return how often an interval over some drives contains the true score.
+def tried(share: float, interval: Callable, metric: Callable, n: int = 20, trials: int = 200) -> NDArray[np.int64]:
+    """Return for each experiment how many drives had the second class, and whether the interval contains the truth.
 
     Parameters
     ----------
@@ -149,10 +150,66 @@ def held(share: float, interval: Callable, metric: Callable, n: int = 20, trials
         Number of drives.
     trials : int
         Number of experiments.
+
+    Returns
+    -------
+    (E, 2) int
+        Number of drives with the second class; 1 if the interval contains the true score, else 0.
     """
     truth = metric(some_drives(np.random.default_rng(0), 100_000, 0.99).sum(axis=0))
-    rng, hits = np.random.default_rng(1), 0
+    rng, found = np.random.default_rng(1), []
     for _ in range(trials):
-        low, _, high = interval(some_drives(rng, n, share), metric)
-        hits += low <= truth <= high
-    return hits / trials
+        matrices = some_drives(rng, n, share)
+        low, _, high = interval(matrices, metric)
+        found.append((matrices[:, 1].any(axis=1).sum(), low <= truth <= high))
+    return np.array(found, dtype=np.int64)
+
+
+def half_width(differences: Callable, counts: Sequence[NDArray], seeds: int = 1, drives: int = 1) -> float:
+    """Return how far an interval would reach to each side, in points, with so many times as many seeds and drives.
+
+    What a drive does to one seed alone is a part of what seeds contribute. This part shrinks with both.
+
+    Parameters
+    ----------
+    differences : callable
+        Takes the confusion matrix of each method, returns the score or the difference of two.
+    counts : sequence of (S, V, C, C) int
+        Confusion matrices of each method, by seed and drive.
+    seeds, drives : int
+        How many times as many.
+    """
+    n_seeds, n_drives = counts[0].shape[:2]
+    totals = [matrices.sum(axis=1) for matrices in counts]
+    scores = np.array([differences(*(total[s] for total in totals)) for s in range(n_seeds)])
+    without = [total[:, None] - matrices for total, matrices in zip(totals, counts, strict=True)]
+    left_out = [[differences(*(w[s, v] for w in without)) for v in range(n_drives)] for s in range(n_seeds)]
+    parts = (n_drives - 1) * (scores[:, None] - np.array(left_out))
+    of_both = parts.var(axis=0, ddof=1).sum() / (n_drives - 1) / n_seeds / n_drives
+    of_seeds = scores.var(ddof=1) / n_seeds
+    of_drives = max(parts.mean(axis=0).var(ddof=1) / n_drives - of_both, 0.0)
+    shared = min(of_both, of_seeds)
+    variances = (of_seeds - shared) / seeds + shared / (seeds * drives), of_drives / drives
+    return 100 * EstimatedMean(0.0, variances, (n_seeds * seeds, n_drives * drives)).half_width(0.95)
+
+
+def by_seed(experiment: str, network: str, labels: str, seeds: int) -> NDArray:
+    """Return a network's kept counts (S, V, C, C) on the test drives, all distances.
+
+    Parameters
+    ----------
+    experiment : str
+        "table1" or "claims".
+    network : str
+        As in the names of the counts, such as "segnet-lidar".
+    labels : str
+        Judged by "lidar" or "true" labels.
+    seeds : int
+        Number of seeds; the first ones.
+    """
+    kept = np.load(RESULTS / "reduced" / f"{experiment}_counts.npz")
+    scored, of = f"score-minikitti-{network}-500+500-seed", f"/network, {labels} labels, all distances"
+    ends = [f"-on-minikitti-test-lidar{refined}{of}" for refined in ("-crf", "")]
+    return np.stack(
+        [kept[f"{scored}{seed}{end}"] for seed in range(seeds) for end in ends if f"{scored}{seed}{end}" in kept]
+    )

@@ -1,11 +1,11 @@
 import matplotlib.pyplot as plt
 import numpy as np
 from worlds.lecture_12_claims import claim_picture, judged
-from worlds.lecture_12_intervals import held, some_drives
+from worlds.lecture_12_intervals import by_seed, half_width, some_drives, tried
 from worlds.lecture_12_pictures import kept
 
-from semgrid_edu.metrics import class_accuracy
-from semgrid_edu.workshop.scoring.statistics import drive_interval
+from semgrid_edu.metrics import class_accuracy, pixel_accuracy
+from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 
 
 def test_a_claims_picture_marks_each_statement_and_its_limit():
@@ -39,4 +39,19 @@ def test_an_interval_that_holds_for_a_common_class_fails_for_a_rare_one():
     def interval(matrices, metric):
         return drive_interval(matrices[None], metric)
 
-    assert held(0.8, interval, class_accuracy, trials=60) > 0.85 > held(0.1, interval, class_accuracy, trials=60)
+    common, rare = (tried(share, interval, class_accuracy, trials=60) for share in (0.8, 0.1))
+    assert common[:, 1].mean() > 0.85 > rare[:, 1].mean()
+    assert not rare[rare[:, 0] == 0, 1].any()  # no drive has the class: another quantity
+
+
+def test_a_half_width_is_the_packages_and_shrinks_with_what_is_bought():
+    usual, two = (by_seed("claims", f"segnet-lidar{end}", "lidar", 3) for end in ("", "-two-stage"))
+    assert usual.shape == two.shape == (3, 110, 14, 14)
+
+    def difference(a, b):
+        return pixel_accuracy(a) - pixel_accuracy(b)
+
+    one = paired_interval(usual, two, pixel_accuracy)
+    now, seeds, drives = (half_width(difference, (usual, two), *n) for n in ((1, 1), (4, 1), (1, 4)))
+    np.testing.assert_allclose(now, 50 * (one.high - one.low))
+    assert seeds < 0.4 * now < 0.8 * now < drives < now

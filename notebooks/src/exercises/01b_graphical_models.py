@@ -223,7 +223,8 @@ _test()
 #
 # `parents` describes a directed graph: for each variable the tuple of its parents, `()` for one without. Complete `separated`: it returns `True` when every path between
 # `a` and `b` is blocked once the variables in `given` are known, and `False` otherwise. Some variables may be **exact**: each of those in `exact` is a function of its parents, without noise,
-# as the pixel of a point is a function of the camera's pose. So as soon as all its parents are known, it is known as well. `a` and `b` are two different variables that aren't known.
+# as the pixel of a point is a function of the camera's pose. So as soon as all its parents are known, it is known as well. (One without parents is known from the start.) `a` and `b` are two different variables
+# that aren't known, not even after this step.
 #
 # First add to what is known whatever is exact and has no unknown parent, again and again. Then use the lecture's rule: look at every path from `a` to `b`, and at every variable inside it. Two helpers do the walking:
 # `paths(parents, a, b)` lists all paths as tuples of names, from `a` to `b`, with or against the arrows and through no variable twice; `below(parents, name)` is the set of `name` and all variables further down its arrows.
@@ -395,6 +396,7 @@ def credible(prior, M, scans):
 
 # %% nbgrader={"grade": false, "grade_id": "a-chain", "locked": true, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 _PRIOR, _M, _TWO_SCANS = np.array([0.5, 0.5]), np.array([[0.9, 0.1], [0.3, 0.7]]), np.array([[0.8, 0.4], [0.2, 1.0]])
+_LOST = np.array([[0.8, 0.4], [1.0, 1.0], [0.2, 1.0]])  # the scan of time 1 got lost
 _LEFT_SLIPS = {  # row 1 of from_left: (0.5 * 0.8, 0.5 * 0.4) = (0.4, 0.2), then M
     (0.084, 0.18): "the scan of time 1 is in its own message: it comes from neither side",
     (0.6, 0.4): "the scan of time 0 is missing: it is before time 1",
@@ -432,6 +434,16 @@ def _test():
     np.testing.assert_allclose(left, [[0.5, 0.5], [0.42, 0.18]], atol=1e-9, err_msg=by_hand)
     by_hand = "row 0: 0.9 * 0.2 + 0.1 * 1.0 and 0.3 * 0.2 + 0.7 * 1.0"
     np.testing.assert_allclose(right, [[0.28, 0.76], [1, 1]], atol=1e-9, err_msg=by_hand)
+    left, right = (answer_array(one, "messages") for one in messages(_PRIOR.copy(), _M.copy(), _LOST.copy()))
+    assert left.shape == right.shape == (3, 2), f"three scans: both are (3, 2), got {left.shape} and {right.shape}"
+    repeated = np.allclose(left[2], left[1])
+    assert not repeated, "row 2 of from_left repeats row 1: go on from the message before it, by one step"
+    repeated = np.allclose(right[0], right[1])
+    assert not repeated, "row 0 of from_right repeats row 1: go on from the message after it, by one step"
+    by_hand = "a lost scan in the middle; row 2: 0.42 * 0.9 + 0.18 * 0.3 and 0.42 * 0.1 + 0.18 * 0.7"
+    np.testing.assert_allclose(left, [[0.5, 0.5], [0.42, 0.18], [0.432, 0.168]], atol=1e-9, err_msg=by_hand)
+    by_hand = "a lost scan in the middle; row 0: 0.9 * 0.28 + 0.1 * 0.76 and 0.3 * 0.28 + 0.7 * 0.76"
+    np.testing.assert_allclose(right, [[0.328, 0.616], [0.28, 0.76], [1, 1]], atol=1e-9, err_msg=by_hand)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
@@ -466,13 +478,14 @@ _test()
 # %% [markdown]
 # ## Task 5: in your own words (2 points)
 #
-# Two cells are one behind the other on the way of a coarse beam. A return says "at least one of you is occupied", and not which. A second beam along the same way returns, too.
+# Two cells are one behind the other on the way of a coarse beam. A return says "at least one of you is occupied", and not which; it never errs. A second beam along the same way returns, too.
 # An occupancy grid keeps one probability per cell: after each beam it updates both cells separately, by Bayes' rule with that beam's likelihood for each cell. Which edges does the true graph of
-# two cells and two beams have, and which dependence does the grid forget after the first beam? Another sensor now reports for certain that the front cell is occupied.
-# What should happen to the probability of the rear cell, and what happens in the grid? Would it help the grid if ten more of the coarse beams returned along the same way, before this report? Six sentences are enough.
+# two cells and two beams have, and which dependence does the grid forget after the first beam? Another sensor now reports for certain that the front cell is *free*.
+# What should happen to the probability of the rear cell, and what happens in the grid? Suppose that ten more of the coarse beams had returned before this report, so that the grid is nearly sure of the rear cell. Is the grid right now, and for the right reason? Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "dropped-edge", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # Each return has arrows from both cells, so each is a collider, and once the returns are known the two cells depend on each other. The grid keeps only the two marginals after each beam, so it drops the coupling "at
-# least one of you". When the front cell turns out to be occupied it explains the returns, so the probability of the rear cell should fall back towards its prior (explaining away). In the grid nothing happens to it, because nothing links
-# it to the front cell. Ten more coarse beams make it worse: each raises the rear cell once more, as if it were a new witness, until the grid is sure of a wall as thick as two cells. Only something that ties the cells together helps, or a range fine enough to name its cell.
-# One point for the collider and the dropped coupling, one for what should happen to the rear cell and why more beams don't repair it.
+# least one of you". When the front cell turns out to be free, only the rear cell can have returned the beams, so it is occupied for certain. In the grid nothing happens to it, because nothing links it to the front
+# cell. After ten more returns the grid is nearly sure of the rear cell, and here this happens to be true. But the reason is wrong: each return counted as a new witness, although the true model learns nothing from the later ones. The
+# grid was just as sure of the front cell, which is free. And had the report been *occupied*, the rear cell should have fallen back to its prior, and the grid would have kept it.
+# One point for the collider and the dropped coupling, one for what should happen to the rear cell and why the grid's certainty after more beams isn't earned.
