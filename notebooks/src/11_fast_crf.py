@@ -504,14 +504,14 @@ for way, undone in (("nothing", bilateral.diagonal), ("1", bilateral.diagonal - 
     other = mean_field_by_filters(-log_g, [bilateral, spatial, lambda Q, part=undone: part[:, None] * Q], own)
     changed = (other.argmax(axis=0) != Q.argmax(axis=0)).ravel()
     print(f"{way} subtracted: {changed.sum()} of {changed.size} labels change, {changed[lonely].sum()} in lonely cells")
-    assert changed[lonely].mean() > 4 * changed[~lonely].mean()
+    assert way == "1" or changed[lonely].mean() > 4 * changed[~lonely].mean()
 print(f"lonely: {100 * lonely.mean():.0f} % of all cells")
 
 # %% [markdown]
-# It matters little, because in most cells many others drown what a cell tells itself. Labels change far more often in the
-# few lonely cells, whose occupancy is unlike their neighbours': they would confirm their own opinion.
+# It matters little, because in most cells many others drown what a cell tells itself. If nothing is subtracted, labels change
+# far more often in the few lonely cells, whose occupancy is unlike their neighbours': they confirm their own opinion.
 #
-# The street differs from the cloud: it has five features, and more vertices than cells. Is the filter still right?
+# The street differs from the cloud: it has five features, and about as many vertices as cells. Is the filter still right?
 # Compare what some cells hear with the exact sums:
 
 # %% tags=["five"]
@@ -526,7 +526,7 @@ normalised = np.abs(rows / sums - exact / exact_sums).sum(axis=1)
 print(f"{len(features)} cells, {len(raw.vertices)} vertices")
 print(f"the lattice's sums are {np.median(sums / exact_sums):.2f} of the exact ones")
 print(f"error of a row: {np.median(as_it_is):.2f}, after dividing both by their sums {np.median(normalised):.2f}")
-assert len(raw.vertices) > len(features)
+assert len(raw.vertices) > 0.9 * len(features)
 assert np.median(normalised) < 0.6 * np.median(as_it_is)
 
 # %% [markdown]
@@ -548,7 +548,7 @@ assert np.median(normalised) < 0.6 * np.median(as_it_is)
 #
 # <details><summary>Answer</summary>
 #
-# None. Each of them loses as many as the lattice does, but for two or three.
+# None. All pairs lose as many as the lattice does, but for one or two. More iterations and Gibbs sampling lose even more.
 #
 # </details>
 
@@ -571,13 +571,13 @@ for way, answer in labels.items():
     right = 100 * (answer == true).mean()
     print(f"{way:<26} {found[way]:3d} of {is_car.sum()} car cells, {other:3d} other labels, {right:.1f} % right")
 network, lattice_way, pairs, longer, drawn = found.values()
-assert max(abs(n - pairs) for n in (lattice_way, longer, drawn)) <= 6
-assert pairs < 0.8 * network
+assert abs(lattice_way - pairs) <= 3
+assert max(longer, drawn) <= pairs < 0.85 * network
 
 # %% [markdown]
 # *Other labels* counts where a row differs from mean field with all pairs. The CRF changes many labels,
-# and the lattice is to blame for few of these. All rows but the first lose the cars. So **the model itself doesn't want
-# them**, and on this crop it makes the map worse. What does the lattice save?
+# and the lattice is to blame for few of these. All rows but the first lose cars, and Gibbs sampling, which draws from
+# the model itself, loses most. So **the model itself doesn't want them**, and on this crop it makes the map worse. What does the lattice save?
 
 # %% jupyter={"source_hidden": true}
 products = (2 * bilateral.shares.nnz + sum(blur.nnz for blur in bilateral.blurs)) / o[0].size
