@@ -152,9 +152,9 @@ def one_log_odds_cell(scans: ArrayLike, prior: float = 0.5) -> StageGraph:
     )
 
 
-def only_later(fork: StageGraph) -> StageGraph:
-    """Return the graph of `one_log_odds_cell` with a single dashed edge, from the cell to the cell later."""
-    return replace(fork, cut=CUT_LOG_ODDS[:1], labels={"next": "later"}, ghosts={"next": fork.ghosts["next"]})
+def as_the_grid(fork: StageGraph) -> StageGraph:
+    """Return the graph of `one_log_odds_cell` with nothing but the grid's own model: one cell and its scans."""
+    return replace(fork, cut=(), labels={}, ghosts={})
 
 
 def package_log_odds_cell(scans: ArrayLike, params: LogOddsParams | None = None) -> NDArray[np.float64]:

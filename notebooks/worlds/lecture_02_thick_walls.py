@@ -121,7 +121,7 @@ def thick_walls(
     -------
     dict of str to (draws, K) float64
         P(occupied) after the last scan, by "exact" inference, "cell by cell" with the same beam model, by the
-        "package", and by the package with "no clamp", the "beam's passes", or "neither".
+        "package", and by the package with "no clamp", "no lower limit", the "beam's passes", or "neither".
     """
     world = same_sensor(noise)
     rng = np.random.default_rng(seed)
@@ -133,6 +133,7 @@ def thick_walls(
     grids = {
         "package": PARAMS,
         "no clamp": replace(PARAMS, **free),
+        "no lower limit": replace(PARAMS, lowest=free["lowest"]),
         "beam's passes": replace(PARAMS, sensor=beams),
         "neither": replace(PARAMS, sensor=beams, **free),
     }
@@ -202,8 +203,8 @@ def scan_with_pose_error(world: BeamWorld | None = None, rings: int = 2) -> Stag
 
 
 def drawn_without_price() -> StageGraph:
-    """Return the graph of a scan of three cells, whose dashed edge carries no numbers."""
-    cut = tuple(edge._replace(price=None) for edge in CUT_POSE)
+    """Return the graph of a scan of three cells; both edges of the pose error are dashed and carry no numbers."""
+    cut = tuple(CUT_POSE[0]._replace(edge=f"e -> {z}", ends=("e", z), price=None) for z in ("z1", "z2"))
     return replace(scan_with_pose_error(same_sensor(1.0, n_cells=3)), cut=cut)
 
 

@@ -174,7 +174,7 @@ _test()
 #
 # Complete `fuse`: it returns the **probability** of each cell after all K scans, `(H, W)`, with $L_0$ the log-odds of the prior and $L_k$ those of scan k.
 # For one more point: a parked car is scanned thousands of times before it drives off, and so many
-# scans must not end in a zero or an infinity that no later scan can take back.
+# scans must not end in a zero or an infinity that no later scan can take back. Do it without a clamp, so that scans which contradict each other cancel exactly.
 
 
 # %% nbgrader={"grade": false, "grade_id": "fuse", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -230,7 +230,7 @@ def _test():
     posteriors = np.concatenate([np.full(1000, 0.9), np.full(1000, 0.1), [0.8]]).reshape(-1, 1, 1)
     got, last = (answer_array(fuse(0.5, p), "fuse") for p in (posteriors.copy(), posteriors[-1:].copy()))
     assert np.isfinite(got).all(), "NaN after 2001 scans: so long a product ends at 0 or infinity; add logarithms"
-    stuck = "odds of 9 ** 1000 are infinite, and a probability of exactly 0 or 1 never comes back; add logarithms"
+    stuck = "odds of 9 ** 1000 are infinite, and a probability of exactly 0 or 1 never comes back; add logarithms, without a clamp"
     assert np.allclose(got, last, atol=1e-6), f"2000 scans cancel, yet {last.ravel()} became {got.ravel()}: {stuck}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import grids
@@ -563,12 +563,12 @@ def _show_streets():
 # %% [markdown]
 # ## Task 6: in your own words (2 points)
 #
-# To shorten the smear, a colleague lowers the clamp from 0.97 to 0.62. What gets worse, and where on a street would you see it? And which smear does no clamp remove: which edge
-# of the graph would you have to draw for it? Five sentences are enough.
+# To shorten the smear, a colleague lowers the clamp from 0.97 to 0.62. What gets worse, and where on a street would you see it? And which smear does no clamp remove: what does
+# the model of a cell lack for it? Five sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "shorter-smear", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # A low clamp makes the grid forget what it has gathered: whatever was hit ten times is worth no more than what was hit once, so one pass (-0.85) makes it free. What
 # is seen only now and then flickers: thin poles between two beams, porous hedges and fences, the edges of cars. No clamp removes the tail that no beam
 # passes: that of an oncoming car lies behind the car, in its shadow, and what has left the field of view is not seen again; log-odds change only where there is
-# evidence, so forgetting helps. The missing edge is that from the cell now to the cell at the next scan: with it a cell may change. One point for a cost with its
-# place, one for the unseen tail and the edge.
+# evidence, so forgetting helps. The model has one variable for the cell at all scans. It lacks a variable for each scan, with an edge from one to the next: with it a cell may change. One
+# point for a cost with its place, one for the unseen tail and the missing change.
