@@ -380,8 +380,7 @@ recalls = {
 losers = {name: both for name, both in recalls.items() if both[1] < both[0] - 0.01}
 print("recall before and after the CRF:", losers)
 assert set(losers) == {"sidewalk", "car", "bicycle"}
-expected = [(0.95, 0.48), (0.74, 0.57), (0.7, 0.2)]
-np.testing.assert_allclose(list(losers.values()), expected, atol=0.06)
+np.testing.assert_allclose(list(losers.values()), [(0.95, 0.48), (0.74, 0.57), (0.7, 0.2)], atol=0.06)
 confidence = [p.max(axis=0)[labelled].mean() for p in (grid, refined)]
 assert confidence[1] > confidence[0] + 0.03
 assert recalls["pedestrian"] == [1, 1]

@@ -26,7 +26,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from ipywidgets import Checkbox, Dropdown, IntSlider, interact
+from ipywidgets import Dropdown, IntSlider, interact
 from matplotlib.patches import Ellipse, Patch, Rectangle
 from scipy.ndimage import binary_closing, distance_transform_edt
 from scipy.spatial.transform import Rotation
@@ -806,7 +806,7 @@ for share in ("found", "wrong"):
 # %% jupyter={"source_hidden": true}
 
 
-def play(reach, movers, clean, observed_only):
+def play(reach, movers, clean_up, cells):
     """Draw where the policy's map differs from the truth, and write its shares below."""
     grid = drive_truth(
         moments,
@@ -817,8 +817,8 @@ def play(reach, movers, clean, observed_only):
             past=reach,
             future=reach,
             movers=movers,
-            visible_to="lidar" if observed_only else "any",
-            cleanup="close" if clean else "none",
+            visible_to="any" if cells == "all" else "lidar",
+            cleanup="close" if clean_up == "yes" else "none",
         ),
     )
     _, ax = plt.subplots(figsize=(6.4, 5.6), layout="compressed")
@@ -834,8 +834,8 @@ _ = interact(
     play,
     reach=IntSlider(value=0, min=0, max=9, description="before, after"),
     movers=Dropdown(options=["smeared", "carved", "carried"]),
-    clean=Checkbox(value=True, description="clean-up"),
-    observed_only=Checkbox(value=False, description="observed only"),
+    clean_up=Dropdown(options=["yes", "no"], description="clean-up"),
+    cells=Dropdown(options=["all", "observed only"]),
 )
 
 # %% [markdown]
