@@ -296,7 +296,7 @@ def test_a_step_goes_down_the_gradient_with_momentum(streets, tmp_path):
     train(build_net(SMALL, CAMERA), streets, tmp_path, params, seed=2)
     trained = load_file(tmp_path / "weights.safetensors")
     for name, w in net.named_parameters():
-        torch.testing.assert_close(trained[name], w.detach(), rtol=1e-3, atol=1e-4)
+        torch.testing.assert_close(trained[name], w.detach(), rtol=1e-3, atol=3e-4)
     assert any(draw_batch(streets, 2, 0.0, k, seed=2).mirrored for k in range(2))  # had `mirror` not been off
 
 

@@ -110,7 +110,7 @@ print(f"recall {both / np.sum(truth == DYNAMIC):.2f}, precision {both / np.sum(c
 
 # %% [markdown]
 # Now the filters of lectures 02, 03 and 04 on twenty simulated drives that none of them was tuned on, with KITTI's
-# scanner and the paper's grid. `worlds/lecture_04_filters.py` made the result in 45 minutes:
+# scanner and the paper's grid. `worlds/lecture_04_filters.py` made the result in an hour:
 
 # %% jupyter={"source_hidden": true}
 result = json.loads(Path("../../docs/results/occupancy.json").read_text(encoding="utf-8"))

@@ -570,5 +570,5 @@ def _show_streets():
 # A low clamp makes the grid forget what it has gathered: whatever was hit ten times is worth no more than what was hit once, so one pass (-0.85) makes it free. What
 # is seen only now and then flickers: thin poles between two beams, porous hedges and fences, the edges of cars. No clamp removes the tail that no beam
 # passes: that of an oncoming car lies behind the car, in its shadow, and what has left the field of view is not seen again; log-odds change only where there is
-# evidence, so forgetting helps. The model has one variable for the cell at all scans. It lacks a variable for each scan, with an edge from one to the next: with it a cell may change. One
-# point for a cost with its place, one for the unseen tail and the missing change.
+# evidence, so forgetting helps. The model has one variable for the cell at all scans. It lacks a variable for each scan, with an edge from one to the next: with it a cell may change.
+# One point for a cost with its place, one for the unseen tail and the missing change.
