@@ -30,7 +30,7 @@ def test_the_same_near_the_borders_of_beams(seed, beams, off, dtype):
 
 @pytest.mark.parametrize("of", [beams_of, polar.beams_of], ids=["fast", "book"])
 def test_columns_on_the_borders_of_beams_fall_where_double_precision_puts_them(of):
-    """Arctangents in single precision differ by kind of processor, and would move one column in a hundred."""
+    """Arctangents in single precision differ by kind of processor, and would move many of these columns."""
     azimuth = np.arange(1200) * (2 * np.pi / 1200) - np.pi + 1e-12
     points = np.float32(np.stack([17 * np.cos(azimuth), 17 * np.sin(azimuth)], axis=1))
     exact = [(math.atan2(float(y), float(x)) + math.pi) * 1200 / (2 * math.pi) for x, y in points]

@@ -284,6 +284,7 @@ def test_a_step_goes_down_the_gradient_with_momentum(streets, tmp_path):
     """
     params = replace(QUICK, image_iterations=0, grid_iterations=2, momentum=0.9, mirror=False)
     net = build_net(SMALL, CAMERA).train()
+    before = {name: w.detach().clone() for name, w in net.named_parameters()}
     alpha = torch.from_numpy(median_frequency_weights([s.truth.numpy() for s in streets], 14, params.weight_limit))
     velocities = [torch.zeros_like(w) for w in net.parameters()]
     for k in range(2):
@@ -296,7 +297,8 @@ def test_a_step_goes_down_the_gradient_with_momentum(streets, tmp_path):
     train(build_net(SMALL, CAMERA), streets, tmp_path, params, seed=2)
     trained = load_file(tmp_path / "weights.safetensors")
     for name, w in net.named_parameters():
-        torch.testing.assert_close(trained[name], w.detach(), rtol=1e-3, atol=3e-4)
+        error, way = (trained[name] - w.detach()).norm(), (w.detach() - before[name]).norm()
+        assert error <= 0.05 * way + 1e-6, name  # a bias before a normalisation doesn't move
     assert any(draw_batch(streets, 2, 0.0, k, seed=2).mirrored for k in range(2))  # had `mirror` not been off
 
 
