@@ -134,7 +134,7 @@ def _blocked(
     before = origins(velocity, spec, walls)
     shortly_before = origins(velocity, spec, walls, walls.second_look)
     open_space = mixed[FREE] + mixed[DYNAMIC]
-    open_to_pace = open_space - mixed[FREE] * nearby
+    open_to_pace = open_space - mixed[FREE] * largest_nearby(mixed[STATIC])
 
     def blocked(k: int) -> NDArray[np.floating]:
         from_wall = _elsewhere(nearby if runs[k] else mixed[STATIC], before[k])

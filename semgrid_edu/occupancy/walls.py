@@ -37,7 +37,8 @@ class Walls:
     moving car itself, and some of these are half STATIC. So only what is nearly certain is a wall: P(STATIC)^4.
 
     *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. For a particle at that speed a
-    cell ahead that borders a STATIC one isn't free space. While the car stands, this doesn't apply.
+    cell ahead that borders a STATIC one isn't free space; its own cells aren't there yet, so P(STATIC) counts as it is.
+    While the car stands, this doesn't apply.
 
     *Wakes.* One thing can't be in two places. So what a moving particle occupied `clearing_time` ago is free now, even
     if no scan sees it.
@@ -146,7 +147,7 @@ class Walls:
         nearby = largest_nearby(wall)
         out_of_a_wall = np.where(runs, at_cells(nearby, before), at_cells(mixed[STATIC], before))
         through_a_wall = runs * at_cells(wall, shortly_before)
-        beside_a_wall = keeps * at_cells(mixed[FREE] * nearby, ahead)
+        beside_a_wall = keeps * at_cells(mixed[FREE] * largest_nearby(mixed[STATIC]), ahead)
         open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - beside_a_wall
         return np.maximum(out_of_a_wall, through_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)
 

@@ -70,10 +70,10 @@ def test_beams_that_the_vehicle_splits_beside_a_near_hedge_move_nothing(right):
 
 
 def test_a_filter_that_knows_that_the_vehicle_drives_sees_fewer_phantoms_in_a_hedge(monkeypatch):
-    """At most 9 in 10 of those that a filter sees which takes the vehicle to stand."""
+    """At most 8 in 10 of those that a filter sees which takes the vehicle to stand."""
     knows = sum(phantoms(drive_past(0.3, seed)) for seed in range(3))
     monkeypatch.setattr(cmcdot, "predict", lambda *arguments: predict(*arguments[:5]))
-    assert 0 < knows <= 0.9 * sum(phantoms(drive_past(0.3, seed)) for seed in range(3))
+    assert 0 < knows <= 0.8 * sum(phantoms(drive_past(0.3, seed)) for seed in range(3))
 
 
 def test_a_car_that_drives_past_parked_cars_is_seen_to_move():

@@ -133,9 +133,9 @@ def test_a_cell_beside_counts_as_origin_but_not_on_the_way(predicted, row, dynam
 
 
 @TWINS
-@pytest.mark.parametrize(("driven", "dynamic"), [(0.0, 0.5), (0.4, 0.5), (1.0, (0.5 - 0.0648) / (1 - 0.0648))])
+@pytest.mark.parametrize(("driven", "dynamic"), [(0.0, 0.5), (0.4, 0.5), (1.0, (0.5 - 0.3) / (1 - 0.3))])
 def test_a_place_beside_what_stands_is_no_open_space_to_what_keeps_pace_with_the_vehicle(predicted, driven, dynamic):
-    """By hand: a = 0.5, u = 1, and b = 0.6^4 a because the cell beside it stands with probability 0.6."""
+    """By hand: a = 0.5, u = 1, and b = 0.6 a because the cell beside it stands with probability 0.6."""
     state = flying(1.0, UNKNOWN, FREE)
     state.probability[:, AHEAD - 1, 0] = 0.4, 0.6, 0, 0
     given = predicted(

@@ -190,7 +190,7 @@ def doubt_arrivals(
     fewest = walls.clearing_cells * np.array([1, walls.second_look, 1])
     other_cells = (cells_at(particles, cells, spec, *path) for path in zip(times, fewest, strict=True))
     wall = mixed[STATIC] ** SURE
-    fields = mixed[FREE], mixed[DYNAMIC], mixed[STATIC], wall, largest_nearby(wall)
+    fields = mixed[FREE], mixed[DYNAMIC], mixed[STATIC], wall, largest_nearby(wall), largest_nearby(mixed[STATIC])
     speeds = *map(float, car_velocity), float(least), float(walls.running_speed)
     return _doubt_arrivals(particles.velocity.ravel(), particles.weight, *other_cells, *fields, *speeds)
 
@@ -206,7 +206,8 @@ def _doubt_arrivals(
     dynamic,
     static,
     wall,
-    nearby,
+    wall_nearby,
+    static_nearby,
     car_x,
     car_y,
     least,
@@ -217,7 +218,8 @@ def _doubt_arrivals(
     dynamic = dynamic.ravel()
     static = static.ravel()
     wall = wall.ravel()
-    nearby = nearby.ravel()
+    wall_nearby = wall_nearby.ravel()
+    static_nearby = static_nearby.ravel()
     for i in range(len(weight)):
         vx = velocity[2 * i]
         vy = velocity[2 * i + 1]
@@ -225,12 +227,12 @@ def _doubt_arrivals(
         runs = vx * vx + vy * vy > running * running
         suspect = np.float32(0)
         if before[i] != OUTSIDE:
-            suspect = nearby[before[i]] if runs else static[before[i]]
+            suspect = wall_nearby[before[i]] if runs else static[before[i]]
         if runs and shortly_before[i] != OUTSIDE:
             suspect = max(suspect, wall[shortly_before[i]])
         room = np.float32(0)
         if ahead[i] != OUTSIDE:
-            beside = nearby[ahead[i]] if keeps else np.float32(0)
+            beside = static_nearby[ahead[i]] if keeps else np.float32(0)
             room = (1 - beside) * free[ahead[i]] + dynamic[ahead[i]]
         doubted[i] = weight[i] * suspect * (1 - room)
     return doubted
