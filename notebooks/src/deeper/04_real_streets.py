@@ -176,8 +176,8 @@ for street in streets:
     for innocent in ("nothing transparent", "exact poses"):
         assert of[innocent] > 0.75 * of["as it was"]
     assert of[BARRED] < 0.2 * of["as it was"]
-for guilty, where in (("no pillars", "mesh and hedge"), ("no births at first sight", "walls")):
-    assert called(where, guilty, "border") < 0.5 * called(where, "as it was", "border")
+assert called("mesh and hedge", "no pillars", "border") < 0.5 * called("mesh and hedge", "as it was", "border")
+assert called("walls", "no births at first sight", "border") < 0.8 * called("walls", "no pillars", "border")
 
 # %% [markdown]
 # Read each line against the first. A suspect that is a cause makes the number fall when it is switched off. Opaque mesh
