@@ -16,6 +16,9 @@ from semgrid_edu.plotting.colours import STATE_COLOURS, colour_legend
 GHOST = (225, 20, 30)
 """The colour of a ghost: occupied in the map, although the road there is empty."""
 
+UNJUDGED = (245, 160, 190)
+"""The colour of cells that only the map calls occupied and that have no label: smear, or the body of a car."""
+
 HIDDEN, WAITING = (130, 0, 60), (250, 150, 30)
 """The colours of ghosts without a pass since the last return, and of those with some."""
 
@@ -25,6 +28,11 @@ ROAD, SIDEWALK, VEGETATION = (KITTI_14.index(name) for name in ("road", "sidewal
 def things(truth: NDArray) -> NDArray[np.bool_]:
     """Return which cells of a map of classes are labelled, and neither road nor sidewalk."""
     return ~np.isin(truth, (ROAD, SIDEWALK, IGNORE))
+
+
+def unjudged(p: NDArray, scan: NDArray, truth: NDArray) -> NDArray[np.bool_]:
+    """Return which cells the map p calls occupied and its last scan doesn't, while they have no label, (H, W)."""
+    return (p > 0.5) & (scan <= 0.5) & (truth == IGNORE)
 
 
 def add_up(
@@ -78,7 +86,10 @@ def passes_since_return(scans: Sequence[NDArray]) -> NDArray[np.int64]:
     return passes
 
 
-def draw(spec: GridSpec, p: NDArray, ax: Axes, title: str, ghost: NDArray | None = None, legend: bool = False) -> None:
+def draw(
+    spec: GridSpec, p: NDArray, ax: Axes, title: str, ghost: NDArray | None = None, legend: bool = False,
+    unlabelled: NDArray | None = None,
+) -> None:  # fmt: skip
     """Draw a map of P(occupied): free light from 0.25 down, occupied dark from 0.75 up, unknown grey, ghosts red.
 
     Parameters
@@ -95,14 +106,20 @@ def draw(spec: GridSpec, p: NDArray, ax: Axes, title: str, ghost: NDArray | None
         Cells to paint red.
     legend : bool
         Whether a legend names the colours.
+    unlabelled : (H, W) bool, optional
+        Cells to paint pink: they may be ghosts, but have no label.
     """
     colours = plotting.occupancy_colours(plotting.binary_states(p))
     if ghost is not None:
         colours[ghost] = GHOST
+    if unlabelled is not None:
+        colours[unlabelled] = UNJUDGED
     plotting.grids.draw_map(spec, colours, ax).set_title(title, fontsize=10)
     if legend:
         names = ["free", "occupied", "unknown", "ghost: occupied\nin the map, but\nempty road"]
-        colour_legend(ax, names, [STATE_COLOURS[s] for s in (State.FREE, State.STATIC, State.UNKNOWN)] + [GHOST])
+        shown = [STATE_COLOURS[s] for s in (State.FREE, State.STATIC, State.UNKNOWN)] + [GHOST]
+        more = unlabelled is not None
+        colour_legend(ax, names + more * ["only in the map,\nand no label"], shown + more * [UNJUDGED])
 
 
 def note(ax: Axes, letters: dict[str, tuple[tuple[float, float], tuple[float, float]]]) -> None:
@@ -112,7 +129,7 @@ def note(ax: Axes, letters: dict[str, tuple[tuple[float, float], tuple[float, fl
         ax.annotate(letter, at, text, color="tab:blue", fontsize=12, fontweight="bold", arrowprops=style)
 
 
-def draw_ghosts(spec: GridSpec, p: NDArray, ax: Axes, hidden: NDArray, waiting: NDArray) -> None:
+def draw_ghosts(spec: GridSpec, p: NDArray, ax: Axes, hidden: NDArray, waiting: NDArray, unlabelled: NDArray) -> None:
     """Draw a map with two kinds of ghosts: those without a pass since the last return, and those with some.
 
     Parameters
@@ -125,9 +142,13 @@ def draw_ghosts(spec: GridSpec, p: NDArray, ax: Axes, hidden: NDArray, waiting: 
         Where to draw.
     hidden, waiting : (H, W) bool
         The cells of the two kinds.
+    unlabelled : (H, W) bool
+        Cells that may be ghosts, but have no label.
     """
     colours = plotting.occupancy_colours(plotting.binary_states(p))
     colours[hidden] = HIDDEN
     colours[waiting] = WAITING
+    colours[unlabelled] = UNJUDGED
     plotting.grids.draw_map(spec, colours, ax).set_title("ghosts after 1.8 s", fontsize=10)
-    colour_legend(ax, ["no pass since\nthe last return", "one to four\npasses"], [HIDDEN, WAITING])
+    names = ["ghost, no pass since\nthe last return", "ghost, one to\nfour passes", "only in the map,\nand no label"]
+    colour_legend(ax, names, [HIDDEN, WAITING, UNJUDGED])

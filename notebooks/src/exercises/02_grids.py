@@ -250,7 +250,8 @@ _test()
 # survives some passes, and the tail is that number times the distance covered from one pass to the next.
 #
 # The tail may be at most `tail` metres long. Complete `highest_clamp`: it returns the highest clamp that keeps it so short, as a **probability**. (A cell that a pass takes
-# to exactly $L = 0$ is free.)
+# to exactly $L = 0$ is free. The computer may hold 3.6 / (12 · 0.1) as slightly less than 3. You needn't care: where
+# `tail` is a whole number of passes long, the tests use numbers that it holds exactly.)
 
 
 # %% nbgrader={"grade": false, "grade_id": "highest-clamp", "locked": false, "schema_version": 3, "solution": true, "task": false}
