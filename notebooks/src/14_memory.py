@@ -7,14 +7,14 @@
 # **You will be able to**
 # - read from the graph of one cell over time what two frames share;
 # - combine frames that make the same mistake, by hand and with an exponent;
-# - find out whether a network's errors last, and whether it is too sure;
+# - measure how long a network's errors last, and tell this from being too sure;
 # - write a memory of classes for one cell;
-# - score a memory against rivals that cost nothing, and find the ghosts that it keeps.
+# - score a memory against rivals that cost nothing, and sort the ghosts that it keeps by their cause.
 #
 # **Prerequisites.** Lectures [03](03_bof.ipynb) and [04](04_cmcdot.ipynb): a filter over time, velocities of cells.
 # Lecture [08](08_fusion.ipynb): the semantic grid. For d-separation: lecture [01b](01b_graphical_models.ipynb).
 #
-# **Time.** 76 minutes, of which the computer needs less than one.
+# **Time.** 75 minutes, of which the computer needs less than one.
 #
 # **Paper.** Section 3, figure 2: nothing leads from one semantic grid to the next. The rest isn't in the paper.
 
@@ -28,7 +28,7 @@ import numpy as np
 from IPython.display import Markdown
 from ipywidgets import FloatSlider, interact
 from scipy.linalg import toeplitz
-from scipy.ndimage import binary_dilation, label
+from scipy.ndimage import label
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu import fast, memory, plotting
@@ -63,9 +63,9 @@ measured = json.loads(Path("../docs/results/memory.json").read_text())
 # %% [markdown]
 # ## What does the map say of a car that has left the picture?
 #
-# The vehicle waits at a crossing. An oncoming car passes on the left. After 1.6 seconds it has left the image, but not
-# the laser scan. The animation starts with this last picture, then shows how it came about. The ring follows the car as
-# soon as the filter finds that it moves.
+# The vehicle waits at a crossing. An oncoming car passes on the left (A). After 1.6 seconds it has left the image (B), but
+# not the laser scan. The animation starts with this last picture, then shows how it came about. The ring follows the car
+# as soon as the filter finds that it moves.
 
 
 # %% jupyter={"source_hidden": true}
@@ -77,33 +77,37 @@ def oncoming(result):
     return np.array([x[cells].mean(), y[cells].mean()]) if cells.sum() > 5 else None
 
 
+# %% jupyter={"source_hidden": true}
 def pictures():
     """Return the figure of image and two maps, its parts that change, and the most probable classes of all frames."""
     fig = plt.figure(figsize=(9.6, 3.9), layout="constrained")
-    axes = fig.subplot_mosaic([["A", "B", "C"]], width_ratios=(2.2, 1, 1))
+    axes = fig.subplot_mosaic([["A", "C", "D"], ["B", "C", "D"]], width_ratios=(2.2, 1, 1))
     fig.supxlabel(real.credit, fontsize=8)
     maps = [[grid.argmax(axis=0) for grid in (result.grid, result.remembered)] for result in street]
-    photo, rings = axes["A"].imshow(street[0].frame.image[::2, ::2]), []
-    axes["A"].set_axis_off()
-    for letter, title, first in zip("BC", ("B: one frame", "C: with memory"), maps[0], strict=True):
+    axes["A"].imshow(street[4].frame.image[::2, ::2] // 16 * 16)
+    axes["A"].set_title(f"A: image, {street[4].frame.time:.1f} s", fontsize="medium")
+    photo, rings = axes["B"].imshow(street[0].frame.image[::2, ::2]), []
+    for letter in "AB":
+        axes[letter].set_axis_off()
+    for letter, title, first in zip("CD", ("C: one frame", "D: with memory"), maps[0], strict=True):
         ax = plotting.grid_labels(spec, first, KITTI_14, ax=axes[letter], legend=False)
         ax.set_ylim(0, 45)
         ax.set_title(title, fontsize="medium")
         rings += [ax.plot([], [], "o", ms=26, mfc="none", mec=c, mew=w)[0] for c, w in (("white", 4), ("red", 2))]
-    axes["C"].set_ylabel("")
-    plotting.class_legend(axes["C"], KITTI_14, np.array(maps))
+    axes["D"].set_ylabel("")
+    plotting.class_legend(axes["D"], KITTI_14, np.array(maps))
     return fig, axes, photo, rings, maps
 
 
-# %% jupyter={"source_hidden": true} alt="animation of a real street: A, the camera image; B, the map of one frame, in which the ringed oncoming car turns from car to unknown-dynamic as it leaves the image; C, the map with memory, in which it stays a car"
+# %% jupyter={"source_hidden": true} alt="animation of a real street: A, the camera image with the oncoming car at the left; B, the image of now; C, the map of one frame, in which the ringed car turns from car to unknown-dynamic as it leaves the image; D, the map with memory, in which it stays a car"
 def passing():
     """Yield image, map of one frame and map with memory, of every second frame; first the last, for a printed page."""
     fig, axes, photo, rings, maps = pictures()
     for k in (8, 0, 2, 4, 6):
         result, both = street[k], maps[k]
         photo.set_data(result.frame.image[::2, ::2] // 16 * 16)
-        axes["A"].set_title(f"A: image, {result.frame.time:.1f} s", fontsize="medium")
-        for letter, one in zip("BC", both, strict=True):
+        axes["B"].set_title(f"B: image, {result.frame.time:.1f} s", fontsize="medium")
+        for letter, one in zip("CD", both, strict=True):
             axes[letter].images[0].set_data(KITTI_14.colours(one))
         place = oncoming(result)
         for ring in rings:
@@ -115,21 +119,24 @@ def passing():
 plotting.animate(passing(), period=1.0, alt="a car leaves the image; only the map with memory still calls it a car")
 
 # %% [markdown]
-# In B, the map of one frame, the car is blue, *car*, where the camera sees it. As it leaves the image it turns pale
-# orange, cell by cell: *unknown-dynamic*. In C it stays a car.
+# In C, the map of one frame, the car is blue, *car*, where the camera sees it. As it leaves the image it turns pale
+# orange, cell by cell: *unknown-dynamic*. In D it stays a car.
 #
-# B takes its classes from the newest image alone. Its occupancy filter remembers *where* things are, but nothing
+# C takes its classes from the newest image alone. Its occupancy filter remembers *where* things are, but nothing
 # remembers *what* they are. So the map knows that something moves there, and no longer that it is a car.
 #
 # The obvious memory multiplies what all frames say. Before we build it, we ask when this would be right.
 #
 # ## What do two frames share?
 #
-# Take one cell at three frames. $m_t$ is its content, $l_t$ says whether a laser beam stops there, and $z_t$ is the
-# class that the network names. So far this is lecture 01's chain with two sensors. The new row is $e_t$, the network's
-# **error**: "none", or "says building, whatever it sees", and so on. Errors last, because the shadow that misled the
-# network is mostly still there a moment later. In our toy an error stays with probability $r = 0.6$, and is otherwise
-# drawn anew. Each frame by itself is right with 0.8.
+# Take one cell at three frames. $m_t$ is its content, which may change, because a car can come or leave. $l_t$ says
+# whether a laser beam stops there, and $z_t$ is the class that the network names. So far this is lecture 01's chain with
+# two sensors. The new row is $e_t$, the network's **error**: "none", or "says building, whatever it sees", and so on for
+# each of the four classes. Errors may last, because the shadow that misled the network is mostly still there a moment
+# later. So in our toy an error stays with probability $r = 0.6$, and is otherwise drawn anew.
+#
+# "None" has probability 0.73, and each of the four others 0.067. So a frame names the right class with 0.8: "says
+# building" is right where a building is.
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph of three frames: contents m0 to m2 in a row, above them scans, below them the classes named, which also depend on a row of errors e0 to e2, highlighted; neighbouring contents and neighbouring errors are joined by arrows"
 stage = toy.class_over_time(toy.MemoryWorld(steps=3, repeats=0.6))
@@ -154,12 +161,13 @@ for one, other, given in (("z0", "z1", "m0 m1"), ("z0", "z1", "m0 m1 e0"), ("z0"
     print(f"{one} and {other} independent, given {given}: {independent}")
 
 # %% [markdown]
-# So two images share the network's error, even when we know everything about the cell. A laser beam and an image don't.
+# So in this graph two images share the network's error, even when we know everything about the cell. An image and a laser
+# beam don't. We drew it so. Whether a real network's errors last, we measure later.
 #
 # ## How much is a second look worth?
 #
 # Two frames in a row say *building*, and the cell doesn't change. One cell in ten of the toy street is a building. A
-# frame is right with 0.8; a wrong one names each of the three other classes with 0.2 / 3 = 0.067.
+# frame is right with 0.8, and names each of the three other classes with 0.2 / 3 = 0.067.
 #
 # - *Independent witnesses*: a building weighs 0.1 · 0.8 · 0.8 = 0.064, everything else 0.9 · 0.067 · 0.067 = 0.004. So
 #   P(building) = 0.94.
@@ -182,9 +190,9 @@ for r in (0.0, 0.6, 1.0):
     print(f"errors stay with {r}: P(building | building, building) = {building / (building + other):.2f}")
 
 # %% [markdown]
-# The exact answer follows the errors, too. In the toy there are four ways to be wrong. A real network has as many as
-# there are shadows and textures, so nobody can write them down. What a system can afford is one belief $b_t(m)$ per cell,
-# and an **exponent** $w$. The scan counts fully. Each image counts as $w$ of a witness:
+# The exact answer follows the errors, too. In the toy a cell can be misread in three ways. For a real network there are
+# as many as there are shadows and textures, so nobody can write them down. What a system can afford is one belief
+# $b_t(m)$ per cell, and an **exponent** $w$ for each image. The scan counts fully.
 #
 # $$ b_t(m) \;\propto\; P(l_t \mid m)\; P(z_t \mid m)^{w} \sum_{m'} P(m \mid m')\, b_{t-1}(m') $$
 #
@@ -204,51 +212,57 @@ def factored(world, named, stopped, w):
     return belief @ CLASS_OF
 
 
-world, seen = toy.MemoryWorld(steps=3, repeats=0.6), ([CLASSES.index("building")] * 2 + [0], [1, 1, 0])
+still = toy.StillStreet()  # on which no content changes
+world, seen = toy.MemoryWorld(steps=3, repeats=0.6, street=still), ([CLASSES.index("building")] * 2 + [0], [1, 1, 0])
 np.testing.assert_allclose(factored(world, *seen, 0.5), toy.factored_classes(world, *seen, exponent=0.5))
 
 # %% [markdown]
 # How good is it? The **log loss** of a belief is −log P(true class), in nats; less is better. The toy is small enough for
-# the exact mean over every sequence of three frames.
+# the exact mean over every sequence of three frames. In A the cell's content doesn't change. Each other panel differs
+# from A in one thing.
 
 
-# %% jupyter={"source_hidden": true} alt="log loss against the exponent from 0 to 1 for a toy cell; A, errors last: a curve with its lowest point near one half, below the dashed line of the last image alone and above the dotted line of the exact answer, and above the dashed line at exponent 1; B, errors drawn anew: the curve falls to the exact answer at exponent 1; C, errors last still longer: the lowest point of the curve is on the dashed line"
-def draw_loss(repeats, ax):
+# %% jupyter={"source_hidden": true} alt="log loss against the exponent from 0 to 1 for a toy cell, in four panels; A, errors last: a curve with its lowest point near one half, far below the dashed line of the last image alone, little above the dotted line of the exact answer, and above the dashed line at exponent 1; B, errors drawn anew: the curve falls to the exact answer at exponent 1; C, errors last still longer: the lowest point is nearer to the dashed line, but below it; D, as A, but contents change: the lowest point is half-way between the dashed and the dotted line"
+def draw_loss(repeats, ax, street=still):
     """Draw the log loss against the exponent, for a rate at which errors stay."""
-    chosen, exponents = toy.MemoryWorld(steps=3, repeats=repeats), np.linspace(0, 1, 21)
+    chosen, exponents = toy.MemoryWorld(steps=3, repeats=repeats, street=street), np.linspace(0, 1, 21)
     price = toy.memory_price(chosen)
-    ax.axhline(price.forgotten, color="0.4", linestyle="--", label="the last image alone")
+    ax.axhline(price.forgotten, color="0.4", linestyle="--", label="the last image alone (and all scans)")
     ax.plot(exponents, toy.loss_by_exponent(chosen, exponents), color="tab:blue", label="every image with exponent w")
     ax.plot(price.exponent, price.weighted, "o", color="tab:blue", label="best exponent")
     ax.axhline(price.exact, color="black", linestyle=":", label="exact")
-    ax.set(xlabel="exponent w of each image", ylabel="log loss [nats]", title=f"errors stay: r = {repeats:.2f}")
+    ax.set(xlabel="exponent w", ylabel="log loss [nats]", title=f"errors stay: r = {repeats:.2f}")
     ax.set_ylim(0, 0.9)
 
 
-fig, axes = plt.subplots(1, 3, figsize=(9.8, 3.2), layout="constrained", sharey=True)
-for ax, letter, r in zip(axes, "ABC", (0.6, 0.0, 0.8), strict=True):
-    draw_loss(r, ax)
-    ax.set_title(f"{letter}: errors stay with r = {r}", fontsize="medium")
+fig, axes = plt.subplots(1, 4, figsize=(9.8, 3.2), layout="constrained", sharey=True)
+panels = ("A: r = 0.6", 0.6, still), ("B: r = 0", 0.0, still), ("C: r = 0.8", 0.8, still)
+for ax, (title, r, on) in zip(axes, (*panels, ("D: as A, contents change", 0.6, toy.SystemWorld())), strict=True):
+    draw_loss(r, ax, on)
+    ax.set_title(title, fontsize="medium")
     ax.label_outer()
-axes[0].legend(frameon=False, fontsize=8, loc="lower right")
+fig.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, fontsize=8)
 plt.show()
 
 # %% jupyter={"source_hidden": true}
 price = toy.memory_price(world)
-assert [round(loss, 2) for loss in price[:4]] == [0.42, 0.52, 0.38, 0.34]
-assert round(price.exponent, 1) == 0.5
-assert toy.memory_price(toy.MemoryWorld(3, 0.0)).independent < 0.3  # switched off: errors that don't last
-lasting = toy.memory_price(toy.MemoryWorld(3, 0.8))
-assert lasting.forgotten < lasting.weighted < lasting.forgotten + 0.01
+assert [round(loss, 2) for loss in price[:4]] == [0.36, 0.47, 0.28, 0.27]
+assert 0.4 < price.exponent < 0.5
+fresh_errors = toy.memory_price(replace(world, repeats=0.0))
+assert fresh_errors.independent < fresh_errors.exact + 1e-6  # switched off: errors that last
+longer = toy.memory_price(replace(world, repeats=0.8))
+assert longer.forgotten - longer.weighted > 0.7 * (longer.forgotten - longer.exact) > 0.02
+moving = toy.memory_price(toy.MemoryWorld(steps=3, repeats=0.6))
+assert [round(loss, 2) for loss in moving[:4]] == [0.42, 0.52, 0.38, 0.34]
 
 # %% [markdown]
-# In A, the product is the right end of the curve: 0.52 nats, *worse* than the last image alone with 0.42. It is very sure
+# In A, the product is the right end of the curve: 0.47 nats, *worse* than the last image alone with 0.36. It is very sure
 # of a wrong class whenever the frames err together. Is that the reason? B switches it off. Errors are drawn anew in each
 # frame, and the product becomes the exact answer.
 #
-# In A the best exponent is one half, with 0.38 nats. Exact inference gets 0.34. So **forgetting costs 0.08 nats in this
-# toy**, and an exponent pays back half of it. But in C, where errors last longer, even the best exponent is no better
-# than the last image alone.
+# The best exponent in A gets 0.28 nats, nearly the exact 0.27. If errors last longer (C), there is less to gain, and the
+# exponent still gains most of it. If contents change (D), old images are stale, too. There forgetting costs 0.08 nats,
+# and the exponent pays back half.
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="log loss against the exponent of each image, for a chosen rate at which errors stay"
@@ -262,20 +276,20 @@ def show(repeats):
 _ = interact(show, repeats=FloatSlider(value=0.6, min=0.0, max=0.95, step=0.05, description="r"))
 
 # %% [markdown]
-# (The slider works with a running kernel.) A textbook formula gives the exponent without a search. If the errors of $T$
-# readings have the correlation $r$ from each to the next one, as in the toy, their best weighted mean is as good as
-# that of
+# (The slider works with a running kernel.) A textbook formula gives an exponent without a search. Say the errors of $T$
+# readings are correlated, with $\rho$ from each to the next and $\rho^k$ after $k$ readings. In a still cell of the toy
+# $\rho$ is just $r$. The best weighted mean of these readings is as good as that of
 #
-# $$ T_\text{eff} = 1 + (T - 1)\,\frac{1 - r}{1 + r} $$
+# $$ T_\text{eff} = 1 + (T - 1)\,\frac{1 - \rho}{1 + \rho} $$
 #
-# independent readings. With $T$ = 3 and $r$ = 0.6 this is 1.5, so each of three frames gets the exponent one half, as in
-# panel A. On average each further look is then worth a quarter of the first.
+# independent ones. With $T$ = 3 and $\rho$ = 0.6 this is 1.5, so each of three frames gets the exponent 1.5 / 3 = 0.5. The
+# best one in A is 0.45.
 #
 # ## Do a real network's errors last?
 #
 # Now a drive: the simulated one, ten frames in two seconds. Take a cell that the camera sees at two frames, and look up
 # where it was. If the network was wrong there in the first, is it wrong in the second? The correlation of "wrong" with
-# "wrong" is the $r$ of the formula.
+# "wrong" is the formula's $\rho$.
 
 
 # %% tags=["repeats"]
@@ -328,7 +342,7 @@ lasting, alike = np.array([correlations(*errors_in_pairs(driven, k)) for k in ap
 fig, ax = plt.subplots(figsize=(5.6, 3.0), layout="constrained")
 ax.plot(0.2 * apart, lasting, "o-", color="tab:blue", label="measured, all cells")
 ax.plot(0.2 * apart, alike, "s-", color="tab:orange", label="measured, within class and distance")
-ax.plot(0.2 * apart, lasting[0] ** apart, "--", color="0.4", label="formula: $r^k$ after k frames")
+ax.plot(0.2 * apart, lasting[0] ** apart, "--", color="0.4", label=r"formula: $\rho^k$ after k frames")
 ax.set(xlabel="time apart [s]", ylabel="correlation of errors", ylim=(0, 0.8), title="how long errors last")
 ax.legend(frameon=False, fontsize=8)
 plt.show()
@@ -347,25 +361,28 @@ assert 1.6 < worth(lasting) < 2.05 < 2.2 < worth(alike) < 2.75
 # textbook has an answer for any correlations: put them into a matrix $R$, and add up all entries of $R^{-1}$. Ten frames
 # are worth 1.8.
 #
-# Part of this correlation only says that some cells are harder than others. If we compare cells of one kind, that is of
-# one class and one band of distance, it starts at 0.44, and ten frames are worth 2.5. So ten frames are worth about
-# two. And panel C of the toy's figure warned us: if errors last so long, an exponent may have nothing to gain.
+# Part of this correlation only says that some cells are harder than others. If we compare cells of one class and one band
+# of distance, it starts at 0.44, and ten frames are worth 2.5. So errors last, and ten frames are worth about two.
 #
-# ## What are ten frames worth together?
+# ## Does the exponent help on the drive?
 #
-# We try the package's memory on the drive, with two of its rules. First, a frame counts only as far as it sees the cell.
-# Second, a hundred frames of empty road are no witness against a car that has just come. So where the camera sees a
-# cell, the newest frame alone decides on cars, people and bicycles.
+# We multiply all ten frames, each with the exponent $w$, as in the toy. The package's memory can do this. It has two rules
+# of its own. First, a map *sees* a cell as far as it gives it one of the ten semantic classes, and counts only that far.
+# Second, a hundred frames of empty road are no witness against a car that has just come. So where the camera sees a cell,
+# the newest frame alone decides on cars, people and bicycles.
 #
-# The first look at a cell has weight 1, and each later one $w$. So ten looks weigh $1 + 9w$.
+# Which $w$? A cell that was seen once needs none, and one that was seen ten times needs a small one. We take 0.5.
 #
-# **Predict before you run.** Which of $w$ = 0.1, 0.35 and 1 is the best on the drive? Is it better than the newest frame
-# alone?
+# An exponent does two things at once. It discounts what frames share, and it makes *each* frame less sure, even a single
+# one. We call this second effect **softening**. To see it alone, switch the memory off: raise only the newest frame's
+# probabilities to a power, and normalise. On this drive the power 0.7 is best.
+#
+# **Predict before you run.** The newest frame has a log loss of 0.60. Do ten frames with $w$ = 0.5 beat it? And do they
+# beat the newest frame, softened?
 #
 # <details><summary>Answer</summary>
 #
-# The two small exponents are nearly alike, but none of the three beats the newest frame: 0.61 nats against 0.60. The
-# product is worst.
+# They beat the newest frame, with 0.58. But the newest frame alone, softened, gets 0.57.
 #
 # </details>
 
@@ -383,36 +400,7 @@ def score(maps):
     return np.concatenate(found, axis=1).mean(axis=1)
 
 
-def remembered_with(views, weight, most, **more):
-    """Return the score of a memory in which each later look has a weight, and all looks together `most`."""
-    params = MemoryParams(near_exponent=weight, decay_distance=np.inf, max_weight=most, **more)  # at any distance
-    return score(remember_drive(views, spec, params))
-
-
-# %% tags=["nbval-ignore-output", "weights"] jupyter={"outputs_hidden": true}
-views = [memory.View(result.frame, result.belief, result.grid) for result in driven]
-loss, sure, right = score([view.grid for view in views])
-print(f"newest frame: {loss:.2f} nats, {100 * sure:.0f} % sure, {100 * right:.0f} % right")
-for w in (0.1, 0.35, 1.0):
-    loss, sure, right = remembered_with(views, w, most=20)  # more than ten looks weigh, so there is no limit
-    print(f"w = {w:<4}:     {loss:.2f} nats, {100 * sure:.0f} % sure, {100 * right:.0f} % right")
-
-# %% [markdown]
-# With more frames the map gets surer, but not better. Is it that errors last? Not only: with $w$ = 0.1 ten looks weigh
-# 1.9, about what we measured, and lose as well. The print shows a second cause. A single frame is already surer than it
-# is right, and each further look makes it surer still.
-#
-# Switch this cause off: **soften** each frame. Raise its probabilities to the power 0.7, which we chose on this drive,
-# and normalise them.
-#
-# And limit the first cause: let all frames *together* weigh one. That is a **running mean** of $\log P$. Let $s$ be the
-# mean in a cell and $p$ what the newest frame says. With $a$ for the weight of the newest,
-#
-# $$ s_\text{new} = (1 - a)\,s_\text{old} + a \log p. $$
-
-
-# %% tags=["nbval-ignore-output", "soften"]
-def soften(view, power=0.7):
+def soften(view, power):
     """Return a view whose classes are less sure; how far the frame sees stays."""
     sees = view.grid[:S].sum(axis=0)
     classes = (view.grid[:S] / np.maximum(sees, 1e-9)) ** power
@@ -420,58 +408,40 @@ def soften(view, power=0.7):
     return view._replace(grid=np.concatenate([classes, view.grid[S:]]))
 
 
-softened = [soften(view) for view in views]
-softer, sure, _ = score([view.grid for view in softened])
-print(f"newest frame, softened: {softer:.2f} nats, {100 * sure:.0f} % sure")
-
-# %% jupyter={"source_hidden": true}
-tries = {"product, w = 1": (1.0, 20), "product, w = 0.35": (0.35, 20), "product, w = 0.1": (0.1, 20)}
-tries |= {"running mean, a = 1": (1.0, 1), "running mean, a = 0.35": (0.35, 1)}
-losses = {name: [remembered_with(given, *one)[0] for given in (views, softened)] for name, one in tries.items()}
-losses["newest frame alone"] = [score([view.grid for view in given])[0] for given in (views, softened)]
-no_rule = {name: remembered_with(views, *one, movable=())[0] for name, one in tries.items()}
-
-# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"] alt="log loss of six ways to use ten frames, as dots in rows; for frames as they are, only the running means are better than the newest frame alone; softened frames are better in every row, and with them the product with w = 0.35 gains, too; without the rule for cars the products are much worse and the running mean with a = 0.35 gains nothing"
-fig, ax = plt.subplots(figsize=(8.0, 3.3), layout="constrained")
-for k, (colour, mark, name) in enumerate(
-    (("tab:blue", "o", "frames as they are"), ("tab:orange", "s", "frames softened"))
-):
-    ax.plot([pair[k] for pair in losses.values()], list(losses), mark, color=colour, label=name)
-    ax.axvline(losses["newest frame alone"][k], color=colour, linestyle="--", lw=1, zorder=0)
-ax.plot(list(no_rule.values()), list(no_rule), "x", color="0.3", label="as they are, without the rule for cars")
-ax.set(xlabel="log loss in view [nats]; less is better", title="ten frames of the simulated drive")
-ax.legend(frameon=False, fontsize=8, loc="upper right", bbox_to_anchor=(1, 0.87))
-plt.show()
+# %% tags=["nbval-ignore-output", "weights"] jupyter={"outputs_hidden": true}
+views = [memory.View(result.frame, result.belief, result.grid) for result in driven]
+halved, softened = ([soften(view, power) for view in views] for power in (0.5, 0.7))
+product = MemoryParams(near_exponent=1, decay_distance=np.inf, max_weight=20)  # all frames count fully, up to 20
+mean = MemoryParams(near_exponent=0.35, decay_distance=np.inf, max_weight=1)  # explained below
+tries = {"newest frame alone": [view.grid for view in views],
+         "ten frames, w = 1": remember_drive(views, spec, product),
+         "ten frames, w = 0.5": remember_drive(halved, spec, product),
+         "newest frame alone, softened": [view.grid for view in softened],
+         "running mean of softened frames": remember_drive(softened, spec, mean)}  # fmt: skip
+scores = {name: score(maps) for name, maps in tries.items()}
+for name, (loss, sure, right) in scores.items():
+    print(f"{name:<32} {loss:.2f} nats, {100 * sure:.0f} % sure, {100 * right:.0f} % right")
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
-newest, softer = losses["newest frame alone"]
-small, third, one = (losses[f"product, w = {w}"] for w in ("0.1", "0.35", "1"))
-latest, averaged = losses["running mean, a = 1"], losses["running mean, a = 0.35"]
-assert newest < min(small[0], third[0]) < third[0] + 0.01 < one[0] - 0.03
-assert softer < newest - 0.02
-assert third[1] < softer - 0.004 < softer + 0.015 < one[1]
-assert max(averaged) == averaged[0] < newest - 0.012
-assert averaged[1] < softer - 0.005
-assert averaged[0] < latest[0] - 0.003
-assert latest[0] < newest - 0.005
-assert abs(no_rule["running mean, a = 0.35"] - newest) < 0.008
+newest, product, halves, softer, averaged = (loss for loss, _, _ in scores.values())
+assert averaged < softer - 0.004 < softer < halves - 0.005 < halves < newest - 0.008 < newest < product - 0.05
+assert np.ptp([right for _, _, right in scores.values()]) < 0.01
+sure, right = np.array(list(scores.values()))[:, 1:].T
+assert sure[0] > right[0] + 0.04
+assert abs(sure[3] - right[3]) < 0.02
 bands = measured["worth"]["log loss"]
-more = np.average(np.subtract(bands["1.0"], bands["0.35"]), weights=measured["worth"]["cells"])
-assert 0.015 < more < 0.03
 
 # %% [markdown]
-# Compare each row with the dashed lines, which are the newest frame alone.
+# A single frame is surer than it is right. The product with $w$ = 1 makes that worse. With $w$ = 0.5 ten frames beat the
+# newest one, but softening the newest one alone gains more. So this gain isn't memory: it is softening.
 #
-# - *Orange*: softening alone, without any memory, gains more than the running mean does. With softened frames the product
-#   with $w$ = 0.35 now gains a little, too, but $w$ = 1 still loses.
-# - *Running mean*: it gains on both kinds of frames. Half of this comes with $a$ = 1 already, where nothing is averaged:
-#   the memory only fills in what the newest frame sees badly.
-# - *Crosses*: without the rule for cars, the mean with $a$ = 0.35 is no better than the newest frame, and the products are
-#   much worse.
+# The last row is what is left for memory. It lets all frames *together* weigh as much as one, however many there are. That
+# is a **running mean** of $\log P$. Let $s$ be the mean in a cell and $p$ what the newest frame says. With $a$ for the
+# weight of the newest,
 #
-# So both causes act, and one drive can't tell how much of each. On two other simulated drives $w$ = 0.1 wins once and
-# loses once, and the mean wins on both. On twelve drives the mean with $a$ = 0.35 is 0.02 nats better than $a$ = 1
-# ([memory.json](../docs/results/memory.json)).
+# $$ s_\text{new} = (1 - a)\,s_\text{old} + a \log p. $$
+#
+# It gains 0.01 nats. In view, memory is worth little.
 #
 # ## Who decides what a cell is?
 #
@@ -504,43 +474,37 @@ for p in logs[1:]:
 histories = {"this frame": (logs, "0.5", ":"), "product": (logs.cumsum(axis=0), "tab:red", "--")}
 histories["running mean, a = 0.35"] = (np.array(kept), "tab:blue", "-")
 
-# %% jupyter={"source_hidden": true} alt="left, P(building) of a cell over twelve frames: one frame alone drops at a blunder in frame 5, the running mean only to one half, the product not at all; when the cell changes at frame 9 the mean follows at once and the product three frames later; right, a table of who decides: in view the mean for what stays and this frame alone for car, person, bicycle; seen before the memory, and for cars memory times laser; never seen the four unknown classes"
-fig, (left, ax) = plt.subplots(1, 2, figsize=(9.8, 3.3), layout="constrained", width_ratios=(1, 1.15))
-for name, (scores, colour, line) in histories.items():
-    left.plot(np.arange(1, 13), np.exp(scores[:, 0]) / np.exp(scores).sum(axis=1), line, color=colour, label=name)
-left.set(xlabel="frame", ylabel="P(building)", ylim=(0, 1.45), yticks=(0, 0.5, 1), title="A: a blunder, then a change")
-left.legend(frameon=False, fontsize=8, ncols=2, loc="upper left")
-decides = {"in view": ("memory and frame,\nrunning mean", "this frame alone"),
-           "seen before": ("memory", "memory, times\nP(something there)"),
-           "never seen": ("nobody: one of the\nunknown classes", "nobody: one of the\nunknown classes")}  # fmt: skip
-ax.set(xlim=(-1.05, 2), ylim=(3.5, -0.1), title="B: who decides")
-ax.set_axis_off()
-for column, head in enumerate(("what stays: road,\nhouse, tree ...", "what comes and goes:\ncar, person, bicycle")):
-    ax.text(column + 0.5, 0.25, head, ha="center", va="center", fontsize=9)
-for row, (where, cells) in enumerate(decides.items()):
-    ax.text(-0.08, row + 1, where, ha="right", va="center", fontsize=9)
-    for column, text in enumerate(cells):
-        shade = ("#dce9f5", "#fbe5cf", "0.93")[2 if row == 2 else column]
-        ax.add_patch(plt.Rectangle((column + 0.03, row + 0.57), 0.94, 0.86, facecolor=shade, edgecolor="0.5"))
-        ax.text(column + 0.5, row + 1, text, ha="center", va="center", fontsize=9)
+# %% jupyter={"source_hidden": true} alt="P(building) of a cell over twelve frames: one frame alone drops at a blunder in frame 5, the running mean only to one half, the product not at all; when the cell changes at frame 9 the mean follows at once and the product three frames later"
+fig, ax = plt.subplots(figsize=(6.4, 2.8), layout="constrained")
+for name, (logs_so_far, colour, line) in histories.items():
+    sums = np.exp(logs_so_far).sum(axis=1)
+    ax.plot(np.arange(1, 13), np.exp(logs_so_far[:, 0]) / sums, line, color=colour, label=name)
+ax.set(xlabel="frame", ylabel="P(building)", ylim=(0, 1.05), yticks=(0, 0.5, 1), title="a blunder, then a change")
+fig.legend(loc="outside right center", frameon=False, fontsize=8)
 plt.show()
 
 # %% [markdown]
-# In A, the fifth frame is a blunder, and from the ninth on the cell really is something else. The mean only dips at the
-# blunder and follows the change. The product ignores both for too long.
+# The fifth frame is a blunder, and from the ninth on the cell really is something else. The mean only dips at the blunder
+# and follows the change. The product ignores both for too long.
 #
-# B shows the whole rule; "this frame" counts as far as it sees the cell. Where the camera doesn't look, the memory
-# speaks, and the laser is a second witness: a remembered car is multiplied by the probability that something is there
-# at all.
+# The whole rule has three witnesses:
 #
-# The package's $a$ falls with the distance, from 0.7 to half of that. On the twelve drives a smaller one would be
-# slightly better.
+# | the camera sees the cell | what stays: road, house, tree ... | what comes and goes: car, person, bicycle |
+# |---|---|---|
+# | now | running mean | newest frame alone |
+# | before | memory | memory, times P(something there) |
+# | never | nobody: one of the unknown classes | nobody: one of the unknown classes |
+#
+# Where the camera doesn't look, the laser is a second witness. It multiplies a remembered car by
+# P(something there) = P(STATIC) + P(DYNAMIC) + P(UNKNOWN) / 2.
+#
+# The package takes $a$ = 0.7 near the vehicle and half of that far away. Near it, 0.2 would be better by 0.01 nats
+# ([memory.json](../docs/results/memory.json)).
 
 # %% jupyter={"source_hidden": true}
-middle = np.convolve(measured["worth"]["edges"], [0.5, 0.5], "valid")
-by_band = np.array([*bands.values()]).T
-for a, band in zip(MemoryParams().exponent(middle), by_band, strict=True):
-    assert np.interp(a, [float(one) for one in bands], band) - band.min() < 0.0105
+assert measured["worth"]["best"][:4] == [0.2] * 4
+assert 0.007 < bands["0.7"][0] - bands["0.2"][0] < 0.013
+assert MemoryParams().exponent(70) < 0.36
 
 # %% [markdown]
 # So the mean decides on what stays, the newest look on what comes and goes, and the laser on what nobody sees now.
@@ -581,7 +545,8 @@ for step in range(11):
         print("{:.1f} s   car {}   class, rest kept {}   class, rest lost {}".format(step * dt, *drawn))
 
 # %% [markdown]
-# Forward is to the right. The package keeps the rest, so the class travels with the car, as in the opening picture.
+# Forward is to the right. The package keeps the 0.2 m that rounding would lose. So the class travels with the car, as in
+# the opening picture.
 #
 # ## What does the memory gain?
 #
@@ -589,13 +554,13 @@ for step in range(11):
 # now. One frame alone is the first rival. In cells seen before, a second one costs nothing: the **last look** keeps what
 # the map said when the camera last saw the cell.
 #
-# **Predict before you run.** In which of the two does the memory gain more? And what may it gain there against the last
-# look: classes, or only fewer answers *unknown*?
+# **Predict before you run.** In which of the two does the memory gain more? Does it still gain there if both must name a
+# class and may not answer *unknown*?
 #
 # <details><summary>Answer</summary>
 #
-# In cells seen before. There it gains 15 points over the last look on simulated streets. But if *unknown* is forbidden to
-# both, only 2.5 are left.
+# In cells seen before. There it gains over 15 points on the last look on simulated streets. If *unknown* is forbidden to
+# both, fewer than three are left.
 #
 # </details>
 
@@ -615,9 +580,10 @@ def table(group, rivals):
         one = measured["scores"][key][group]
         shares = [100 * one["methods"][m]["pixel accuracy"]["mean"] for m in (*rivals, "memory")]
         found = one["gain" if shares[0] >= shares[-2] else "gain over the last look"]
-        low, mean, high = (f"{100 * found['pixel accuracy'][part]:+.1f}" for part in ("low", "mean", "high"))
-        forbidden = f"{100 * found['unknown forbidden']['mean']:+.1f}"
-        rows.append(f"| {name} | {' | '.join(f'{s:.0f}' for s in shares)} | {mean} ({low} to {high}) | {forbidden} |")
+        gains = [[f"{100 * found[metric][part]:+.1f}" for part in ("mean", "low", "high")]
+                 for metric in ("pixel accuracy", "unknown forbidden")]  # fmt: skip
+        cells = [f"{s:.0f}" for s in shares] + ["{} ({} to {})".format(*gain) for gain in gains]
+        rows.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(rows)
 
 
@@ -627,24 +593,28 @@ Markdown(table("in view", ["one frame"]) + "\n\n" + table("seen before", ["one f
 fresh = measured["scores"]["fresh simulated streets"]
 gains = {group: fresh[group][name] for group, name in (("in view", "gain"), ("seen before", "gain over the last look"))}
 shown = [round(100 * gains[g][m]["mean"], 1) for g in gains for m in ("pixel accuracy", "unknown forbidden")]
-assert shown == [5.0, 0.8, 15.4, 2.5], shown
+assert 4.5 < shown[0] < 5.5
+assert 0.5 < shown[1] < 1.1
+assert 15 < shown[2] < 16.5
+assert 2 < shown[3] < 3
 own = measured["scores"]["real street, network that learned from its frames"]
 lost = own["in view"]["gain"]["class accuracy"]
 assert -0.008 < lost["mean"] < -0.005
 assert lost["high"] < 0
-assert round(100 * own["seen before"]["gain"]["unknown forbidden"]["mean"], 1) == 0.5
-later = [fresh["seen later"]["methods"][m]["pixel accuracy"]["mean"] for m in ("memory", "whole drive")]
-assert [round(100 * share) for share in later] == [11, 63]
+assert abs(own["seen before"]["gain"]["pixel accuracy"]["low"]) < 0.002
+mine = measured["scores"]["real street, network from simulated streets"]["in view"]["gain"]["unknown forbidden"]
+assert mine["low"] < 0 < mine["high"] < 0.01
 
 # %% [markdown]
 # The intervals are over drives (lecture 12), on the real street over pieces of two seconds. On streets that are new to
 # the network, memory gains about five points in view, and more than ten where the camera looked before. If the network
-# learned from these very frames, memory gains almost nothing in view, and loses 0.6 points of class accuracy.
+# learned from these very frames, memory gains almost nothing in view, and loses 0.6 points of class accuracy. The interval
+# of its gain in cells seen before starts at zero.
 #
-# Is this knowledge, or does the memory only say *unknown* less often? Forbid that answer to all (the tables' last
-# column). The gains fall to one point in view and to a few points in cells seen before. So most of the gain is fewer
-# answers *unknown*. Then a simple rival must be tried, too. The **last known class** keeps, in each cell, the newest
-# answer that wasn't *unknown*.
+# Is this knowledge, or does the memory only say *unknown* less often? Forbid that answer to all (last column). In view
+# less than a point is left, on the real street nothing that we can tell from zero; in cells seen before, a few points. So
+# most of the gain is fewer answers *unknown*. Then a simple rival must be tried, too. The **last known class** keeps, in
+# each cell, the newest answer that wasn't *unknown*.
 
 
 # %% tags=["nbval-ignore-output", "known"]
@@ -676,111 +646,126 @@ for alone, known, with_it in zip(*rates.values(), strict=True):
 # %% [markdown]
 # On this drive the last known class gets more than half of the gain in view, and most of it in cells seen before.
 
-# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="four maps of the simulated street, the largest patches of cells seen before outlined in white, beside the view and right before the vehicle; with one frame most of these are pale, brown or black, unknown; with the last known class and with memory, road, sidewalk and vegetation reach to the vehicle, and the memory has fewer holes; the truth"
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true} alt="four maps of the simulated street, the largest patches of cells seen before outlined in white on black, beside the view and right before the vehicle; with one frame most of these are pale, brown or black, unknown; with the last known class and with memory, road, sidewalk and vegetation reach to the vehicle, and the memory has fewer holes; in the map of the memory bright dots mark car cells on empty road, most of them in stripes beside and behind cars at the left; the truth"
 maps = {name: called[-1] for name, called in answers.items()} | {"truth": truth[-1]}
 fig = plotting.label_maps(spec, maps, KITTI_14)
 y, x = spec.centers()[0, :, 1], spec.centers()[:, 0, 0]
 patches, _ = label(before[-1])
 large = (np.bincount(patches.ravel()) >= 60)[patches] & before[-1]
 for ax in fig.axes[: len(maps)]:
-    ax.contour(y, x, large, levels=[0.5], colors="white", linewidths=1.5)
+    for colour, width in (("black", 3), ("white", 1.5)):
+        ax.contour(y, x, large, levels=[0.5], colors=colour, linewidths=width)
+kept = before[-1] & (truth[-1] == KITTI_14.index("road")) & (maps["memory"] == KITTI_14.index("car"))
+fig.axes[2].plot(y[np.nonzero(kept)[1]], x[np.nonzero(kept)[0]], "o", ms=4, mfc="cyan", mec="black", mew=0.6)
 plt.show()
 
 # %% [markdown]
 # White lines surround the largest patches of cells seen before. There, one frame calls even the road right before the
-# vehicle unknown.
-#
-# Whoever makes labels from a recorded drive also has the *later* images. `smooth_drive` runs a second memory backward
-# through the drive. In cells that are only seen later it is right in six of ten, and the memory of the past in one.
+# vehicle unknown. The bright dots are for the next section.
 #
 # So the memory gains little in view and much where the camera has looked before, and most of it a simple rule gains, too.
 #
 # ## Where this breaks: a car that has left
 #
-# A car can leave a cell while the camera looks elsewhere. The memory then keeps a **ghost**: a cell of empty road, seen
-# before, that it calls car. On the simulated drive we know the truth, so we can count ghosts, and ask which of them had a
-# car at an earlier frame. The trivial baseline is the same share among *all* cells of empty road that were seen before.
+# A car can leave a cell while the camera looks elsewhere. The memory may then keep a **ghost**: a cell of empty road, seen
+# before, that it calls car. The bright dots in the figure above are ghosts. Do they all come from cars that left? On the
+# simulated drive we know the truth, so we can sort them:
+#
+# - *a car that left*: at an earlier frame a car was there, and the map of that frame called it car;
+# - *a mistake kept*: not so, but the map of some frame called it car where the truth was road;
+# - *other*: neither.
+#
+# The baseline is the same count among *all* cells of empty road that were seen before.
 
 
 # %% tags=["nbval-ignore-output"]
 cars, road, comes = KITTI_14.index("car"), KITTI_14.index("road"), list(MemoryParams().movable)
 empty, hidden = before & (truth == road), before & (truth == cars)
 ghosts = empty & (answers["memory"] == cars)
-parked = np.zeros_like(ghosts)
+left, mistaken = np.zeros_like(ghosts), np.zeros_like(ghosts)
 for k, result in enumerate(driven):
-    for earlier, then in enumerate(driven[:k]):
-        parked[k] |= moved_to(result, then, truth[earlier][None] == cars)[0] > 0
-touches = binary_dilation(truth == cars, structure=np.ones((1, 3, 3)))
-for name, cells in (("ghosts", ghosts), ("empty road", empty), ("ghosts without an earlier car", ghosts & ~parked)):
-    earlier, beside = 100 * parked[cells].mean(), 100 * touches[cells].mean()
-    print(f"{cells.sum():5} {name}: a car earlier {earlier:.0f} %, beside a car now {beside:.0f} %")
+    for earlier, then in enumerate(driven[: k + 1]):
+        called = answers["one frame"][earlier] == cars
+        true_or_not = np.stack([called & (truth[earlier] == cars), called & (truth[earlier] == road)])
+        was_left, was_mistaken = moved_to(result, then, true_or_not) > 0
+        left[k] |= was_left
+        mistaken[k] |= was_mistaken
+mistaken &= ~left
+for name, cells in (("ghosts", ghosts), ("empty road", empty)):
+    shares = [100 * one[cells].mean() for one in (left, mistaken, ~left & ~mistaken)]
+    print("{:4} {:<10}: a car that left {:2.0f} %, a mistake kept {:2.0f} %, other {:2.0f} %".format(
+        cells.sum(), name, *shares))  # fmt: skip
+occupancy = np.stack([result.belief.probability for result in driven])
+for state in State:
+    print(
+        f"the laser's answer in ghosts: {state.name:<8} {100 * (occupancy.argmax(axis=1)[ghosts] == state).mean():2.0f} %"
+    )
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 assert ghosts.sum() > 200
-assert parked[ghosts].mean() > 0.5 > 0.25 > parked[empty].mean()
-assert touches[ghosts & ~parked].mean() > 0.7 > 0.3 > touches[empty].mean()
+assert 0.42 < left[ghosts].mean() < 0.58
+assert 0.28 < mistaken[ghosts].mean() < 0.42
+assert max(left[empty].mean(), mistaken[empty].mean()) < 0.12
+states = occupancy.argmax(axis=1)
+assert 0.28 < (states[ghosts] == State.FREE).mean() < 0.42
+assert (states[ghosts & left] == State.FREE).mean() > (states[ghosts & mistaken] == State.FREE).mean() + 0.1
 
 # %% [markdown]
-# In six of ten ghosts an earlier frame had a car, against two of ten cells of empty road. Most of the others touch a car
-# that is there now: they are the frayed edges of its patch on the map.
+# Half of the ghosts are cars that the network saw and that have left. A third are mistakes of the network that the memory
+# keeps, the subject of this lecture's first half. Among all cells of empty road both are rare.
 #
-# The laser could object, but it isn't sure enough. By hand: the memory says car with 0.9, and the filter FREE with 0.6
-# and STATIC with 0.4. The car keeps 0.9 · 0.4 / (0.9 · 0.4 + 0.1) = 0.78.
+# Why doesn't the laser object? In one ghost of three it says FREE, but isn't sure enough. By hand: the memory says car with
+# 0.9, and the filter FREE with 0.6 and STATIC with 0.4. The car keeps 0.9 · 0.4 / (0.9 · 0.4 + 0.1) = 0.78. In the other
+# ghosts the laser sees something, or nothing at all.
 #
-# What can be done? Forbid the memory to answer car, person or bicycle where the camera doesn't look. Or let the laser
-# decide alone: no car where the filter says FREE. What does each cost?
+# What can be done where the camera doesn't look? Forbid the answers car, person and bicycle. Or let the laser decide
+# alone: none of these where P(FREE) is above one half. The last known class gets the same judge. What does each cost?
 
 # %% tags=["nbval-ignore-output"]
-free = np.stack([result.belief.probability[State.FREE] for result in driven]) > 0.5
-remembered = np.stack([result.remembered for result in driven])
+free = before & (occupancy[:, State.FREE] > 0.5)
+remembered, known = np.stack([result.remembered for result in driven]), answers["last known class"]
 without, corrected = remembered.copy(), remembered.copy()
-without[:, comes] = 0
+without[:, comes] *= ~before[:, None]
 corrected[:, comes] *= ~free[:, None]
-rules = answers | {"no car where FREE": corrected.argmax(axis=1), "no cars at all": without.argmax(axis=1)}
+judged = np.where(free & np.isin(known, comes), answers["one frame"], known)
+rules = {"last known class": known, "last known class and judge": judged, "memory": answers["memory"],
+         "memory and judge": corrected.argmax(axis=1), "memory without cars": without.argmax(axis=1)}  # fmt: skip
 found = {}
 for name, called in rules.items():
     claims, right = called == cars, called == truth
     found[name] = claims[empty].sum(), 100 * claims[hidden].mean(), 100 * right[before].mean()
-    print("{:<18} {:4} ghosts, {:2.0f} % of car cells found, {:.1f} % of all right".format(name, *found[name]))
-instead = rules["no cars at all"][hidden & (answers["memory"] == cars)]  # of the car cells that the memory finds
-standing = 100 * (instead == KITTI_14.index("unknown-static")).mean()
-print(f"no cars at all, in car cells that the memory finds: unknown-static in {standing:.0f} %, "
-      f"road in {100 * (instead == road).mean():.0f} %")  # fmt: skip
+    print("{:<27} {:3} ghosts, {:2.0f} % of hidden car cells found, {:.0f} % of all right".format(name, *found[name]))
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 assert hidden.sum() < 0.05 * before.sum()
-assert found["no cars at all"][0] == 0
-assert found["no cars at all"][2] > found["memory"][2]
-assert found["no car where FREE"][0] < 0.8 * found["memory"][0]
-assert found["memory"][1] > 25 > 5 > found["one frame"][1]
+assert found["memory without cars"][:2] == (0, 0)
+assert np.ptp([found[name][2] for name in list(found)[2:]]) < 2
+assert 0.55 < found["memory and judge"][0] / found["memory"][0] < 0.8
+assert 0.4 < found["last known class and judge"][0] / found["last known class"][0] < 0.6
+assert found["memory and judge"][1] > 0.7 * found["memory"][1] > 18
 assert found["last known class"][0] > 1.2 * found["memory"][0]
-assert standing > 50
 
 # %% [markdown]
-# The last known class keeps more ghosts than the memory. Without cars the ghosts are gone, and even *more* cells are
-# right. So should a memory forget cars? It found almost a third of the hidden cars' cells, and one frame finds nearly
-# none. Pixel accuracy can't see that, because cars are few. A vehicle that forgets them still knows that something
-# stands in most of these cells, because the filter remembers *where*. But it no longer knows that this may drive off,
-# and a few cells become road. The laser as a judge is the better repair: it removes a third of the ghosts and keeps
-# most of the cars. In the exercise you let the laser judge all that stands.
+# Without cars the ghosts are gone, but no hidden car is found. Pixel accuracy hardly notices either, because cars are few.
+# The judge removes a third of the memory's ghosts, and half of those of the last known class; each keeps most of the cars
+# that it had found. So the laser is the better repair, for the rival as well. In the exercise you let it judge all that
+# stands.
 #
 # **What this doesn't show.** The fresh streets come from the simulator that the network learned from. The real street is
-# a few seconds at one corner. And all these poses hardly drift; what a memory is worth with poses that do, we haven't
+# a few seconds at one corner, and the ghosts are from one drive. And all these poses hardly drift; what a memory is worth with poses that do, we haven't
 # measured.
 #
 # ## In five lines
 #
 # 1. Frames share the network's errors, so they aren't independent witnesses. A product of them can be worse than one
 #    frame.
-# 2. In the toy an exponent wins back half of what forgetting costs, if errors don't last too long. On the drive they last
-#    long, and each frame is surer than right. There, no exponent that we tried beats the newest frame, unless frames are
-#    softened first.
-# 3. A running mean gains with either. What comes and goes is decided by the newest look, and by the laser where nobody
-#    looks.
+# 2. An exponent wins back most of what forgetting costs in a toy cell that stands still, and half if contents change. On
+#    the drive it beats the newest frame, but softening that frame alone gains more.
+# 3. A running mean lets all frames weigh as much as one. What comes and goes is decided by the newest look, and where
+#    nobody looks, the laser has a say.
 # 4. In view the memory gains little. Where the camera looked before it gains far more. Mostly these are fewer answers
 #    *unknown*, and keeping the last known class gets most of it.
-# 5. Forgetting is the last price on lecture 00's list: 0.08 nats in the toy. A memory has a price of its own, the ghosts
-#    of cars that have left.
+# 5. Memory has a price of its own, the ghosts: cars that have left, and mistakes that it keeps.
 #
 # **What you can now do.** You can draw a perception system as a graph, find what it leaves out, compute on a toy what
 # that costs, build the repair, and measure whether the toy was right.

@@ -21,6 +21,14 @@ from worlds.lecture_00_stage_graph import CutEdge, Price, StageGraph, directed
 from worlds.lecture_00_street import CLASS_OF, CLASSES, STATE_OF, STREET, SystemWorld
 
 
+class StillStreet(SystemWorld):
+    """A street on which nothing changes."""
+
+    def change(self) -> NDArray[np.float64]:
+        """Return P(content now | content before), (5, 5): the content stays."""
+        return np.eye(len(STREET))
+
+
 @dataclass(frozen=True)
 class MemoryWorld:
     """One cell that a LIDAR and a camera observe repeatedly.

@@ -6,6 +6,7 @@ from pyagrum_oracle import assert_oracle_agrees
 from worlds.lecture_00_street import CLASS_OF, SystemWorld
 from worlds.lecture_14_class_memory import (
     MemoryWorld,
+    StillStreet,
     class_over_time,
     exact_classes,
     factored_classes,
@@ -51,6 +52,13 @@ def test_a_product_of_frames_that_err_together_is_worse_than_forgetting_and_an_e
     assert price.exact < price.weighted < price.forgotten < price.independent
     losses = loss_by_exponent(MemoryWorld(steps=3, repeats=0.6), (price.exponent, 1.0))
     assert losses == pytest.approx([price.weighted, price.independent])
+
+
+@pytest.mark.parametrize("repeats", [0.6, 0.8])
+def test_in_a_cell_that_stands_still_an_exponent_pays_back_most(repeats):
+    still, moving = (memory_price(MemoryWorld(3, repeats, street)) for street in (StillStreet(), SystemWorld()))
+    paid = [(one.forgotten - one.weighted) / (one.forgotten - one.exact) for one in (still, moving)]
+    assert paid[0] > 0.7 > 0.55 > paid[1]
 
 
 @pytest.mark.parametrize("frames", [2, 3, 4])

@@ -91,7 +91,8 @@ _test()
 #
 # `wrong` is `(N, T)`: for each of N places whether the network was wrong in each of T frames in a row, 1 or 0. Pair each frame with the next one, in all places
 # together: that is N (T - 1) pairs. The correlation coefficient of these pairs is $r$. By the lecture's formula, T frames are then worth
-# $1 + (T - 1)\,(1 - r) / (1 + r)$ independent ones.
+# $1 + (T - 1)\,(1 - r) / (1 + r)$ independent ones. This holds if the correlation falls by the factor $r$ with each frame. If it falls more slowly, as on the lecture's drive, they
+# are worth less.
 #
 # Complete `errors_last`: it returns $r$ and this worth. The correlation coefficient of x and y is their covariance divided by both standard deviations; here x are all
 # earlier ones of the pairs and y all later ones.
@@ -146,7 +147,7 @@ _test()
 # ## Task 3: the laser corrects the memory (3 points)
 #
 # The lecture's ghosts are cells that the memory calls *car* though the car has left. The package lets the laser speak of cars, people and bicycles, and takes off half of P(UNKNOWN),
-# too; here the laser speaks of all that stands, and an UNKNOWN cell takes nothing off. `p` is what the memory says of C classes, `(C, H, W)`; it sums to
+# too; here the laser speaks of all that stands, because a building can't be in a free cell either, and an UNKNOWN cell takes nothing off, because no beam has been there. `p` is what the memory says of C classes, `(C, H, W)`; it sums to
 # 1 in each cell. `o` is the occupancy grid, `(4, H, W)`, in the order FREE, STATIC, DYNAMIC, UNKNOWN. `standing` lists the numbers of the classes that stand up, such as car
 # and building. A standing thing can't be in a free cell, so its probability is multiplied by 1 - P(FREE); a class of the ground keeps its own. Then each cell is divided by
 # its sum.
