@@ -29,16 +29,29 @@ def _turn(degrees: ArrayLike) -> NDArray[np.float64]:
     return rigid_transform(Rotation.from_rotvec(degrees, degrees=True).as_matrix(), np.zeros(3))
 
 
-def camera_turned(frame: Frame) -> Frame:
-    """Turn the camera by 2 degrees to the right in the calibration alone.
+def camera_turned(frame: Frame, degrees: ArrayLike = (0, -TURN, 0)) -> Frame:
+    """Turn the camera in the calibration alone, by 2 degrees to the right or by another turn.
 
     Parameters
     ----------
     frame : Frame
         A frame.
+    degrees : (3,) float
+        The turn about the camera's axes: pitch, yaw and roll.
     """
-    turned = _turn([0, -TURN, 0]) @ frame.camera.T_camera_from_lidar
+    turned = _turn(degrees) @ frame.camera.T_camera_from_lidar
     return replace(frame, camera=replace(frame.camera, T_camera_from_lidar=turned))
+
+
+def image_mirrored(frame: Frame) -> Frame:
+    """Swap left and right of the image alone, so that borders of the scan don't fall on their own.
+
+    Parameters
+    ----------
+    frame : Frame
+        A frame with an image.
+    """
+    return replace(frame, image=np.ascontiguousarray(frame.need_image()[:, ::-1]))
 
 
 def lidar_tilted(frame: Frame) -> Frame:

@@ -156,6 +156,17 @@ def brighter(frame: Frame, by: int) -> Frame:
     return replace(frame, image=np.clip(frame.need_image().astype(int) + by, 0, 255).astype(np.uint8))
 
 
+def grey(frame: Frame) -> Frame:
+    """Return a frame whose image shows nothing: one grey everywhere.
+
+    Parameters
+    ----------
+    frame : Frame
+        A frame with an image.
+    """
+    return replace(frame, image=np.full_like(frame.need_image(), 128))
+
+
 def ground_begins(camera: Camera, spec: GridSpec) -> float:
     """Return how far ahead the nearest ground in the image is, metres.
 

@@ -15,7 +15,7 @@ from semgrid_edu.metrics import METRICS
 from semgrid_edu.workshop.course.street import motion_between, piece_confusions
 from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 from worlds import lecture_13_checks as checks
-from worlds.lecture_13_faults import YAWS
+from worlds.lecture_13_faults import YAWS, image_mirrored
 from worlds.lecture_13_scan_borders import edge_contrast
 
 TURNED, LEANS, SHIFTED, OVERSURE = 0.5, 1.0, 0.05, 0.05
@@ -40,14 +40,17 @@ class Line(NamedTuple):
         What was measured.
     verdict : bool or None
         Whether the reading passes; None when this drive can't tell.
+    unseen : str
+        What this check can't see, even when it passes.
     """
 
     check: str
     reading: str
     verdict: bool | None
+    unseen: str = ""
 
 
-def border_verdict(contrast: NDArray, turns: NDArray) -> bool | None:
+def border_verdict(contrast: NDArray, turns: NDArray, null: float = 1.0) -> bool | None:
     """Judge where borders in scan and image agree best.
 
     Parameters
@@ -56,15 +59,17 @@ def border_verdict(contrast: NDArray, turns: NDArray) -> bool | None:
         From `edge_contrast`.
     turns : (n,) float
         The turns of the camera that were tried, degrees.
+    null : float
+        The largest contrast of borders that have nothing to do with the image, see `image_mirrored`.
 
     Returns
     -------
     bool or None
         None when the best turn is the first or the last one that was tried, so that a better one may lie beyond, or
-        when even the best contrast isn't above 1: then borders in the scan have nothing to do with those in the image.
+        when even the best contrast isn't above the null level.
     """
     best = contrast.argmax()
-    if best in (0, len(turns) - 1) or contrast[best] <= 1:
+    if best in (0, len(turns) - 1) or contrast[best] <= null:
         return None
     return bool(abs(turns[best]) <= TURNED)
 
@@ -99,27 +104,57 @@ def check_lines(drive: FrameSequence, frames: Sequence[Frame]) -> list[Line]:
     """
     times, errors = [frame.time for frame in frames], checks.axes_errors(frames, thin=3)
     contrast = np.mean([edge_contrast(frame, YAWS) for frame in frames[::3]], axis=0)
+    null = np.mean([edge_contrast(image_mirrored(frame), YAWS) for frame in frames[::3]], axis=0).max()
     ground = np.mean([checks.ground_plane(frame.points, frame.camera.lidar_height) for frame in frames], axis=0)
     problems, gaps, best = len(drive.problems()), len(checks.time_gaps(times)), YAWS[contrast.argmax()]
     far = float(np.linalg.norm(motion_between(frames[0], frames[-1])[:3, 3]))
+    borders = f"best at {best:+.2f}°, contrast {contrast.max():.2f}"
+    lean, cause = [bool(abs(angle) <= LEANS) for angle in ground[1:]], "whether LIDAR or street"
     return [
-        Line("files", f"{problems} problems", problems == 0),
-        Line("gaps in time", f"{gaps}; a step takes {1000 * np.median(np.diff(times)):.0f} ms", gaps == 0),
+        Line("files", f"{problems} problems", problems == 0, "wrong numbers in whole files"),
+        Line(
+            "gaps in time",
+            f"{gaps}; a step takes {1000 * np.median(np.diff(times)):.0f} ms",
+            False if gaps else None,
+            "steps that are all too long",
+        ),
         _clock_line(drive),
-        Line("borders", f"best at {best:+.2f}°, contrast {contrast.max():.2f}", border_verdict(contrast, YAWS)),
-        Line("ground ahead", f"rises by {ground[1]:+.1f}°", bool(abs(ground[1]) <= LEANS)),
-        Line("ground to the left", f"rises by {ground[2]:+.1f}°", bool(abs(ground[2]) <= LEANS)),
-        Line("motion", f"{errors['as the poses say']:.2f} m off; {far:.1f} m driven", motion_verdict(errors)),
+        Line("borders", borders, border_verdict(contrast, YAWS, null), "roll; pitch, or names it yaw"),
+        Line("ground ahead", f"rises by {ground[1]:+.1f}°", lean[0], cause),
+        Line("ground to the left", f"rises by {ground[2]:+.1f}°", lean[1], cause),
+        Line(
+            "motion",
+            f"{errors['as the poses say']:.2f} m off; {far:.1f} m driven",
+            motion_verdict(errors),
+            "swapped sides, if straight on",
+        ),
     ]
+
+
+def view_line(begins: float, learned: float) -> Line:
+    """Judge whether the camera sees the ground from about where the network's camera saw it.
+
+    Parameters
+    ----------
+    begins, learned : float
+        How far ahead the ground comes into view, here and where the network learned, metres.
+    """
+    reading = f"from {begins:.0f} m; learned from {learned:.0f} m"
+    return Line("ground in view", reading, bool(begins <= learned + 1), "other differences of cameras")
 
 
 def _clock_line(drive: FrameSequence) -> Line:
     """Judge the delays between sensors: if all are zero, one clock was written into every file."""
     if not isinstance(drive, KittiRawDrive):
-        return Line("clocks", "one time for each frame", None)
+        return Line("clocks", "one time for each frame", None, "how late a sensor is")
     late = np.concatenate([*checks.sensor_delays(drive).values()])
     largest = 1000 * np.nanmax(np.abs(late))
-    return Line("clocks", f"up to {largest:.0f} ms apart", bool(largest < 50) if largest else None)
+    return Line(
+        "clocks",
+        f"up to {largest:.0f} ms apart",
+        bool(largest < 50) if largest else None,
+        "stamps that are wrong alike",
+    )
 
 
 def map_lines(name: str, truths: NDArray, grids: NDArray, rivals: Mapping[str, NDArray], pieces: NDArray) -> list[Line]:
@@ -144,9 +179,14 @@ def map_lines(name: str, truths: NDArray, grids: NDArray, rivals: Mapping[str, N
         low, gain, high = paired_interval(ours, piece_confusions(truths, called, pieces), accuracy)
         points = [f"{round(100 * value) + 0:+d}" for value in (low, gain, high)]  # no -0
         reading = f"{right:.0f} % right, {points[1]} points ({points[0]} to {points[2]})"
-        lines.append(Line(f"{name} against {rival}", reading, None if low <= 0 <= high else bool(gain > 0)))
+        lines.append(
+            Line(f"{name} against {rival}", reading, None if low <= 0 <= high else bool(gain > 0), "other streets")
+        )
     error = expected_calibration_error(reliability(np.moveaxis(grids, 1, 0), truths, BINS))
-    return [*lines, Line(f"{name}: how sure", f"off by {100 * error:.0f} points", bool(error <= OVERSURE))]
+    return [
+        *lines,
+        Line(f"{name}: how sure", f"off by {100 * error:.0f} points", bool(error <= OVERSURE), "other streets"),
+    ]
 
 
 def draw_report_card(lines: Sequence[Line], ax: Axes) -> Axes:
@@ -162,8 +202,10 @@ def draw_report_card(lines: Sequence[Line], ax: Axes) -> Axes:
     for row, line in enumerate(lines):
         word, colour, mark = MARKS[line.verdict]
         ax.plot(0.02, row, mark, color=colour, markersize=9)
-        for x, text in ((0.06, word), (0.2, line.check), (0.58, line.reading)):
+        for x, text in ((0.05, word), (0.17, line.check), (0.41, line.reading), (0.75, line.unseen)):
             ax.text(x, row, text, va="center", fontsize=9, color=colour if text == word else "black")
-    ax.set(xlim=(0, 1.05), ylim=(len(lines) - 0.4, -0.6))
+    for x, title in ((0.17, "check"), (0.41, "reading"), (0.75, "what it can't see")):
+        ax.text(x, -1, title, va="center", fontsize=9, fontweight="bold")
+    ax.set(xlim=(0, 1.05), ylim=(len(lines) - 0.4, -1.5))
     ax.axis("off")
     return ax

@@ -102,13 +102,13 @@ def _street(seed: int) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def _gain(refine: Callable, seed: int) -> float:
-    """Return by how much the share of right cells of a street rises."""
+    """Return by how much the share of right cells of a street rises, compared with forbidding the unknown classes."""
     g, o, truth = _street(seed)
     counted = truth != 255
     refined = answer_array(refine(np.log(g), o.copy()))
     assert refined.shape == g.shape, "another shape"
     assert close(refined.sum(axis=0), np.ones(g.shape[1:]), atol=1e-4), "no probabilities on another street"
-    new, old = ((one.argmax(axis=0) == truth)[counted].mean() for one in (refined, g))
+    new, old = ((one.argmax(axis=0) == truth)[counted].mean() for one in (refined, g[:10]))
     return new - old
 
 

@@ -309,29 +309,32 @@ _test()
 # %% [markdown]
 # ## Task 5: a better map of a real street (2 + 2 points)
 #
-# The open end. The network from simulated streets has about 55 % of the labelled cells of the real street right, and you have seen how its map fails: road below the image's edge is called
-# vegetation or sidewalk, and six wrong cells in ten have one of the four unknown classes. Exchange one stage: write a `refine` that makes this map better. It gets `log_g` (14, H, W), natural logarithms of the network's probabilities, and `o` (4, H, W), the
-# probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, and returns probabilities (14, H, W) that sum to 1 in each cell. It doesn't see the labels, must work on grids of any size, and leaves its arguments as they are.
+# The open end. The network from simulated streets has about 55 % of the labelled cells of the real street right. Forbid it the four unknown classes, which no label has, and it has 69 %: that is one line, and **where you begin**. Exchange one stage: write
+# a `refine` that makes *that* map better. It gets `log_g` (14, H, W), natural logarithms of the network's probabilities, and `o` (4, H, W), the probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, and returns probabilities (14, H, W) that sum to 1 in each
+# cell. It doesn't see the labels, must work on grids of any size, and leaves its arguments as they are.
 #
-# What counts as better is fixed before you begin. Over squares of 8 m of the street, in the labelled cells:
+# What counts as better is fixed before you begin. All gains are measured from the map without unknown classes, over squares of 8 m of the street, in the labelled cells:
 #
-# - the 95 % interval for the gain of **pixel accuracy** must lie above **5 points**: a slight blur gains one or two, so that is no solution;
-# - that for the gain of **class accuracy** must not lie below zero. (A table of occupancy states gains much in the first and loses the small classes.)
+# - the gain of **pixel accuracy** must be at least **2 points**, and its 95 % interval must lie above zero: a slight blur gains one, so that is no solution;
+# - the 95 % interval for the gain of **class accuracy** must not lie wholly below zero. (A table of occupancy states gains much in the first and loses the small classes.)
 #
-# The first two points are for probabilities that are right in more cells of a made-up street, which fails in the same two ways; a blur doesn't help there.
+# The first two points are for probabilities that are right in more cells of a made-up street, again compared with forbidding the unknown classes alone. There, too, road is called vegetation; a blur doesn't help.
 #
-# The classes are 0 road, 1 sidewalk, 2 vegetation, 3 car, 4 pedestrian, 5 bicycle, 6 building, 7 signage, 8 fence, 9 sky, and 10 to 13 the four unknown ones. Which of them can a labelled cell have at all? What does the occupancy grid say against a road, and what against a wall? Ideas are free.
+# The classes are 0 road, 1 sidewalk, 2 vegetation, 3 car, 4 pedestrian, 5 bicycle, 6 building, 7 signage, 8 fence, 9 sky, and 10 to 13 the four unknown ones. What does the occupancy grid say against a road, and what against a wall? Of what does a LIDAR see the front alone, so that cells behind it stay UNKNOWN? Ideas are free.
 
 
 # %% nbgrader={"grade": false, "grade_id": "refine", "locked": false, "schema_version": 3, "solution": true, "task": false}
 def refine(log_g, o):
     """Return the refined probabilities of the classes, (14, H, W)."""
     ### BEGIN SOLUTION
-    # The network asks what is labelled and what is there; we only want the second, so the unknown classes leave.
+    # The unknown classes leave. Then each state of a cell speaks for some classes and against others.
     n = 10
+    free, static, dynamic, unknown = o
     g = np.exp(log_g[:n] - log_g[:n].max(axis=0))
-    g[2:] *= 1 - 0.9 * o[0]  # what stands isn't in free cells
-    g[:2] *= 1 - 0.5 * (o[1] + o[2])  # road and sidewalk are less likely where something stands
+    g[2:] *= 1 - 0.9 * free  # what stands isn't in free cells
+    g[0] *= 1 + free
+    g[3] *= 1 + static + dynamic
+    g[6] *= 1 + 4 * (static + unknown)  # of a building the LIDAR sees the front alone
     refined = np.zeros(log_g.shape)
     refined[:n] = g / g.sum(axis=0)
     return refined
@@ -364,10 +367,10 @@ def _test():
         assert np.allclose(got.sum(axis=0), 1, atol=1e-4), "the classes of a cell don't sum to 1: normalise over axis 0"
     g, o, truth = _made_up()
     refined = answer_array(refine(np.log(g), o.copy()), "refine")
-    new, old = (100 * (one.argmax(axis=0) == truth).mean() for one in (refined, g))
+    new, old = (100 * (one.argmax(axis=0) == truth).mean() for one in (refined, g[:10]))
     assert new > old + 10, (
-        f"on a made-up street {new:.0f} % of the cells are right, and {old:.0f} % without `refine`: there road is called "
-        "vegetation where o says FREE, and things are called unknown-static, which no label says"
+        f"on a made-up street {new:.0f} % of the cells are right, and {old:.0f} % if one only forbids the unknown classes: "
+        "there road is called vegetation where o says FREE"
     )
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import real_drive as _hidden
@@ -383,17 +386,17 @@ _test()
 # %% nbgrader={"grade": false, "grade_id": "street-fixture", "locked": true, "schema_version": 3, "solution": false, "task": false}
 @functools.cache
 def _street(drive=None, stop=10):
-    """Return what a stage `refine` gets in the first frames of a labelled drive, the truths, the pieces, and the map as it is."""
+    """Return what a stage `refine` gets in the first frames of a labelled drive, the truths, the pieces, and the map without unknown classes."""
     results, spec = street_results(drive, stop)
     drive = real_drive() if drive is None else drive
     beliefs = [result.belief.probability.copy() for result in results]
     inputs = [(np.log(np.maximum(result.grid, 1e-12)), o) for result, o in zip(results, beliefs, strict=True)]
-    called = np.stack([result.grid.argmax(axis=0) for result in results])
+    called = np.stack([result.grid[:10].argmax(axis=0) for result in results])
     return inputs, semantic_truths(drive, beliefs, spec), street_pieces(drive[:stop], spec), called
 
 
 def _gains(refine, drive=None, stop=10):
-    """Return the gain of a refinement, an interval for each metric."""
+    """Return the gain of a refinement over forbidding the unknown classes, an interval for each metric."""
     inputs, truths, pieces, called = _street(drive, stop)
     mine = np.stack([np.asarray(refine(log_g, o)).argmax(axis=0) for log_g, o in inputs])
     counts = [piece_confusions(truths, one, pieces) for one in (mine, called)]
@@ -406,10 +409,12 @@ def _test():
     says = "; ".join(
         f"{name} {mean:+.1f} points ({low:+.1f} to {high:+.1f})" for name, (low, mean, high) in gain.items()
     )
-    assert gain["pixel accuracy"][0] > 5, f"no clear gain of 5 points of pixel accuracy: {says}"
     assert gain["class accuracy"][2] >= 0, (
         f"class accuracy is clearly lost: {says}. Which small classes did you give up?"
     )
+    low, mean, _ = gain["pixel accuracy"]
+    assert mean >= 2, f"no clear gain of 2 points of pixel accuracy over forbidding the unknown classes: {says}"
+    assert low > 0, f"no clear gain of pixel accuracy, its interval reaches down to {low:.1f} points: {says}"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import real_drive as _hidden
 
@@ -446,5 +451,5 @@ def my_street(folder=None, scene=("2011_09_26", "0013")):
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "believe-the-map", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # What holds: the network can repeat what it was taught about this very view. The last two seconds show the same street again, so 93 % is the score of a memory, and says nothing of other streets. With her own drive one can hold
-# back a *part of the street*, one side say, with a margin, and score there; in the lecture the share fell from 91 to 46 % that way. Then a second drive, elsewhere, on which nothing was learned, with an interval over pieces of street or, better, over several drives. The
+# back a *part of the street*, one side say, with a margin, and score there; in the lecture the taught network had 92 % in its own half and 32 % in the other, no more than before the lesson. Then a second drive, elsewhere, on which nothing was learned, with an interval over pieces of street or, better, over several drives. The
 # check of the motion can't tell while the car stands (nor can late images be noticed): the next drive must move, and go round a bend, or mirrored poses stay unseen. One point for what the score doesn't say and the measurement that would, one for the check and its drive.
