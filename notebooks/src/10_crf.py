@@ -9,7 +9,7 @@
 # - compute the energy of a labelling by hand, and turn energies into probabilities;
 # - tell the most likely labelling from the most likely label of each cell, and say when you want which;
 # - carry out a mean-field update, follow its free energy, and say where it fails;
-# - say what the weights do to a map, why equation (4) is normalised in practice, and what a CRF does to thin things.
+# - say what the weights do to a map, why equation (4) is normalised in practice, and when a thin thing survives it.
 #
 # **Prerequisites.** Lectures [01b](01b_graphical_models.ipynb), factors, and [08](08_fusion.ipynb), the semantic grid $g$. Logarithms and expected values.
 #
@@ -53,7 +53,7 @@ spec = GridSpec(x_min=0.0, x_max=30.0, y_min=-10.0, y_max=10.0, cell=0.5)
 truths = np.stack([grid_truth(r.frame.labels, r.belief.probability, GridSpec.compact()) for r in results])[near]
 o = [r.belief.probability[near].astype(float) for r in results]
 unaries = [crf.unary_from_probability(r.grid[near].astype(float)) for r in results]
-default, shown = CrfParams.for_cells(spec.cell), 0
+default, shown = CrfParams.for_cells(spec.cell), 3
 
 
 def refine_all(params):
@@ -65,42 +65,45 @@ maps = {"network": np.stack([phi.argmin(axis=0) for phi in unaries]), "after the
 
 
 # %% jupyter={"source_hidden": true}
-def middle_of_largest_patch(mask):
-    """Return the cell in the middle of the largest connected patch of a mask (H, W)."""
-    numbers, _ = ndimage.label(mask)
-    cells = np.argwhere(numbers == 1 + np.bincount(numbers.ravel())[1:].argmax())
-    return tuple(cells[((cells - cells.mean(axis=0)) ** 2).sum(axis=1).argmin()])
-
-
 was_right, is_right = (labels[shown] == truths[shown] for labels in maps.values())
-A = middle_of_largest_patch(~was_right & is_right)
-B = middle_of_largest_patch(was_right & ~is_right & (truths[shown] == KITTI_14.index("bicycle")))
-assert KITTI_14.names[maps["network"][shown][A]].startswith("unknown")
-assert KITTI_14.names[truths[shown][A]] == "vegetation"
+patches, _ = ndimage.label(~was_right & is_right)
+A = patches == 1 + np.bincount(patches.ravel())[1:].argmax()  # the largest patch that the CRF mends
+bicycles, n_bicycles = ndimage.label(truths[shown] == KITTI_14.index("bicycle"), np.ones((3, 3)))
+lost = [(was_right & ~is_right)[bicycles == n].sum() for n in range(1, n_bicycles + 1)]
+B = bicycles == 1 + np.argmax(lost)  # the bicycle that loses most
+assert set(truths[shown][A]) == {KITTI_14.index("vegetation")}
+assert all(KITTI_14.names[label].startswith("unknown") for label in maps["network"][shown][A])
+
 
 # %% [markdown]
 # ## Can a rule repair a map?
 #
-# In lecture 08 a network named every cell. Here is the part of its map near the vehicle, in a frame of the
-# sample drive, beside the map after this lecture's refinement and beside the truth:
+# In lecture 08 a network named every cell. Here is a part of its map in a frame of the sample drive, beside the map
+# after this lecture's refinement and beside the truth:
 
-# %% jupyter={"source_hidden": true} alt="three maps of a street, 30 m ahead: the network's with ragged patches, the refined one with smooth areas, and the truth; A marks a ragged patch beside the vegetation that refinement fills, B a part of a bicycle that it removes"
+# %% jupyter={"source_hidden": true} alt="three maps of a street: the network's with ragged patches, the refined one with smooth areas, and the truth; frame A holds a ragged patch in the vegetation that refinement fills, frame B a bicycle of which it removes a half"
 fig = plotting.label_maps(
     spec, {name: labels[shown] for name, labels in maps.items()} | {"truth": truths[shown]}, KITTI_14
 )
 for ax in fig.axes[:3]:
-    for letter, cell in (("A", A), ("B", B)):
-        x, y = spec.centers()[cell]
-        style = {"arrowstyle": "->", "color": "white", "linewidth": 1.5}
-        text = (np.clip(y - 4 * np.sign(y), -9, 9), x + 2)
+    for letter, patch in (("A", A), ("B", B)):
+        x, y = spec.centers()[patch].T
+        corner = y.max() + 0.4, x.min() - 0.4
+        size = y.min() - y.max() - 0.8, x.max() - x.min() + 0.8
+        ax.add_patch(plt.Rectangle(corner, *size, fill=False, edgecolor="white", linewidth=1.8))
         box = {"facecolor": "black", "alpha": 0.6, "pad": 1.5}
-        ax.annotate(letter, (y, x), text, color="white", fontsize=12, fontweight="bold", arrowprops=style, bbox=box)
+        ax.text(y.max() + 1.2, x.mean(), letter, color="white", fontsize=12, fontweight="bold", ha="center", bbox=box)
+    ax.set(xlim=(5, -10), ylim=(8, 30))
 plt.show()
+print(f"the whole map: {(~was_right & is_right).sum()} cells mended, {(was_right & ~is_right).sum()} broken")
+print(f"A, {A.sum()} cells of vegetation, right: network {was_right[A].sum()}, after the CRF {is_right[A].sum()}")
+print(f"B, {B.sum()} cells of a bicycle, right: network {was_right[B].sum()}, after the CRF {is_right[B].sum()}")
+assert (was_right[B].sum(), is_right[B].sum()) == (8, 4)
 
 # %% [markdown]
-# At A the network calls a ragged patch *unknown* where the vegetation on its left goes on. We want a rule that corrects
-# this. The rule must also know when *not* to correct: at B the network had found a part of a bicycle, and
-# the refined map has lost some of it.
+# At A the network calls a ragged patch *unknown*. Most of it is vegetation, and the refined map mends that; it also paints over
+# the few cells that are unknown in truth. At B the network had found eight cells of a bicycle, and the refined map keeps
+# four. So the rule must also know when *not* to correct. Over the whole map it mends twice as many cells as it breaks.
 #
 # A CRF writes such a rule as a list of prices. A label that the network thinks improbable costs something. Two cells
 # with different labels cost something too, and more when they are close together and alike in occupancy. The cheapest
@@ -118,10 +121,10 @@ plt.show()
 #
 # | cell 1 | cell 2 | energy $E$ | $e^{-E}$ | divided by the sum |
 # |---|---|---|---|---|
-# | road | road | 1.022 | 0.360 | 0.568 |
-# | road | car | 1.616 | 0.199 | 0.314 |
-# | car | road | 4.219 | 0.015 | 0.023 |
-# | car | car | 2.813 | 0.060 | 0.095 |
+# | road | road | 1.022 | 0.3600 | 0.5684 |
+# | road | car | 1.616 | 0.1987 | 0.3137 |
+# | car | road | 4.219 | 0.0147 | 0.0232 |
+# | car | car | 2.813 | 0.0600 | 0.0947 |
 #
 # The sum of prices is called the **energy**. We define the probability of a labelling as $P \propto e^{-E}$: the lower
 # the energy, the more probable. Without a pair price this rule gives back what the network said. With it, the labellings
@@ -220,8 +223,8 @@ print(f"k12 = {k[0, 1]:.2f}, k23 = {k[1, 2]:.2f}, k13 = {k[0, 2]:.2f}")
 # On the drive, cells have sides of 0.5 m, so `CrfParams.for_cells(0.5)` makes the widths smaller. Take one cell of the
 # road beside a parked car, and look at its price with every other cell:
 
-# %% jupyter={"source_hidden": true} alt="left, occupancy around a cross beside a parked car; middle, the bilateral term: half a round spot that ends at the car; right, the spatial term: a smaller, round spot that crosses the outline of the car"
-cross = 31, 3  # row and column: 14.25 m ahead, 8.25 m to the left
+# %% jupyter={"source_hidden": true}
+cross = 36, 3  # row and column: 11.75 m ahead, 8.25 m to the left
 rows, cols = np.indices(spec.shape)
 apart = (rows - cross[0]) ** 2 + (cols - cross[1]) ** 2
 unlike = ((o[shown] - o[shown][:, *cross][:, None, None]) ** 2).sum(axis=0)
@@ -230,6 +233,8 @@ terms = {
     * np.exp(-apart / (2 * default.sigma_alpha**2) - unlike / (2 * default.sigma_beta**2)),
     "second term (spatial)": default.w_spatial * np.exp(-apart / (2 * default.sigma_gamma**2)),
 }
+
+# %% jupyter={"source_hidden": true} alt="left, occupancy around a cross beside a parked car; middle, the bilateral term: half a round spot that ends at the car; right, the spatial term: a smaller, round spot that crosses the outline of the car"
 fig, axes = plt.subplots(1, 3, figsize=(10.5, 4.2), layout="compressed")
 plotting.occupancy(spec, o[shown], axes[0], legend=True).set_title("occupancy")
 for ax, (title, prices) in zip(axes[1:], terms.items(), strict=True):
@@ -237,12 +242,24 @@ for ax, (title, prices) in zip(axes[1:], terms.items(), strict=True):
     ax.set_title(title)
 for ax in axes:
     ax.plot(*spec.centers()[cross][::-1], "+", color="red", markersize=12, markeredgewidth=2)
-    ax.set(xlim=(10, 0), ylim=(8, 26))
+    ax.set(xlim=(10, 3), ylim=(7, 17))
+for ax, prices in zip(axes[1:], terms.values(), strict=True):
+    for row, col in ((cross[0], cross[1] - 1), (cross[0], cross[1] + 1)):
+        x, y = spec.centers()[row, col]
+        ax.annotate(
+            f"{prices[row, col]:.1f}",
+            (y, x),
+            (y + 5 * (y - 8.25) * 0.3, 8.3),
+            color="white",
+            ha="center",
+            arrowprops={"arrowstyle": "-", "color": "white"},
+        )
 plt.show()
 
 # %% [markdown]
-# In the middle a piece is missing on the left: the parked car and what it hides. Labels can change at the car's outline
-# without paying the first term. On the right, the spatial term ignores the car, but it reaches less far.
+# The two numbers are the prices with the neighbours left (car) and right (road). In the middle a piece is missing on the
+# left: the parked car and what it hides. Labels can change at its outline without paying the first term. On the right, the
+# spatial term ignores the car, but it reaches less far.
 #
 # ## Four cells: which answer do we want?
 #
@@ -316,20 +333,21 @@ assert list(by_cell) == [0, 1, 0, 1]
 # %% [markdown]
 # Both answers are right, for different purposes. The most likely labelling has the best chance of being right
 # *everywhere*. The most likely label of each cell has the fewest wrong *cells* on average, and that is what pixel
-# accuracy counts. So marginals are what we want on the drive. But the number of its labellings has thousands of digits, and because every pair is linked, no order of summation helps. We need an approximation.
+# accuracy counts. Here they are the labels that the network gave; only the most likely labelling differs. So marginals
+# are what we want on the drive. But the number of its labellings has thousands of digits, and because every pair is linked, no order of summation helps. We need an approximation.
 #
 # ## Mean field: ask how the others are on average
 #
 # **Mean field** looks for a distribution $Q$ in which all cells are independent, $Q(x) = \prod_i Q_i(x_i)$, and which is
-# as close as possible to $P$. In the graph above this deletes the six squares between cells. Each cell keeps its own
+# as close as possible to $P$. In the graph of the four cells, this deletes the six squares between cells. Each cell keeps its own
 # distribution $Q_i$.
 #
 # How does a cell hear from the others, then? It pays for each neighbour *on average*. If cell $j$ has label $l$ with
 # probability $Q_j(l)$, then choosing $l$ in cell $i$ costs $k_{ij}$ with probability $1 - Q_j(l)$. So the average
-# price of label $l$ is $\phi_u(l) + \sum_{j \neq i} k_{ij} (1 - Q_j(l))$. Turning prices into probabilities as
+# price of label $l$ is $\phi_u(x_i{=}l) + \sum_{j \neq i} k_{ij} (1 - Q_j(l))$. Turning prices into probabilities as
 # before, with $Z_i$ for the sum, gives the update
 #
-# $$ Q_i(l) \;\leftarrow\; \frac{1}{Z_i} \exp\!\Big(\!-\phi_u(l) - \sum_{j \neq i} k_{ij}\,\big(1 - Q_j(l)\big)\Big) $$
+# $$ Q_i(l) \;\leftarrow\; \frac{1}{Z_i} \exp\!\Big(\!-\phi_u(x_i{=}l) - \sum_{j \neq i} k_{ij}\,\big(1 - Q_j(l)\big)\Big) $$
 #
 # By hand on the two cells from above: cell 1 says road with 0.9. So in cell 2 road gets $0.4\,e^{-0.1} = 0.362$ and car
 # gets $0.6\,e^{-0.9} = 0.244$.
@@ -409,7 +427,7 @@ for n in range(4):
 # <details><summary>Answer</summary>
 #
 # The first hears "car" and turns to car, the second hears "road" and turns to road. Now they disagree the other way
-# round, so they swap back, and so on for ever. Exactly, both cells are road with about 0.56: they agree, but on which class
+# round, so they swap back, and so on for ever. The exact answers are 0.56 and 0.55 for road: they agree, but on which class
 # is nearly undecided.
 #
 # </details>
@@ -496,15 +514,15 @@ plotting.animate(
 # %% [markdown]
 # Dark is low $F$. Its two dark corners are the valleys "both road" and "both car". Updated all at once (squares), the
 # rivals jump between the two bright corners for ever. One after the other (triangles), they fall into a valley. So do they when all move
-# at once but each goes only a part of the way (circles); this is called **damping**, and the part is chosen so that $F$ never rises. (The companion
+# at once but each goes only a part of the way (circles); this is called **damping**, and the part is the smaller, the larger the prices are, so that $F$ never rises. (The companion
 # [the CRF, measured](deeper/11_crf_measured.ipynb) shows why in a picture.) Mean field finds *a* minimum of $F$, and the
 # way there decides which. No minimum is near the exact answer (star), because independent cells can't say "both are the same, and we
 # don't know which".
 #
 # ## Is mean field too sure on more than two cells?
 #
-# Nine cells are still few enough for the exact answer. Call **coupling** the weight $w_1$, with $w_2$ kept at
-# three quarters of it: one number that says how hard the cells pull. Opinions are split: four cells
+# Nine cells are still few enough for the exact answer. Call **coupling** the weight $w_1$ of the package, with $w_2$ kept at
+# three quarters of it. It says how hard *all* neighbours together pull at a cell, as the next section explains. Opinions are split: four cells
 # say *road* with 0.6, four with 0.4, and the centre with 0.52. With very large prices all nine must agree. The eight votes cancel
 # each other, so the exact answer is 0.52 for road: they agree, and we don't know on what.
 
@@ -534,29 +552,28 @@ assert centre["mean field, centre 0.48"][-1] < 0.01
 # With weak coupling mean field is right. With strong coupling it **picks a side**: at the package's default, the right end, it is nearly
 # certain of road, and nearly certain of the opposite when the centre's opinion moves to 0.48.
 #
-# This is a tie, made on purpose. Is the CRF too sure on the drive, too? There we have no exact answer, but we have the truth. Of
-# the cells that a map gives at least 0.99, how many are right?
+# We made this tie on purpose. Is the CRF too sure on the drive as well? There we have no exact answer, but we have the truth.
+# A map's probabilities are good when it is, on average, as sure as it is right:
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
-for name, params in (("network", coupled(0)), ("coupling 1", coupled(1)), ("coupling 4", coupled(4))):
-    params = replace(default, w_bilateral=params.w_bilateral, w_spatial=params.w_spatial)
+for name, coupling in (("network", 0), ("coupling 1", 1), ("coupling 4", 4)):
+    params = replace(default, w_bilateral=coupling, w_spatial=coupled(coupling).w_spatial)
     Q = np.stack([fast.mean_field(phi, cells, params) for phi, cells in zip(unaries, o, strict=True)])
-    sure = (Q.max(axis=1) >= 0.99) & (truths != IGNORE)
-    right = (Q.argmax(axis=1) == truths)[sure].mean()
-    print(f"{name:<11} {sure.mean():.0%} of the cells are given at least 0.99; {right:.1%} of these are right")
-assert right < 0.97
+    sure, right = Q.max(axis=1).mean(), (Q.argmax(axis=1) == truths).mean()
+    print(f"{name:<11} probability of the chosen label, mean {sure:.0%}; right {right:.0%}")
+assert sure > right + 0.05
 
 # %% [markdown]
-# Yes: the harder the cells pull, the more cells are called nearly certain, and the fewer of them are right. How much of this is mean
-# field, and how much is the model, which counts a neighbour's error as a second opinion, can't be told here. So take the refined map's
-# labels, and the network's probabilities.
+# Yes. The network is as sure as it is right. The harder the cells pull, the surer they become, but hardly more of them are right. So
+# don't read a refined $Q$ as a probability: here 97 % means 91 %.
 #
 # ## How strong should the prices be?
 #
 # Now the map of the drive. Take equation (4) as printed. A cell pays a price to each of its neighbours, and there are many:
 
 # %% tags=["nbval-ignore-output"]
-print(f"all prices of the red cross: {sum(prices.sum() for prices in terms.values()) - 7:.0f} nats")
+own = default.w_bilateral + default.w_spatial  # the red cross with itself, which is no pair
+print(f"all prices of the red cross: {sum(prices.sum() for prices in terms.values()) - own:.0f} nats")
 print(f"a label that the network gives one chance in a million: {-np.log(1e-6):.0f} nats")
 
 # %% [markdown]
@@ -564,9 +581,9 @@ print(f"a label that the network gives one chance in a million: {-np.log(1e-6):.
 # Gaussian of width $\sigma$ covers about $2\pi\sigma^2$ cells. Krähenbühl and Koltun's code therefore divides each kernel
 # $K$ (with $K_{ii} = 1$) by the root of its row sums on both sides: $\tilde K_{ij} = K_{ij} / \sqrt{D_i D_j}$ with $D_i = \sum_j K_{ij}$.
 #
-# In the middle of a large area all $D_i$ are alike, so a row of $\tilde K$ sums to about 1. Then $w_1$ and $w_2$ *are*
-# the total prices, and widths only say how they are shared out. The paper doesn't say whether it normalises; the package does, unless you
-# ask for `normalization="none"`.
+# In the middle of a large area all $D_i$ are alike, so a row of $\tilde K$ sums to about 1. Then $w_1$ and $w_2$ are nearly
+# the total prices (a cell's own share is missing), and widths only say how they are shared out. The paper doesn't say
+# whether it normalises; the package does, unless you ask for `normalization="none"`.
 
 
 # %% tags=["normalisation"]
@@ -583,11 +600,8 @@ only_spatial = CrfParams(w_bilateral=0, w_spatial=3, sigma_gamma=1.5)
 np.testing.assert_allclose(3 * normalise(K), crf.gram_matrix(all_free((6, 5)), only_spatial))
 
 # %% [markdown]
-# Two things change at once: prices are weaker, and they are shared out differently. To tell which one matters, a third map
-# keeps equation (4) as printed, with both weights so small that a cell in a large area pays the same in total as in the
-# normalised one.
-#
-# If strength is what matters, this third map looks like the normalised one. If sharing is, it looks like the printed one.
+# The cross pays at most 7 nats now. Is that the right strength? We multiply both weights by a quarter, by one and by 25; the last column
+# has equation (4) as printed. Below are all classes of which the default loses more than five points.
 
 
 # %% jupyter={"source_hidden": true}
@@ -597,52 +611,55 @@ def scores(labels):
     return 100 * pixel_accuracy(counts), 100 * class_accuracy(counts)
 
 
-def total_price(params):
-    """Return what a cell pays to all its neighbours in the middle of a large area of one state."""
-    prices = pair_weights(all_free((31, 31)), params)
-    return prices[len(prices) // 2].sum()
-
-
-def alone(params, weight):
-    """Return the parameters with one of the two weights set to zero."""
-    return replace(params, **{weight: 0})
+def times(factor):
+    """Return the default parameters with both weights multiplied."""
+    return replace(default, w_bilateral=factor * default.w_bilateral, w_spatial=factor * default.w_spatial)
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
-printed, weak = replace(default, normalization="none"), {}
-for weight, other in (("w_bilateral", "w_spatial"), ("w_spatial", "w_bilateral")):
-    share_kept = total_price(alone(default, other)) / total_price(alone(printed, other))
-    weak[weight] = getattr(default, weight) * share_kept
 tried = {
     "network": maps["network"],
-    "as printed": refine_all(printed),
-    "printed, weak": refine_all(replace(printed, **weak)),
-    "normalised": maps["after the CRF"],
+    "a quarter": refine_all(times(0.25)),
+    "default": maps["after the CRF"],
+    "times 25": refine_all(times(25)),
+    "as printed": refine_all(replace(default, normalization="none")),
 }
 found = {name: scores(labels) for name, labels in tried.items()}
-small = [KITTI_14.index(name) for name in ("pedestrian", "bicycle", "signage")]
-for name, (pixel, by_class) in found.items():
-    kept = [(tried[name] == truths)[truths == label].mean() for label in small]
-    print(f"{name:<13} pixel accuracy {pixel:.1f} %, class accuracy {by_class:.1f} %; found:", end=" ")
-    print("pedestrian {:.0%}, bicycle {:.0%}, signage {:.0%}".format(*kept))
-assert found["as printed"][0] < found["network"][0] < min(found["printed, weak"][0], found["normalised"][0])
-assert found["as printed"][1] < found["normalised"][1] < found["network"][1]
-assert found["as printed"][1] < found["printed, weak"][1] - 20
+recall = {
+    name: np.array(
+        [(labels == truths)[truths == label].mean() if (truths == label).any() else 1 for label in range(14)]
+    )
+    for name, labels in tried.items()
+}
+losing = np.flatnonzero(recall["network"] - recall["default"] > 0.05)
+print(f"{'cells right [%]':<16}", *(f"{name:>10}" for name in tried))
+for n, kind in enumerate(("pixel accuracy", "class accuracy")):
+    print(f"{kind:<16}", *(f"{pair[n]:>10.0f}" for pair in found.values()))
+for label in losing:
+    print(f"{KITTI_14.names[label]:<16}", *(f"{100 * kept[label]:>10.0f}" for kept in recall.values()))
+assert len(losing) == 5
+assert found["as printed"][0] < found["times 25"][0] < found["network"][0] < found["a quarter"][0]
+assert found["network"][1] - 2 < found["a quarter"][1]
+assert found["as printed"][1] < found["times 25"][1] < found["default"][1] - 10 < found["network"][1] - 14
 
-# %% jupyter={"source_hidden": true} alt="four maps of the same frame: the network's; equation (4) as printed, where small things are gone and borders are displaced; the same with weak prices and the normalised one, which look alike and keep cars and single poles"
-plotting.label_maps(spec, {name: labels[shown] for name, labels in tried.items()}, KITTI_14)
+# %% jupyter={"source_hidden": true} alt="four maps of the same frame: the network's; a quarter of the prices, which keeps the bicycle; the default, which loses a half of it; equation (4) as printed, where small things are gone and borders are displaced"
+four_maps = {name: labels[shown] for name, labels in tried.items() if name != "times 25"}
+fig = plotting.label_maps(spec, four_maps, KITTI_14)
+for ax in fig.axes[:4]:
+    ax.set(xlim=(5, -10), ylim=(8, 30))
 plt.show()
 
 # %% [markdown]
-# As printed, with these weights, equation (4) **over-smooths**: it removes small things and moves borders, and both
-# accuracies fall below the network's own. With weak prices it does neither. So a normalisation isn't there to make a better
-# map. It makes weights mean the same for every width and every size of cell.
-#
-# Both weak maps raise pixel accuracy a little and cost class accuracy, as in the paper. The table shows why: small things
-# are outvoted by what is around them. The model doesn't know that a person is small and still a person.
+# Up to the column *times 25* only the strength grows, and ever fewer cells of these classes are right. As printed, equation
+# (4) **over-smooths**: it is worse than no CRF. The default loses class accuracy, too, most of all in *unknown-dynamic* and
+# *building*. A quarter of it keeps nearly all, and pixel accuracy is no lower, so the default is too strong here. But we chose the
+# quarter on the drive that we score; the next section tries it on another.
 #
 # **Play with it.** Can you find weights that fill the patch at A and keep the bicycle at B? (Without a running kernel, look at
 # the maps above.)
+#
+# <details><summary>Answer</summary>Not quite: we tried both weights in steps of a tenth of a decade, and no position fills A and keeps all eight
+# cells of the bicycle. With a full A, at most seven are left.</details>
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
@@ -675,82 +692,115 @@ on_sidewalk = labels == KITTI_14.index("sidewalk")
 assert (np.argwhere(on_sidewalk)[:, 2] < 2).mean() > 0.9
 
 
-# %% tags=["thin"]
-def refined_with(columns_beside):
-    """Refine all maps with columns added on their left: `columns_beside(maps)` returns them. Cut them off again."""
+# %% tags=["thin"] jupyter={"source_hidden": true}
+def refined_with(columns_beside, params=default):
+    """Refine all maps with columns added on their left: `columns_beside(maps)` returns them."""
     refined = []
     for r in pictures:
         maps = [crf.unary_from_probability(r.grid), r.belief.probability]
-        beside = [columns_beside(m) for m in maps]
-        wide = [np.concatenate(pair, axis=2) for pair in zip(beside, maps, strict=True)]
-        refined.append(fast.mean_field(*wide, default)[:, :, beside[0].shape[2] :])
+        wide = [np.concatenate([columns_beside(m), m], axis=2) for m in maps]
+        refined.append(fast.mean_field(*wide, params))
     return np.stack(refined).argmax(axis=1)
 
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} tags=["nbval-ignore-output"]
-real_maps = {
-    "network": np.stack([r.grid for r in pictures]).argmax(axis=1),
-    "after the CRF": refined_with(lambda maps: maps[:, :, :0]),
-    "thin, not at the edge": refined_with(lambda maps: maps[:, :, 9:1:-1]),
-    "at the edge, not thin": refined_with(lambda maps: maps[:, :, [0] * 8]),
-}
-for name, guesses in real_maps.items():
-    hit, labelled = (guesses == labels)[on_sidewalk].mean(), (guesses == labels)[labels != IGNORE].mean()
-    print(f"{name:<22} sidewalk found {hit:.0%}, all labelled cells right {labelled:.1%}")
+# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
+def report(name, guesses):
+    """Print how many labelled cells are right; columns that were added on the left don't count."""
+    right = guesses[:, :, -labels.shape[2] :] == labels
+    print(
+        f"{name:<22} sidewalk found {right[on_sidewalk].mean():.0%}, all cells right {right[labels != IGNORE].mean():.0%}"
+    )
+    return right[on_sidewalk].mean()
+
+
+report("network", np.stack([r.grid for r in pictures]).argmax(axis=1))
+strip = {"after the CRF": refined_with(lambda maps: maps[:, :, :0])}
+_ = report("after the CRF", strip["after the CRF"])
 
 # %% [markdown]
-# The network finds 96 % of these cells, the CRF 34 %. There are two suspects. The strip is *thin*, so the road beside it outvotes it.
-# Or it is *at the edge*, where a cell has neighbours on one side only. Each can be tested without the other:
+# There are three suspects. Each can be tested without the others:
 #
-# - thin, not at the edge: put road on the left of the strip, a mirror image of what is on its right;
-# - at the edge, not thin: repeat the first column eight times, so that the strip is ten columns wide and still at the edge.
+# - the strip is *thin*, so the road beside it outvotes it. Repeat the first column eight times: the strip is wide, and still at the edge.
+# - it is *at the edge*, with neighbours on one side only. Put a mirror image of the road on its left: it is still thin.
+# - the prices are *too strong*. Take a quarter of them and change nothing else.
 #
-# **Predict before you run.** Which of the two brings the sidewalk back?
+# **Predict before you run.** Which of the three changes bring the sidewalk back?
 #
-# <details><summary>Answer</summary>The wide strip: 93 % are found. The thin one in the middle of the road is worse off than at the edge,
-# 12 %, because there it has road on both sides. So the cause is that it is thin, and the edge even helps.</details>
+# <details><summary>Answer</summary>Two of them: the wide strip and the weaker prices. Away from the edge the strip is worse off,
+# because there it has road on both sides.</details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="the left border of four maps of a real street: the network's has a strip of sidewalk two cells wide, the refined one has lost most of it; with road on both sides still more is lost; with eight more columns of sidewalk beside it the strip is kept"
-beside = GridSpec(real_spec.x_max - 40, real_spec.x_max, real_spec.y_max - 6, real_spec.y_max, real_spec.cell)
-zoomed = {name.replace(", ", ",\n"): guesses[-1][:80, :12] for name, guesses in real_maps.items()}
-fig = plotting.label_maps(beside, zoomed, KITTI_14)
-fig.set_size_inches(10, 5.5)
-for ax in fig.axes[:4]:
-    ax.set(aspect=0.4, xlabel="y, left [m]")
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} tags=["nbval-ignore-output"]
+strip |= {
+    "wide": refined_with(lambda maps: maps[:, :, [0] * 8]),
+    "not at the edge": refined_with(lambda maps: maps[:, :, 9:1:-1]),
+    "a quarter": refined_with(lambda maps: maps[:, :, :0], times(0.25)),
+}
+kept = {name: report(name, guesses) for name, guesses in strip.items()}
+assert kept["not at the edge"] < kept["after the CRF"] < 0.5 < 0.85 < min(kept["wide"], kept["a quarter"])
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="the left border of four maps of a real street: the labels have a strip of sidewalk two cells wide where they are known; the refined map has lost most of it; with eight more columns of sidewalk beside it, left of a dashed line, it is kept; with a quarter of the prices it is kept"
+ADDED, last = 8, {"labels": labels[-1]} | {name: guesses[-1] for name, guesses in strip.items()}
+fig, axes = plt.subplots(1, 4, figsize=(10, 5), layout="constrained", sharey=True)
+for ax, name in zip(axes, ("labels", "after the CRF", "wide", "a quarter"), strict=True):
+    part = last[name][:80, : 12 + ADDED * (name == "wide")]
+    y = real_spec.y_max + ADDED * real_spec.cell * (name == "wide")
+    extent = (y, y - part.shape[1] * real_spec.cell, real_spec.x_max - 40, real_spec.x_max)
+    ax.imshow(KITTI_14.colours(part), extent=extent, aspect="auto", interpolation="nearest")
+    ax.axvline(real_spec.y_max, color="black", linestyle="--", linewidth=1)
+    ax.set(title=name, xlabel="y, left [m]", xlim=(real_spec.y_max + 4, real_spec.y_max - 6))
+axes[0].set_ylabel("x, forward [m]")
+plotting.class_legend(axes[-1], KITTI_14, np.stack([m[:80, -labels.shape[2] :][:, :12] for m in last.values()]))
 fig.supxlabel(street.credit, fontsize=8)
 plt.show()
 
-
-# %% jupyter={"source_hidden": true, "outputs_hidden": true}
-def strip_survives(width, at_edge):
-    """Say whether a strip in a wide road keeps its middle row, when the network gives 0.8 to the right class."""
-    p = np.full((60, 40), 0.2)
-    start = 0 if at_edge else (40 - width) // 2
-    p[:, start : start + width] = 0.8
-    Q = fast.mean_field(two_classes(p), all_free(p.shape), default)
-    return (Q[0, 30, start : start + width] > 0.5).all()
+# %% [markdown]
+# So thin things are lost when prices are strong. On this street, too, a quarter of the default is the better choice.
+#
+# But look at the fence in the first figure. It is one column wide, and the CRF keeps it. What does the fence have that the
+# sidewalk doesn't? The network is surer of it, and it has an occupancy state of its own: it is STATIC, while sidewalk and
+# road are both FREE. We take away one, the other, and both: no fence cell gets more than 0.8, and with a large $\sigma_\beta$ all states count as alike.
 
 
-least = {at_edge: next(w for w in range(1, 10) if strip_survives(w, at_edge)) for at_edge in (True, False)}
-print(f"columns that a strip needs to survive: {least[True]} at the edge, {least[False]} inside")
-assert least == {True: 3, False: 5}
+# %% jupyter={"source_hidden": true} tags=["nbval-ignore-output"]
+FENCE, ALIKE = KITTI_14.index("fence"), replace(default, sigma_beta=100)
+
+
+def less_sure(phi, truth, limit=0.8):
+    """Return the prices with P(fence) of the fence's cells at most `limit`; the other classes share the rest as before."""
+    p = np.exp(-phi.astype(float))
+    lower = np.minimum(p[FENCE], limit)
+    changed = p * (1 - lower) / np.maximum(1 - p[FENCE], 1e-12)
+    changed[FENCE] = lower
+    return crf.unary_from_probability(np.where(truth == FENCE, changed / changed.sum(axis=0), p))
+
+
+unsure = [less_sure(phi, truth) for phi, truth in zip(unaries, truths, strict=True)]
+fence_kept = {}
+for name, prices, params in (
+    ("as it is", unaries, default),
+    ("network less sure", unsure, default),
+    ("states alike", unaries, ALIKE),
+    ("both", unsure, ALIKE),
+):
+    refined = [fast.mean_field(phi, cells, params).argmax(axis=0) for phi, cells in zip(prices, o, strict=True)]
+    fence_kept[name] = (np.stack(refined) == FENCE)[truths == FENCE].mean()
+    print(f"{name:<18} fence found {fence_kept[name]:.0%}")
+assert fence_kept["both"] < 0.4 < 0.85 < min(fence_kept[name] for name in list(fence_kept)[:3])
 
 # %% [markdown]
-# On a made-up road whose cells are all given 0.8, a strip survives from three columns on at the edge, and from five on inside. What is
-# thinner is lost, however long it is: only pairs count, there are no shapes.
-#
-# The package's `pad=8` repeats the border on all sides. It doesn't repair the CRF. It asserts that what is at the border goes on
-# outside, which is true of a sidewalk. And on this street the network without a CRF has more labelled cells right than either.
+# Either is enough, and without both the fence is lost like the sidewalk. Whether a thin thing survives depends on its width, on
+# how sure the network is, on its occupancy state, and on the prices.
 #
 # ## In five lines
 #
 # 1. A CRF sets prices: $-\log g$ for a label, $k_{ij}$ for two cells that differ. $P \propto e^{-E}$ turns them into probabilities.
 # 2. The most likely labelling and the most likely label of each cell answer different questions and can differ.
 # 3. Mean field makes the cells independent and asks how the others are on average. The free energy measures it, and the
-#    update follows from it. Updating all cells at once needs damping, or rivals swap for ever.
+#    update follows from it. Updating all cells at once can make strong rivals swap for ever; damping prevents it.
 # 4. When cells pull hard, mean field picks a side where the exact answer stays undecided. On the drive, too, the CRF is too sure.
-# 5. Prices that are too strong over-smooth; a normalisation makes weights comparable. Pixel accuracy rises a little, and small and
-#    thin things are lost, because only pairs count.
+# 5. Prices that are too strong over-smooth, and the default is. With a quarter of them the sidewalk is found. A thin
+#    thing also survives when the network is sure of it or when it has a state of its own.
 #
 # What is missing is speed: the paper's grid has over a billion pairs. Lecture 11 computes nearly the same sums without visiting them.
 #
