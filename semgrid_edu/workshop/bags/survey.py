@@ -1,6 +1,6 @@
 """What a bag's topics say before anything is written: time stamps, coordinate frames, calibration, path."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +12,7 @@ from semgrid_edu.datasets.calibration import camera_from
 from semgrid_edu.errors import DataError
 from semgrid_edu.workshop.bags.bag import Bag, frame_of, stamp_of
 from semgrid_edu.workshop.bags.pictures_and_clouds import image_of
-from semgrid_edu.workshop.bags.transforms import NS, StaticTransforms, Trajectory, pose_of
+from semgrid_edu.workshop.bags.transforms import NS, RecordedPath, StaticTransforms, pose_of
 
 TYPES = {
     "image": ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"),
@@ -55,7 +55,7 @@ class Survey(NamedTuple):
     ----------
     scans, images : (N,), (M,) int64
         Time stamps of all scans and images, nanoseconds, rising.
-    trajectory : Trajectory
+    trajectory : RecordedPath
         The path of the base.
     T_base_from_lidar : (4, 4) float64
         Metres.
@@ -65,7 +65,7 @@ class Survey(NamedTuple):
 
     scans: NDArray[np.int64]
     images: NDArray[np.int64]
-    trajectory: Trajectory
+    trajectory: RecordedPath
     T_base_from_lidar: NDArray[np.float64]
     camera: Camera
 
@@ -88,34 +88,53 @@ def survey(bag: Bag, topics: Topics, lidar_height: float) -> Survey:
         When a topic is missing or of another type, time stamps don't rise, a topic's coordinate frame changes, there is
         no chain of transforms, or the images aren't rectified.
     """
-    counts = {topic: bag.count(topic, *types) for topic, types in zip(topics, TYPES.values(), strict=True)}
-    stamps: dict[str, list[int]] = {topic: [] for topic in topics}
-    frames: dict[str, set[str]] = {topic: set() for topic in topics}
-    first: dict[str, Any] = {}
-    sent, poses = [], []
-    for topic, message in tqdm(bag.messages(*topics), "reading", sum(counts.values()), leave=False):
-        if topic == topics.transforms:
-            sent.append(message)
-            continue
-        first.setdefault(topic, message)
-        stamps[topic].append(stamp_of(message))
-        frames[topic].add(frame_of(message))
-        if topic == topics.odometry:
-            poses.append(pose_of(message, bag.place(topic)))
-    rising = {topic: _rising(stamps[topic], bag.place(topic)) for topic in topics[:3]}
-    lidar = _one_frame(frames[topics.points], bag.place(topics.points))
-    eye = _one_frame(frames[topics.image], bag.place(topics.image))
-    base = getattr(first[topics.odometry], "child_frame_id", BASE).lstrip("/")
-    fixed = StaticTransforms(sent, bag.place(topics.transforms))
-    T_base_from_lidar = fixed.between(base, lidar)
-    T_camera_from_base = _looking_ahead(fixed.between(eye, base), f"{bag.place(topics.image)}, frame {eye}", base)
+    heard = _listen(bag, topics)
+    rising = {topic: _rising(heard.stamps[topic], bag.place(topic)) for topic in topics[:3]}
+    T_base_from_lidar, T_camera_from_base = _mounting(heard, bag, topics)
     T_base_from_level = rigid_transform(np.eye(3), T_base_from_lidar[:3, 3])
-    size = image_of(first[topics.image], bag.place(topics.image)).shape[:2]
-    K, shift = _intrinsics(first[topics.camera_info], size, topics, bag)
+    size = image_of(heard.first[topics.image], bag.place(topics.image)).shape[:2]
+    K, shift = _intrinsics(heard.first[topics.camera_info], size, topics, bag)
     T_camera_from_level = rigid_transform(np.eye(3), shift) @ T_camera_from_base @ T_base_from_level
     camera = camera_from(bag.place(topics.camera_info), K, T_camera_from_level, size, lidar_height)
-    trajectory = Trajectory(rising[topics.odometry], np.array(poses))
+    trajectory = RecordedPath(rising[topics.odometry], np.array(heard.poses))
     return Survey(rising[topics.points], rising[topics.image], trajectory, T_base_from_lidar, camera)
+
+
+class _Heard(NamedTuple):
+    """What is kept of all messages: by topic the first one, time stamps and frames; all poses and transforms."""
+
+    first: dict[str, Any]
+    stamps: defaultdict[str, list[int]]
+    frames: defaultdict[str, set[str]]
+    poses: list[NDArray[np.float64]]
+    transforms: list[Any]
+
+
+def _listen(bag: Bag, topics: Topics) -> _Heard:
+    """Check that the topics are there, and go once through their messages."""
+    total = sum(bag.count(topic, *types) for topic, types in zip(topics, TYPES.values(), strict=True))
+    heard = _Heard({}, defaultdict(list), defaultdict(set), [], [])
+    for topic, message in tqdm(bag.messages(*topics), "reading", total, leave=False):
+        if topic == topics.transforms:
+            heard.transforms.append(message)
+            continue
+        heard.first.setdefault(topic, message)
+        heard.stamps[topic].append(stamp_of(message))
+        heard.frames[topic].add(frame_of(message))
+        if topic == topics.odometry:
+            heard.poses.append(pose_of(message, bag.place(topic)))
+    return heard
+
+
+def _mounting(heard: _Heard, bag: Bag, topics: Topics) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return T_base_from_lidar and T_camera_from_base, (4, 4), metres."""
+    lidar, eye = (_one_frame(heard.frames[topic], bag.place(topic)) for topic in (topics.points, topics.image))
+    base = getattr(heard.first[topics.odometry], "child_frame_id", BASE).lstrip("/")
+    fixed = StaticTransforms(heard.transforms, bag.place(topics.transforms))
+    T_base_from_lidar = fixed.between(base, lidar)
+    T_camera_from_base = fixed.between(eye, base)
+    _check_ahead(T_camera_from_base[2, :3], f"{bag.place(topics.image)}, frame {eye}", base)
+    return T_base_from_lidar, T_camera_from_base
 
 
 def _rising(stamps: list[int], place: str) -> NDArray[np.int64]:
@@ -138,13 +157,11 @@ def _one_frame(names: set[str], place: str) -> str:
     return next(iter(names))
 
 
-def _looking_ahead(T_camera_from_base: NDArray, place: str, base: str) -> NDArray[np.float64]:
-    """Return a camera's pose after checking that it looks along x of the vehicle: ROS has x ahead, y left, z up."""
-    axis = T_camera_from_base[2, :3]
+def _check_ahead(axis: NDArray[np.float64], place: str, base: str) -> None:
+    """Check that a camera's axis, (3,) in the base, points along x of the vehicle: ROS has x ahead, y left, z up."""
     if axis[0] < AHEAD:
         found = f"({', '.join(f'{number:.2f}' for number in axis)})"
         raise DataError(place, f"a camera whose z axis looks ahead, along x of {base}", f"a look along {found}")
-    return T_camera_from_base
 
 
 def is_rectified(topic: str) -> bool:

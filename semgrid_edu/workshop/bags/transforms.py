@@ -86,7 +86,7 @@ def pose_of(message: Any, place: str) -> NDArray[np.float64]:
     return _rigid(pose.position, pose.orientation, place)
 
 
-class Trajectory:
+class RecordedPath:
     """Poses at any time: positions on straight lines and turns at a constant rate from one message to the next.
 
     Parameters
