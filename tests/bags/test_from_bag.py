@@ -189,3 +189,14 @@ def test_the_demo_says_what_to_type_for_a_bag(tmp_path, kind):
         with pytest.raises(DataError, match="first type semgrid-edu data from-bag BAG DIR --image TOPIC") as caught:
             drive_at(path)
         assert "\n" not in str(caught.value)
+
+
+def test_a_height_in_the_calibration_must_be_one(tmp_path):
+    _, drive = converted(tmp_path)
+    path = drive.date_folder / "calib_velo_to_cam.txt"
+    text = path.read_text()
+    path.write_text(text.replace("lidar_height: 1.9", "lidar_height: -1.9"))
+    with pytest.raises(DataError, match=r"calib_velo_to_cam.txt: expected lidar_height: metres above the ground"):
+        KittiRawDrive(tmp_path / "out", "2026_01_01", "0001")[0]
+    path.write_text("".join(line for line in text.splitlines(keepends=True) if "height" not in line))
+    assert KittiRawDrive(tmp_path / "out", "2026_01_01", "0001").camera.lidar_height == 1.73
