@@ -23,7 +23,7 @@ def test_a_room_loads_neither_torch_nor_scipy_stats(room):
     assert loaded(f"import semgrid_edu.{room}") == set()
 
 
-EXTRAS = ("numba", "trimesh", "embreex", "lightning_fabric", "joblib", "pandas", "pooch", "requests")
+EXTRAS = ("numba", "trimesh", "embreex", "lightning_fabric", "joblib", "pandas", "pooch", "requests", "rosbags")
 
 
 def test_the_core_runs_a_frame_without_any_optional_extra():

@@ -13,6 +13,10 @@ ROTATION_TOLERANCE = 1e-4
 """The largest accepted entry of R R^T - I: KITTI prints seven digits, which leaves about 1e-6."""
 
 
+LIDAR_HEIGHT = "lidar_height"
+"""A line of calib_velo_to_cam.txt that KITTI's own drives lack: the height of a LIDAR above the ground, metres."""
+
+
 def read_camera(folder: Path, name: str = "image_02") -> Camera:
     """Read the calibration of a camera; image_02 is the left colour camera, image_03 the right one.
 
@@ -29,7 +33,19 @@ def read_camera(folder: Path, name: str = "image_02") -> Camera:
         Name of the folder of its images, "image_00" to "image_03".
     """
     K, T_camera_from_camera0, size = read_rectification(folder / "calib_cam_to_cam.txt", name)
-    return Camera(K, T_camera_from_camera0 @ read_rigid(folder / "calib_velo_to_cam.txt"), size)
+    of_lidar = folder / "calib_velo_to_cam.txt"
+    return Camera(K, T_camera_from_camera0 @ read_rigid(of_lidar), size, _read_lidar_height(of_lidar))
+
+
+def _read_lidar_height(path: Path) -> float:
+    """Return the height of the LIDAR above the ground, metres: KITTI's where the file has none."""
+    calibration = read_calibration(path)
+    if LIDAR_HEIGHT not in calibration:
+        return KITTI_LIDAR_HEIGHT
+    height = float(entry_of(path, calibration, LIDAR_HEIGHT, (1,))[0])
+    if not height > 0:
+        raise DataError(path, f"{LIDAR_HEIGHT}: metres above the ground", height)
+    return height
 
 
 def camera_from(

@@ -7,6 +7,15 @@ _UNSYNCED = (
     "archives whose names end in _sync"
 )
 
+FROM_BAG = (
+    "a bag of ROS: first type semgrid-edu data from-bag BAG DIR --image TOPIC --points TOPIC --odometry TOPIC "
+    "--lidar-height METRES"
+)
+"""What to do about a recording of ROS."""
+
+BAGS = (".bag", ".db3", ".mcap")
+"""How the names of its files end."""
+
 LAYOUTS = {
     "*/*_drive_*_extract": _UNSYNCED,
     "*_drive_*_extract": _UNSYNCED,
@@ -19,6 +28,7 @@ LAYOUTS = {
     "reads tracking, from Python",
     "data_3d_raw": "KITTI-360, which keeps calibration and times in other files: it has no reader here",
     "v1.0-*": "nuScenes, which keeps scans and calibration in other files: it has no reader here",
+    **{f"*{suffix}": FROM_BAG for suffix in BAGS},
 }
 """Advice for a folder that matches a pattern of `Path.glob`; the surest sign comes first."""
 

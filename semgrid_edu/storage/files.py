@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import shutil
 import tempfile
 import tomllib
 from collections.abc import Iterator
@@ -61,6 +62,57 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
             temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_new(folder: str | Path) -> None:
+    """Check that a folder isn't there yet, or is empty, before long work that will fill it.
+
+    Parameters
+    ----------
+    folder : path-like
+        The folder; the one above it is created when missing.
+
+    Raises
+    ------
+    DataError
+        When something is in the folder, or a file has its name.
+    OSError
+        When the folder above can't be made or written to.
+    """
+    folder = Path(folder)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise DataError(folder, "a new folder, or an empty one", "files in it" if folder.is_dir() else "a file")
+    check_writable(folder.with_name(f".{folder.name}-"))
+
+
+@contextmanager
+def atomic_folder(folder: str | Path) -> Iterator[Path]:
+    """Yield a hidden folder beside `folder`, which gets its name when the block ends without an error.
+
+    If the block raises an error, nothing is left.
+
+    Parameters
+    ----------
+    folder : path-like
+        A folder that isn't there, or is empty: see `check_new`.
+
+    Yields
+    ------
+    Path
+        Where to write.
+    """
+    folder = Path(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    partial = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-", suffix=".partial"))
+    try:
+        with named_errors(folder):
+            yield partial
+            partial.chmod(0o755)
+            if folder.is_dir():
+                folder.rmdir()  # Windows renames to no folder that is there
+            partial.rename(folder)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
 
 
 @contextmanager

@@ -18,6 +18,9 @@ FOLDERS = {
     "training/velodyne": "KittiTrackingRun",
     "data_3d_raw/2013_05_28_drive_0000_sync/velodyne_points/data": "KITTI-360",
     "v1.0-mini": "nuScenes",
+    "drive.bag": "data from-bag BAG DIR",
+    "drive_0.db3": "data from-bag BAG DIR",
+    "drive_0.mcap": "data from-bag BAG DIR",
 }
 
 

@@ -64,6 +64,28 @@ def fetch(
     typer.echo(f"{fetched.folder} holds the drive, frames: {len(fetched)}; {folder / 'archives'} may be deleted")
 
 
+@data.command("from-bag")
+def from_bag(
+    bag: Annotated[Path, typer.Argument(help="A .bag of ROS 1, a folder of ROS 2, or an .mcap.")],
+    folder: Annotated[Path, typer.Argument(help="The new folder of the drive.")],
+    image: Annotated[str, typer.Option(help="Topic of rectified images, such as /camera/image_rect_color.")],
+    points: Annotated[str, typer.Option(help="Topic of the LIDAR's point clouds.")],
+    odometry: Annotated[str, typer.Option(help="Topic of nav_msgs/Odometry, or of poses of base_link.")],
+    lidar_height: Annotated[float, typer.Option(help="Height of the LIDAR above the ground, metres.")],
+    camera_info: Annotated[str | None, typer.Option(help="Calibration; else camera_info beside the images.")] = None,
+) -> None:
+    """Write a recording of ROS as a drive in KITTI's raw layout. The sensors' places come from /tf_static."""
+    from semgrid_edu.workshop.bags.convert import convert_bag
+    from semgrid_edu.workshop.bags.survey import Topics, info_beside
+
+    topics = Topics(image, points, odometry, camera_info or info_beside(image))
+    written = convert_bag(bag, folder, topics, lidar_height)
+    for why, number in written.left_out.items():
+        typer.echo(f"semgrid-edu: scans left out: {number}: {why}", err=True)
+    typer.echo(f"{folder} holds the drive {written.date} {written.drive}, frames: {written.n_frames}")
+    typer.echo(f"look at it: semgrid-edu demo {folder}")
+
+
 @data.command()
 def index(
     folder: Annotated[Path, typer.Argument(help="The folder of the data set; the scene itself stays where it is.")],

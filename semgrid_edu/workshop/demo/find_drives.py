@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.kitti_raw import VIEWS, KittiRawDrive
-from semgrid_edu.datasets.layouts import what_is
+from semgrid_edu.datasets.layouts import BAGS, FROM_BAG, what_is
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.errors import DataError
@@ -85,6 +85,8 @@ def drive_at(path: str | Path, camera: str | None = None) -> tuple[str, FrameSeq
 def _existing(path: str | Path, what: str) -> Path:
     """Return the path of a folder, or raise an error if there is none."""
     path = Path(path)
+    if path.is_file() and path.suffix in BAGS:
+        raise DataError(path, what, FROM_BAG)
     if not path.is_dir():
         raise DataError(path, what, "a file" if path.exists() else "no folder")
     return path

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
+from semgrid_edu.datasets.calibration import LIDAR_HEIGHT
 from semgrid_edu.datasets.kitti_labels import DEPTH_UNIT, KINDS
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.datasets.project_lidar import depth_scan
@@ -77,6 +79,8 @@ def _row(name: str, numbers: NDArray | tuple) -> str:
 def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
     """Write KITTI's three calibration files. The cameras are ideal: undistorted and parallel.
 
+    A LIDAR that isn't as high above the ground as KITTI's gets a line of its own, `LIDAR_HEIGHT`.
+
     Parameters
     ----------
     root : path-like
@@ -97,8 +101,11 @@ def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
         rows |= {"S_rect": (width, height), "R_rect": rig.R_rect, "P_rect": P}
         text += "".join(_row(f"{name}_{index:02d}", numbers) for name, numbers in rows.items())
     write_text(day / "calib_cam_to_cam.txt", text)
+    more = _row("delta_f", (0, 0)) + _row("delta_c", (0, 0))
+    if rig.camera.lidar_height != KITTI_LIDAR_HEIGHT:
+        more += _row(LIDAR_HEIGHT, (rig.camera.lidar_height,))
     for name, T, extra in (
-        ("calib_velo_to_cam.txt", rig.T_camera0_from_lidar, _row("delta_f", (0, 0)) + _row("delta_c", (0, 0))),
+        ("calib_velo_to_cam.txt", rig.T_camera0_from_lidar, more),
         ("calib_imu_to_velo.txt", rig.T_lidar_from_imu, ""),
     ):
         write_text(day / name, time + _row("R", T[:3, :3]) + _row("T", T[:3, 3]) + extra)
@@ -113,8 +120,16 @@ def _write_times(folder: Path, times: Sequence[datetime]) -> None:
         (folder / f"{name}.txt").write_text("".join(f"{time:%Y-%m-%d %H:%M:%S.%f}000\n" for time in moved))
 
 
-def _save_png(path: Path, pixels: NDArray) -> None:
-    """Write a PNG. Higher compression levels take longer and hardly save space."""
+def save_png(path: Path, pixels: NDArray) -> None:
+    """Write a PNG. Higher compression levels take longer and hardly save space.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its folder is created when missing.
+    pixels : (h, w) or (h, w, 3) uint8, or (h, w) uint16
+        The image.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     Image.fromarray(pixels).save(path, compress_level=4)
 
@@ -167,7 +182,7 @@ def _write_labels(folder: Path, name: str, labels: FrameLabels) -> None:
     """Write the labels of one frame."""
     images = (labels.image, depth_to_png(labels.depth), labels.birdseye, np.uint8(255) * labels.visible)
     for kind, pixels in zip(KINDS, images, strict=True):
-        _save_png(folder / kind / f"{name}.png", pixels)
+        save_png(folder / kind / f"{name}.png", pixels)
 
 
 def _write_files(folder: Path, frames: Iterable[WrittenFrame], label_set: str) -> tuple[int, list[int]]:
@@ -179,7 +194,7 @@ def _write_files(folder: Path, frames: Iterable[WrittenFrame], label_set: str) -
     labelled = []
     for k, frame in enumerate(frames):
         name = f"{k:010d}"
-        _save_png(folder / "image_02" / "data" / f"{name}.png", frame.image)
+        save_png(folder / "image_02" / "data" / f"{name}.png", frame.image)
         (folder / "velodyne_points" / "data" / f"{name}.bin").write_bytes(frame.points.tobytes())
         (folder / "oxts" / "data" / f"{name}.txt").write_text(frame.oxts)
         times.append(frame.time)

@@ -242,7 +242,7 @@ class Geodesy:
         return float(np.degrees(2 * np.arctan(np.exp(mercator))) - 90), float(longitude)
 
 
-def oxts_packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) -> str:
+def oxts_packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy, step: float = _STEP) -> str:
     """Return the thirty numbers of an oxts packet; `DATAFORMAT` describes them.
 
     Parameters
@@ -253,21 +253,23 @@ def oxts_packet(pose: Callable[[float], NDArray], t: float, geodesy: Geodesy) ->
         Time of the packet, seconds since the drive began.
     geodesy : Geodesy
         Geographic start of the drive.
+    step : float
+        Time step of the differences that velocity and acceleration are, seconds.
 
     Returns
     -------
     str
         One line.
     """
-    before, now, after = (pose(t + h) for h in (-_STEP, 0.0, _STEP))
+    before, now, after = (pose(t + h) for h in (-step, 0.0, step))
     turn = geodesy.rotation
     offset = turn @ (now[:3, 3] - pose(0.0)[:3, 3])
     latitude, longitude = geodesy.degrees(offset)
     R = turn @ now[:3, :3]
     yaw, pitch, roll = Rotation.from_matrix(R).as_euler("ZYX")
-    velocity = turn @ (after[:3, 3] - before[:3, 3]) / (2 * _STEP)
-    acceleration = turn @ (after[:3, 3] - 2 * now[:3, 3] + before[:3, 3]) / _STEP**2
-    rates = Rotation.from_matrix(before[:3, :3].T @ after[:3, :3]).as_rotvec() / (2 * _STEP)
+    velocity = turn @ (after[:3, 3] - before[:3, 3]) / (2 * step)
+    acceleration = turn @ (after[:3, 3] - 2 * now[:3, 3] + before[:3, 3]) / step**2
+    rates = Rotation.from_matrix(before[:3, :3].T @ after[:3, :3]).as_rotvec() / (2 * step)
     level = Rotation.from_euler("z", yaw).as_matrix()
     felt = np.add(acceleration, (0, 0, GRAVITY))
     numbers = [latitude, longitude, geodesy.altitude + offset[2], roll, pitch, yaw, velocity[1], velocity[0]]

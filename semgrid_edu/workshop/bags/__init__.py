@@ -1,0 +1,1 @@
+"""Recordings of ROS 1, ROS 2 and MCAP, written in KITTI's raw layout."""

@@ -1,0 +1,202 @@
+"""`data from-bag`: a drive written from a bag says the same as the bag; what a bag lacks is refused by name."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rosbags", reason="the extra ros isn't installed")
+
+from tiny_bag import (
+    IMAGES,
+    LANDMARKS,
+    N_SCANS,
+    PERIOD,
+    START,
+    T_BASE_FROM_LIDAR,
+    T_BASE_FROM_MOUNT,
+    T_MOUNT_FROM_OPTICAL,
+    K,
+    pose,
+    write_bag,
+)
+
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.workshop.bags.convert import convert_bag
+from semgrid_edu.workshop.bags.survey import Topics
+from semgrid_edu.workshop.commands.main import run
+from semgrid_edu.workshop.demo.find_drives import drive_at
+
+TOPICS = Topics("/cam/image_raw", "/points", "/odom", "/cam/camera_info")
+HEIGHT = 1.9
+
+
+def converted(tmp_path, kind="mcap", topics=TOPICS, **changes):
+    """Write a bag, convert it, and open the drive."""
+    written = convert_bag(write_bag(tmp_path / "bag", kind, **changes), tmp_path / "out", topics, HEIGHT)
+    return written, KittiRawDrive(tmp_path / "out", written.date, written.drive)
+
+
+@pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])
+def test_a_drive_says_what_the_bag_says(tmp_path, kind):
+    written, drive = converted(tmp_path, kind)
+    assert (written.date, written.n_frames, written.left_out) == ("2026_01_01", N_SCANS, {})
+    assert drive.problems() == []
+    T_camera_from_base = np.linalg.inv(T_BASE_FROM_MOUNT @ T_MOUNT_FROM_OPTICAL)
+    for k, frame in enumerate(drive):
+        np.testing.assert_array_equal(frame.image, IMAGES[k])
+        assert frame.time == pytest.approx(k * PERIOD / 1e9, abs=1e-9)
+        # Landmarks don't move: pose and points together give back where they are from the first pose.
+        there = frame.points[:, :3] @ frame.T_world_from_lidar[:3, :3].T + frame.T_world_from_lidar[:3, 3]
+        expected = (np.linalg.inv(pose(0.0)) @ np.c_[LANDMARKS, np.ones(50)].T)[:3].T
+        np.testing.assert_allclose(there, expected, atol=1e-3)
+        # The camera sees them where the bag's transforms say.
+        T_base_from_world = np.linalg.inv(pose(k * PERIOD / 1e9))
+        seen = (T_camera_from_base @ T_base_from_world @ np.c_[LANDMARKS, np.ones(50)].T)[:3].T
+        T = frame.camera.T_camera_from_lidar
+        np.testing.assert_allclose(frame.points[:, :3] @ T[:3, :3].T + T[:3, 3], seen, atol=1e-4)
+        np.testing.assert_allclose(frame.points[:, 3], np.arange(50) * 5 / 255, rtol=1e-6)
+    np.testing.assert_allclose(drive.camera.K, K)
+
+
+def test_a_tilted_lidar_is_made_level_at_its_height(tmp_path):
+    _, drive = converted(tmp_path)
+    T_world_from_lidar = drive[0].T_world_from_lidar
+    np.testing.assert_allclose(T_world_from_lidar[:3, 3], T_BASE_FROM_LIDAR[:3, 3], atol=1e-6)
+    np.testing.assert_allclose(T_world_from_lidar[:3, :3], np.eye(3), atol=1e-6)
+    assert drive.camera.lidar_height == HEIGHT
+    np.testing.assert_allclose(drive[0].points_grid[:, 2], drive[0].points[:, 2] + HEIGHT, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "expected"),
+    [("bgr8", IMAGES), ("png", IMAGES), ("mono8", np.repeat(IMAGES[..., :1], 3, axis=-1))],
+)
+def test_encodings_of_images(tmp_path, encoding, expected):
+    _, drive = converted(tmp_path, encoding=encoding)
+    np.testing.assert_array_equal([frame.image for frame in drive], expected)
+
+
+@pytest.mark.parametrize(
+    ("changes", "factor"),
+    [
+        ({"big_endian": True}, 1.0),
+        ({"intensity_type": 2}, 1.0),  # bytes
+        ({"intensity": "reflectivity", "intensity_type": 4}, 1.0),  # 16 bits, up to 255
+        ({"intensity_scale": 1 / 245, "intensity_type": 8}, 255 / 245),  # 0 to 1 already
+        ({"intensity": None}, 0.0),
+    ],
+)
+def test_any_layout_of_points_gives_a_reflectance_from_0_to_1(tmp_path, changes, factor):
+    _, drive = converted(tmp_path, **changes)
+    for frame in drive:
+        np.testing.assert_allclose(frame.points[:, 3], factor * np.arange(50) * 5 / 255, rtol=1e-5)
+
+
+def test_poses_without_a_frame_are_those_of_base_link(tmp_path):
+    _, drive = converted(tmp_path, pose_type="geometry_msgs/msg/PoseStamped")
+    np.testing.assert_allclose(drive[0].T_world_from_lidar[:3, 3], T_BASE_FROM_LIDAR[:3, 3], atol=1e-6)
+
+
+def test_a_rectified_topic_may_have_distortion_and_takes_the_projection(tmp_path):
+    topic = "/cam/image_rect_color"
+    _, drive = converted(tmp_path, topics=TOPICS._replace(image=topic), image_topic=topic, distortion=0.1)
+    np.testing.assert_allclose(drive.camera.K, K)
+
+
+def test_scans_without_image_are_left_out(tmp_path):
+    written, drive = converted(tmp_path, left_out_images=(2,))
+    assert (written.n_frames, dict(written.left_out)) == (5, {"no image within 0.05 s": 1})
+    np.testing.assert_allclose([frame.time for frame in drive], [0.0, 0.1, 0.3, 0.4, 0.5], atol=1e-9)
+    np.testing.assert_array_equal(drive[2].image, IMAGES[3])
+
+
+def test_scans_after_the_odometry_are_left_out(tmp_path):
+    written, _ = converted(tmp_path, scan_stamps={5: START + 900_000_000})
+    assert dict(written.left_out) == {"no odometry around them within 0.5 s": 1}
+
+
+@pytest.mark.parametrize(
+    ("changes", "topics", "message"),
+    [
+        ({"without": "/odom"}, TOPICS, r"the topic /odom of the type nav_msgs/Odometry .*found only .*/points \(sens"),
+        ({}, TOPICS._replace(points="/odom"), "/odom of the type sensor_msgs/PointCloud2, found .* nav_msgs/Odometry"),
+        ({"without": "/tf_static"}, TOPICS, "the topic /tf_static"),
+        ({"without": "/cam/camera_info"}, TOPICS, "the topic /cam/camera_info"),
+        ({"transforms": ("base_link lidar", "mount optical")}, TOPICS, "a chain .* base_link and optical, .*-> lidar"),
+        ({"base": "rear_axle"}, TOPICS, "/tf_static: expected a chain of transforms between lidar and rear_axle"),
+        ({"base": "optical"}, TOPICS, "whose z axis looks ahead, along x of optical, found a look along"),
+        ({"distortion": 0.1}, TOPICS, r"/cam/image_raw: expected rectified images.*found distortion \[0.1"),
+        ({"scan_stamps": {3: START}}, TOPICS, "/points: expected time stamps that rise, found .* in message 3 after"),
+        ({"encoding": "rgba8"}, TOPICS, "/cam/image_raw: expected images as rgb8, bgr8, mono8, JPEG or PNG, found"),
+        ({"intensity_scale": 10.0}, TOPICS, "/points: expected a brightness of 0 to 255, found 0 to 2450"),
+        ({"info_size": (24, 80)}, TOPICS, "/cam/camera_info: expected the size of the images .*40 x 12 .*found 80 x"),
+    ],
+)
+def test_what_a_bag_lacks_is_refused_by_name(tmp_path, changes, topics, message):
+    with pytest.raises(DataError, match=message):
+        converted(tmp_path, topics=topics, **changes)
+    assert not (tmp_path / "out").exists()
+    assert {path.name for path in tmp_path.iterdir()} == {"bag"}  # no half of a drive
+
+
+def test_a_folder_with_files_is_not_overwritten(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "mine.txt").write_text("mine")
+    with pytest.raises(DataError, match=r"out: expected a new folder, or an empty one, found files in it"):
+        converted(tmp_path)
+
+
+@pytest.mark.parametrize("height", [0.0, -1.7, 1730.0, float("nan")])
+def test_a_height_that_no_lidar_has_is_refused(tmp_path, height):
+    with pytest.raises(ArgumentError, match="--lidar-height"):
+        convert_bag(tmp_path / "bag", tmp_path / "out", TOPICS, height)
+
+
+def test_what_is_no_bag_is_named(tmp_path):
+    (tmp_path / "no.bag").write_bytes(b"not a bag")
+    for name in ("no.bag", "nothing.mcap"):
+        with pytest.raises(DataError, match=f"{name}: expected a bag of ROS 1"):
+            convert_bag(tmp_path / name, tmp_path / "out", TOPICS, HEIGHT)
+
+
+def test_a_bag_cut_short_is_named(tmp_path):
+    bag = write_bag(tmp_path / "bag", "ros1")
+    bag.write_bytes(bag.read_bytes()[:-5000])
+    with pytest.raises(DataError, match=r"bag\.bag"):
+        convert_bag(bag, tmp_path / "out", TOPICS, HEIGHT)
+
+
+def test_the_command_writes_a_drive_that_demo_finds(tmp_path, monkeypatch, capsys):
+    bag = write_bag(tmp_path / "bag", "mcap")
+    shutil.move(next(bag.glob("*.mcap")), tmp_path / "alone.mcap")  # a file without the folder of ROS 2
+    options = ["--image", "/cam/image_raw", "--points", "/points", "--odometry", "/odom", "--lidar-height", "1.9"]
+    arguments = ["data", "from-bag", str(tmp_path / "alone.mcap"), str(tmp_path / "out"), *options]
+    monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        run()
+    assert not ended.value.code
+    assert "holds the drive 2026_01_01 0001, frames: 6" in capsys.readouterr().out
+    assert drive_at(tmp_path / "out")[0] == "KITTI raw"
+
+
+@pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])
+def test_the_demo_says_what_to_type_for_a_bag(tmp_path, kind):
+    bag = write_bag(tmp_path / "bag", kind)
+    file = bag if kind == "ros1" else next(one for one in bag.iterdir() if one.suffix != ".yaml")
+    for path in (file, file.parent):
+        with pytest.raises(DataError, match="first type semgrid-edu data from-bag BAG DIR --image TOPIC") as caught:
+            drive_at(path)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_height_in_the_calibration_must_be_one(tmp_path):
+    _, drive = converted(tmp_path)
+    path = drive.date_folder / "calib_velo_to_cam.txt"
+    text = path.read_text()
+    path.write_text(text.replace("lidar_height: 1.9", "lidar_height: -1.9"))
+    with pytest.raises(DataError, match=r"calib_velo_to_cam.txt: expected lidar_height: metres above the ground"):
+        KittiRawDrive(tmp_path / "out", "2026_01_01", "0001")[0]
+    path.write_text("".join(line for line in text.splitlines(keepends=True) if "height" not in line))
+    assert KittiRawDrive(tmp_path / "out", "2026_01_01", "0001").camera.lidar_height == 1.73
