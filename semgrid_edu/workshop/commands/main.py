@@ -74,6 +74,12 @@ def demo(
         bool, typer.Option("--skip-damaged", help="Leave out frames with a damaged file, and say which.")
     ] = False,
     out: Annotated[Path, typer.Option(help="The folder for the page.")] = Path("out/demo"),
+    save: Annotated[
+        Path | None, typer.Option(help="A new folder for arrays, maps of the drive and an animation.")
+    ] = None,
+    rerun: Annotated[
+        Path | None, typer.Option(help="An .rrd file for the Rerun viewer, which the extra rerun installs.")
+    ] = None,
     force: Force = False,
     show: Annotated[bool, typer.Option("--open", help="Show the page in a browser.")] = False,
 ) -> None:
@@ -96,6 +102,7 @@ def demo(
         chosen = chosen_drive(kitti_named, pandaset_named, camera)
     tell([*(drive_doubts(chosen) if chosen else ()), *(weights_doubts(weights) if weights else ())])
     options = {"stages": stages, "frames": frames, "force": force, "memory": memory}
+    options |= {"save": save, "rerun": rerun}
     if skip_damaged:
         options["skipped"] = lambda line: typer.echo(f"semgrid-edu: left out: {line}", err=True)
     if chosen is None:
@@ -103,6 +110,8 @@ def demo(
     else:
         page = write_demo(chosen, weights or real_weights(), out, **options)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
+    for written in filter(None, (save, rerun)):
+        typer.echo(f"written to {written}")
     if show:
         typer.launch(page.resolve().as_uri())
 

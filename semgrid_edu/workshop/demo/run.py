@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from importlib.util import find_spec
 from itertools import tee
 from pathlib import Path
@@ -13,18 +13,20 @@ from tqdm.auto import tqdm
 from semgrid_edu.datasets.drive_files import first_sound, sound_frames
 from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError, DataError, needed
 from semgrid_edu.fast import load_net
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.pipeline import FrameResult, Stages, run_pipeline
-from semgrid_edu.storage.files import check_ours, write_text
+from semgrid_edu.storage.files import check_new_folder, check_ours, write_text
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.demo.details import story_data
 from semgrid_edu.workshop.demo.overview import save_overview
 from semgrid_edu.workshop.demo.page import page_html
 from semgrid_edu.workshop.demo.record import Record
+from semgrid_edu.workshop.demo.rerun import APPLICATION, rerun_recording
+from semgrid_edu.workshop.demo.save import saved_drive
 from semgrid_edu.workshop.demo.stages_file import Comparison, load_stages
 
 SHOWN = 40
@@ -125,6 +127,8 @@ def write_demo(
     force: bool | None = None,
     memory: bool = False,
     skipped: Callable[[str], None] | None = None,
+    save: str | Path | None = None,
+    rerun: str | Path | None = None,
 ) -> Path:
     """Run every stage over a drive and write a page that shows it.
 
@@ -150,6 +154,10 @@ def write_demo(
         any case.
     skipped : callable, optional
         Is called with a line for each damaged frame, which is left out. By default a damaged frame ends the drive.
+    save : path-like, optional
+        A new or empty folder for arrays, maps and an animation of the frames that are run, see `saved_drive`.
+    rerun : path-like, optional
+        A file for a recording of them, see `rerun_recording`. Both hold the results of a student's stages, if given.
 
     Returns
     -------
@@ -171,6 +179,7 @@ def write_demo(
     card = _card_beside(weights)
     known = str(card.get("other_streets", ""))
     page, picture = _check_page(out, force)
+    _check_handed_out(out, save, rerun, force)
     first = first_sound(drive.__getitem__, chosen.run if skipped else chosen.run[:1])
     if first.image is None:
         raise DataError(drive.folder, f"images of {getattr(drive, 'view', 'its camera')}", "none")
@@ -192,8 +201,14 @@ def write_demo(
         record.leave_out()
 
     frames_read = sound_frames(drive, chosen.run, leave_out if skipped else None)
-    results = run_side_by_side(frames_read, *runs)
-    with compile_bar():
+    with ExitStack() as written:
+        takers = []
+        if save is not None:
+            takers.append(written.enter_context(saved_drive(save, net, weights, Path(stages or "").name)))
+        if rerun is not None:
+            takers.append(written.enter_context(rerun_recording(rerun, net, drive.camera)))
+        results = _handed_out(run_side_by_side(frames_read, *runs), takers)
+        written.enter_context(compile_bar())
         broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
     words = {"expected": known or ("" if record.labelled else POOR), "credit": drive.credit}
     save_overview(record, picture, " ".join(filter(None, words.values())))
@@ -221,7 +236,8 @@ def write_both_streets(out: str | Path, weights: str | Path | None = None, **opt
     weights : path-like, optional
         The network for both; when left out, each street has one that has learned from such streets.
     **options
-        `stages`, `frames`, `force`, `memory` and `skipped` of `write_demo`.
+        `stages`, `frames`, `force`, `memory`, `skipped`, `save` and `rerun` of `write_demo`. What the last two name
+        for the real street has, for the simulated one, a folder `simulated/` as well.
 
     Returns
     -------
@@ -229,10 +245,16 @@ def write_both_streets(out: str | Path, weights: str | Path | None = None, **opt
         The page of the real street, which leads to the other one.
     """
     second = Path(out) / "simulated"
-    for folder in (out, second):  # before the first page is made
-        _check_page(folder, options.get("force"))
+    others = {name: options.get(name) for name in ("save", "rerun")}
+    if others["save"]:
+        others["save"] = Path(others["save"]) / second.name
+    if others["rerun"]:
+        others["rerun"] = Path(others["rerun"]).parent / second.name / Path(others["rerun"]).name
+    _check_page(out, options.get("force"))  # all of them before the first page is made
+    _check_page(second, options.get("force"))
+    _check_handed_out(second, None, others["rerun"], options.get("force"))
     page = write_demo(real_drive(), weights or real_weights(), out, switch=REAL, **options)
-    write_demo(sample_drive(), weights or sample_weights(), second, switch=SIMULATED, **options)
+    write_demo(sample_drive(), weights or sample_weights(), second, switch=SIMULATED, **options | others)
     return page
 
 
@@ -279,6 +301,31 @@ def _check_page(out: str | Path, force: bool | None) -> tuple[Path, Path]:
     files = Path(out) / "index.html", Path(out) / "overview.png"
     check_ours("<h1>From a laser scan and a picture to a map with meaning</h1>", *files, force=force)
     return files
+
+
+def _check_handed_out(out: str | Path, save: str | Path | None, rerun: str | Path | None, force: bool | None) -> None:
+    """Check that what is handed out beside the page can be written, and wouldn't replace anything else."""
+    if rerun is not None:
+        if Path(rerun).suffix != ".rrd":
+            raise ArgumentError("--rerun", "a file that ends in .rrd", rerun)
+        needed("rerun")
+        check_ours(APPLICATION, rerun, force=force)
+    if save is None:
+        return
+    for other in filter(None, (out, rerun)):
+        if Path(other).resolve().is_relative_to(Path(save).resolve()):
+            raise ArgumentError("--save", f"a folder of its own, not one that holds {other}", save)
+    check_new_folder(save)
+
+
+def _handed_out(
+    results: Iterable[tuple[FrameResult, ...]], takers: list[Callable[[FrameResult], None]]
+) -> Iterator[tuple[FrameResult, ...]]:
+    """Pass results on, and give the last of each frame, a student's if there is one, to what is written beside."""
+    for of_frame in results:
+        for take in takers:
+            take(of_frame[-1])
+        yield of_frame
 
 
 def _card_beside(weights: str | Path) -> dict[str, object]:
