@@ -144,7 +144,7 @@ def test_what_a_bag_lacks_is_refused_by_name(tmp_path, changes, topics, message)
 def test_a_folder_with_files_is_not_overwritten(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine.txt").write_text("mine")
-    with pytest.raises(DataError, match=r"out: expected a new folder, or an empty one, found files in it"):
+    with pytest.raises(DataError, match=r"out: expected a new or an empty folder, found one with files in it"):
         converted(tmp_path)
 
 
