@@ -17,7 +17,7 @@ from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
-from semgrid_edu.datasets.training_set import Mixture
+from semgrid_edu.datasets.training_set import Mixture, Sample
 from semgrid_edu.fast import TrainingSet, build_net, load_net
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
@@ -217,7 +217,7 @@ class _Subset(TrainingSet):
     def __init__(self, frames: TrainingSet, numbers: list[int]) -> None:
         self.__dict__ |= frames.__dict__
         self.drives = tuple(frames.drives[k] for k in numbers)
-        self.arrays = {name: frames.arrays[name][numbers] for name in ("image", "labels", "occupancy", "truth", "true")}
+        self.arrays = {name: frames.arrays[name][numbers] for name in (*Sample._fields, "true")}
 
 
 def _networks(

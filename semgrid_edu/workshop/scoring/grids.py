@@ -87,7 +87,8 @@ def learned_log_g(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
     sample : Sample
         The frame.
     """
-    return net(unit_image(sample.image)[None], sample.occupancy[None])[0].log_softmax(dim=0).numpy()
+    heights = None if sample.heights is None else sample.heights[None]
+    return net(unit_image(sample.image)[None], sample.occupancy[None], heights)[0].log_softmax(dim=0).numpy()
 
 
 def crf_refinement(cell: float) -> Refine:
