@@ -33,7 +33,7 @@ from worlds.lecture_08_heights import (
     scan_heights,
     scores_of_returns,
 )
-from worlds.lecture_08_real_streets import Part, open_views, splits
+from worlds.lecture_08_real_streets import Part, image_size_of, open_views, splits
 
 FUSION_STEPS = 200
 """Number of steps of each fusion network that is compared with and without heights."""
@@ -218,7 +218,7 @@ def camera_worth(root: str | Path, scene: str, runs: str | Path, way: str, seed:
         "scores" and "counts" by split and method, and what made them.
     """
     runs = Path(runs) / scene
-    views = open_views(root, scene, runs)
+    views = open_views(root, scene, runs, image_size_of(way))
     heights = {camera: heights_of(PandasetScene(root, scene, camera), one, runs) for camera, one in views.items()}
     scores, texts, weights = {}, {}, {}
     for split, rounds in splits(views).items():
