@@ -664,6 +664,9 @@ EXPERIMENTS = (
         "train --data TINY --out OUT --from none.safetensors",
         "none.safetensors: expected a safetensors file, found no such file",
     ),
+    Row(
+        "half a size", "train --data TINY --out OUT --image-size 640", "--image-size: expected height x width in pixels"
+    ),
     Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "tint: expected a share of at least 0"),
     Row("no results to check", "reproduce check TINY", "TINY: expected results such as table1.json, found none"),
     Row("no folder of results", "reproduce check NONE", "NONE: expected results such as table1.json, found none"),

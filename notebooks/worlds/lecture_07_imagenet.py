@@ -154,12 +154,11 @@ def start_from(start: str, seed: int, normalised: bool = False) -> Segmenter:
     seed : int
         Seed for fresh weights, and for the order of shuffled ones.
     normalised : bool
-        Whether each map is normalised before the pyramid adds it.
+        Whether each map is normalised before the pyramid adds it, as the package's network does.
     """
     net = build_segmenter("efficientnet", len(KITTI_14), "compact", seed)
-    if normalised:
-        pairs = (nn.Sequential(layer, nn.BatchNorm2d(layer.out_channels)) for layer in net.lateral)
-        net.lateral = nn.ModuleList(pairs)
+    if not normalised:
+        net.lateral = nn.ModuleList(convolution for convolution, _ in net.lateral)
     for layer in net.modules():
         if isinstance(layer, nn.BatchNorm2d):
             layer.momentum = 0.1  # the published 0.01 would need hundreds of steps to forget its first statistics

@@ -26,14 +26,14 @@ from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, sho
 from worlds.lecture_08_counts import Counts, add_counts, as_text, camera_of, camera_scores
 from worlds.lecture_08_heights import (
     HeightFusion,
-    above_ground,
     forest_grids,
     height_channels,
     height_rule,
     learn_fusion,
+    scan_heights,
     scores_of_returns,
 )
-from worlds.lecture_08_real_streets import Part, open_views, splits
+from worlds.lecture_08_real_streets import Part, image_size_of, open_views, splits
 
 FUSION_STEPS = 200
 """Number of steps of each fusion network that is compared with and without heights."""
@@ -61,7 +61,7 @@ class Cells(NamedTuple):
     o : (N, 4, H, W) float32
         The occupancy grid.
     heights : (N, 2, H, W) float
-        From `above_ground`.
+        From `scan_heights`.
     learned, true : (N, H, W) uint8
         The classes that networks learn from, and those that are scored: of labelled returns of the frame's own scan.
     """
@@ -218,7 +218,7 @@ def camera_worth(root: str | Path, scene: str, runs: str | Path, way: str, seed:
         "scores" and "counts" by split and method, and what made them.
     """
     runs = Path(runs) / scene
-    views = open_views(root, scene, runs)
+    views = open_views(root, scene, runs, image_size_of(way))
     heights = {camera: heights_of(PandasetScene(root, scene, camera), one, runs) for camera, one in views.items()}
     scores, texts, weights = {}, {}, {}
     for split, rounds in splits(views).items():
@@ -239,7 +239,7 @@ def camera_worth(root: str | Path, scene: str, runs: str | Path, way: str, seed:
 
 
 def heights_of(drive: PandasetScene, frames: TrainingSet, folder: Path) -> NDArray:
-    """Return the heights of all frames of a camera, (N, 2, H, W), from `above_ground`.
+    """Return the heights of all frames of a camera, (N, 2, H, W), from `scan_heights`.
 
     They are kept in a file, because scans are slow to read.
 
@@ -250,11 +250,10 @@ def heights_of(drive: PandasetScene, frames: TrainingSet, folder: Path) -> NDArr
     folder : Path
         Takes the file.
     """
-    path = folder / f"heights, {drive.view.name}.npy"
+    path = folder / f"lowest and highest, {drive.view.name}.npy"
     if not path.exists():
         scans = (drive.without_labels(k).points_grid for k in range(len(drive)))
-        # The last column marks the vehicle's returns.
-        np.save(path, np.stack([above_ground(points[points[:, 4] == 0], frames.spec) for points in scans]))
+        np.save(path, np.stack([scan_heights(points, frames.spec) for points in scans]))
     return np.load(path)
 
 

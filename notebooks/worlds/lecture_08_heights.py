@@ -9,7 +9,6 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter
 from torch import Tensor, nn
 
 from semgrid_edu.grid import GridSpec
@@ -18,9 +17,7 @@ from semgrid_edu.networks import FusionNet
 from semgrid_edu.networks.conv_deconv import ConvDeconv
 from semgrid_edu.networks.segmenter import fresh_weights
 from semgrid_edu.occupancy import N_STATES
-
-NEIGHBOURS = 9
-"""Side of the square of cells whose lowest return is taken for the ground: 4.5 m."""
+from semgrid_edu.planes import above_ground, cell_heights
 
 ROAD_BELOW, CAR_BELOW = 0.25, 2.2
 """Heights above the ground up to which a cell is called road, and car, metres; above, it is called building."""
@@ -29,36 +26,12 @@ TREES = 100
 """Number of trees in a forest."""
 
 
-def cell_heights(points: NDArray, spec: GridSpec) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the highest and the lowest return of each cell, (H, W) metres; NaN in a cell without any.
+def scan_heights(points: NDArray, spec: GridSpec) -> NDArray[np.float64]:
+    """Return each cell's lowest and highest return `above_ground`, (2, H, W) metres; NaN in a cell without any.
 
-    Parameters
-    ----------
-    points : (N, 3+) float
-        Returns in the grid frame.
-    spec : GridSpec
-        The grid.
+    Parameters are those of `cell_heights`.
     """
-    rows, cols, inside = spec.cells(points)
-    cells = rows[inside], cols[inside]
-    heights = points[inside, 2].astype(np.float64)
-    highest = np.full(spec.shape, -np.inf)
-    lowest = np.full(spec.shape, np.inf)
-    np.maximum.at(highest, cells, heights)
-    np.minimum.at(lowest, cells, heights)
-    empty = np.isinf(lowest)
-    return np.where(empty, np.nan, highest), np.where(empty, np.nan, lowest)
-
-
-def above_ground(points: NDArray, spec: GridSpec) -> NDArray[np.float64]:
-    """Return how far each cell's highest and lowest return are above the lowest within 9 x 9 cells, (2, H, W) metres.
-
-    NaN in a cell without a return. Parameters are those of `cell_heights`.
-    """
-    highest, lowest = cell_heights(points, spec)
-    filled = np.where(np.isnan(lowest), np.inf, lowest)
-    ground = minimum_filter(filled, NEIGHBOURS, mode="constant", cval=np.inf)
-    return np.stack([highest, lowest]) - np.where(np.isinf(ground), np.nan, ground)
+    return above_ground(torch.from_numpy(cell_heights(points, spec))).numpy()
 
 
 def height_rule(heights: NDArray) -> NDArray[np.uint8]:
@@ -67,9 +40,9 @@ def height_rule(heights: NDArray) -> NDArray[np.uint8]:
     Parameters
     ----------
     heights : (..., 2, H, W) float
-        From `above_ground`.
+        From `scan_heights`.
     """
-    highest = heights[..., 0, :, :]
+    highest = heights[..., 1, :, :]
     classes = np.full(highest.shape, KITTI_14.index("building"), np.uint8)
     classes[highest <= CAR_BELOW] = KITTI_14.index("car")
     classes[~(highest > ROAD_BELOW)] = KITTI_14.index("road")
@@ -82,10 +55,11 @@ def height_channels(heights: NDArray) -> NDArray[np.float32]:
     Parameters
     ----------
     heights : (..., 2, H, W) float
-        From `above_ground`, metres.
+        From `scan_heights`, metres.
     """
     returned = ~np.isnan(heights[..., :1, :, :])
-    clipped = np.clip(np.nan_to_num(heights), 0, 5) / 2.5
+    highest_first = heights[..., ::-1, :, :]  # the order of the channels in docs/results/camera_worth.json
+    clipped = np.clip(np.nan_to_num(highest_first), 0, 5) / 2.5
     return np.concatenate([clipped, returned], axis=-3).astype(np.float32)
 
 

@@ -12,6 +12,7 @@ import typer
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS
+from semgrid_edu.networks.weights import read_architecture
 from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, on_cells, per_cent
@@ -44,7 +45,7 @@ def other_street(
     runs = Path(runs)
     views = open_views(root, learned, runs / learned)
     drive = PandasetScene(root, other, CAMERAS[0])
-    frames = open_frames(drive, runs / other)
+    frames = open_frames(drive, runs / other, read_architecture(weights).image_size)
     fitted = [(one, list(range(len(one)))) for one in views.values()]
     tested: list[Part] = [(frames, list(range(len(frames))))]
     above = {

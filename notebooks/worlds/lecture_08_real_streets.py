@@ -17,7 +17,7 @@ from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
-from semgrid_edu.datasets.training_set import Mixture
+from semgrid_edu.datasets.training_set import Mixture, Sample
 from semgrid_edu.fast import TrainingSet, build_net, load_net
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
@@ -73,7 +73,8 @@ class WayToTrain(NamedTuple):
 def _way(architecture: dict | None = None, training: dict | None = None, **fields) -> WayToTrain:
     """Return the way described by a row of the table beside this file."""
     params = None if training is None else TrainingParams(**training)
-    return WayToTrain(Architecture(**(architecture or {})), params=params, **fields)
+    values = {name: tuple(value) if isinstance(value, list) else value for name, value in (architecture or {}).items()}
+    return WayToTrain(Architecture(**values), params=params, **fields)
 
 
 TABLE = table_beside(__file__)
@@ -134,14 +135,16 @@ def compare_real(
     """
     fabric = open_fabric(device)
     runs = Path(runs) / scene
-    views = open_views(root, scene, runs)
+    sizes = {Architecture.image_size, *map(image_size_of, WAYS)}
+    of_size = {size: splits(open_views(root, scene, runs, size)) for size in sizes}
     streets = TrainingSet.by_camera(simulated, "train")
     found, weights, seeds = {}, {}, range(seed, seed + TABLE["seeds"])
-    for split, rounds in splits(views).items():
-        table, tests = _joined(_count_states(*one) for one in rounds)[STATE_TABLE], [test for _, test in rounds]
+    for split, usual in of_size[Architecture.image_size].items():
+        table = _joined(_count_states(*one) for one in usual)[STATE_TABLE]
         found[split] = {STATE_TABLE: _scores_of([table], table)}
         for name in TABLE["later"] if split == LATER else WAYS:
-            counted = []
+            counted, rounds = [], of_size[image_size_of(name)][split]
+            tests = [test for _, test in rounds]
             for k in seeds if WAYS[name].params else seeds[:1]:
                 files = _networks(name, rounds, streets, runs / split, seeds, k, fabric)
                 weights |= {run: sha256(file) for run, file in files.items()}
@@ -152,7 +155,20 @@ def compare_real(
     return {"scores": found, "weights": weights, "seed": seed, **made_by(command, "numpy", "torch", "numba")}
 
 
-def open_views(root: str | Path, scene: str, runs: Path) -> dict[str, TrainingSet]:
+def image_size_of(name: str) -> tuple[int, int]:
+    """Return the size of the images that a way's networks see.
+
+    Parameters
+    ----------
+    name : str
+        A key of `WAYS`.
+    """
+    return WAYS[WAYS[name].mean_of or name].architecture.image_size
+
+
+def open_views(
+    root: str | Path, scene: str, runs: Path, image_size: tuple[int, int] = Architecture.image_size
+) -> dict[str, TrainingSet]:
     """Open the frames of every camera, by its name.
 
     Parameters
@@ -161,10 +177,12 @@ def open_views(root: str | Path, scene: str, runs: Path) -> dict[str, TrainingSe
         As `PandasetScene` takes them.
     runs : Path
         Takes the arrays that are made of the frames.
+    image_size : (int, int)
+        Height and width to which images are resized, pixels.
     """
     drives = {camera: PandasetScene(root, scene, camera) for camera in CAMERAS}  # before any is read: all are needed
     check_writable(runs / "run")
-    return {camera: open_frames(drive, runs) for camera, drive in drives.items()}
+    return {camera: open_frames(drive, runs, image_size) for camera, drive in drives.items()}
 
 
 def splits(views: dict[str, TrainingSet]) -> dict[str, list[Round]]:
@@ -190,7 +208,9 @@ def splits(views: dict[str, TrainingSet]) -> dict[str, list[Round]]:
     return {LEFT_OUT: rounds, LATER: [(first, last)]}
 
 
-def open_frames(drive: PandasetScene, folder: Path) -> TrainingSet:
+def open_frames(
+    drive: PandasetScene, folder: Path, image_size: tuple[int, int] = Architecture.image_size
+) -> TrainingSet:
     """Open all frames of a camera; "true" is what the returns of each scan alone say of the cells in view.
 
     Parameters
@@ -199,11 +219,13 @@ def open_frames(drive: PandasetScene, folder: Path) -> TrainingSet:
         The camera's drive.
     folder : Path
         Takes the arrays that are made of the frames.
+    image_size : (int, int)
+        Height and width to which images are resized, pixels.
     """
     root, scene, camera = drive.folder.parent, drive.folder.name, drive.view.name
     listed = tuple(LabelledFrame((scene, camera), k) for k in range(len(drive)))
     index = DatasetIndex(root, f"pandaset-{scene}", KITTI_14, {camera: listed}, PandasetScene, folder)
-    frames = TrainingSet(index, camera)
+    frames = TrainingSet(index, camera, image_size=image_size)
     spec, ignored = frames.spec, np.uint8(IGNORE)
     own = [np.where(drive.undecided(k, spec), drive.truth(k, spec, 0, 0), ignored) for k in range(len(drive))]
     frames.arrays["true"] = np.stack(own)
@@ -217,7 +239,7 @@ class _Subset(TrainingSet):
     def __init__(self, frames: TrainingSet, numbers: list[int]) -> None:
         self.__dict__ |= frames.__dict__
         self.drives = tuple(frames.drives[k] for k in numbers)
-        self.arrays = {name: frames.arrays[name][numbers] for name in ("image", "labels", "occupancy", "truth", "true")}
+        self.arrays = {name: frames.arrays[name][numbers] for name in (*Sample._fields, "true")}
 
 
 def _networks(

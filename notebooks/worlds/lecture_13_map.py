@@ -18,7 +18,7 @@ from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.pipeline import network_image
 from semgrid_edu.planes import plane_heights, plane_pixels
 from semgrid_edu.workshop.course.street import best_table
-from worlds.lecture_08_heights import above_ground, height_rule
+from worlds.lecture_08_heights import height_rule, scan_heights
 
 
 class Inputs(NamedTuple):
@@ -119,7 +119,7 @@ def trivial_maps(
     return {
         "always road": np.full(truths.shape, KITTI_14.index("road")),
         "table of o": best_table(truths, beliefs),
-        "height rule": np.stack([height_rule(above_ground(frame.points_grid, spec)) for frame in frames]),
+        "height rule": np.stack([height_rule(scan_heights(frame.points_grid, spec)) for frame in frames]),
     }
 
 

@@ -40,12 +40,16 @@ class Sample(NamedTuple):
         Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
     truth : (H, W) uint8
         The class of each cell.
+    heights : (2, H, W) float32, or None
+        The lowest and the highest return of each cell, metres, from `cell_heights`; only networks with `uses_heights`
+        need them.
     """
 
     image: Tensor
     labels: Tensor
     occupancy: Tensor
     truth: Tensor
+    heights: Tensor | None = None
 
 
 class TrainingSet(Dataset[Sample]):
@@ -150,7 +154,7 @@ class TrainingSet(Dataset[Sample]):
 
     def __getitem__(self, k: int) -> Sample:
         """Return frame k, by drive in the order of the index."""
-        return Sample(*(torch.from_numpy(np.array(self.arrays[name][k])) for name in Sample._fields))
+        return Sample(**{n: torch.from_numpy(np.array(self.arrays[n][k])) for n in Sample._fields if n in self.arrays})
 
     def returns(self, k: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Return the pixel and the cell of each LIDAR return that the camera sees in a frame.
@@ -251,7 +255,8 @@ def read_excerpt(folder: str | Path) -> list[Sample]:
     """
     path = Path(folder) / FRAMES
     _, tensors = read_tensors(path)
+    names = [name for name in Sample._fields if name in tensors or name not in Sample._field_defaults]
     try:
-        return [Sample(*frame) for frame in zip(*(tensors[name] for name in Sample._fields), strict=True)]
+        return [Sample(*frame) for frame in zip(*(tensors[name] for name in names), strict=True)]
     except (KeyError, ValueError) as error:
-        raise DataError(path, f"labelled frames: {', '.join(Sample._fields)}", error) from error
+        raise DataError(path, f"labelled frames: {', '.join(names)}", error) from error

@@ -8,6 +8,7 @@ from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.networks.fusion import FusionNet
 from semgrid_edu.networks.imagenet import load_imagenet
 from semgrid_edu.networks.registry import SEGMENTERS, build_segmenter
+from semgrid_edu.networks.returns_fusion import ReturnsFusion
 from semgrid_edu.networks.segmenter import Segmenter, unit_image
 from semgrid_edu.networks.semantic_grid import Architecture, SemanticGridNet
 from semgrid_edu.networks.weights import IMAGE_STAGE, WEIGHTS, load_net, save_net
@@ -21,6 +22,7 @@ __all__ = [
     "EfficientNet",
     "Fcn",
     "FusionNet",
+    "ReturnsFusion",
     "SegNet",
     "Segmenter",
     "SemanticGridNet",

@@ -54,10 +54,11 @@ class EfficientNet(Segmenter):
     """Segment an image by EfficientNet-Lite0 and a feature pyramid on its maps at strides 2 to 32.
 
     The encoder is the one network here that is small enough for a CPU at its published size, so its ImageNet weights
-    fit both presets. At each stride a 1x1 convolution brings the encoder's map to the pyramid's width. From the
-    coarsest map down, each is smoothed by a 3x3 convolution, doubled in size and added to the next finer one. The sum
-    at stride 2 is only normalised, because smoothing it would cost twice as much as the rest of the pyramid; its scores
-    are enlarged twofold.
+    fit both presets. At each stride a 1x1 convolution brings the encoder's map to the pyramid's width, and batch
+    normalisation to one size: ImageNet's maps are three to seven times as large as fresh ones, and the pyramid adds
+    them. From the coarsest map down, each is smoothed by a 3x3 convolution, doubled in size and added to the next finer
+    one. The sum at stride 2 is only normalised, because smoothing it would cost twice as much as the rest of the
+    pyramid; its scores are enlarged twofold.
 
     The other Parameters are those of `Segmenter`.
 
@@ -90,7 +91,9 @@ class EfficientNet(Segmenter):
             Number of channels of the pyramid.
         """
         self.backbone = LiteEncoder()
-        self.lateral = nn.ModuleList(nn.Conv2d(n_in, width, 1) for n_in in self.backbone.widths)
+        self.lateral = nn.ModuleList(
+            nn.Sequential(nn.Conv2d(n_in, width, 1), nn.BatchNorm2d(width)) for n_in in self.backbone.widths
+        )
         self.smooth = nn.ModuleList(conv_bn_relu(width, width) for _ in self.backbone.widths[1:])
         self.score = nn.Sequential(nn.BatchNorm2d(width), nn.ReLU(inplace=True), nn.Conv2d(width, n_classes, 1))
 

@@ -98,10 +98,22 @@ class FusionNet(nn.Module):
             The input of the conv-deconv network.
         """
         if not self.uses_occupancy:
-            occupancy = torch.zeros_like(occupancy)  # as after a scan without a single beam
-            occupancy[:, State.UNKNOWN] = 1
+            occupancy = no_scan(occupancy)
         occupancy = occupancy.contiguous(memory_format=torch.channels_last)
         return torch.cat([reduced.squeeze(2), occupancy], dim=1)
+
+
+def no_scan(occupancy: Tensor) -> Tensor:
+    """Return an occupancy grid that is UNKNOWN in every cell, as after a scan without a single beam.
+
+    Parameters
+    ----------
+    occupancy : (B, 4, H, W) float
+        A grid of this size.
+    """
+    unknown = torch.zeros_like(occupancy)
+    unknown[:, State.UNKNOWN] = 1
+    return unknown
 
 
 class PlaneConvolution(nn.Conv3d):

@@ -8,6 +8,7 @@ from torch import Tensor, nn
 from semgrid_edu.errors import ArgumentError, types_named
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks.fusion import N_REDUCED, FusionNet
+from semgrid_edu.networks.returns_fusion import ReturnsFusion
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.planes import PlaneSampler, plane_heights
 
@@ -47,6 +48,10 @@ class Architecture:
         Whether the 1x1 convolution reduces the planes. Otherwise the conv-deconv network takes all D x C of them.
     n_segmenters : int
         How many image networks score an image, 1 to 9; s is the mean of their scores, see `MeanSegmenter`.
+    uses_heights : bool
+        Whether the fusion network sees the heights of the scan's returns, and the scores at these heights alone, see
+        `ReturnsFusion`; then `reduces` has no effect. Its planes hold class probabilities, the soft-max of the scores:
+        it must compare them between views, and raw scores have another size in each.
     """
 
     segmenter: str = "segnet"
@@ -58,6 +63,7 @@ class Architecture:
     uses_occupancy: bool = True
     reduces: bool = True
     n_segmenters: int = 1
+    uses_heights: bool = False
 
     @types_named
     def __post_init__(self) -> None:
@@ -71,11 +77,13 @@ class Architecture:
         if rows * columns * len(self.heights) > MOST_POINTS:
             found = f"{rows} x {columns} cells on {len(self.heights)} planes"
             raise ArgumentError("grid, heights", f"at most {MOST_POINTS} points of planes", found)
+        if self.uses_heights and list(self.heights) != sorted(set(self.heights)):
+            raise ArgumentError("heights", "planes from the lowest up, with uses_heights", self.heights)
 
     @property
-    def layout(self) -> tuple[str, tuple[int, int], GridSpec, tuple[float, ...]]:
-        """Label set, image size, grid and heights. Networks in which these are equal can exchange their stages."""
-        return self.label_set, self.image_size, self.grid, self.heights
+    def layout(self) -> tuple[str, tuple[int, int], GridSpec, tuple[float, ...], bool]:
+        """Label set, image size, grid, planes, and what these hold. Equal ones can exchange their stages."""
+        return self.label_set, self.image_size, self.grid, self.heights, self.uses_heights
 
 
 class NetOutputs(NamedTuple):
@@ -86,7 +94,7 @@ class NetOutputs(NamedTuple):
     scores : (B, C, h, w) float
         s, the scores of each class at each pixel, before any soft-max.
     planes : (B, C, D, H, W) float
-        p, the scores on the planes.
+        p, the scores on the planes; class probabilities with `uses_heights`.
     logits : (B, C, H, W) float
         g before the soft-max.
     """
@@ -133,14 +141,18 @@ class SemanticGridNet(nn.Module):
         self.architecture = architecture
         n_scores = getattr(segmenter, "n_classes", n_classes)
         options = architecture or Architecture()
-        self.fusion = FusionNet(
-            n_scores,
-            sampler.planes_shape[0],
-            n_classes,
-            n_reduced=N_REDUCED if options.reduces else None,
-            seed=seed,
-            uses_occupancy=options.uses_occupancy,
-        )
+        self.uses_heights = options.uses_heights
+        if self.uses_heights:
+            self.fusion = ReturnsFusion(n_scores, options.heights, n_classes, seed, options.uses_occupancy)
+        else:
+            self.fusion = FusionNet(
+                n_scores,
+                sampler.planes_shape[0],
+                n_classes,
+                n_reduced=N_REDUCED if options.reduces else None,
+                seed=seed,
+                uses_occupancy=options.uses_occupancy,
+            )
 
     def need_architecture(self) -> Architecture:
         """Return the architecture, or raise an `ArgumentError`: without it a network can't be saved or trained."""
@@ -150,7 +162,12 @@ class SemanticGridNet(nn.Module):
         return self.architecture
 
     def stages(
-        self, image: Tensor, occupancy: Tensor, mirrored: bool = False, sampler: PlaneSampler | None = None
+        self,
+        image: Tensor,
+        occupancy: Tensor,
+        mirrored: bool = False,
+        sampler: PlaneSampler | None = None,
+        heights: Tensor | None = None,
     ) -> NetOutputs:
         """Return the result of every stage, from the scores to the semantic grid.
 
@@ -166,20 +183,29 @@ class SemanticGridNet(nn.Module):
             symmetric, so in a mirrored image equation (1) would give the wrong pixels.
         sampler : PlaneSampler, optional
             s -> p for the camera that took these images; the network's own sampler when left out.
+        heights : (B, 2, H, W) float, optional
+            The lowest and the highest return of each cell, from `cell_heights`. A network with `uses_heights` needs
+            them; others don't look.
 
         Returns
         -------
         NetOutputs
             Scores, planes and logits.
+
+        Raises
+        ------
+        ArgumentError
+            When a shape is wrong, or heights are missing.
         """
         _check("image", image, (3, *self.sampler.image_size))
         _check("occupancy", occupancy, (N_STATES, *self.sampler.planes_shape[1:]))
         if len(image) != len(occupancy):
             raise ArgumentError("occupancy", f"one for each of the {len(image)} images", len(occupancy))
-        sampler = sampler or self.sampler
+        if self.uses_heights:
+            self._check_heights(heights, len(image))  # before the image network, which takes longest
         scores = self.segment(image, mirrored)
-        planes = sampler(scores)
-        return NetOutputs(scores, planes, self.fuse(planes, occupancy, mirrored))
+        planes = self.sample(scores, sampler)
+        return NetOutputs(scores, planes, self.fuse(planes, occupancy, mirrored, heights))
 
     def segment(self, image: Tensor, mirrored: bool = False) -> Tensor:
         """Return s, the image network's scores. Parameters are those of `SemanticGridNet.stages`.
@@ -191,7 +217,23 @@ class SemanticGridNet(nn.Module):
         """
         return _flip(self.segmenter(_flip(image, mirrored)), mirrored)
 
-    def fuse(self, planes: Tensor, occupancy: Tensor, mirrored: bool = False) -> Tensor:
+    def sample(self, scores: Tensor, sampler: PlaneSampler | None = None) -> Tensor:
+        """Return p, the scores on the planes; with `uses_heights` the class probabilities, see `Architecture`.
+
+        The other Parameters are those of `SemanticGridNet.stages`.
+
+        Parameters
+        ----------
+        scores : (B, C, h, w) float
+            s, before any soft-max.
+
+        Returns
+        -------
+        (B, C, D, H, W) float
+        """
+        return (sampler or self.sampler)(scores.softmax(dim=1) if self.uses_heights else scores)
+
+    def fuse(self, planes: Tensor, occupancy: Tensor, mirrored: bool = False, heights: Tensor | None = None) -> Tensor:
         """Return the logits of the semantic grid from the sampled planes: (p, o) -> g.
 
         The other Parameters are those of `SemanticGridNet.stages`.
@@ -206,9 +248,19 @@ class SemanticGridNet(nn.Module):
         (B, C, H, W) float
             g before the soft-max.
         """
-        # The 1x1 convolution sees one cell at a time, so we mirror after it, when there is less data to move.
-        reduced = _flip(self.fusion.reduce(planes), mirrored)
-        return _flip(self.fusion.fuse(reduced, _flip(occupancy, mirrored)), mirrored)
+        scan = (self._check_heights(heights, len(planes)),) if self.uses_heights else ()
+        # What reduces the planes sees one cell at a time, so we mirror after it, when there is less data to move.
+        reduced = _flip(self.fusion.reduce(planes, *scan), mirrored)
+        mirrored_scan = (_flip(part, mirrored) for part in (occupancy, *scan))
+        return _flip(self.fusion.fuse(reduced, *mirrored_scan), mirrored)
+
+    def _check_heights(self, heights: Tensor | None, n_frames: int) -> Tensor:
+        """Return the heights that the network needs, or raise an `ArgumentError` if they are missing or don't fit."""
+        expected = (n_frames, 2, *self.sampler.planes_shape[1:])
+        if heights is None or tuple(heights.shape) != expected:
+            found = "none" if heights is None else tuple(heights.shape)
+            raise ArgumentError("heights", f"shape {expected}: the network uses the heights of returns", found)
+        return heights
 
     def with_sampler(self, sampler: nn.Module) -> "SemanticGridNet":
         """Return a network of the same layers, which are shared, with another sampler.
@@ -222,7 +274,7 @@ class SemanticGridNet(nn.Module):
         other.fusion = self.fusion
         return other.train(self.training)
 
-    def forward(self, image: Tensor, occupancy: Tensor) -> Tensor:
+    def forward(self, image: Tensor, occupancy: Tensor, heights: Tensor | None = None) -> Tensor:
         """Return the logits of the semantic grid. Parameters and errors are those of `SemanticGridNet.stages`.
 
         Returns
@@ -230,7 +282,7 @@ class SemanticGridNet(nn.Module):
         (B, C, H, W) float
             g before the soft-max.
         """
-        return self.stages(image, occupancy).logits
+        return self.stages(image, occupancy, heights=heights).logits
 
 
 def _flip(x: Tensor, mirrored: bool) -> Tensor:

@@ -48,13 +48,15 @@ class CheckedStage:
         """Say which stage, where it is written, and at which frame: "refine (my_stages.py, line 12), frame 3"."""
         return f"{self.name} ({where(self.stage)}), frame {self.frame}"
 
-    def __call__(self, *inputs: NDArray) -> NDArray[np.float32]:
+    def __call__(self, *inputs: NDArray, **named: NDArray) -> NDArray[np.float32]:
         """Call the stage and check what it returns.
 
         Parameters
         ----------
         *inputs : array
             What the stage takes.
+        **named : array
+            What `fuse` takes by name: heights, if it asks for them.
 
         Returns
         -------
@@ -64,7 +66,7 @@ class CheckedStage:
         self.frame += 1
         given = inputs if self.is_ours else [np.copy(array) for array in inputs]
         with self.blamed():
-            value = self.stage(*given)
+            value = self.stage(*given, **{name: np.copy(array) for name, array in named.items()})
         result = self.array(value, self.shape)
         if self.name == "segment":
             self.finite(result)

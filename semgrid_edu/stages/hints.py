@@ -23,6 +23,9 @@ STAGES = {
 }
 """The names of the paper's stages, in their order, and of the arguments that a function for each of them takes."""
 
+HEIGHTS = "heights"
+"""A third argument that a function for `fuse` may take: the lowest and the highest return of each cell."""
+
 REMEMBER = {"remember": ("views", "spec")}
 """The stage that the paper leaves out: without it, classes are forgotten at every frame."""
 
@@ -44,6 +47,7 @@ def check_usage(name: str, stage: object) -> None:
     """
     takes = (STAGES | REMEMBER)[name]
     usage = f"a function {name}({', '.join(takes)})"
+    named = {HEIGHTS: None} if name == "fuse" and takes_heights(stage) else {}
     if "spec" in takes:
         usage += " or an object with step(frame)"
     if isinstance(stage, type):
@@ -57,9 +61,23 @@ def check_usage(name: str, stage: object) -> None:
     except ValueError:  # some functions written in C don't say what they take
         return
     try:
-        signature.bind(*takes)
+        signature.bind(*takes, **named)
     except TypeError as error:
         raise ArgumentError(name, usage, f"{name}{signature}") from error
+
+
+def takes_heights(fuse: object) -> bool:
+    """Return whether a stage `fuse` has an argument named `heights`.
+
+    Parameters
+    ----------
+    fuse : object
+        What may be a function, or a `CheckedStage` around one.
+    """
+    try:
+        return HEIGHTS in inspect.signature(getattr(fuse, "stage", fuse)).parameters
+    except (TypeError, ValueError):  # not a function, or one written in C
+        return False
 
 
 def where(function: Callable) -> str:

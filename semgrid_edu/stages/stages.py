@@ -6,7 +6,7 @@
 import copy
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,11 +18,13 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.crf import CrfParams, mean_field
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.errors import ArgumentError, MissingExtraError
+from semgrid_edu.frame import Frame
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.memory import ClassMemory, MemoryParams
 from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
 from semgrid_edu.occupancy import CmcdotParams, DriveTracker
-from semgrid_edu.stages.hints import REMEMBER, STAGES, check_usage
+from semgrid_edu.planes import cell_heights
+from semgrid_edu.stages.hints import REMEMBER, STAGES, check_usage, takes_heights
 from semgrid_edu.stages.stepping import checked
 
 
@@ -57,7 +59,8 @@ class Stages:
         s -> p: `sample(s (C, h, w))` returns the scores on the planes, (C, D, H, W) float.
     fuse : callable, optional
         (p, o) -> g: `fuse(p (C, D, H, W), o (4, H, W))` returns log g (C, H, W) float, natural logarithms of
-        probabilities: exp(log g) sums to 1 in each cell.
+        probabilities: exp(log g) sums to 1 in each cell. A function with a third argument called `heights` also gets
+        the lowest and the highest return of each cell, (2, H, W) metres, NaN without a return (`cell_heights`).
     refine : callable, optional
         g -> g: `refine(log_g (C, H, W), o (4, H, W))` returns g (C, H, W) float, probabilities that sum to 1 in each
         cell.
@@ -68,6 +71,11 @@ class Stages:
         g -> g over frames: an object whose `step(view)` returns (C, H, W) float, probabilities that sum to 1 in each
         cell, for a `View` (frame, belief and g of that frame alone). Or a generator function `remember(views, spec)`.
         Without it nothing is remembered.
+
+    Attributes
+    ----------
+    wants_heights : bool
+        Whether `fuse` has the argument `heights`.
 
     Raises
     ------
@@ -85,15 +93,17 @@ class Stages:
     track: Tracker | Callable | None = None
     segment: Callable[[NDArray], NDArray] | None = None
     sample: Callable[[NDArray], NDArray] | None = None
-    fuse: Callable[[NDArray, NDArray], NDArray] | None = None
+    fuse: Callable[..., NDArray] | None = None
     refine: Callable[[NDArray, NDArray], NDArray] | None = None
     architecture: Architecture | None = None
     remember: Tracker | Callable | None = None
+    wants_heights: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         """Reject what can't be called as its stage is."""
         for name in self.given:
             check_usage(name, getattr(self, name))
+        object.__setattr__(self, "wants_heights", takes_heights(self.fuse))
 
     @property
     def given(self) -> tuple[str, ...]:
@@ -145,8 +155,13 @@ class Stages:
         architecture = net.need_architecture()
         crf = crf or CrfParams.for_cells(architecture.grid.cell)
 
-        def log_grid(planes: Tensor, occupancy: Tensor) -> Tensor:
-            return net.fuse(planes, occupancy).log_softmax(dim=1)
+        def log_grid(planes: Tensor, occupancy: Tensor, heights: Tensor | None = None) -> Tensor:
+            return net.fuse(planes, occupancy, heights=heights).log_softmax(dim=1)
+
+        fuse = _on_arrays(log_grid)
+
+        def fuse_with_heights(p: NDArray, o: NDArray, heights: NDArray) -> NDArray:
+            return fuse(p, o, heights)
 
         def refine(log_g: NDArray, o: NDArray) -> NDArray:
             return mean_field(-log_g, o, crf)
@@ -154,8 +169,8 @@ class Stages:
         return cls(
             track=DriveTracker(architecture.grid, occupancy, seed, keep_steps),
             segment=_on_arrays(net.segment),
-            sample=_on_arrays(net.sampler),
-            fuse=_on_arrays(log_grid),
+            sample=_on_arrays(net.sample),
+            fuse=fuse_with_heights if architecture.uses_heights else fuse,
             refine=refine,
             architecture=architecture,
             remember=_memory(memory, architecture),
@@ -223,6 +238,16 @@ class Stages:
         if set(STAGES) <= set(stages.given) and memory is False:
             return stages
         return stages.over(cls.fast(load_net(sample_weights(), camera), memory=memory, **options))
+
+    def heights(self, frame: Frame) -> NDArray[np.float64]:
+        """Return the lowest and the highest return of each cell, (2, H, W) metres, from `cell_heights`.
+
+        Parameters
+        ----------
+        frame : Frame
+            A frame with a scan.
+        """
+        return cell_heights(frame.points_grid, (self.architecture or Architecture()).grid)
 
     def need_ready(self) -> None:
         """Raise an `ArgumentError` unless `run_frame` can run these stages: all five, and no generator among them."""

@@ -69,7 +69,8 @@ def draw_batch(
     """
     part, turn = dataset.turn(iteration) if isinstance(dataset, Mixture) else (dataset, iteration)
     chosen = frames_of_step(len(part), size, turn, seed)
-    frames = Sample(*map(torch.stack, zip(*(part[i] for i in chosen.tolist()), strict=True)))
+    fields = zip(*(part[i] for i in chosen.tolist()), strict=True)
+    frames = Sample(*(None if field[0] is None else torch.stack(field) for field in fields))
     rng = np.random.default_rng((seed, 1, iteration))
     contrast, brightness = rng.uniform(-jitter, jitter, (2, size, 1, 1, 1)).astype(np.float32)
     image = (unit_image(frames.image) - 0.5) * (1 + torch.from_numpy(contrast)) + 0.5 + torch.from_numpy(brightness)
@@ -121,7 +122,7 @@ def share_of_batch(batch: Batch, process: int, n_processes: int, device: torch.d
     """
     size = len(batch.frames.image) // n_processes
     part = slice(process * size, (process + 1) * size)
-    return batch._replace(frames=Sample(*(field[part].to(device) for field in batch.frames)))
+    return batch._replace(frames=Sample(*(None if f is None else f[part].to(device) for f in batch.frames)))
 
 
 def image_scores(net: SemanticGridNet, batch: Batch) -> Tensor:
@@ -150,4 +151,5 @@ def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
     (B, C, H, W) float32
         The logits, unmirrored.
     """
-    return net.stages(batch.frames.image, batch.frames.occupancy, batch.mirrored, batch.sampler).logits
+    frames = batch.frames
+    return net.stages(frames.image, frames.occupancy, batch.mirrored, batch.sampler, frames.heights).logits

@@ -213,7 +213,7 @@ def _check_finite(step: Step, learning_rate: float) -> None:
 
 def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams, n_processes: int) -> None:
     """Check that the network can be saved, that the frames fit it, and that processes can share a batch."""
-    net.need_architecture()
+    uses_heights = net.need_architecture().uses_heights
     for part in dataset.parts if isinstance(dataset, Mixture) else (dataset,):
         if len(part) < params.batch_size:
             raise ArgumentError("dataset", f"at least one batch of {params.batch_size} frames", f"{len(part)} frames")
@@ -221,8 +221,10 @@ def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: Trai
         raise ArgumentError("batch_size", f"a multiple of {n_processes}, the number of processes", params.batch_size)
     size = net.sampler.image_size
     shape = net.sampler.planes_shape[1:]
-    expected = Sample((3, *size), size, (N_STATES, *shape), shape)
+    expected = Sample((3, *size), size, (N_STATES, *shape), shape, (2, *shape))
     for k, sample in enumerate(dataset):
+        if uses_heights and sample.heights is None:
+            raise ArgumentError("dataset", "heights of returns, which the network uses", f"none in frame {k}")
         for name, part, want in zip(Sample._fields, sample, expected, strict=True):
-            if tuple(part.shape) != want:
+            if part is not None and tuple(part.shape) != want:
                 raise ArgumentError("dataset", f"{name} of shape {want}", f"{tuple(part.shape)} in frame {k}")

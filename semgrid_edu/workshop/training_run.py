@@ -1,6 +1,7 @@
 """Train a network on a data set and write down how it was made (paper, section 4.1)."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
@@ -31,7 +32,9 @@ PAPER_IMAGE = (375, 1242)
 """Height and width of KITTI's images, pixels; the paper's networks see them at this size."""
 
 
-def architecture(segmenter: str, preset: str = "compact") -> Architecture:
+def architecture(
+    segmenter: str, preset: str = "compact", uses_heights: bool = False, image_size: tuple[int, int] | None = None
+) -> Architecture:
     """Return the architecture of a preset, with its image size and its grid.
 
     Parameters
@@ -40,6 +43,10 @@ def architecture(segmenter: str, preset: str = "compact") -> Architecture:
         Name of the image network, a key of `SEGMENTERS`.
     preset : str
         "compact" for the CPU; "paper" for the published networks, KITTI's images at full size, and 0.2 m cells.
+    uses_heights : bool
+        Whether the fusion network sees the heights of returns, see `Architecture`.
+    image_size : (int, int), optional
+        Height and width of the images, pixels; the preset's when left out.
 
     Returns
     -------
@@ -47,10 +54,32 @@ def architecture(segmenter: str, preset: str = "compact") -> Architecture:
         What `build_net` takes.
     """
     if preset == "compact":
-        return Architecture(segmenter)
-    if preset == "paper":
-        return Architecture(segmenter, preset, image_size=PAPER_IMAGE, grid=GridSpec.paper())
-    raise ArgumentError("--preset", "compact or paper", repr(preset))
+        usual = Architecture(segmenter)
+    elif preset == "paper":
+        usual = Architecture(segmenter, preset, image_size=PAPER_IMAGE, grid=GridSpec.paper())
+    else:
+        raise ArgumentError("--preset", "compact or paper", repr(preset))
+    return replace(usual, uses_heights=uses_heights, image_size=image_size or usual.image_size)
+
+
+def chosen_size(text: str | None) -> tuple[int, int] | None:
+    """Return the height and the width of images that an option names, or None.
+
+    Parameters
+    ----------
+    text : str or None
+        Such as "192x640".
+
+    Examples
+    --------
+    >>> chosen_size("192x640")
+    (192, 640)
+    """
+    if text is None:
+        return None
+    if not (found := re.fullmatch(r"(\d+)x(\d+)", text)):
+        raise ArgumentError("--image-size", "height x width in pixels, such as 192x640", repr(text))
+    return int(found[1]), int(found[2])
 
 
 def training_params(
@@ -119,6 +148,8 @@ def train_network(
     truth: LidarTruth | None = None,
     start: str | Path | Sequence[str | Path] = (),
     half: bool = False,
+    uses_heights: bool = False,
+    image_size: tuple[int, int] | None = None,
 ) -> None:
     """Train a network on the split "train" of data sets; under torchrun, in all of its processes.
 
@@ -150,6 +181,8 @@ def train_network(
         weights are fresh.
     half : bool
         Whether the trained network's convolutions are written in 16 bits, see `save_net`.
+    uses_heights, image_size
+        As `architecture` takes them.
 
     Raises
     ------
@@ -164,7 +197,7 @@ def train_network(
     folders = [data] if isinstance(data, str | Path) else list(data)
     folder = Path(folder)
     began = datetime.now(UTC)
-    description = architecture(segmenter, preset)
+    description = architecture(segmenter, preset, uses_heights, image_size)
     if len(starts) > 1:
         params = replace(params, image_iterations=0)
     # All that can be wrong is found before the data are prepared, which takes minutes.
@@ -259,11 +292,14 @@ def _command(
     truth: LidarTruth | None,
 ) -> str:
     """Return the command that repeats a training run, as far as a command can: not every policy has a name."""
+    size = h, w = description.image_size
     named = (name for name, policy in POLICIES.items() if truth == LidarTruth(policy, TruthFlaws()))
     options = [
         *(f"--data {_name(data)}" for data in folders),
         f"--out {_name(folder)} --segmenter {description.segmenter}",
         f"--preset {description.preset}" if description.preset != Architecture.preset else "",
+        "--heights" if description.uses_heights else "",
+        "" if size == architecture(description.segmenter, description.preset).image_size else f"--image-size {h}x{w}",
         f"--imagenet {_name(imagenet)}" if imagenet else "",
         *(f"--from {_name(Path(path).parent)}/{_name(path)}" for path in start),
         f"--seed {seed} --iterations {params.grid_iterations}",

@@ -13,6 +13,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.fast import TrainingSet, track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import CmcdotParams
+from semgrid_edu.planes import cell_heights
 from semgrid_edu.storage.files import CACHE_VARIABLE, cache_folder
 from semgrid_edu.workshop.commands.main import app
 
@@ -52,6 +53,8 @@ class TestBuilt:
             drive = KittiRawDrive(built, DATE, name)
             *_, belief = track_drive(drive, spec, seed=0)
             np.testing.assert_array_equal(sample.occupancy, belief.probability)
+            heights = cell_heights(drive[2].points_grid, spec)
+            np.testing.assert_array_equal(sample.heights, heights.astype(np.float32))
             np.testing.assert_array_equal(sample.truth, grid_truth(drive[2].labels, belief.probability, spec))
             blocks = drive[2].image.reshape(6, 2, 20, 2, 3).mean(axis=(1, 3)).transpose(2, 0, 1)
             np.testing.assert_allclose(sample.image.numpy(), blocks, atol=1)

@@ -16,11 +16,12 @@ from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net
-from semgrid_edu.occupancy import CmcdotParams, SensorModel, scan_evidence, update
+from semgrid_edu.occupancy import CmcdotParams, SensorModel, State, scan_evidence, update
 from semgrid_edu.occupancy.state import FilterState, Particles
-from semgrid_edu.planes import plane_pixels
+from semgrid_edu.pipeline import Stages, run_pipeline
+from semgrid_edu.planes import cell_heights, plane_pixels
 from semgrid_edu.workshop.demo import cell_story
-from semgrid_edu.workshop.demo.contributions import contributions
+from semgrid_edu.workshop.demo.contributions import contributions, fusion_inputs
 from semgrid_edu.workshop.demo.evidence import VERDICTS, place_history, scan_maps
 from semgrid_edu.workshop.demo.neighbours import neighbour_pull
 from semgrid_edu.workshop.demo.stories import frame_story
@@ -123,6 +124,29 @@ class TestContributions:
         np.testing.assert_allclose(parts.planes[:, 3, 12, 16], planes.sum(axis=0), atol=1e-4)
         np.testing.assert_allclose(parts.occupancy[:, 3, 12, 16], states, atol=1e-4)
         assert states.any() == net.fusion.uses_occupancy
+
+    def test_of_a_network_with_heights_leave_the_part_of_the_heights_in_the_rest(self, last_labelled, make_net):
+        """Gradient times input by a backward pass; without a scan it takes every score on the ground."""
+        net = make_net(last_labelled.camera, uses_heights=True)
+        result = list(run_pipeline(last_labelled, Stages.fast(net, PARAMS)))[-1]
+        told = frame_story(result, net)
+        heights = cell_heights(result.frame.points_grid, SPEC)
+        planes, states, z = fusion_inputs(net, result.scores, result.belief.probability, heights)
+        planes.requires_grad_()
+        states.requires_grad_()
+        cell = (82, 25)
+        logits = net.fusion(planes, states, z)[0, :, *cell]
+        difference = logits[told.label[cell]] - logits[told.rival[cell]]
+        gradients = torch.autograd.grad(difference, (planes, states))
+        of_planes, of_states = ((g * x)[0].sum(dim=(-2, -1)) for g, x in zip(gradients, (planes, states), strict=True))
+        why = told.why.at(cell)
+        np.testing.assert_allclose(why.planes, of_planes.sum(dim=0).detach(), atol=1e-4)
+        np.testing.assert_allclose(why.occupancy, of_states.detach(), atol=1e-4)
+        assert why.planes.sum() + why.occupancy.sum() + why.rest == pytest.approx(difference.item(), abs=1e-3)
+        unknown = torch.zeros_like(states)
+        unknown[:, State.UNKNOWN] = 1
+        blind = net.fusion(planes, unknown, torch.full_like(z, torch.nan))[0].argmax(dim=0)
+        np.testing.assert_array_equal(told.otherwise["no occupancy"], blind)
 
     def test_a_network_in_training_mode_is_refused(self, last_labelled, told):
         net = build_net(Architecture(), last_labelled.camera)

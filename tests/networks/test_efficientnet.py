@@ -104,7 +104,14 @@ def test_presets_differ_in_the_pyramid_alone():
     classifier = 320 * 1280 + 2 * 1280 + 1280 * 1000 + 1000
     for net in (compact, paper):
         assert sum(p.numel() for p in net.backbone.parameters()) == 4_652_008 - classifier
-    assert (compact.lateral[0].out_channels, paper.lateral[0].out_channels) == (48, 256)
+    assert (compact.lateral[0][0].out_channels, paper.lateral[0][0].out_channels) == (48, 256)
+
+
+def test_maps_enter_the_pyramid_at_one_size_however_large_the_encoders_are():
+    net = build_segmenter("efficientnet", 14).train()
+    maps = [10.0**k * torch.randn(2, width, 8, 8) for k, width in enumerate(net.backbone.widths)]
+    for lateral, found in zip(net.lateral, maps, strict=True):
+        assert lateral(found).std().item() == pytest.approx(1, abs=0.05)
 
 
 def test_the_encoder_alone_is_loaded():

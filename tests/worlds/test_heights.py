@@ -5,12 +5,11 @@ import pytest
 import torch
 from worlds.lecture_08_heights import (
     HeightFusion,
-    above_ground,
-    cell_heights,
     forest_grids,
     height_channels,
     height_rule,
     learn_fusion,
+    scan_heights,
     scores_of_returns,
 )
 
@@ -29,16 +28,8 @@ def _street():
     return np.array([*ground, kerb, roof, wall, far])
 
 
-def test_the_highest_and_the_lowest_return_of_a_cell():
-    highest, lowest = cell_heights(_street(), SPEC)
-    assert (highest[8, 0], lowest[8, 0]) == (1.4, -0.1)
-    assert (highest[10, 0], lowest[10, 0]) == (0.15, 0.15)
-    assert np.isnan(highest[:, 1]).all()
-    assert np.isnan(lowest[:, 1]).all()
-
-
 def test_heights_are_above_the_lowest_return_within_four_cells():
-    highest, lowest = above_ground(_street(), SPEC)
+    lowest, highest = scan_heights(_street(), SPEC)
     np.testing.assert_allclose(highest[[11, 10, 8, 7, 1], 0], [0, 0.25, 1.5, 2.6, 0], atol=1e-9)
     np.testing.assert_allclose(lowest[[11, 10, 8, 7, 1], 0], [0, 0.25, 0, 0, 0], atol=1e-9)
 
@@ -47,11 +38,11 @@ def test_the_rule_calls_road_up_to_a_quarter_metre_and_car_up_to_a_vans_height()
     """Beyond the last limit it is a building; a lone high return is its own ground; without a return it is road."""
     highest = np.array([[0.0, 0.25, 0.26, 2.2, 2.21, np.nan]])
     assert height_rule(np.stack([highest, highest])).tolist() == [[ROAD, ROAD, CAR, CAR, BUILDING, ROAD]]
-    assert height_rule(above_ground(_street(), SPEC))[[8, 7, 1], 0].tolist() == [CAR, BUILDING, ROAD]
+    assert height_rule(scan_heights(_street(), SPEC))[[8, 7, 1], 0].tolist() == [CAR, BUILDING, ROAD]
 
 
 def test_channels_are_finite_and_say_where_a_return_is():
-    channels = height_channels(np.array([[[10.0, np.nan]], [[1.0, np.nan]]]))
+    channels = height_channels(np.array([[[1.0, np.nan]], [[10.0, np.nan]]]))
     np.testing.assert_allclose(channels[:, 0], [[2.0, 0], [0.4, 0], [1, 0]])
 
 

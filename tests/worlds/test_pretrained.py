@@ -58,6 +58,13 @@ def test_shuffled_weights_have_the_same_values_in_another_order():
     assert not torch.equal(taught["_conv_stem.weight"], shuffled["_conv_stem.weight"])
 
 
+def test_the_control_leaves_the_normalisation_out_and_changes_nothing_else():
+    with_norm, without = (imagenet.start_from(FRESH, 3, normalised) for normalised in (True, False))
+    assert not any(isinstance(layer, torch.nn.BatchNorm2d) for layer in without.lateral.modules())
+    for (convolution, _), alone in zip(with_norm.lateral, without.lateral, strict=True):
+        assert torch.equal(convolution.weight, alone.weight)
+
+
 def test_maps_of_pretrained_weights_are_three_to_seven_times_as_large():
     frame = sample_drive()[0]
     image = torch.tensor(resize_image(frame.image, imagenet.SIZE)).permute(2, 0, 1)[None] / 255

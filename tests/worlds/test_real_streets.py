@@ -74,13 +74,16 @@ MEAN_OF_THREE = "simulated, then real, mean of three image networks"
 
 @pytest.fixture
 def small(monkeypatch, streets):
-    """Two cameras, and three ways: one takes two steps, one of them with simulated frames; one fuses its scores."""
+    """Two cameras, four ways: two steps, one with simulated frames; one fuses their scores; one sees heights."""
     once = WayToTrain(Architecture(), params=TrainingParams(1, 1), with_simulated=True)
+    tall = WayToTrain(Architecture(uses_heights=True, image_size=(48, 160)), params=TrainingParams(0, 1))
     mean = WayToTrain(Architecture(), mean_of="once", params=TrainingParams(0, 1, end_to_end=False))
     monkeypatch.setattr(real_streets.TrainingSet, "by_camera", lambda *_: [streets])
     monkeypatch.setattr(real_streets, "CAMERAS", ("front_camera", "left_camera"))
     monkeypatch.setattr(
-        real_streets, "WAYS", {"as shipped": WayToTrain(Architecture(), "segnet"), "once": once, "mean": mean}
+        real_streets,
+        "WAYS",
+        {"as shipped": WayToTrain(Architecture(), "segnet"), "once": once, "mean": mean, "tall": tall},
     )
     chosen = {"left_out": [["left_camera"], ["front_camera"]], "later": ["once", "mean"], "seeds": 1}
     monkeypatch.setattr(real_streets, "TABLE", real_streets.TABLE | chosen)
@@ -91,11 +94,13 @@ def test_every_way_is_scored_and_a_run_that_has_ended_is_not_repeated(small, roo
     result = compare_real(root, SCENE, "simulated", tmp_path)
     (by_side, in_time), runs = result["scores"].values(), sorted((tmp_path / SCENE).glob(f"*/{WEIGHTS}"))
     learned = ["once", "once + CRF", "mean", "mean + CRF"]
-    assert list(by_side) == [STATE_TABLE, "as shipped", "as shipped + CRF", *learned]
+    tall = ["tall", "tall + CRF"]
+    assert list(by_side) == [STATE_TABLE, "as shipped", "as shipped + CRF", *learned, *tall]
     assert list(in_time) == [STATE_TABLE, *learned]
     assert len({scores["cells"] for scores in by_side.values()}) == 1
     rounds = [f"{LEFT_OUT} 0", f"{LEFT_OUT} 1", f"{LATER} 0"]
-    assert [run.parent.name for run in runs] == [f"{one}, {way}, 0" for one in rounds for way in ("mean", "once")]
+    names = [f"{one}, {way}, 0" for one in rounds for way in ("mean", "once", "tall")]
+    assert [run.parent.name for run in runs] == names[:-1]  # "tall" isn't tried on later frames
     assert list(by_side["once"]["cameras"]) == ["left_camera", "front_camera"]
     assert sorted(root.rglob("*")) == before
     written = [run.stat().st_mtime_ns for run in runs]

@@ -134,6 +134,8 @@ def train(
     out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
     segmenter: Annotated[str, typer.Option(help="The image network.")] = "segnet",
     preset: Annotated[str, typer.Option(help="compact or paper (published size, 0.2 m cells).")] = "compact",
+    heights: Annotated[bool, typer.Option("--heights", help="Let the fusion see the heights of returns.")] = False,
+    image_size: Annotated[str | None, typer.Option(help="Height x width of the images, such as 192x640.")] = None,
     imagenet: Annotated[
         str | None, typer.Option(help="ImageNet weights to start from: a file; for efficientnet `installed`.")
     ] = None,
@@ -156,11 +158,12 @@ def train(
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
     from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
-    from semgrid_edu.workshop.training_run import chosen_truth, train_network, training_params
+    from semgrid_edu.workshop.training_run import chosen_size, chosen_truth, train_network, training_params
 
+    kind = {"preset": preset, "uses_heights": heights, "image_size": chosen_size(image_size)}
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
-    choices = {"preset": preset, "imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
+    choices = kind | {"imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
     train_network(data, out, segmenter, params, seed, resume, start=start or (), half=half, **choices)
 
 

@@ -25,7 +25,8 @@ class Contributions:
     that the convolutions carry to this one are included. In evaluation mode the fusion network consists of
     convolutions, shifts, ReLUs and maxima, so near its present input it is linear plus a constant. The parts are the
     linear share, without any approximation. The constant, `rest`, comes from the biases and the batch normalisations:
-    it is what the network says whatever the input, as long as the same ReLUs are active.
+    it is what the network says whatever the input, as long as the same ReLUs are active. Of a network that sees the
+    heights of returns, `rest` also has their part.
 
     A part isn't the change that follows if its input is removed, because then other ReLUs would be active. Parts of
     opposite signs can be much larger than the score that they sum to. Then they say little about causes.
@@ -82,7 +83,9 @@ class Contributions:
         return Contributions(*(part[..., *cell] for part in (self.score, self.planes, self.classes, self.occupancy)))
 
 
-def contributions(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> Contributions:
+def contributions(
+    net: SemanticGridNet, scores: NDArray, occupancy: NDArray, heights: NDArray | None = None
+) -> Contributions:
     """Split the logit of every class in every cell into the parts of planes, image classes and occupancy.
 
     A backward pass would give the gradient of a single logit, and there are C H W of them. Forward-mode differentiation
@@ -97,6 +100,8 @@ def contributions(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> 
         s, the image network's scores.
     occupancy : (4, H, W) float32
         o, the probabilities of the four states.
+    heights : (2, H, W) float32, optional
+        The lowest and the highest return of each cell, for a network with `uses_heights`.
 
     Returns
     -------
@@ -110,8 +115,14 @@ def contributions(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> 
     """
     if net.training:
         raise ArgumentError("net", "a network in evaluation mode, see `net.eval()`", "one in training mode")
-    planes, o = fusion_inputs(net, scores, occupancy)
-    reduce, joined, last_layers = net.fusion.reduce, net.fusion.joined, net.fusion.conv_deconv
+    planes, o, *scan = fusion_inputs(net, scores, occupancy, heights)
+    last_layers = net.fusion.conv_deconv
+
+    def reduce(planes: Tensor) -> Tensor:
+        return net.fusion.reduce(planes, *scan)
+
+    def joined(reduced: Tensor, o: Tensor) -> Tensor:
+        return net.fusion.joined(reduced, o, *scan)
 
     def change_of_reduced(group: Tensor) -> Tensor:
         return jvp(reduce, (planes,), (planes * group[..., None, None],))[1]
@@ -134,7 +145,9 @@ def contributions(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> 
     return Contributions(logits, *np.split(parts, [n_planes, n_planes + n_scores]))
 
 
-def fusion_inputs(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> tuple[Tensor, Tensor]:
+def fusion_inputs(
+    net: SemanticGridNet, scores: NDArray, occupancy: NDArray, heights: NDArray | None = None
+) -> tuple[Tensor, ...]:
     """Return what the fusion network is given in a frame. Parameters are those of `contributions`.
 
     Returns
@@ -143,10 +156,13 @@ def fusion_inputs(net: SemanticGridNet, scores: NDArray, occupancy: NDArray) -> 
         p, the scores on the planes.
     occupancy : (1, 4, H, W) float32
         o.
+    heights : (1, 2, H, W) float32
+        Only for a network with `uses_heights`.
     """
+    given = (scores, occupancy, heights) if net.uses_heights else (scores, occupancy)
+    scores, *scan = (torch.tensor(np.asarray(part, np.float32))[None] for part in given)
     with torch.no_grad():
-        planes = net.sampler(torch.tensor(np.asarray(scores, np.float32))[None])
-    return planes, torch.tensor(np.asarray(occupancy, np.float32))[None]
+        return net.sample(scores), *scan
 
 
 def _plane_groups(n_scores: int, n_planes: int) -> Tensor:

@@ -22,7 +22,7 @@ from semgrid_edu.labels import IGNORE, LABEL_SETS
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.pipeline import FrameResult
-from semgrid_edu.planes import plane_pixels
+from semgrid_edu.planes import cell_heights, plane_pixels
 from semgrid_edu.workshop.demo.contributions import Contributions, contributions, fusion_inputs
 from semgrid_edu.workshop.demo.evidence import (
     VERDICTS,
@@ -116,12 +116,13 @@ def frame_story(result: FrameResult, net: SemanticGridNet, past: Sequence[tuple[
     if net.training:
         raise ArgumentError("net", "a network in evaluation mode, see `net.eval()`", "one in training mode")
     net = with_fast_sampler(net)
+    inputs = result.scores, o, cell_heights(result.frame.points_grid, spec)
     with torch.no_grad():
-        logits = net.fusion(*fusion_inputs(net, result.scores, o))[0]
+        logits = net.fusion(*fusion_inputs(net, *inputs))[0]
     apart = np.abs(softmax(logits.numpy(), axis=0) - result.grid).max()
     if apart > TOLERANCE:
         raise ArgumentError("net", "the network that made the result", f"one whose probabilities are {apart:.3f} apart")
-    parts = contributions(net, result.scores, o)
+    parts = contributions(net, *inputs)
     labels = result.frame.labels
     truth = np.full(spec.shape, IGNORE) if labels is None else grid_truth(labels, o, spec).astype(np.int64)
     label, second = np.argsort(-result.grid, axis=0, kind="stable")[:2]

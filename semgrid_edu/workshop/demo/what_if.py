@@ -14,6 +14,7 @@ from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import State
 from semgrid_edu.occupancy.steps import NOTHING_KNOWN
 from semgrid_edu.pipeline import FrameResult
+from semgrid_edu.planes import cell_heights
 from semgrid_edu.workshop.demo.contributions import fusion_inputs
 from semgrid_edu.workshop.demo.evidence import pixel_truth
 
@@ -39,18 +40,21 @@ def what_if(result: FrameResult, net: SemanticGridNet) -> dict[str, NDArray[np.i
     Returns
     -------
     dict of str to (H, W) int64
-        "no image": all scores are zero. "no occupancy": no scan was ever taken. And where the frame has labels, "true
-        image" (`right_scores`), "true occupancy" (`right_occupancy`) and "both true". Nothing else changes.
+        "no image": all scores are zero. "no occupancy": no scan was ever taken, so there are no heights either. And
+        where the frame has labels, "true image" (`right_scores`), "true occupancy" (`right_occupancy`) and "both true".
+        Nothing else changes.
     """
     s, o, labels = result.scores, result.belief.probability, result.frame.labels
+    spec = net.need_architecture().grid
+    z = cell_heights(result.frame.points_grid, spec)
     changed = {
-        NO_IMAGE: (np.zeros_like(s), o),
-        NO_OCCUPANCY: (s, np.broadcast_to(NOTHING_KNOWN[:, None, None], o.shape)),
+        NO_IMAGE: (np.zeros_like(s), o, z),
+        NO_OCCUPANCY: (s, np.broadcast_to(NOTHING_KNOWN[:, None, None], o.shape), np.full_like(z, np.nan)),
     }
     if labels is not None:
         true_s = right_scores(s, pixel_truth(labels, s.shape[1:]))
-        true_o = right_occupancy(o, labels, net.need_architecture().grid)
-        changed |= {TRUE_IMAGE: (true_s, o), TRUE_OCCUPANCY: (s, true_o), TRUE_BOTH: (true_s, true_o)}
+        true_o = right_occupancy(o, labels, spec)
+        changed |= {TRUE_IMAGE: (true_s, o, z), TRUE_OCCUPANCY: (s, true_o, z), TRUE_BOTH: (true_s, true_o, z)}
     with torch.no_grad():
         logits = {name: net.fusion(*fusion_inputs(net, *inputs))[0] for name, inputs in changed.items()}
     return {name: values.argmax(dim=0).numpy() for name, values in logits.items()}

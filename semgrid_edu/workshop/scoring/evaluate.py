@@ -11,6 +11,7 @@ from semgrid_edu.fast import TrainingSet, load_net
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet
+from semgrid_edu.networks.weights import read_architecture
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions, save_confusions
@@ -55,13 +56,14 @@ def evaluate(
     Raises
     ------
     ArgumentError
-        When the data set lacks a split, or the network expects other grids or images.
+        When the data set lacks a split, or the network expects other grids.
     DataError
         When a file is missing or damaged.
     StageError
         When `refine` raises an error, or its result isn't probabilities.
     """
-    training, test = TrainingSet(dataset_dir, "train"), TrainingSet(dataset_dir, "test")
+    size = read_architecture(weights).image_size
+    training, test = (TrainingSet(dataset_dir, split, image_size=size) for split in ("train", "test"))
     net = load_net(weights, test.camera)
     segmenters = {"end-to-end": net.segmenter}
     image_stage = Path(weights).with_name(IMAGE_STAGE)

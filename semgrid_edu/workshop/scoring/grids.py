@@ -87,7 +87,10 @@ def learned_log_g(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
     sample : Sample
         The frame.
     """
-    return net(unit_image(sample.image)[None], sample.occupancy[None])[0].log_softmax(dim=0).numpy()
+    scan = [sample.occupancy[None]]
+    if getattr(net, "uses_heights", False) and sample.heights is not None:
+        scan.append(sample.heights[None])
+    return net(unit_image(sample.image)[None], *scan)[0].log_softmax(dim=0).numpy()
 
 
 def crf_refinement(cell: float) -> Refine:

@@ -1,0 +1,109 @@
+"""Fusion that knows the heights of the returns: the edge from l to g, which the paper leaves out (section 3.4)."""
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor, nn
+
+from semgrid_edu.networks.conv_deconv import ConvDeconv
+from semgrid_edu.networks.fusion import FusionNet, no_scan
+from semgrid_edu.networks.segmenter import fresh_weights
+from semgrid_edu.occupancy import N_STATES
+from semgrid_edu.planes import above_ground, pick_planes
+
+HIGHEST, HALF = 5.0, 2.5
+"""Metres: heights above the ground are clipped to 5 m, and divided by half of that, so that they are 0..2."""
+
+
+class ReturnsFusion(nn.Module):
+    """Fuse the image's scores at the heights of the scan's returns with occupancy grid and heights: (p, o, l) -> g.
+
+    The four numbers of o don't say how high a cell is occupied, and D planes of scores are many to learn from few
+    frames. Here the scan chooses the planes: nothing reduces them, and the conv-deconv network sees the scores at each
+    cell's lowest and highest return, the occupancy grid, how far both are above the ground, and whether there is any.
+
+    Parameters
+    ----------
+    n_scores : int
+        Number of classes scored on the planes.
+    heights : (D,) float
+        delta_i, the heights of the planes, from the lowest up, metres.
+    n_classes : int
+        C, the number of classes of the semantic grid.
+    seed : int
+        Seed for the initial weights.
+    uses_occupancy : bool
+        Whether the network sees the occupancy grid. Otherwise it sees UNKNOWN in every cell, and still the heights.
+    """
+
+    def __init__(
+        self, n_scores: int, heights: Sequence[float], n_classes: int, seed: int = 0, uses_occupancy: bool = True
+    ) -> None:
+        super().__init__()
+        self.plane_heights = tuple(heights)
+        self.uses_occupancy = uses_occupancy
+        n_in = 2 * n_scores + N_STATES + 3
+        with fresh_weights(self, seed):
+            self.conv_deconv = ConvDeconv(n_in, n_classes, FusionNet.WIDTHS, FusionNet.DEPTHS, skips=True)
+
+    def forward(self, planes: Tensor, occupancy: Tensor, heights: Tensor) -> Tensor:
+        """Return the logits of the semantic grid; a soft-max over C makes them probabilities.
+
+        Parameters
+        ----------
+        planes : (B, C, D, H, W) float
+            p, the image's class probabilities on the planes.
+        occupancy : (B, 4, H, W) float
+            o, the probabilities of the four states; they sum to 1 in each cell.
+        heights : (B, 2, H, W) float
+            The lowest and the highest return of each cell, from `cell_heights`.
+
+        Returns
+        -------
+        (B, C, H, W) float
+            g before the soft-max.
+        """
+        return self.fuse(self.reduce(planes, heights), occupancy, heights)
+
+    def reduce(self, planes: Tensor, heights: Tensor) -> Tensor:
+        """Pick the scores at the heights of the returns. Parameters are those of `ReturnsFusion.forward`.
+
+        Returns
+        -------
+        (B, 2 n_scores, 1, H, W) float
+            From `pick_planes`.
+        """
+        return pick_planes(planes, heights, self.plane_heights).unsqueeze(2)
+
+    def fuse(self, reduced: Tensor, occupancy: Tensor, heights: Tensor) -> Tensor:
+        """Return the logits, as `forward` does, from scores that are already picked.
+
+        Parameters
+        ----------
+        reduced : (B, 2 n_scores, 1, H, W) float
+            The result of `reduce`.
+        occupancy : (B, 4, H, W) float
+            o, the probabilities of the four states; they sum to 1 in each cell.
+        heights : (B, 2, H, W) float
+            The lowest and the highest return of each cell, from `cell_heights`.
+
+        Returns
+        -------
+        (B, C, H, W) float
+            g before the soft-max.
+        """
+        return self.conv_deconv(self.joined(reduced, occupancy, heights))
+
+    def joined(self, reduced: Tensor, occupancy: Tensor, heights: Tensor) -> Tensor:
+        """Append occupancy and heights to the picked scores. Parameters are those of `ReturnsFusion.fuse`.
+
+        Returns
+        -------
+        (B, 2 n_scores + 4 + 3, H, W) float
+            The input of the conv-deconv network.
+        """
+        if not self.uses_occupancy:
+            occupancy = no_scan(occupancy)
+        above = above_ground(heights).nan_to_num(nan=0.0).clamp(0, HIGHEST) / HALF
+        has_return = ~heights[:, :1].isnan()
+        return torch.cat([reduced.squeeze(2), occupancy, above, has_return.to(above.dtype)], dim=1)

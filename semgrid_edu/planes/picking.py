@@ -1,0 +1,74 @@
+"""Scores on the planes at the heights of the scan's returns: the scan says which planes to look at (section 3.4)."""
+
+from collections.abc import Sequence
+
+import torch
+import torch.nn.functional as F
+from torch import Tensor
+
+NEIGHBOURS = 9
+"""Side of the square of cells whose lowest return is taken for the ground: 4.5 m in cells of 0.5 m."""
+
+
+def above_ground(heights: Tensor) -> Tensor:
+    """Return how far returns are above the lowest one within 9 x 9 cells, metres; NaN in a cell without a return.
+
+    Parameters
+    ----------
+    heights : (..., 2, H, W) float
+        The lowest and the highest return of each cell, from `cell_heights`.
+
+    Returns
+    -------
+    (..., 2, H, W) float
+    """
+    lowest = heights[..., :1, :, :].nan_to_num(nan=torch.inf)
+    ground = -F.max_pool2d(-lowest, NEIGHBOURS, stride=1, padding=NEIGHBOURS // 2)
+    return heights - ground
+
+
+def pick_planes(planes: Tensor, z: Tensor, heights: Tensor | Sequence[float]) -> Tensor:
+    """Return the scores at two heights of each cell, linear between the planes below and above.
+
+    Below the lowest plane and above the highest one these planes themselves are taken, and in a cell without a return
+    the ground.
+
+    Parameters
+    ----------
+    planes : (B, C, D, H, W) float
+        p, the image's scores on the planes.
+    z : (B, 2, H, W) float
+        Two heights of each cell, metres above flat ground, from `cell_heights`; NaN without a return.
+    heights : (D,) float
+        delta_i, the heights of the planes, from the lowest up, metres.
+
+    Returns
+    -------
+    (B, 2C, H, W) float
+        The scores of the C classes at the first height, then those at the second.
+
+    Examples
+    --------
+    A score of 4 on the ground and 8 one metre above it, looked up at 0.25 m and at 3 m:
+
+    >>> planes = torch.tensor([4.0, 8.0]).reshape(1, 1, 2, 1, 1)
+    >>> pick_planes(planes, torch.tensor([0.25, 3.0]).reshape(1, 2, 1, 1), [0.0, 1.0]).ravel()
+    tensor([5., 8.])
+    """
+    heights = torch.as_tensor(heights, dtype=z.dtype, device=z.device)
+    z = z.nan_to_num(nan=0.0).clamp(heights[0], heights[-1]).contiguous()
+    above = torch.searchsorted(heights, z)
+    below = (above - 1).clamp(min=0)
+    distance = heights[above] - heights[below]  # zero on the lowest plane, which is both
+    share = (z - heights[below]) / distance.where(distance > 0, 1)
+    picked = [
+        torch.lerp(_on_plane(planes, below[:, k]), _on_plane(planes, above[:, k]), share[:, k, None].to(planes.dtype))
+        for k in range(2)
+    ]
+    return torch.cat(picked, dim=1)
+
+
+def _on_plane(planes: Tensor, number: Tensor) -> Tensor:
+    """Return the scores (B, C, H, W) on the plane whose number (B, H, W) each cell has."""
+    index = number[:, None, None].expand(-1, planes.shape[1], -1, -1, -1)
+    return planes.gather(2, index).squeeze(2)

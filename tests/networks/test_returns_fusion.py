@@ -1,0 +1,103 @@
+"""Fusion that knows the heights of the returns."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from safetensors import safe_open
+
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import with_fast_sampler
+from semgrid_edu.grid import GridSpec
+from semgrid_edu.networks import Architecture, build_net, load_net, save_net
+from semgrid_edu.planes import above_ground, pick_planes
+
+SMALL = Architecture(image_size=(24, 80), grid=GridSpec(2, 26, -6, 6, 1.0), heights=(0.0, 0.5, 1.0), uses_heights=True)
+
+
+@pytest.fixture
+def net(camera):
+    return build_net(SMALL, camera, seed=3).eval()
+
+
+@pytest.fixture
+def inputs():
+    """Image, occupancy, and heights from -0.5 to 6 m, a third of them missing, of two frames."""
+    rng = torch.Generator().manual_seed(0)
+    shape = SMALL.grid.shape
+    lowest, more = torch.rand(2, 2, 1, *shape, generator=rng)
+    heights = torch.cat([lowest - 0.5, lowest - 0.5 + 5.5 * more], dim=1)
+    heights[(torch.rand(2, 1, *shape, generator=rng) < 1 / 3).expand(-1, 2, -1, -1)] = torch.nan
+    occupancy = torch.rand(2, 4, *shape, generator=rng).softmax(dim=1)
+    return torch.rand(2, 3, *SMALL.image_size, generator=rng), occupancy, heights
+
+
+def test_the_conv_deconv_network_sees_picked_probabilities_states_and_heights(net, inputs):
+    image, occupancy, heights = inputs
+    seen = net.stages(image, occupancy, heights=heights)
+    torch.testing.assert_close(seen.planes, net.sampler(seen.scores.softmax(dim=1)))
+    picked = pick_planes(seen.planes, heights, SMALL.heights)
+    above = above_ground(heights).nan_to_num(0).clamp(0, 5) / 2.5
+    joined = torch.cat([picked, occupancy, above, (~heights[:, :1].isnan()).float()], dim=1)
+    assert joined.shape[1] == 2 * 14 + 4 + 3
+    torch.testing.assert_close(seen.logits, net.fusion.conv_deconv(joined))
+    assert torch.equal(seen.logits, net(image, occupancy, heights))
+
+
+def test_mirrored_it_sees_the_mirror_of_everything(net, inputs):
+    image, occupancy, heights = inputs
+    seen = net.stages(image, occupancy, mirrored=True, heights=heights)
+    mirror = net.fusion(*(part.flip(-1) for part in (seen.planes, occupancy, heights)))
+    torch.testing.assert_close(seen.logits, mirror.flip(-1))
+    assert not torch.allclose(seen.logits, net(image, occupancy, heights))
+
+
+def test_every_input_matters_and_a_larger_image_score_alone_does_not(net, inputs):
+    image, occupancy, heights = inputs
+    logits = net(image, occupancy, heights)
+    assert not torch.allclose(logits, net(image.flip(-1), occupancy, heights))
+    assert not torch.allclose(logits, net(image, occupancy.flip(1), heights))
+    assert not torch.allclose(logits, net(image, occupancy, heights + 1))  # other planes
+    scores = net.segment(image)
+    torch.testing.assert_close(net.sample(scores + 5), net.sample(scores))
+
+
+def test_the_fast_sampler_gives_the_same_logits(net, inputs):
+    torch.testing.assert_close(with_fast_sampler(net)(*inputs), net(*inputs), rtol=1e-4, atol=1e-4)
+
+
+def test_without_occupancy_it_still_sees_heights(camera, inputs):
+    blind = build_net(replace(SMALL, uses_occupancy=False), camera, seed=3).eval()
+    image, occupancy, heights = inputs
+    logits = blind(image, occupancy, heights)
+    assert torch.equal(logits, blind(image, occupancy.flip(1), heights))
+    assert not torch.allclose(logits, blind(image, occupancy, heights.flip(-1)))
+
+
+def test_weights_come_back_bit_for_bit(net, camera, tmp_path, inputs):
+    save_net(net, tmp_path / "net.safetensors")
+    loaded = load_net(tmp_path / "net.safetensors", camera)
+    assert loaded.architecture == SMALL
+    assert torch.equal(loaded(*inputs), net(*inputs))
+
+
+def test_other_networks_ignore_heights_and_their_files_do_not_mention_them(camera, tmp_path, inputs):
+    usual = build_net(replace(SMALL, uses_heights=False), camera, seed=3).eval()
+    assert torch.equal(usual(*inputs), usual(*inputs[:2]))
+    save_net(usual, tmp_path / "net.safetensors")
+    with safe_open(tmp_path / "net.safetensors", "pt") as file:
+        assert "uses_heights" not in str(file.metadata())
+
+
+@pytest.mark.parametrize("spoil", [lambda heights: None, lambda heights: heights[:, :1], lambda heights: heights[:1]])
+def test_missing_and_misshapen_heights_are_refused(net, inputs, spoil):
+    image, occupancy, heights = inputs
+    with pytest.raises(ArgumentError, match=r"heights: expected shape \(2, 2, 24, 12\).*uses the heights of returns"):
+        net(image, occupancy, spoil(heights))
+    with pytest.raises(ArgumentError, match="heights: "):
+        net.fuse(torch.rand(2, 14, 3, 24, 12), occupancy, heights=spoil(heights))
+
+
+def test_planes_in_any_other_order_are_refused():
+    with pytest.raises(ArgumentError, match="heights: expected planes from the lowest up"):
+        replace(SMALL, heights=(0.5, 0.0))

@@ -1,0 +1,91 @@
+"""Stages of a network that sees the heights of the scan's returns."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from tiny_drive import DATE, write_tiny_drive
+
+from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast import build_net
+from semgrid_edu.networks import Architecture
+from semgrid_edu.occupancy import CmcdotParams
+from semgrid_edu.pipeline import StageError, Stages, network_image, run_frame, run_pipeline
+from semgrid_edu.planes import cell_heights
+
+FEW = CmcdotParams(n_particles=2000)
+ARCHITECTURE = Architecture(uses_heights=True)
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory):
+    root = tmp_path_factory.mktemp("drive")
+    write_tiny_drive(root)
+    return KittiRawDrive(root, DATE, "0001")
+
+
+@pytest.fixture(scope="module")
+def net(drive):
+    return build_net(ARCHITECTURE, drive.camera, seed=3).eval()
+
+
+def even(p, o):
+    return np.full((14, *o.shape[1:]), -np.log(14), np.float32)
+
+
+def test_a_frame_gets_the_grid_of_the_network_and_the_book_equals_the_fast_stages(drive, net):
+    frame = drive[0]
+    fast, book = (run_frame(frame, make(net, FEW)) for make in (Stages.fast, Stages.of))
+    for result in (fast, book):
+        heights = torch.from_numpy(cell_heights(frame.points_grid, ARCHITECTURE.grid)).float()
+        image = torch.from_numpy(network_image(frame, ARCHITECTURE.image_size))
+        with torch.inference_mode():
+            logits = net(image[None], torch.from_numpy(result.belief.probability)[None], heights[None])
+        np.testing.assert_allclose(result.grid, logits[0].softmax(dim=0).numpy(), atol=1e-5)
+    np.testing.assert_allclose(fast.grid, book.grid, atol=1e-3)
+    (checked,) = run_pipeline([frame], net, FEW)
+    np.testing.assert_array_equal(checked.grid, fast.grid)
+
+
+def test_the_returns_of_the_vehicle_itself_are_not_seen(drive, net):
+    frame = drive[0]
+    ghosts = np.array([[x, y, 3.0, 0.5] for x in np.arange(2.2, 40, 0.5) for y in np.arange(-9.7, 10, 0.5)], np.float32)
+    mine = np.arange(len(frame.points) + len(ghosts)) >= len(frame.points)
+    marked = replace(frame, points=np.concatenate([frame.points, ghosts]), vehicle_returns=mine)
+    stages = Stages.fast(net, FEW)
+    np.testing.assert_array_equal(stages.heights(marked), stages.heights(frame))
+
+
+def test_a_stage_of_ones_own_gets_heights_only_if_it_asks(drive, net):
+    frame, given = drive[0], []
+
+    def asks(p, o, heights):
+        given.append(heights)
+        return even(p, o)
+
+    def optional(p, o, scale=1.0):
+        given.append(scale)
+        return even(p, o)
+
+    for fuse in (even, asks, optional):
+        (result,) = run_pipeline([frame], replace(Stages.fast(net, FEW), fuse=fuse))
+        np.testing.assert_allclose(result.grid, 1 / 14, rtol=1e-5)
+    heights, scale = given
+    np.testing.assert_array_equal(heights, cell_heights(frame.points_grid, ARCHITECTURE.grid))
+    assert scale == 1.0
+
+
+def test_errors_of_a_stage_that_asks_for_heights(drive, net):
+    with pytest.raises(ArgumentError, match=r"fuse: expected a function fuse\(p, o\).*found fuse\(p, heights\)"):
+        Stages(fuse=lambda p, heights: even(p, heights))
+    stages = replace(Stages.fast(net, FEW), fuse=lambda p, o, heights: heights)
+    with pytest.raises(StageError, match=r"fuse .*expected shape \(14, 142, 62\)"):
+        next(run_pipeline(drive, stages))
+
+
+def test_stages_of_networks_whose_planes_hold_other_numbers_are_not_mixed(net, drive):
+    usual = Stages.fast(build_net(Architecture(), drive.camera).eval(), FEW)
+    with pytest.raises(ArgumentError, match="architecture"):
+        Stages(fuse=even, architecture=ARCHITECTURE).over(usual)
