@@ -36,6 +36,7 @@ DEMO = f"demo --kitti TINY --date {DATE} --drive 0001 --out OUT"
 TRAIN = "train --data TINY --out OUT"
 EVALUATE = "evaluate --data TINY --weights weights.safetensors --out scores.json"
 FETCH = "data fetch kitti --drive 2011_09_26_0013 --folder OUT"
+FROM_BAG, TOPICS = "data from-bag", "--image /camera --points /points --odometry /odometry --lidar-height 1.7"
 TABLE1 = "reproduce table1 --runs RUNS --out OUT --plan"
 CHECK = "reproduce check OUT"
 
@@ -588,6 +589,11 @@ DATA = (
         text("OUT/sample/simulation.json", DEEP),
     ),
     Row("an empty folder's name", "data make sample ''", "argument 4: expected a value"),
+    Row("no bag there", f"{FROM_BAG} NONE.bag OUT {TOPICS}", "NONE.bag: expected.*nothing"),
+    Row("a drive in place of a bag", f"{FROM_BAG} TINY OUT {TOPICS}", "TINY: expected.*without metadata.yaml"),
+    Row(
+        "a LIDAR below the ground", f"{FROM_BAG} TINY OUT {TOPICS} --lidar-height -1", "--lidar-height: expected metres"
+    ),
     Row("an unknown archive", "data fetch nuscenes --drive 2011_09_26_0013 --folder OUT", "expected kitti or pandaset"),
     Row("a drive of scenes", "data fetch pandaset --drive 2011_09_26_0013", "--drive: expected no drive of PandaSet"),
     Row("a drive that is no date", "data fetch kitti --drive 13 --folder OUT", "drive: expected date and number"),

@@ -99,7 +99,8 @@ def rescored(net: SemanticGridNet, camera: Camera, some: Streets) -> Streets:
 
 def training_streets(net: SemanticGridNet, camera: Camera) -> Streets:
     """Return the six shipped training frames. Parameters are those of `streets`."""
-    image, _, o, truth = map(torch.stack, zip(*sample_frames(), strict=True))
+    frames = sample_frames()
+    image, o, truth = (torch.stack([getattr(one, name) for one in frames]) for name in ("image", "occupancy", "truth"))
     return streets(net, camera, unit_image(image), o, truth)
 
 

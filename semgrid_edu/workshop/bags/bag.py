@@ -106,6 +106,8 @@ def open_bag(path: Path) -> Iterator[Bag]:
     highlevel, typesys = needed("rosbags.highlevel"), needed("rosbags.typesys")
     if not path.exists():
         raise DataError(path, EXPECTED, "nothing of this name")
+    if path.is_dir() and not (path / "metadata.yaml").exists():
+        raise DataError(path, EXPECTED, "a folder without metadata.yaml")
     try:
         # Old bags of ROS 2 don't say what their messages consist of.
         reader = highlevel.AnyReader([path], default_typestore=typesys.get_typestore(typesys.Stores.LATEST))
