@@ -77,17 +77,21 @@ for name, share in held.items():
     print(f"{name:<14} after 1.6 s holds {100 * share:2.0f} % of the free road in B's lane occupied")
 other = filtered(fast.Cmcdot(spec, params, seed=1))
 moves = [b[16].probability.argmax(axis=0) == DYNAMIC for b in (by_bof, by_cmcdot, other)]
-print("cells called DYNAMIC: BOF {}, CMCDOT {}, ".format(*(m.sum() for m in moves)), end="")
-shared, by_luck = (moves[0] & moves[1]).sum(), (moves[1] & moves[2]).sum()
-print(f"both {shared}; CMCDOT and CMCDOT with other random numbers {by_luck}")
+alike = [100 * (a & b).sum() / (a | b).sum() for a, b in pairwise(moves)]
+cells = np.prod(spec.shape)
+kept = [cells * len(lattice) / 1e6, (4 * cells + 5 * params.n_particles) / 1e6]
+print("of the cells that either of two filters calls DYNAMIC, both do:")
+print(f"BOF and CMCDOT {alike[0]:.0f} %, CMCDOT and CMCDOT with other random numbers {alike[1]:.0f} %")
+print("numbers kept: BOF {:.1f} million, CMCDOT {:.1f} million".format(*kept))
 assert max(held["BOF"], held["CMCDOT"]) < 0.1 < 0.25 < held["log-odds grid"] < 0.35
-assert shared > 0.75 * moves[1].sum()
-assert abs(shared - by_luck) < 20
+assert 58 < alike[0] < 72 < 74 < alike[1] < 86
+assert 1.7 < kept[0] < 1.8 < 1.7 * kept[1] + 0.1
 
 # %% [markdown]
 # **A** overtakes us, **B** is the first of three cars that come towards us, **D** is parked. **C** is the road that B
-# has just left. The log-odds grid goes on holding it occupied. The two others have cleared it, and they call nearly the
-# same cells DYNAMIC: CMCDOT agrees with BOF as well as with itself under other random numbers. Why want another filter?
+# has just left. The log-odds grid goes on holding it occupied. The two others have cleared it. Of the cells that either
+# calls DYNAMIC, two thirds are DYNAMIC for both. Two runs of CMCDOT with other random numbers share four fifths. Why
+# want another filter?
 #
 # Count on a line first. Six cells with five velocities each are thirty numbers. Something moves in *one* of the cells.
 # Then most of the thirty numbers only repeat that nothing moves in the others.
@@ -97,7 +101,7 @@ assert abs(shared - by_luck) < 20
 #
 # <details><summary>Answer</summary>
 #
-# About 55,000 cells times 1,960 velocities: more than a hundred million, and each is shifted ten times a second.
+# About 55,000 cells times 1,960 velocities: more than a hundred million.
 #
 # </details>
 
@@ -117,14 +121,15 @@ assert numbers < 0.012 * cells * velocities
 # | FREE | nothing | still nothing, here | one number per cell |
 # | STATIC | something that stands | still here | one number per cell |
 # | DYNAMIC | something that moves | **elsewhere** | particles, and their sum in each cell |
-# | UNKNOWN | no scan has said anything | still unknown, here | one number per cell |
+# | UNKNOWN | nobody knows (any more) | still unknown, here | one number per cell |
 #
 # Only DYNAMIC leaves its cell, so only DYNAMIC needs velocities. A sample of them will do, spent where something may
 # move. It consists of **particles**. Each has a place, a velocity and a weight $w$, which is the probability that it
 # carries. The dynamic probability of a cell is the sum of the weights in it.
 #
-# We write $b_F, b_S, b_D, b_U$ for the belief of one cell. So a third filter is wanted because it says nearly what BOF
-# says, with a hundredth of the numbers.
+# We write $b_F, b_S, b_D, b_U$ for the belief of one cell. So a third filter is wanted because on the paper's grid it
+# keeps a hundredth of BOF's numbers. There we don't compare what the two find. On the small grid of our drive, where we
+# did, CMCDOT keeps 1.0 million numbers and BOF 1.7.
 #
 # ## What are the four steps?
 #
@@ -139,8 +144,7 @@ assert numbers < 0.012 * cells * velocities
 # | 4 resampling | "new particles" where something is new or moves | `resample` | `comb` |
 #
 # Before them the map has to follow our vehicle, by `move`. Here is one round of the filter for each scan. (`fast` has
-# compiled copies of the package's functions. The last argument of `predict` is our motion, for a rule about hedges that
-# we don't need here.)
+# compiled copies of the package's functions, whose docstrings count `move` as step 1.)
 
 
 # %%
@@ -165,7 +169,8 @@ same = by_cmcdot[16].probability.argmax(axis=0) == resampled.probability.argmax(
 assert same.mean() > 0.9
 
 # %% [markdown]
-# The package's `Cmcdot` is this loop on a larger map. Watch the overtaking car A go through one round:
+# The package's `Cmcdot` is this loop on a larger map, with a second update for what it hands out. Watch the
+# overtaking car A go through one round:
 
 # %% jupyter={"source_hidden": true} alt="four small maps of the overtaking car A: after step 1, a pale orange L with blurred borders; the scan, a black L of hits, pink where beams passed and white where none came; after steps 2 and 3, a sharp orange L; after step 4, blue particles with the same outline"
 fig, axes = plt.subplots(1, 4, figsize=(9.6, 3.9), layout="constrained", sharey=True)
@@ -174,9 +179,10 @@ lecture_04_pictures.legend_of_round(fig)
 plt.show()
 
 # %% [markdown]
-# - *Step 1.* The orange mass has flown ahead, and pales where its particles don't agree about the velocity.
-# - *Steps 2 and 3.* The scan is all one colour for whatever is in its way. The orange stays where there was a hit and
-#   goes where beams passed.
+# - *Step 1.* The orange mass has flown ahead. It pales, because its particles don't agree about the velocity and
+#   because every cell forgets a little.
+# - *Steps 2 and 3.* The scan knows hit and passed, but not *moves*. The orange stays where there was a hit and goes
+#   where beams passed.
 # - *Step 4.* The same mass on new particles.
 #
 # Moving needs one trick. We drive 0.4 m per scan, and a post stands in cell 3 of a row of cells of one metre. If each
@@ -205,9 +211,9 @@ for step in range(1, 6):
 # ## What if something arrives where something may stand?
 #
 # While $\Delta t$ passes without a scan, two things happen. First each cell forgets a little (the table left that out),
-# by the transition matrix of lecture 01: what is FREE or STATIC slowly turns UNKNOWN, and a sliver turns DYNAMIC. That
-# mass is **born**. (The matrix belongs to $\Delta t$: two steps of 0.05 s do what one of 0.1 s does.) Then the
-# particles fly.
+# by the transition matrix of lecture 01: what is FREE or STATIC slowly turns UNKNOWN, what is DYNAMIC faster, and
+# a sliver turns DYNAMIC. That mass is **born**. (The matrix belongs to $\Delta t$: two steps of 0.05 s do what one of
+# 0.1 s does.) Then the particles fly.
 #
 # Here is a line of cells of one metre. A tenth of a second passes. In cell 1 are two particles at 10 m/s and one at 2
 # m/s, all of one weight. In cell 3 is another one at 10 m/s. In cell 4 there may be a fence:
@@ -332,8 +338,8 @@ for _trial in range(20):  # the package's predict, with and without forgetting
 # ## What does a scan change?
 #
 # A return comes back from one cell. If the cell is occupied, this is four times as probable as if it is free. Half of
-# what is predicted for the cell is UNKNOWN. This isn't a kind of thing. It says that no scan has looked, and now one
-# does. So first share it out among the others, in the proportions in which things are found at **first sight**, here
+# what is predicted for the cell is UNKNOWN. This isn't a kind of thing. It says that nobody knows, and now a scan
+# looks. So first share it out among the others, in the proportions in which things are found at **first sight**, here
 # 0.6, 0.3, 0.1. Then Bayes' rule:
 #
 # ```
@@ -344,12 +350,13 @@ for _trial in range(20):  # the package's predict, with and without forgetting
 # divided by the sum     0.20    0.56    0.24     0       the sum is 0.5
 # ```
 #
-# **Predict before you run.** Which row changes the ratio of STATIC to DYNAMIC? What is it after ten more such scans?
+# **Predict before you run.** Which row changes the ratio of STATIC to DYNAMIC? What is it after ten more such scans,
+# if nothing happens between them?
 #
 # <details><summary>Answer</summary>
 #
-# Only *shared out*: two to one becomes seven to three. The evidence multiplies both by the same number, so the ratio is
-# the same after any number of scans.
+# Only *shared out*: two to one becomes seven to three. The evidence multiplies both by the same number, so the ratio
+# stays. Only what happens *between* scans can change it.
 #
 # </details>
 
@@ -380,26 +387,30 @@ for b, occupied, free in (((0.2, 0.2, 0.1, 0.5), 0.8, 0.2), ((0.2, 0.2, 0.1, 0.5
 # The particles take part with their weights. In the graph every path from $z_k$ to $q$ leads through $m_k$. So all
 # particles of a cell are multiplied by one number, whatever their velocity.
 #
-# If no scan tells STATIC from DYNAMIC, what does? Two parts of the filter could. *First sight*: an occupied cell that
-# nobody has seen before is STATIC rather than DYNAMIC, by fifteen to one. *Arrivals*: where a particle arrives in a
-# cell that is known to be FREE, $b_D$ rises, and the next hit confirms it.
+# If no scan tells STATIC from DYNAMIC, what does? *First sight* is a guess: an occupied cell that nobody has seen before
+# is STATIC rather than DYNAMIC, by fifteen to one. Then the particles fly. Where one *arrives* in a cell that is known to
+# be FREE, $b_D$ rises. Where one *leaves*, or *stops*, $b_D$ falls.
 #
-# We switch off each. Particles begin at first sight or at birth, so without both there are none. The last row is the
-# control: as many particles as ever, but they don't fly, so none arrives anywhere. While we drive, a wall, a parked car
-# and a car that comes at 8 m/s are scanned:
+# While we drive, a wall, a parked car and a car that comes at 8 m/s are scanned. "Nothing arrives": what leaves a cell
+# is lost. Four rows begin with the opposite guess, fifteen to one for DYNAMIC:
 
 # %% jupyter={"source_hidden": true}
 print("cells called DYNAMIC [%], mean of eight seeds    wall  parked car  coming car")
-for name, shares in lecture_04_crossing.arrivals().items():
-    wall, parked, car = shares.mean(axis=0)
+table = {name: shares.mean(axis=0) for name, shares in lecture_04_crossing.arrivals().items()}
+for name, (wall, parked, car) in table.items():
     print(f"{name:<47} {wall:5.0f} {parked:11.0f} {car:11.0f}")
-    assert (10 < wall < 20 and parked < 1) if "15:1" in name else shares[:, :2].max() < 3, name
-    assert (shares[:, 2].max() == 0) if "particles" in name else (shares[:, 2].min() > 70), name
+usual, lost, guess, no_stop, only_leave, nothing = table.values()
+assert usual[:2].max() < 2 < 75 < usual[2]
+assert lost.max() < 1
+assert guess[1] < 2 < 12 < guess[0] < 20 < 50 < no_stop[0] < 62
+assert only_leave.max() < 6 < 20 < no_stop[1] < 30
+assert nothing[:2].min() > 99
 
 # %% [markdown]
-# Whatever the odds of first sight, the car is DYNAMIC. Up to even odds this smooth wall is STATIC. Without particles
-# the car is missed, and with particles that don't fly as well. So a scan keeps the ratio, and here the *arrivals*
-# change it. But this car comes through cells that we have seen FREE. Remember that for the last section.
+# *Arrivals make the car DYNAMIC*: without them none of it is. *Leaving and stopping make the wall STATIC.* With the
+# opposite guess, and nothing that flies or stops, the wall and the parked car stay DYNAMIC. If particles may leave, but
+# not arrive or stop, both are nearly all STATIC. If they may arrive, too, half of the wall is DYNAMIC again, and stopping
+# removes most of that. But this car comes through cells that we have seen FREE. Remember that for the last section.
 #
 # ## Which particles go on?
 #
@@ -462,8 +473,8 @@ assert params.birth_share == 0.3
 #
 # Take four cells in a row, all FREE but cell 2. There something moves, to the left or to the right with one half each.
 # A scan has a hit in cell 3, and beams pass the three others. So the thing is hardly in cell 1. But a filter that keeps
-# each cell by itself only knows of cell 1 that a beam has passed there. Keeping a product of simple beliefs after each
-# step is called **assumed-density filtering**, and no number of particles mends it:
+# each cell by itself only knows of cell 1 that a beam has passed there. Lecture 03 called
+# this **assumed-density filtering**. More particles don't help, because they only sample what such a filter keeps:
 
 # %% jupyter={"source_hidden": true}
 row = ({}, {"left": 0.5, "right": 0.5}, {}, {})
@@ -477,24 +488,23 @@ assert min(bof[0, left], sampled[0, left]) > 4 * exact[0, left]
 
 # %% [markdown]
 # What do particles add to it? Call **bias** the root mean square error of BOF to the exact answer. Call sampling error
-# how far the particles scatter around BOF. The two are nearly independent, so their squares add:
+# how far the particles scatter around BOF. If they do it without a preference, the squares add:
 #
 # $$ \text{error}^2 \approx \text{bias}^2 + \text{sampling}^2, \qquad \text{sampling} \propto N^{-1/2} $$
 #
 # The scatter of a mean of $N$ draws falls like $N^{-1/2}$: four times as many, half of it. For CMCDOT:
 
-# %% jupyter={"source_hidden": true} alt="errors against the number of particles on logarithmic axes: the sampling error falls along a line of slope minus one half; the bias is a horizontal dashed line at 0.055; the error to the exact answer is near the curve of their sum, a little below it; it is above the bias at 10 particles and on it from 160 on"
-error = lecture_04_cmcdot.sampling_error(world, [10, 40, 160, 640], seeds=range(16))
+# %% jupyter={"source_hidden": true} alt="errors against the number of particles on logarithmic axes: the sampling error falls along a line of slope minus one half; the bias is a horizontal dashed line at 0.055; the error to the exact answer is on the curve of their sum; it is above the bias at 10 particles and on it from 160 on"
+error = lecture_04_cmcdot.sampling_error(world, [10, 40, 160, 640], seeds=range(100))
 lecture_04_pictures.draw_error(error)
 plt.show()
-assert np.abs(error.to_exact / np.hypot(error.bias, error.to_bof) - 1).max() < 0.08  # the squares add, nearly
+assert np.abs(error.to_exact / np.hypot(error.bias, error.to_bof) - 1).max() < 0.04  # the squares add
 assert -0.6 < error.slope < -0.4
 print(f"bias {error.bias:.3f}; sampling error with 10 particles {error.to_bof[0]:.3f}, with 640 {error.to_bof[-1]:.3f}")
 
 # %% [markdown]
-# With ten particles the sampling error is half of the bias. The error is above the bias, and five per cent below the
-# solid curve, the root of the sum: the two are *nearly* independent. With 640 only the bias is left. So no: more
-# particles bring CMCDOT to BOF, not to the truth.
+# With ten particles the sampling error is half of the bias, and the error is above the bias. With 640 only the bias is
+# left. So no: more particles bring CMCDOT to BOF, not to the truth.
 #
 # To sample only the motion and to sum the cells' states exactly is the idea of the **Rao-Blackwellised particle
 # filter**, and the "conditional Monte Carlo" in the filter's name. One thing is missing altogether: no variable says
@@ -511,8 +521,8 @@ print(f"bias {error.bias:.3f}; sampling error with 10 particles {error.to_bof[0]
 #
 # <details><summary>Answer</summary>
 #
-# The person suffers more. And no: a tenth of the particles finds nearly as much of the car. With a hundredth either is a
-# matter of luck.
+# The person suffers more. And no: a tenth of the particles finds nearly as much of the car. With a hundredth the
+# seed decides what is found of either.
 #
 # </details>
 
@@ -534,23 +544,20 @@ for name, found in changed.items():
 
 # %% jupyter={"source_hidden": true}
 walker = luck[3000][:, 1]
-large, running, beside_parked, creeping = changed.values()
+large, running, beside_parked = changed.values()
 for found in (large, running, beside_parked):
     assert found.mean() > walker.mean() + 3 * np.hypot(found.std(ddof=1), walker.std(ddof=1)) / 24**0.5
 assert running.mean() > 90
-assert creeping.mean() < luck[3000][:, 0].mean() - 20
-assert max(running.std(), beside_parked.std(), creeping.std()) < 10 < 15 < large.std() < walker.std()
+assert max(running.std(), beside_parked.std()) < 10 < 15 < large.std() < walker.std()
 
 # %% [markdown]
-# The mean rises for both, and the scatter shrinks. With 3,000 particles most of the car is DYNAMIC
-# in every run, but of the person it may be nearly all or nearly nothing. With 30,000 every run finds both. (The dark
-# bar behind the car lies in its shadow, where no beam contradicts it.)
+# (± is the standard deviation over the seeds.) The mean rises for both. With 3,000 particles most of the car is DYNAMIC
+# in every run, but of the person it may be nearly all or nearly nothing. With 30,000 every run finds both.
 #
 # Why the person? It is small, it is slow, and the car takes more than half of the particles. The lower rows change
 # one thing at a time. A walker four times as large across its way is found better. So is the same
-# small person who runs at 3 m/s, and so is the walker when the car is parked and takes none. A car that creeps at the
-# walker's 1.4 m/s is found less well than the fast one, but alike in nearly every run. So it is a matter of luck whether
-# something small *and* slow is found beside something large that moves.
+# small person who runs at 3 m/s, and so is the walker when the car is parked and takes none. So with too few particles it
+# is a matter of luck whether something small and slow is found beside something large that moves.
 #
 # So the smallest slow thing that you must not miss sets the number, on the busiest street.
 
@@ -596,13 +603,13 @@ assert abs(lecture_04_crossing.speed_ahead(real) - 2.4) < 0.1
 
 # %% [markdown]
 # At first the cars in lane E are STATIC. After about a second particles have arrived with them in cells that were seen
-# FREE, and they are DYNAMIC. On the right hardly a cell ever is. (The streak between the frames isn't counted.) But F,
-# which rolls at 2.4 m/s, stays dark. Why?
+# FREE, and they are DYNAMIC. On the right hardly a cell ever is. But F, which rolls at 2.4 m/s,
+# stays dark. Why?
 #
 # We see only F's rear. As it moves on, it arrives in cells that its own body has hidden, and that nobody has seen FREE.
 # In such cells two parts of the filter speak against motion:
 #
-# - **First sight**, as for the bus of lecture 03: what turns up in a cell that nobody has seen is STATIC, by fifteen to
+# - **First sight**: what turns up in a cell that nobody has seen is STATIC, by fifteen to
 #   one.
 # - **A rule that the paper doesn't have.** Real walls come into view piece by piece, and each new piece looks like
 #   something that arrives. So `occupancy/walls.py` looks back along each particle's path. If something STATIC is where
@@ -610,7 +617,7 @@ assert abs(lecture_04_crossing.speed_ahead(real) - 2.4) < 0.1
 #   piece of the wall. F was STATIC at first, and hides what is ahead of it. So the rule doubts F, too.
 #
 # Switch off each by itself, then both. In the control nothing is switched off, but the filter is told at the beginning
-# that F's way is free.
+# that the cells of F and of its way are free. There only the last scans are of use, when F has left its first place.
 #
 # **Predict before you run.** Will F be found in the control, although both are at work?
 #
@@ -643,22 +650,23 @@ assert 8 < stands["both"] < 10
 
 # %% [markdown]
 # As it is, F is hardly found. Even odds help at once, without the rule F is found late, and either alone leaves more
-# than half of F dark to the end. With both switches most of F is DYNAMIC. Which of them counts more can't be told here:
+# than half of F dark to the end. With both switches most of F is DYNAMIC, but a third stays dark,
+# and we haven't looked for its cause. Which of them counts more can't be told here:
 # F has about fifteen cells, and from 1 s on the two curves differ by about one cell. In the control F is found as well,
 # although nothing is switched off. So the root is the way that F itself hides.
 #
 # Then why not use both switches? The right column counts fences, walls and hedges on six simulated drives. They
 # stand, but with both switches 9 % of their cells seem to move. Without the rule alone, F is found several times as well
-# at the end, and 4 % of the borders seem to move instead of 1 %. Whether that is worth it is a choice. The package keeps
-# the rule; its story is [phantoms on real streets](deeper/04_real_streets.ipynb). So one error is traded for another:
-# what stands is left standing, and the car that starts ahead of us seems to stand, too.
+# at the end, and 4 % of the borders seem to move instead of 1 %. The package keeps
+# the rule; its story is [phantoms on real streets](deeper/04_real_streets.ipynb). So one error is traded for another.
 #
 # ## In five lines
 #
 # 1. FREE, STATIC and UNKNOWN stay in their cell, one number each; only DYNAMIC leaves it, on particles.
 # 2. Predict: let particles fly, and strike out an arrival where something stands. Update: share UNKNOWN out, then Bayes'
 #    rule. Resample with one comb.
-# 3. A scan keeps the ratio of STATIC to DYNAMIC. Arrivals in cells that were seen FREE change it.
+# 3. A scan keeps the ratio of STATIC to DYNAMIC. Arrivals in cells that were seen FREE make it DYNAMIC; leaving and
+#    stopping make it STATIC.
 # 4. More particles shrink the sampling error, like $N^{-1/2}$, and leave the bias. The smallest slow thing that you must
 #    not miss sets their number.
 # 5. A car that drives away into cells that it hides is called STATIC, by first sight together with the package's rule

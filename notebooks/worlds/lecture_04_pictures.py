@@ -100,7 +100,7 @@ def draw_error(error: SamplingError) -> None:
     ax.set_yticks([0.003, 0.01, 0.03, 0.1], ["0.003", "0.01", "0.03", "0.1"])
     ax.minorticks_off()
     ax.set(xlabel="particles", ylabel="root mean square error", ylim=(0.003, 0.1))
-    ax.set_title("mean of 16 seeds", fontsize=10)
+    ax.set_title("100 seeds", fontsize=10)
 
 
 def draw_crossing(
