@@ -136,12 +136,12 @@ class _Heard(NamedTuple):
 
 def _listen(bag: Bag, topics: Topics) -> _Heard:
     """Check that the topics are there, and go once through their messages."""
-    types = {getattr(topics, kind): of_kind for kind, of_kind in TYPES.items() if kind != "transforms"}
-    types |= dict.fromkeys(topics.transforms, TYPES["transforms"])
-    total = sum(bag.count(topic, *of_topic) for topic, of_topic in types.items())
+    wanted = [(getattr(topics, kind), types) for kind, types in TYPES.items() if kind != "transforms"]
+    wanted += [(topic, TYPES["transforms"]) for topic in topics.transforms]
+    total = sum(bag.count(topic, *types) for topic, types in wanted)
     transforms = StaticTransforms(bag.place(", ".join(topics.transforms)))
     heard = _Heard({}, defaultdict(list), defaultdict(set), [], [], Counter(), transforms)
-    for topic, message in tqdm(bag.messages(*types), "reading", total, leave=False):
+    for topic, message in tqdm(bag.messages(*dict(wanted)), "reading", total, leave=False):
         if topic in topics.transforms:
             heard.transforms.add(message)
         elif topic != topics.points or _has_returns(message, bag.place(topic), heard):

@@ -103,9 +103,8 @@ def saved_drive(
         reached.append(pose.to_previous(_corners(spec)))
         rows, cols = _around(np.concatenate(reached), spec.cell).shape
         if rows * cols > LARGEST:
-            raise DataError(
-                folder, f"poses of a map of at most {LARGEST:,} pixels", f"{rows} x {cols} at frame {number}"
-            )
+            found = f"{rows} x {cols} at frame {number}"
+            raise DataError(folder, f"poses of a map of at most {LARGEST:,} pixels", found)
         frames.append(frame_arrays(result) | {"frame": number})
 
     yield take
