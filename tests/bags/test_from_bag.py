@@ -18,6 +18,7 @@ from tiny_bag import (
     T_MOUNT_FROM_OPTICAL,
     K,
     pose,
+    rigid,
     write_bag,
 )
 
@@ -25,6 +26,7 @@ from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.workshop.bags.convert import convert_bag
 from semgrid_edu.workshop.bags.survey import Topics
+from semgrid_edu.workshop.bags.transforms import RecordedPath
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.demo.find_drives import drive_at
 
@@ -126,6 +128,23 @@ def test_transforms_may_be_beside_those_that_change(tmp_path):
     topics = TOPICS._replace(transforms=("/tf",))
     _, drive = converted(tmp_path, topics=topics, tf_topic="/tf")
     np.testing.assert_allclose(drive[0].T_world_from_lidar[:3, 3], T_BASE_FROM_LIDAR[:3, 3], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"slash": "/"},  # as old bags have it
+        {"transforms": ("ground base_link", "ground lidar", "base_link mount", "mount optical")},
+    ],
+)
+def test_the_chain_may_lead_through_a_parent_and_names_may_have_a_slash(tmp_path, changes):
+    _, drive = converted(tmp_path, **changes)
+    check_landmarks(drive[3])
+
+
+def test_between_two_poses_the_turn_is_steady():
+    path = RecordedPath(np.array([0, 10**9]), np.stack([np.eye(4), rigid((0, 0, 90), (4, 0, 0))]))
+    np.testing.assert_allclose(path.at(250_000_000), rigid((0, 0, 22.5), (1, 0, 0)), atol=1e-12)
 
 
 OF_THEIR_OWN = "scans without an image of their own within 0.05 s"

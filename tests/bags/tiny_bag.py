@@ -73,6 +73,7 @@ class Recipe:
     tf_topic: str = "/tf_static"
     drifting: str = ""
     base_turn: tuple = (0, 0, 0)
+    slash: str = ""
     transforms: tuple = ("base_link lidar", "base_link mount", "mount optical")
     info_size: tuple = SIZE
 
@@ -110,7 +111,12 @@ class Messages:
 
     def header(self, stamp: int, frame: str):
         time = self.make("builtin_interfaces/msg/Time", sec=stamp // 10**9, nanosec=stamp % 10**9)
-        return self.make("std_msgs/msg/Header", stamp=time, frame_id=frame, **({"seq": 0} if self.is_ros1 else {}))
+        return self.make(
+            "std_msgs/msg/Header",
+            stamp=time,
+            frame_id=self.recipe.slash + frame,
+            **({"seq": 0} if self.is_ros1 else {}),
+        )
 
     def all(self):
         for k in range(N_SCANS if self.recipe.tf_topic == "/tf" else 1):
@@ -132,6 +138,8 @@ class Messages:
             "base_link lidar": turn @ T_BASE_FROM_LIDAR,
             "base_link mount": turn @ T_BASE_FROM_MOUNT,
             "mount optical": T_MOUNT_FROM_OPTICAL,
+            "ground base_link": rigid((0, 0, 0), (0.2, 0.0, 0.3)),
+            "ground lidar": rigid((0, 0, 0), (0.2, 0.0, 0.3)) @ T_BASE_FROM_LIDAR,
             "odom base_link": pose(k * PERIOD / 1e9),
         }
         transforms = []

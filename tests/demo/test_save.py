@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 from tiny_drive import DATE, write_tiny_drive
 
 from semgrid_edu.datasets import KittiRawDrive
@@ -100,6 +101,12 @@ class TestMap:
         assert TrinaryMap(folder).origin[2] == 0
         assert set(np.unique(TrinaryMap(folder).pixels)) == {0, 205, 254}
 
+    def test_nav2_whose_limits_belong_to_both_sides_reads_the_same(self, folder):
+        said = TrinaryMap(folder).said
+        p = (255 - np.array([0, 205, 254])) / 255
+        assert (p >= float(said["occupied_thresh"])).tolist() == [True, False, False]
+        assert (p <= float(said["free_thresh"])).tolist() == [False, False, True]
+
     @pytest.mark.parametrize("y", [-0.4, 2.2, 5.4])
     def test_a_wall_is_where_it_is_in_the_world_after_the_vehicle_turned(self, folder, y):
         drawn = TrinaryMap(folder)
@@ -189,14 +196,16 @@ def test_a_jump_of_the_poses_is_refused_and_the_frames_before_it_are_saved(weigh
         assert saved["frame"].tolist() == [7]
 
 
+@pytest.mark.parametrize("tilt", [0, 5])
 @pytest.mark.parametrize("cell", [0.5, 1 / 3, 0.2])
-def test_the_map_of_one_frame_is_its_grid_turned(cell):
-    """A car looks along the world's y axis, so its grid and the map have the same rows and columns."""
+def test_the_map_of_one_frame_is_its_grid_turned(cell, tilt):
+    """A car looks along the world's y axis, so its grid and the map have the same rows and columns, tilted or not."""
     spec = GridSpec(0.0, 30 * cell, -10 * cell, 10 * cell, cell)
     state = np.random.default_rng(0).integers(0, 2, spec.shape)
     classes = np.random.default_rng(1).integers(0, 14, spec.shape).astype(np.uint8)
     T = np.eye(4)
-    T[:2, :2], T[:2, 3] = [[0, -1], [1, 0]], (300 * cell, -700 * cell)
+    T[:3, :3] = Rotation.from_euler("ZYX", [90, tilt, -tilt], degrees=True).as_matrix()
+    T[:3, 3] = 300 * cell, -700 * cell, 1.73
     drawn = world_map(np.moveaxis(np.eye(4)[state], -1, 0)[None], classes[None], T[None], spec)
     rows, cols = (np.flatnonzero((drawn.pixels != 205).any(axis=axis)) for axis in (1, 0))
     seen = np.ix_(rows, cols)
