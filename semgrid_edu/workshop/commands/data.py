@@ -73,7 +73,7 @@ def from_bag(
     odometry: Annotated[str, typer.Option(help="Topic of nav_msgs/Odometry, or of poses of base_link.")],
     lidar_height: Annotated[float, typer.Option(help="Height of the LIDAR above the ground, metres.")],
     camera_info: Annotated[str | None, typer.Option(help="Calibration; else camera_info beside the images.")] = None,
-    transforms: Annotated[list[str] | None, typer.Option(help="Fixed transforms, else /tf_static; again for more.")] = None,
+    transforms: Annotated[list[str] | None, typer.Option(help="Else /tf_static; may be given again.")] = None,
 ) -> None:
     """Write a recording of ROS as a drive in KITTI's raw layout. Where the sensors are comes from /tf_static."""
     from semgrid_edu.workshop.bags.convert import convert_bag
