@@ -25,8 +25,9 @@ from semgrid_edu.occupancy import SensorModel
 from semgrid_edu.occupancy.polar import beams_of, height_above_ground
 from semgrid_edu.storage.files import LOCK, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import write_provenance
+from semgrid_edu.workshop.simulation.sensors.calibration_files import write_calibration
 from semgrid_edu.workshop.simulation.sensors.rig import Geodesy, oxts_packet
-from semgrid_edu.workshop.simulation.writer import WrittenFrame, write_calibration, write_frames
+from semgrid_edu.workshop.simulation.writer import WrittenFrame, write_frames
 
 IMAGE_SIZE = (145, 480)
 """Height and width of the images, pixels: a quarter of the original. At a third, a number plate could be read."""

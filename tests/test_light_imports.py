@@ -50,5 +50,11 @@ except ImportError as error:
     assert missing == "numba isn't installed: pip install 'semgrid_edu[fast]'"
 
 
+def test_a_bag_is_written_without_the_simulator():
+    """`pip install semgrid_edu[ros]` is all that `data from-bag` needs."""
+    script = f"import sys; sys.modules.update(dict.fromkeys({EXTRAS!r})); import semgrid_edu.workshop.bags.convert"
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
 def test_what_is_loaded_is_found():
     assert loaded("import torch") >= {"torch"}

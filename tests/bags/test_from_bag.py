@@ -18,6 +18,7 @@ from tiny_bag import (
     T_MOUNT_FROM_OPTICAL,
     K,
     pose,
+    rigid,
     write_bag,
 )
 
@@ -25,10 +26,12 @@ from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.workshop.bags.convert import convert_bag
 from semgrid_edu.workshop.bags.survey import Topics
+from semgrid_edu.workshop.bags.transforms import RecordedPath
 from semgrid_edu.workshop.commands.main import run
 from semgrid_edu.workshop.demo.find_drives import drive_at
 
 TOPICS = Topics("/cam/image_raw", "/points", "/odom", "/cam/camera_info")
+RECTIFIED = TOPICS._replace(image="/cam/image_rect_color")
 HEIGHT = 1.9
 
 
@@ -36,6 +39,13 @@ def converted(tmp_path, kind="mcap", topics=TOPICS, **changes):
     """Write a bag, convert it, and open the drive."""
     written = convert_bag(write_bag(tmp_path / "bag", kind, **changes), tmp_path / "out", topics, HEIGHT)
     return written, KittiRawDrive(tmp_path / "out", written.date, written.drive)
+
+
+def check_landmarks(frame):
+    """Landmarks don't move: pose and points together give back where they are from the first pose."""
+    T = frame.T_world_from_lidar
+    expected = (np.linalg.inv(pose(0.0)) @ np.c_[LANDMARKS, np.ones(50)].T)[:3].T
+    np.testing.assert_allclose(frame.points[:, :3] @ T[:3, :3].T + T[:3, 3], expected, atol=1e-3)
 
 
 @pytest.mark.parametrize("kind", ["ros1", "sqlite3", "mcap"])
@@ -47,10 +57,7 @@ def test_a_drive_says_what_the_bag_says(tmp_path, kind):
     for k, frame in enumerate(drive):
         np.testing.assert_array_equal(frame.image, IMAGES[k])
         assert frame.time == pytest.approx(k * PERIOD / 1e9, abs=1e-9)
-        # Landmarks don't move: pose and points together give back where they are from the first pose.
-        there = frame.points[:, :3] @ frame.T_world_from_lidar[:3, :3].T + frame.T_world_from_lidar[:3, 3]
-        expected = (np.linalg.inv(pose(0.0)) @ np.c_[LANDMARKS, np.ones(50)].T)[:3].T
-        np.testing.assert_allclose(there, expected, atol=1e-3)
+        check_landmarks(frame)
         # The camera sees them where the bag's transforms say.
         T_base_from_world = np.linalg.inv(pose(k * PERIOD / 1e9))
         seen = (T_camera_from_base @ T_base_from_world @ np.c_[LANDMARKS, np.ones(50)].T)[:3].T
@@ -71,7 +78,10 @@ def test_a_tilted_lidar_is_made_level_at_its_height(tmp_path):
 
 @pytest.mark.parametrize(
     ("encoding", "expected"),
-    [("bgr8", IMAGES), ("png", IMAGES), ("mono8", np.repeat(IMAGES[..., :1], 3, axis=-1))],
+    [
+        *((encoding, IMAGES) for encoding in ("bgr8", "rgba8", "bgra8", "8UC3", "png")),
+        ("mono8", np.repeat(IMAGES[..., :1], 3, axis=-1)),
+    ],
 )
 def test_encodings_of_images(tmp_path, encoding, expected):
     _, drive = converted(tmp_path, encoding=encoding)
@@ -85,6 +95,7 @@ def test_encodings_of_images(tmp_path, encoding, expected):
         ({"intensity_type": 2}, 1.0),  # bytes
         ({"intensity": "reflectivity", "intensity_type": 4}, 1.0),  # 16 bits, up to 255
         ({"intensity_scale": 1 / 245, "intensity_type": 8}, 255 / 245),  # 0 to 1 already
+        ({"intensity_scale": 10.0, "intensity_type": 4}, 2550 / 2450),  # 16 bits, divided by the brightest
         ({"intensity": None}, 0.0),
     ],
 )
@@ -92,29 +103,98 @@ def test_any_layout_of_points_gives_a_reflectance_from_0_to_1(tmp_path, changes,
     _, drive = converted(tmp_path, **changes)
     for frame in drive:
         np.testing.assert_allclose(frame.points[:, 3], factor * np.arange(50) * 5 / 255, rtol=1e-5)
+        check_landmarks(frame)
 
 
-def test_poses_without_a_frame_are_those_of_base_link(tmp_path):
-    _, drive = converted(tmp_path, pose_type="geometry_msgs/msg/PoseStamped")
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"base": ""},
+        {"pose_type": "geometry_msgs/msg/PoseStamped"},
+        {"pose_type": "geometry_msgs/msg/PoseWithCovarianceStamped"},
+    ],
+)
+def test_poses_without_a_frame_are_those_of_base_link(tmp_path, changes):
+    _, drive = converted(tmp_path, **changes)
     np.testing.assert_allclose(drive[0].T_world_from_lidar[:3, 3], T_BASE_FROM_LIDAR[:3, 3], atol=1e-6)
 
 
 def test_a_rectified_topic_may_have_distortion_and_takes_the_projection(tmp_path):
-    topic = "/cam/image_rect_color"
-    _, drive = converted(tmp_path, topics=TOPICS._replace(image=topic), image_topic=topic, distortion=0.1)
+    _, drive = converted(tmp_path, topics=RECTIFIED, image_topic=RECTIFIED.image, distortion=0.1)
     np.testing.assert_allclose(drive.camera.K, K)
+
+
+def test_transforms_may_be_beside_those_that_change(tmp_path):
+    topics = TOPICS._replace(transforms=("/tf",))
+    _, drive = converted(tmp_path, topics=topics, tf_topic="/tf")
+    np.testing.assert_allclose(drive[0].T_world_from_lidar[:3, 3], T_BASE_FROM_LIDAR[:3, 3], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"slash": "/"},  # as old bags have it
+        {"transforms": ("ground base_link", "ground lidar", "base_link mount", "mount optical")},
+    ],
+)
+def test_the_chain_may_lead_through_a_parent_and_names_may_have_a_slash(tmp_path, changes):
+    _, drive = converted(tmp_path, **changes)
+    check_landmarks(drive[3])
+
+
+def test_between_two_poses_the_turn_is_steady():
+    path = RecordedPath(np.array([0, 10**9]), np.stack([np.eye(4), rigid((0, 0, 90), (4, 0, 0))]))
+    np.testing.assert_allclose(path.at(250_000_000), rigid((0, 0, 22.5), (1, 0, 0)), atol=1e-12)
+
+
+OF_THEIR_OWN = "scans without an image of their own within 0.05 s"
 
 
 def test_scans_without_image_are_left_out(tmp_path):
     written, drive = converted(tmp_path, left_out_images=(2,))
-    assert (written.n_frames, dict(written.left_out)) == (5, {"no image within 0.05 s": 1})
+    assert (written.n_frames, dict(written.left_out)) == (5, {OF_THEIR_OWN: 1})
     np.testing.assert_allclose([frame.time for frame in drive], [0.0, 0.1, 0.3, 0.4, 0.5], atol=1e-9)
     np.testing.assert_array_equal(drive[2].image, IMAGES[3])
 
 
+def test_of_two_scans_beside_an_image_the_nearer_gets_it(tmp_path):
+    written, drive = converted(tmp_path, scan_stamps={2: START + 108_000_000})  # the image is at 107 ms
+    assert dict(written.left_out) == {OF_THEIR_OWN: 1}
+    np.testing.assert_allclose([frame.time for frame in drive], [0.0, 0.108, 0.3, 0.4, 0.5], atol=1e-9)
+    np.testing.assert_array_equal(drive[1].image, IMAGES[1])
+
+
 def test_scans_after_the_odometry_are_left_out(tmp_path):
     written, _ = converted(tmp_path, scan_stamps={5: START + 900_000_000})
-    assert dict(written.left_out) == {"no odometry around them within 0.5 s": 1}
+    assert dict(written.left_out) == {"scans without odometry around them within 0.5 s": 1}
+
+
+def test_scans_without_returns_are_left_out(tmp_path):
+    written, drive = converted(tmp_path, empty_scans=(0, 3))
+    assert (written.n_frames, dict(written.left_out)) == (4, {"scans without returns": 2})
+    assert drive.problems() == []
+    np.testing.assert_array_equal(drive[0].image, IMAGES[1])
+
+
+def test_returns_too_far_for_a_lidar_are_left_out_by_their_distance(tmp_path):
+    written, drive = converted(tmp_path, n_far=2)  # at (200, 200) from a LIDAR that is turned
+    assert dict(written.left_out) == {"returns beyond 250 m": 2 * N_SCANS}
+    assert drive.problems() == []
+    check_landmarks(drive[3])
+
+
+def test_messages_may_overtake_each_other_or_come_twice(tmp_path):
+    written, drive = converted(tmp_path, scan_stamps={1: START + 2 * PERIOD, 2: START + PERIOD, 4: START + 3 * PERIOD})
+    assert dict(written.left_out) == {"scans with the time stamp of an earlier one": 1}
+    np.testing.assert_allclose([frame.time for frame in drive], [0.0, 0.1, 0.2, 0.3, 0.5], atol=1e-9)
+    for frame in drive:
+        check_landmarks(frame)
+
+
+def test_clocks_that_are_apart_show_in_the_error(tmp_path):
+    stamps = {k: START + k * PERIOD + 37_000_000_000 for k in range(N_SCANS)}
+    with pytest.raises(DataError, match=r"found none; .*scans from 1767261637.0 to 1767261637.5 s, images from"):
+        converted(tmp_path, scan_stamps=stamps)
 
 
 @pytest.mark.parametrize(
@@ -125,12 +205,31 @@ def test_scans_after_the_odometry_are_left_out(tmp_path):
         ({"without": "/tf_static"}, TOPICS, "the topic /tf_static"),
         ({"without": "/cam/camera_info"}, TOPICS, "the topic /cam/camera_info"),
         ({"transforms": ("base_link lidar", "mount optical")}, TOPICS, "a chain .* base_link and optical, .*-> lidar"),
-        ({"base": "rear_axle"}, TOPICS, "/tf_static: expected a chain of transforms between lidar and rear_axle"),
-        ({"base": "optical"}, TOPICS, "whose z axis looks ahead, along x of optical, found a look along"),
-        ({"distortion": 0.1}, TOPICS, r"/cam/image_raw: expected rectified images.*found distortion \[0.1"),
-        ({"scan_stamps": {3: START}}, TOPICS, "/points: expected time stamps that rise, found .* in message 3 after"),
-        ({"encoding": "rgba8"}, TOPICS, "/cam/image_raw: expected images as rgb8, bgr8, mono8, JPEG or PNG, found"),
-        ({"intensity_scale": 10.0}, TOPICS, "/points: expected a brightness of 0 to 255, found 0 to 2450"),
+        ({"base": "rear_axle"}, TOPICS, "/tf_static: expected a chain of fixed transforms between lidar and rear_axle"),
+        ({"base": "optical"}, TOPICS, r"looks ahead, along x of optical, .* found z along \(0.00, 0.00, 1.00\)"),
+        (
+            {"base_turn": (180, 0, 0)},
+            TOPICS,
+            r"y axis points down, against z, found .*, y along .*, 1.00\)",
+        ),
+        ({"distortion": 0.1}, TOPICS, r"/cam/image_raw: expected rectified images.*found distortion .*\[0.1"),
+        ({"model": "equidistant"}, TOPICS, "/cam/image_raw: expected rectified images.*found distortion 'equidistant'"),
+        ({"image_topic": RECTIFIED.image, "shift": -2.4}, RECTIFIED, r"the left one of a pair, .* found \[-2.4, 0.0"),
+        ({"scan_stamps": {3: START - 2 * 10**9}}, TOPICS, "/points: expected a clock that isn't set back, found"),
+        ({"empty_scans": tuple(range(N_SCANS))}, TOPICS, "/points: expected two usable messages at least, .* found 0"),
+        ({"n_far": 60}, TOPICS, "/points: expected returns within 250 m, found 60 of 110 beyond: are they metres"),
+        ({"encoding": "mono16"}, TOPICS, "/cam/image_raw: expected images as rgb8, .* JPEG or PNG, found 'mono16'"),
+        (
+            {"encoding": "png16"},
+            TOPICS,
+            "/cam/image_raw: expected images as .* with 8 bits, found 'png' with pixels 'I",
+        ),
+        ({"intensity_scale": -1.0}, TOPICS, "/points: expected a finite brightness from 0 up, found -245 to"),
+        (
+            {"tf_topic": "/tf", "drifting": "base_link mount"},
+            TOPICS._replace(transforms=("/tf",)),
+            r"/tf: expected a chain of fixed transforms between base_link and optical.* -> mount \(changes\)",
+        ),
         ({"info_size": (24, 80)}, TOPICS, "/cam/camera_info: expected the size of the images .*40 x 12 .*found 80 x"),
     ],
 )

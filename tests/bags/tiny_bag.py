@@ -57,6 +57,8 @@ class Recipe:
     image_topic: str = "/cam/image_raw"
     encoding: str = "rgb8"
     distortion: float = 0.0
+    model: str = "plumb_bob"
+    shift: float = 0.0
     intensity: str | None = "intensity"
     intensity_type: int = 7
     intensity_scale: float = 1.0
@@ -66,6 +68,12 @@ class Recipe:
     without: str = ""
     left_out_images: tuple = ()
     scan_stamps: dict = field(default_factory=dict)
+    empty_scans: tuple = ()
+    n_far: int = 0
+    tf_topic: str = "/tf_static"
+    drifting: str = ""
+    base_turn: tuple = (0, 0, 0)
+    slash: str = ""
     transforms: tuple = ("base_link lidar", "base_link mount", "mount optical")
     info_size: tuple = SIZE
 
@@ -103,10 +111,16 @@ class Messages:
 
     def header(self, stamp: int, frame: str):
         time = self.make("builtin_interfaces/msg/Time", sec=stamp // 10**9, nanosec=stamp % 10**9)
-        return self.make("std_msgs/msg/Header", stamp=time, frame_id=frame, **({"seq": 0} if self.is_ros1 else {}))
+        return self.make(
+            "std_msgs/msg/Header",
+            stamp=time,
+            frame_id=self.recipe.slash + frame,
+            **({"seq": 0} if self.is_ros1 else {}),
+        )
 
     def all(self):
-        yield "/tf_static", START, self.static()
+        for k in range(N_SCANS if self.recipe.tf_topic == "/tf" else 1):
+            yield self.recipe.tf_topic, START + k * PERIOD, self.static(k)
         for k in range(N_SCANS):
             stamp = START + k * PERIOD
             yield "/points", stamp + 1, self.cloud(k, self.recipe.scan_stamps.get(k, stamp))
@@ -117,16 +131,22 @@ class Messages:
             stamp = START + k * PERIOD // 5 + 3_000_000
             yield "/odom", stamp, self.odometry(stamp)
 
-    def static(self):
+    def static(self, k: int):
+        """The fixed transforms, and on /tf the path too, which changes."""
+        turn = rigid(self.recipe.base_turn, (0, 0, 0))
         known = {
-            "base_link lidar": T_BASE_FROM_LIDAR,
-            "base_link mount": T_BASE_FROM_MOUNT,
+            "base_link lidar": turn @ T_BASE_FROM_LIDAR,
+            "base_link mount": turn @ T_BASE_FROM_MOUNT,
             "mount optical": T_MOUNT_FROM_OPTICAL,
+            "ground base_link": rigid((0, 0, 0), (0.2, 0.0, 0.3)),
+            "ground lidar": rigid((0, 0, 0), (0.2, 0.0, 0.3)) @ T_BASE_FROM_LIDAR,
+            "odom base_link": pose(k * PERIOD / 1e9),
         }
         transforms = []
-        for names in self.recipe.transforms:
+        for names in (*self.recipe.transforms, *["odom base_link"][: self.recipe.tf_topic == "/tf"]):
             parent, child = names.split()
             (x, y, z), turn = known[names][:3, 3], self.quaternion(known[names])
+            z += 0.01 * k * (names == self.recipe.drifting)
             vector = self.make("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
             transform = self.make("geometry_msgs/msg/Transform", translation=vector, rotation=turn)
             stamped = {"header": self.header(START, parent), "child_frame_id": child, "transform": transform}
@@ -144,26 +164,35 @@ class Messages:
         place = self.make("geometry_msgs/msg/Pose", position=point, orientation=self.quaternion(T))
         if self.recipe.pose_type.endswith("PoseStamped"):
             return self.make(self.recipe.pose_type, header=self.header(stamp, "map"), pose=place)
+        doubt = np.zeros(36)
+        unsure = self.make("geometry_msgs/msg/PoseWithCovariance", pose=place, covariance=doubt)
+        if self.recipe.pose_type.endswith("PoseWithCovarianceStamped"):
+            return self.make(self.recipe.pose_type, header=self.header(stamp, "map"), pose=unsure)
         zero = self.make("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.0)
         twist = self.make("geometry_msgs/msg/Twist", linear=zero, angular=zero)
-        doubt = np.zeros(36)
         return self.make(
             "nav_msgs/msg/Odometry",
             header=self.header(stamp, "odom"),
             child_frame_id=self.recipe.base,
-            pose=self.make("geometry_msgs/msg/PoseWithCovariance", pose=place, covariance=doubt),
+            pose=unsure,
             twist=self.make("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=doubt),
         )
 
     def image(self, k: int, stamp: int):
         header = self.header(stamp, "optical")
         pixels = IMAGES[k]
-        if self.recipe.encoding == "png":
+        if self.recipe.encoding.startswith("png"):
             file = BytesIO()
+            pixels = pixels[..., 0].astype(np.uint16) if self.recipe.encoding == "png16" else pixels
             Image.fromarray(pixels).save(file, "PNG")
             data = np.frombuffer(file.getvalue(), np.uint8)
             return self.make("sensor_msgs/msg/CompressedImage", header=header, format="png", data=data)
-        pixels = {"bgr8": pixels[..., ::-1], "mono8": pixels[..., :1]}.get(self.recipe.encoding, pixels)
+        if self.recipe.encoding in ("bgr8", "bgra8", "8UC3"):
+            pixels = pixels[..., ::-1]
+        if self.recipe.encoding in ("rgba8", "bgra8"):
+            pixels = np.dstack([pixels, np.full(SIZE, 200, np.uint8)])
+        if self.recipe.encoding == "mono8":
+            pixels = pixels[..., :1]
         rows = pixels.reshape(SIZE[0], -1)
         padded = np.hstack([rows, np.full((SIZE[0], 5), 99, np.uint8)])
         return self.make(
@@ -173,21 +202,22 @@ class Messages:
 
     def info(self, stamp: int):
         roi = {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False}
-        P = np.c_[K, np.zeros(3)].ravel()
+        P = np.c_[K, [self.recipe.shift, 0, 0]].ravel()
         raw = K if not self.recipe.distortion else K + np.diag([3.0, 3.0, 0.0])
         calibration = {"d": np.full(5, self.recipe.distortion), "k": raw.ravel(), "r": np.eye(3).ravel(), "p": P}
         calibration = {name.upper() if self.is_ros1 else name: values for name, values in calibration.items()}
         return self.make(
             "sensor_msgs/msg/CameraInfo", header=self.header(stamp, "optical"), height=self.recipe.info_size[0],
-            width=self.recipe.info_size[1], distortion_model="plumb_bob", binning_x=0, binning_y=0,
+            width=self.recipe.info_size[1], distortion_model=self.recipe.model, binning_x=0, binning_y=0,
             roi=self.make("sensor_msgs/msg/RegionOfInterest", **roi), **calibration,
         )  # fmt: skip
 
     def cloud(self, k: int, stamp: int):
-        """The landmarks as the LIDAR sees them, and two beams without return, in two rows that are padded."""
+        """The landmarks as the LIDAR sees them, far returns and two beams without one, in two padded rows."""
         T_lidar_from_world = np.linalg.inv(pose((stamp - START) / 1e9) @ T_BASE_FROM_LIDAR)
         points = LANDMARKS @ T_lidar_from_world[:3, :3].T + T_lidar_from_world[:3, 3]
-        points = np.vstack([points, [np.nan] * 3, [0, 0, 0]])
+        points = np.vstack([points, *[[200, 200, 0]] * self.recipe.n_far, [np.nan] * 3, [0, 0, 0]])
+        points = points[: 0 if k in self.recipe.empty_scans else None]
         order = ">" if self.recipe.big_endian else "<"
         kind = {2: "u1", 4: "u2", 7: "f4", 8: "f8"}[self.recipe.intensity_type]
         layout = {"z": ("f4", 1, 7), "x": ("f8", 9, 8), "y": ("f4", 21, 7)}
@@ -201,7 +231,8 @@ class Messages:
         for name, column in zip("xyz", points.T, strict=True):
             records[name] = column
         if self.recipe.intensity:
-            records[self.recipe.intensity] = np.append(BRIGHTNESS, [7, 7]) * self.recipe.intensity_scale
+            brightness = np.append(BRIGHTNESS, [7] * (self.recipe.n_far + 2)) * self.recipe.intensity_scale
+            records[self.recipe.intensity] = brightness[: len(points)]
         rows = np.frombuffer(records.tobytes(), np.uint8).reshape(2, -1)
         padded = np.hstack([rows, np.full((2, 3), 7, np.uint8)])
         fields = [

@@ -2,12 +2,16 @@
 
 import hashlib
 import sys
+from itertools import count
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
+from tiny_drive import DATE, write_tiny_drive
 
+from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError, MissingExtraError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -15,12 +19,11 @@ from semgrid_edu.networks import save_net
 from semgrid_edu.occupancy import State
 from semgrid_edu.workshop.demo import run, write_both_streets, write_demo
 from semgrid_edu.workshop.demo.run import _handed_out
-from semgrid_edu.workshop.demo.save import saved_drive
+from semgrid_edu.workshop.demo.save import saved_drive, world_map
 
 pytestmark = pytest.mark.usefixtures("few_stories")
 
 SPEC = GridSpec(x_min=0.0, x_max=20.0, y_min=-10.0, y_max=10.0, cell=0.5)
-NET = SimpleNamespace(architecture=SimpleNamespace(grid=SPEC, label_set="KITTI-14"))
 POSES = [(0.0, 0.0, 0.0), (3.0, 1.0, np.pi / 6), (3.0, 4.0, -0.4)]
 """x, y and yaw of the vehicle in the world; it moves and turns."""
 
@@ -60,7 +63,7 @@ def weights(tmp_path_factory):
 @pytest.fixture(scope="module")
 def folder(weights, tmp_path_factory):
     folder = tmp_path_factory.mktemp("saved") / "new"
-    with saved_drive(folder, NET, weights) as take:
+    with saved_drive(folder, SPEC, KITTI_14, weights, iter((5, 6, 9))) as take:
         for k in range(len(POSES)):
             take(made_result(k))
     return folder
@@ -97,6 +100,12 @@ class TestMap:
         assert said["mode"] == "trinary"
         assert TrinaryMap(folder).origin[2] == 0
         assert set(np.unique(TrinaryMap(folder).pixels)) == {0, 205, 254}
+
+    def test_nav2_whose_limits_belong_to_both_sides_reads_the_same(self, folder):
+        said = TrinaryMap(folder).said
+        p = (255 - np.array([0, 205, 254])) / 255
+        assert (p >= float(said["occupied_thresh"])).tolist() == [True, False, False]
+        assert (p <= float(said["free_thresh"])).tolist() == [False, False, True]
 
     @pytest.mark.parametrize("y", [-0.4, 2.2, 5.4])
     def test_a_wall_is_where_it_is_in_the_world_after_the_vehicle_turned(self, folder, y):
@@ -147,6 +156,7 @@ class TestArrays:
                 np.testing.assert_array_equal(arrays[name][k], result.grid.argmax(axis=0))
                 np.testing.assert_allclose(arrays[f"{name}_probability"][k], 0.74, atol=5e-4)
         assert arrays["time"].tolist() == [0.0, 0.1, 0.2]
+        assert arrays["frame"].tolist() == [5, 6, 9]
 
     def test_name_what_is_needed_to_read_them(self, folder, weights):
         with np.load(folder / "frames.npz", allow_pickle=False) as saved:
@@ -168,9 +178,42 @@ def test_the_animation_shows_every_frame_as_fast_as_it_was(folder):
 
 
 def test_nothing_is_left_of_a_drive_that_is_interrupted(weights, tmp_path):
-    with pytest.raises(KeyboardInterrupt), saved_drive(tmp_path / "new", NET, weights):
+    with pytest.raises(KeyboardInterrupt), saved_drive(tmp_path / "new", SPEC, KITTI_14, weights, count()):
         raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_jump_of_the_poses_is_refused_and_the_frames_before_it_are_saved(weights, tmp_path):
+    far = made_result(1)
+    far.frame.T_world_from_lidar[:2, 3] = 1e6
+    with saved_drive(tmp_path / "new", SPEC, KITTI_14, weights, count(7)) as take:
+        take(made_result(0))
+        with pytest.raises(
+            DataError, match=r"new: expected poses of a map of at most 1,000,000,000 pixels, .* at frame 8"
+        ):
+            take(far)
+    with np.load(tmp_path / "new" / "frames.npz") as saved:
+        assert saved["frame"].tolist() == [7]
+
+
+@pytest.mark.parametrize("tilt", [0, 5])
+@pytest.mark.parametrize("cell", [0.5, 1 / 3, 0.2])
+def test_the_map_of_one_frame_is_its_grid_turned(cell, tilt):
+    """A car looks along the world's y axis, so its grid and the map have the same rows and columns, tilted or not."""
+    spec = GridSpec(0.0, 30 * cell, -10 * cell, 10 * cell, cell)
+    state = np.random.default_rng(0).integers(0, 2, spec.shape)
+    classes = np.random.default_rng(1).integers(0, 14, spec.shape).astype(np.uint8)
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_euler("ZYX", [90, tilt, -tilt], degrees=True).as_matrix()
+    T[:3, 3] = 300 * cell, -700 * cell, 1.73
+    drawn = world_map(np.moveaxis(np.eye(4)[state], -1, 0)[None], classes[None], T[None], spec)
+    rows, cols = (np.flatnonzero((drawn.pixels != 205).any(axis=axis)) for axis in (1, 0))
+    seen = np.ix_(rows, cols)
+    # Forward (row 0 of the grid) is up in the map, and what is left of the car is left.
+    np.testing.assert_array_equal(drawn.pixels[seen], np.where(state == State.FREE, 254, 0))
+    np.testing.assert_array_equal(drawn.classes[seen], classes)
+    left, below = cols[0], len(drawn.pixels) - 1 - rows[-1]
+    np.testing.assert_allclose(np.add(drawn.origin, (left * cell, below * cell)), (290 * cell, -700 * cell))
 
 
 def test_nothing_is_left_of_writing_that_fails(weights, tmp_path, monkeypatch):
@@ -178,7 +221,10 @@ def test_nothing_is_left_of_writing_that_fails(weights, tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Image.Image, "save", full)
-    with pytest.raises(OSError, match="No space left") as caught, saved_drive(tmp_path / "new", NET, weights) as take:
+    with (
+        pytest.raises(OSError, match="No space left") as caught,
+        saved_drive(tmp_path / "new", SPEC, KITTI_14, weights, count()) as take,
+    ):
         take(made_result(0))
     assert caught.value.filename == str(tmp_path / "new")
     assert list(tmp_path.iterdir()) == []
@@ -201,6 +247,24 @@ class TestDemo:
             for k, result in enumerate(told):
                 np.testing.assert_allclose(saved["occupancy"][k], result.belief.probability, atol=5e-4)
                 np.testing.assert_array_equal(saved["remembered"][k], result.remembered.argmax(axis=0))
+
+    def test_numbers_the_frames_that_are_not_left_out(self, trained, tmp_path):
+        folder = write_tiny_drive(tmp_path, n_frames=4)
+        (folder / "velodyne_points" / "data" / "0000000000.bin").write_bytes(b"\0")
+        (folder / "image_02" / "data" / "0000000002.png").write_bytes(b"no image")
+        drive = KittiRawDrive(tmp_path, DATE, "0001")
+        write_demo(drive, trained, tmp_path / "page", skipped=print, save=tmp_path / "saved")
+        with np.load(tmp_path / "saved" / "frames.npz") as saved:
+            assert saved["frame"].tolist() == [1, 3]
+
+    def test_holds_the_frames_before_a_damaged_one_and_the_error_says_so(self, trained, tmp_path):
+        folder = write_tiny_drive(tmp_path)
+        (folder / "velodyne_points" / "data" / "0000000002.bin").write_bytes(b"\0" * 7)
+        drive = KittiRawDrive(tmp_path, DATE, "0001")
+        with pytest.raises(DataError, match=r"0000000002\.bin.*index.html shows the frames before it, as .*saved does"):
+            write_demo(drive, trained, tmp_path / "page", save=tmp_path / "saved")
+        with np.load(tmp_path / "saved" / "frames.npz") as saved:
+            assert saved["frame"].tolist() == [0, 1]
 
     @pytest.mark.parametrize(
         ("options", "error", "message"),

@@ -10,8 +10,9 @@ from PIL import Image
 from semgrid_edu.camera import invert_rigid
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.sensors.calibration_files import write_calibration
 from semgrid_edu.workshop.simulation.street.plan import Wishes
-from semgrid_edu.workshop.simulation.writer import DATE, depth_to_png, write_calibration, write_drive
+from semgrid_edu.workshop.simulation.writer import DATE, depth_to_png, write_drive
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +23,7 @@ def simulated():
 @pytest.fixture(scope="module")
 def root(simulated, tmp_path_factory):
     root = tmp_path_factory.mktemp("kitti")
-    write_calibration(root, simulated.rig)
+    write_calibration(root, simulated.rig, DATE)
     write_drive(root, "0007", simulated, labelled=[3])
     return root
 

@@ -18,7 +18,8 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.workshop.flaws import NO_FLAWS
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
-from semgrid_edu.workshop.simulation.writer import write_calibration, write_drive
+from semgrid_edu.workshop.simulation.sensors.calibration_files import write_calibration
+from semgrid_edu.workshop.simulation.writer import DATE, write_drive
 
 ROAD, WALK, CAR = (KITTI_14.index(name) for name in ("road", "sidewalk", "car"))
 FREE, HIDDEN = KITTI_14.index("unknown-free"), KITTI_14.index("unknown-unobserved")
@@ -121,7 +122,7 @@ def test_windows_of_scans_reach_as_far_as_the_simulated_drives_and_as_their_name
 def test_a_simulated_frame_is_what_a_reader_finds_on_disk(tmp_path):
     (frame,) = policies.simulated_drive(7, n_frames=1)
     drive = SimulatedDrive(7, 1)
-    write_calibration(tmp_path, drive.rig)
+    write_calibration(tmp_path, drive.rig, DATE)
     write_drive(tmp_path, "0001", drive, {0})
     read = KittiRawDrive(tmp_path, "2026_01_01", "0001")[0]
     np.testing.assert_array_equal(frame.points, read.points)

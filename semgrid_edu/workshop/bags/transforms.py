@@ -1,7 +1,6 @@
 """Where things are in a bag: fixed transforms between the sensors, and the path of the vehicle."""
 
 from collections import defaultdict
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -15,32 +14,50 @@ NS = 1e9
 """Nanoseconds in a second."""
 
 
-def _rigid(translation: Any, quaternion: Any, place: str) -> NDArray[np.float64]:
-    """Return the (4, 4) transform of a message's vector and quaternion."""
-    numbers = [quaternion.x, quaternion.y, quaternion.z, quaternion.w]
-    shift = np.array([translation.x, translation.y, translation.z])
-    if not (np.isfinite(shift).all() and abs(np.linalg.norm(numbers) - 1) < 0.01):
-        raise DataError(place, "finite positions and quaternions of length 1", [*shift.tolist(), *numbers])
-    return rigid_transform(Rotation.from_quat(numbers).as_matrix(), shift)
+FIXED = 1e-4
+"""By how much the numbers of a fixed transform may differ from message to message, metres and parts of 1."""
+
+
+def _numbers(vector: Any, quaternion: Any) -> tuple[float, ...]:
+    """Return the seven numbers of a message's vector and quaternion."""
+    return vector.x, vector.y, vector.z, quaternion.x, quaternion.y, quaternion.z, quaternion.w
+
+
+def _rigid(numbers: tuple[float, ...], place: str) -> NDArray[np.float64]:
+    """Return the (4, 4) transform of a vector and a quaternion."""
+    if not (np.isfinite(numbers).all() and abs(np.linalg.norm(numbers[3:]) - 1) < 0.01):
+        raise DataError(place, "finite positions and quaternions of length 1", list(numbers))
+    return rigid_transform(Rotation.from_quat(numbers[3:]).as_matrix(), np.array(numbers[:3]))
 
 
 class StaticTransforms:
-    """The tree of fixed coordinate frames.
+    """The tree of coordinate frames, in which only transforms that never change are walked along.
 
     Parameters
     ----------
-    messages : iterable of tf2_msgs/TFMessage
-        What was sent; of two transforms to the same frame the later one is valid.
     place : str
-        The topic, for errors.
+        The topics, for errors.
     """
 
-    def __init__(self, messages: Iterable[Any], place: str) -> None:
+    def __init__(self, place: str) -> None:
         self.place = place
-        self.parents: dict[str, tuple[str, NDArray[np.float64]]] = {}
-        for one in (transform for message in messages for transform in message.transforms):
-            T_parent_from_child = _rigid(one.transform.translation, one.transform.rotation, place)
-            self.parents[one.child_frame_id.lstrip("/")] = one.header.frame_id.lstrip("/"), T_parent_from_child
+        self.links: dict[str, tuple[str, tuple[float, ...]]] = {}
+        self.changing: set[str] = set()
+
+    def add(self, message: Any) -> None:
+        """Take in what was sent.
+
+        Parameters
+        ----------
+        message : tf2_msgs/TFMessage
+            Transforms to any frames.
+        """
+        for one in message.transforms:
+            child, parent = one.child_frame_id.lstrip("/"), one.header.frame_id.lstrip("/")
+            numbers = _numbers(one.transform.translation, one.transform.rotation)
+            known_parent, known = self.links.setdefault(child, (parent, numbers))
+            if parent != known_parent or not np.allclose(numbers, known, rtol=0, atol=FIXED):
+                self.changing.add(child)
 
     def between(self, target: str, source: str) -> NDArray[np.float64]:
         """Return T_target_from_source, (4, 4), metres, along the chain of transforms between two frames.
@@ -53,10 +70,13 @@ class StaticTransforms:
         Raises
         ------
         DataError
-            When no chain leads from one to the other; it lists the transforms that there are.
+            When no chain leads from one to the other; the error lists the transforms that there are.
         """
         neighbours = defaultdict(list)
-        for child, (parent, T_parent_from_child) in self.parents.items():
+        for child, (parent, numbers) in self.links.items():
+            if child in self.changing:
+                continue
+            T_parent_from_child = _rigid(numbers, f"{self.place}, {parent} -> {child}")
             neighbours[child].append((parent, T_parent_from_child))
             neighbours[parent].append((child, invert_rigid(T_parent_from_child)))
         reached = {source: np.eye(4)}
@@ -67,8 +87,11 @@ class StaticTransforms:
                     reached[other] = T_other_from_frame @ reached[frame]
                     waiting.append(other)
         if target not in reached:
-            there = ", ".join(f"{parent} -> {child}" for child, (parent, _) in self.parents.items())
-            raise DataError(self.place, f"a chain of transforms between {source} and {target}", there or "none")
+            there = ", ".join(
+                f"{parent} -> {child}" + " (changes)" * (child in self.changing)
+                for child, (parent, _) in self.links.items()
+            )
+            raise DataError(self.place, f"a chain of fixed transforms between {source} and {target}", there or "none")
         return reached[target]
 
 
@@ -77,13 +100,13 @@ def pose_of(message: Any, place: str) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    message : nav_msgs/Odometry or geometry_msgs/PoseStamped
+    message : nav_msgs/Odometry, geometry_msgs/PoseStamped or PoseWithCovarianceStamped
         The pose.
     place : str
         The topic, for the error.
     """
     pose = getattr(message.pose, "pose", message.pose)
-    return _rigid(pose.position, pose.orientation, place)
+    return _rigid(_numbers(pose.position, pose.orientation), place)
 
 
 class RecordedPath:

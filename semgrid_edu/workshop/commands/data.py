@@ -73,15 +73,18 @@ def from_bag(
     odometry: Annotated[str, typer.Option(help="Topic of nav_msgs/Odometry, or of poses of base_link.")],
     lidar_height: Annotated[float, typer.Option(help="Height of the LIDAR above the ground, metres.")],
     camera_info: Annotated[str | None, typer.Option(help="Calibration; else camera_info beside the images.")] = None,
+    transforms: Annotated[list[str] | None, typer.Option(help="Else /tf_static; may be given again.")] = None,
 ) -> None:
-    """Write a recording of ROS as a drive in KITTI's raw layout. The sensors' places come from /tf_static."""
+    """Write a recording of ROS as a drive in KITTI's raw layout. Where the sensors are comes from /tf_static."""
     from semgrid_edu.workshop.bags.convert import convert_bag
     from semgrid_edu.workshop.bags.survey import Topics, info_beside
 
-    topics = Topics(image, points, odometry, camera_info or info_beside(image))
+    places = tuple(transforms or ("/tf_static",))
+    topics = Topics(image, points, odometry, camera_info or info_beside(image), places)
     written = convert_bag(bag, folder, topics, lidar_height)
     for why, number in written.left_out.items():
-        typer.echo(f"semgrid-edu: scans left out: {number}: {why}", err=True)
+        typer.echo(f"semgrid-edu: left out: {why}: {number}", err=True)
+    typer.echo(f"reflectance 1 is a brightness of {written.brightest:g}")
     typer.echo(f"{folder} holds the drive {written.date} {written.drive}, frames: {written.n_frames}")
     typer.echo(f"look at it: semgrid-edu demo {folder}")
 

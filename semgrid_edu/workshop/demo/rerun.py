@@ -13,8 +13,7 @@ from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import needed
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import IGNORE, LABEL_SETS, LabelSet
-from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.plotting import depth_colours, occupancy_colours
 from semgrid_edu.storage.files import atomic_path
@@ -27,17 +26,21 @@ CAMERA = "world/lidar/camera"
 
 
 @contextmanager
-def rerun_recording(path: str | Path, net: SemanticGridNet, camera: Camera) -> Iterator[Callable[[FrameResult], None]]:
+def rerun_recording(
+    path: str | Path, spec: GridSpec, label_set: LabelSet, camera: Camera
+) -> Iterator[Callable[[FrameResult], None]]:
     """Open a recording, which is written when the block ends without an error.
 
     Parameters
     ----------
     path : path-like
         The file to write, which ends in .rrd.
-    net : SemanticGridNet
-        The network, for grid and classes.
+    spec : GridSpec
+        The grid of the results.
+    label_set : LabelSet
+        Their classes.
     camera : Camera
-        The camera of the drive.
+        The camera of the drive, for its lens and size; its pose is that of each frame.
 
     Yields
     ------
@@ -50,21 +53,19 @@ def rerun_recording(path: str | Path, net: SemanticGridNet, camera: Camera) -> I
         When rerun-sdk isn't installed.
     """
     rr = needed("rerun")
-    label_set = LABEL_SETS[net.architecture.label_set]
     with atomic_path(path) as temporary:
         stream = rr.RecordingStream(APPLICATION, recording_id=uuid4())
         stream.save(temporary)
         try:
             _log_once(rr, stream, camera, label_set)
-            yield partial(_log_frame, rr, stream, net.architecture.grid)
+            yield partial(_log_frame, rr, stream, spec)
         finally:
             stream.disconnect()
 
 
 def _log_once(rr: ModuleType, stream: object, camera: Camera, label_set: LabelSet) -> None:
-    """Log what holds for the whole drive: axes, calibration, names and colours of classes."""
+    """Log what holds for the whole drive: axes, the camera's lens, names and colours of classes."""
     stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    stream.log(CAMERA, _transform(rr, invert_rigid(camera.T_camera_from_lidar)), static=True)
     K = camera.K.copy()
     K[:2, 2] += 0.5  # Rerun's pixels begin at (0, 0), ours have their centre there
     stream.log(f"{CAMERA}/image", rr.Pinhole(image_from_camera=K, resolution=camera.size[::-1]), static=True)
@@ -77,6 +78,7 @@ def _log_frame(rr: ModuleType, stream: object, spec: GridSpec, result: FrameResu
     frame, belief = result.frame, result.belief
     stream.set_time("time", duration=frame.time)
     stream.log("world/lidar", _transform(rr, frame.T_world_from_lidar))
+    stream.log(CAMERA, _transform(rr, invert_rigid(frame.camera.T_camera_from_lidar)))
     xyz = frame.points[:, :3]
     stream.log("world/lidar/points", rr.Points3D(xyz, colors=depth_colours(np.linalg.norm(xyz, axis=1))))
     stream.log(f"{CAMERA}/image", rr.Image(frame.image).compress())

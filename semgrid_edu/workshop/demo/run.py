@@ -170,7 +170,7 @@ def write_demo(
         When the drive has no images, or not the frames that are asked for.
     DataError
         When a file of the drive, the weights, their card or the stages can't be read. If it is a file of a later frame,
-        the page of the frames before it is written first.
+        the page of the frames before it is written first, and `save` and `rerun` hold these.
     StageError
         When a stage of the file raises an error, or returns what the next one can't use.
     """
@@ -190,23 +190,25 @@ def write_demo(
     if stages is not None:
         runs.append(mine.over(runs[0]))
         comparison = Comparison(Path(stages).name, mine.given, memory)
-    spec = net.architecture.grid
+    spec, label_set = net.architecture.grid, LABEL_SETS[net.architecture.label_set]
     stories = _stories_every(len(chosen.shown), spec)
-    record = Record(spec, LABEL_SETS[net.architecture.label_set], chosen.shown, comparison, net, stories, memory)
-    left_out: list[str] = []
+    record = Record(spec, label_set, chosen.shown, comparison, net, stories, memory)
+    left_out: dict[int, str] = {}
 
     def leave_out(k: int, error: DataError) -> None:
-        left_out.append(f"frame {k}: {error}")
-        skipped(left_out[-1])
+        left_out[k] = f"frame {k}: {error}"
+        skipped(left_out[k])
         record.leave_out()
 
     frames_read = sound_frames(drive, chosen.run, leave_out if skipped else None)
     with ExitStack() as written:
         takers = []
         if save is not None:
-            takers.append(written.enter_context(saved_drive(save, net, weights, Path(stages or "").name)))
+            numbers = (k for k in chosen.run if k not in left_out)  # as the run goes on
+            saving = saved_drive(save, spec, label_set, weights, numbers, Path(stages or "").name)
+            takers.append(written.enter_context(saving))
         if rerun is not None:
-            takers.append(written.enter_context(rerun_recording(rerun, net, drive.camera)))
+            takers.append(written.enter_context(rerun_recording(rerun, spec, label_set, drive.camera)))
         results = _handed_out(run_side_by_side(frames_read, *runs), takers)
         written.enter_context(compile_bar())
         broken = _record_all(tqdm(results, total=len(chosen.run), desc=drive.folder.name, unit="frame"), record)
@@ -214,11 +216,13 @@ def write_demo(
     save_overview(record, picture, " ".join(filter(None, words.values())))
     story = story_data(net, drive.camera, record.layout) | {"start": record.start}
     words |= {"choice": chosen.told(len(drive)), "broken": str(broken or ""), "switch": switch}
-    words |= {"left_out": left_out, "learned": drive.folder.name in card.get("learned_drives", [])}
+    words |= {"left_out": [*left_out.values()], "learned": drive.folder.name in card.get("learned_drives", [])}
     html = page_html(record, drive.folder.name, drive.camera, net.architecture.image_size, story, **words)
     write_text(page, html)
     if broken:
-        raise DataError(broken.path, broken.args[1], f"{broken.args[2]}; {page} shows the frames before it") from broken
+        beside = "".join(f", as {path} does" for path in (save, rerun) if path is not None)
+        found = f"{broken.args[2]}; {page} shows the frames before it{beside}"
+        raise DataError(broken.path, broken.args[1], found) from broken
     return page
 
 

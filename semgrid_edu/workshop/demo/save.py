@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from semgrid_edu.errors import DataError
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.labels import IGNORE, LABEL_SETS, LabelSet
-from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.labels import IGNORE, LabelSet
 from semgrid_edu.occupancy import PlanarMotion, State
 from semgrid_edu.pipeline import FrameResult
 from semgrid_edu.plotting import STATE_COLOURS, STATE_NAMES
@@ -24,7 +24,7 @@ OCCUPIED_PIXEL, FREE_PIXEL, UNSEEN_PIXEL = 0, 254, 205
 YAML = """\
 image: map.pgm
 resolution: {cell}
-origin: [{x}, {y}, 0.0]
+origin: [{x:.6f}, {y:.6f}, 0.0]
 negate: 0
 occupied_thresh: 0.65
 free_thresh: 0.196
@@ -34,6 +34,9 @@ mode: trinary
 
 With a `free_thresh` of 0.25, which is common too, unknown would be read as free.
 """
+
+LARGEST = 10**9
+"""The most pixels of a map, which takes about 5 GB then: 40 km2 in cells of 0.2 m. More is a jump of the poses."""
 
 ENLARGED = 3
 """Pixels of the animation along a side of a cell."""
@@ -62,7 +65,12 @@ class WorldMap(NamedTuple):
 
 @contextmanager
 def saved_drive(
-    folder: str | Path, net: SemanticGridNet, weights: str | Path, stages: str = ""
+    folder: str | Path,
+    spec: GridSpec,
+    label_set: LabelSet,
+    weights: str | Path,
+    numbers: Iterator[int],
+    stages: str = "",
 ) -> Iterator[Callable[[FrameResult], None]]:
     """Collect the results of a drive, and write them to a folder when the block ends without an error.
 
@@ -70,22 +78,37 @@ def saved_drive(
     ----------
     folder : path-like
         The folder to write to, new or empty: frames.npz, map.pgm with map.yaml, classes.png and drive.gif.
-    net : SemanticGridNet
-        The network, for grid and classes.
+    spec : GridSpec
+        The grid of the results.
+    label_set : LabelSet
+        Their classes.
     weights : path-like
-        Its weights, which frames.npz names.
+        The network's weights, which frames.npz names.
+    numbers : iterator of int
+        The number of each frame in the drive; one is taken with each result.
     stages : str
         The name of a student's file of stages that made the results.
 
     Yields
     ------
     callable
-        Takes the result of the next frame.
+        Takes the result of the next frame; raises `DataError` when the map would have more than `LARGEST` pixels.
     """
-    spec, label_set = net.architecture.grid, LABEL_SETS[net.architecture.label_set]
     frames: list[dict[str, NDArray]] = []
-    yield lambda result: frames.append(frame_arrays(result))
-    arrays = {name: np.stack([frame[name] for frame in frames]) for name in frames[0]}
+    reached: list[NDArray] = []
+
+    def take(result: FrameResult) -> None:
+        number = np.int64(next(numbers))
+        pose = PlanarMotion.from_poses(np.eye(4), result.frame.T_world_from_lidar)
+        reached.append(pose.to_previous(_corners(spec)))
+        rows, cols = _around(np.concatenate(reached), spec.cell).shape
+        if rows * cols > LARGEST:
+            found = f"{rows} x {cols} at frame {number}"
+            raise DataError(folder, f"poses of a map of at most {LARGEST:,} pixels", found)
+        frames.append(frame_arrays(result) | {"frame": number})
+
+    yield take
+    arrays = {name: np.stack([frame.pop(name) for frame in frames]) for name in [*frames[0]]}
     place = world_map(arrays["occupancy"], arrays["refined"], arrays["T_world_from_lidar"], spec)
     with atomic_folder(folder) as temporary:
         np.savez_compressed(temporary / "frames.npz", **arrays, **_about(spec, label_set, weights, stages))
@@ -164,13 +187,16 @@ def world_map(occupancy: NDArray, classes: NDArray, T_world_from_lidar: NDArray,
     poses = [PlanarMotion.from_poses(np.eye(4), T) for T in T_world_from_lidar]
     corners = np.array([pose.to_previous(_corners(spec)) for pose in poses])
     world = _around(corners.reshape(-1, 2), spec.cell)
-    centers = world.centers()
+    height, width = world.shape
+    x = world.x_max - (np.arange(height) + 0.5) * world.cell
+    y = world.y_max - (np.arange(width) + 0.5) * world.cell
     pixels = np.full(world.shape, UNSEEN_PIXEL, np.uint8)
     drawn = np.full(world.shape, IGNORE, np.uint8)
     moved = np.zeros(world.shape, bool)
     for probability, labels, pose, its_corners in zip(occupancy, classes, poses, corners, strict=True):
         window = _window(world, its_corners)
-        rows, cols, inside = spec.cells(pose.to_now(centers[window]).reshape(-1, 2))
+        centers = np.stack(np.meshgrid(x[window[0]], y[window[1]], indexing="ij"), axis=-1)
+        rows, cols, inside = spec.cells(pose.to_now(centers).reshape(-1, 2))
         state = np.where(inside, probability.argmax(axis=0)[rows, cols], State.UNKNOWN).reshape(pixels[window].shape)
         known = (state == State.FREE) | (state == State.STATIC)
         pixels[window][known] = np.where(state == State.FREE, FREE_PIXEL, OCCUPIED_PIXEL)[known]
@@ -188,7 +214,7 @@ def _corners(spec: GridSpec) -> NDArray:
 def _around(points: NDArray, cell: float) -> GridSpec:
     """Return a grid of the world, with borders at multiples of the cell, that reaches beyond all points."""
     low, high = np.floor(points.min(axis=0) / cell) - 1, np.ceil(points.max(axis=0) / cell) + 1
-    (x_min, x_max), (y_min, y_max) = (np.round(np.stack([low, high]) * cell, 6).T).tolist()
+    (x_min, x_max), (y_min, y_max) = (np.stack([low, high]) * cell).T.tolist()
     return GridSpec(x_min, x_max, y_min, y_max, cell)
 
 

@@ -18,6 +18,7 @@ from semgrid_edu.storage.provenance import versions, write_provenance
 from semgrid_edu.storage.reading import read_json
 from semgrid_edu.workshop.simulation import writer
 from semgrid_edu.workshop.simulation.drive import SimulatedDrive
+from semgrid_edu.workshop.simulation.sensors.calibration_files import write_calibration
 from semgrid_edu.workshop.simulation.sensors.rig import KITTI_AHEAD, SAMPLE_RIG, Rig
 from semgrid_edu.workshop.simulation.street.plan import RANDOM_STREET, SAMPLE_STREET, Wishes
 from semgrid_edu.workshop.workplace import check_workers, workplace
@@ -169,7 +170,7 @@ def make_from_recipe(recipe: DatasetRecipe, folder: Path, seed: int, workers: in
     routes = {f"{k + 1:04d}": route for k, route in enumerate(recipe.routes)}
     with sole_writer(root):
         _claim(root, {"name": recipe.name, "seed": seed, "format": recipe.edition})
-        writer.write_calibration(root, recipe.rig)
+        write_calibration(root, recipe.rig, writer.DATE)
         writer.remove_unfinished(root / writer.DATE)
         missing = [drive for drive in routes if not drive_folder(root, writer.DATE, drive).exists()]
         missing.sort(key=lambda drive: -routes[drive].n_frames)

@@ -12,17 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_edu.camera import KITTI_LIDAR_HEIGHT
-from semgrid_edu.datasets.calibration import LIDAR_HEIGHT
 from semgrid_edu.datasets.kitti_labels import DEPTH_UNIT, KINDS
 from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.datasets.project_lidar import depth_scan
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import FrameLabels
 from semgrid_edu.labels import KITTI_14, LabelSet
-from semgrid_edu.storage.files import write_text
 from semgrid_edu.workshop.simulation.drive import PERIOD, SimulatedDrive
-from semgrid_edu.workshop.simulation.sensors.rig import DATAFORMAT, Rig, oxts_packet
+from semgrid_edu.workshop.simulation.sensors.rig import DATAFORMAT, oxts_packet
 from semgrid_edu.workshop.simulation.things.materials import class_of_kind
 
 DATE = "2026_01_01"
@@ -70,45 +67,6 @@ def check_complete(folder: Path, n_frames: int, labelled: Collection[int]) -> No
     if missing:
         found = f"{len(missing)} missing, such as {missing[0]}"
         raise DataError(folder, f"all {len(expected)} files of a drive (delete the folder to make it again)", found)
-
-
-def _row(name: str, numbers: NDArray | tuple) -> str:
-    return f"{name}: " + " ".join(f"{x:.12e}" for x in np.ravel(numbers)) + "\n"
-
-
-def write_calibration(root: Path, rig: Rig, date: str = DATE) -> None:
-    """Write KITTI's three calibration files. The cameras are ideal: undistorted and parallel.
-
-    A LIDAR that isn't as high above the ground as KITTI's gets a line of its own, `LIDAR_HEIGHT`.
-
-    Parameters
-    ----------
-    root : path-like
-        Parent of the day's folder.
-    rig : Rig
-        The poses of camera, LIDAR and IMU.
-    date : str
-        The day, which is also the folder's name.
-    """
-    day = Path(root) / date
-    time = "calib_time: 01-Jan-2026 09:00:00\n"
-    height, width = rig.camera.size
-    text = time + _row("corner_dist", (0.0995,))
-    for index in range(4):
-        P = rig.P_rect(index)
-        baseline = rig.R_rect.T @ np.array([P[0, 3] / P[0, 0], 0.0, 0.0])
-        rows = {"S": (width, height), "K": P[:, :3], "D": np.zeros(5), "R": np.eye(3), "T": baseline}
-        rows |= {"S_rect": (width, height), "R_rect": rig.R_rect, "P_rect": P}
-        text += "".join(_row(f"{name}_{index:02d}", numbers) for name, numbers in rows.items())
-    write_text(day / "calib_cam_to_cam.txt", text)
-    more = _row("delta_f", (0, 0)) + _row("delta_c", (0, 0))
-    if rig.camera.lidar_height != KITTI_LIDAR_HEIGHT:
-        more += _row(LIDAR_HEIGHT, (rig.camera.lidar_height,))
-    for name, T, extra in (
-        ("calib_velo_to_cam.txt", rig.T_camera0_from_lidar, more),
-        ("calib_imu_to_velo.txt", rig.T_lidar_from_imu, ""),
-    ):
-        write_text(day / name, time + _row("R", T[:3, :3]) + _row("T", T[:3, 3]) + extra)
 
 
 def _write_times(folder: Path, times: Sequence[datetime]) -> None:
@@ -259,7 +217,7 @@ def write_frames(root: Path, drive: tuple[str, str], frames: Iterable[WrittenFra
     Parameters
     ----------
     root : path-like
-        Parent of the day's folder, as in `write_calibration`.
+        Parent of the day's folder, which holds the calibration.
     drive : (str, str)
         Date and number of the drive, four digits.
     frames : iterable of WrittenFrame
