@@ -76,9 +76,9 @@ MEAN_OF_THREE = "simulated, then real, mean of three image networks"
 def small(monkeypatch, streets):
     """Two cameras, four ways: two steps, one with simulated frames; one fuses their scores; one sees heights."""
     once = WayToTrain(Architecture(), params=TrainingParams(1, 1), with_simulated=True)
-    tall = WayToTrain(Architecture(uses_heights=True, image_size=(48, 160)), params=TrainingParams(0, 1))
+    tall = WayToTrain(Architecture(uses_return_heights=True, image_size=(48, 160)), params=TrainingParams(0, 1))
     mean = WayToTrain(Architecture(), mean_of="once", params=TrainingParams(0, 1, end_to_end=False))
-    monkeypatch.setattr(real_streets.TrainingSet, "by_camera", lambda *_: [streets])
+    monkeypatch.setattr(real_streets.TrainingSet, "by_camera", lambda *_, **__: [streets])
     monkeypatch.setattr(real_streets, "CAMERAS", ("front_camera", "left_camera"))
     monkeypatch.setattr(
         real_streets,
@@ -113,7 +113,7 @@ def test_the_mean_is_of_the_image_networks_of_all_seeds_of_the_same_round(monkey
     started = []
     monkeypatch.setattr(real_streets, "Mixture", lambda parts: parts)
     monkeypatch.setattr(real_streets, "_train", lambda way, starts, *_: started.append(starts))
-    found = real_streets._networks(MEAN_OF_THREE, [([], []), ([], [])], [], tmp_path / LEFT_OUT, range(3, 6), 4, "cpu")
+    found = real_streets._networks(MEAN_OF_THREE, [([], []), ([], [])], {}, tmp_path / LEFT_OUT, range(3, 6), 4, "cpu")
     runs = [[f"{LEFT_OUT} {r}, simulated, then real, two stages, {seed}" for seed in (3, 4, 5)] for r in (0, 1)]
     assert started == [[tmp_path / run / IMAGE_STAGE for run in one] for one in runs]
     assert list(found) == [f"{LEFT_OUT} {r}, {MEAN_OF_THREE}, 4" for r in (0, 1)]
