@@ -173,5 +173,5 @@ def test_evaluates_a_network_from_disk_at_its_own_sizes(tmp_path, monkeypatch):
         assert kept.of(method, "true").total(method).tolist() == confusion
         assert np.sum(confusion) == 40 * 20, method  # every cell has a class
     save_net(build_net(Architecture(), camera), tmp_path / "image_stage.safetensors")
-    with pytest.raises(ArgumentError, match=r"image_stage.safetensors: expected image size \(48, 160\)"):
+    with pytest.raises(ArgumentError, match=r"image_stage\.safetensors: expected image size \(48, 160\)"):
         evaluate(root, tmp_path / "net.safetensors")
