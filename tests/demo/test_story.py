@@ -147,7 +147,7 @@ class TestContributions:
         unknown[:, State.UNKNOWN] = 1
         blind = net.fusion(planes, unknown, torch.full_like(z, torch.nan))[0].argmax(dim=0)
         np.testing.assert_array_equal(told.otherwise["no occupancy"], blind)
-        with pytest.raises(ArgumentError, match="return_heights: expected shape .*found none"):
+        with pytest.raises(ArgumentError, match=r"return_heights: expected shape .*found none"):
             contributions(net, result.scores, result.belief.probability)
 
     def test_a_network_in_training_mode_is_refused(self, last_labelled, told):

@@ -157,7 +157,7 @@ def test_evaluates_a_network_from_disk_at_its_own_sizes(tmp_path, monkeypatch):
     monkeypatch.setattr(training_cache, "WORKERS", 1)
     root = write_tiny_dataset(tmp_path / "tiny")
     camera = KittiRawDrive(root, "2026_01_01", "0001").camera
-    other = Architecture(image_size=(48, 160), grid=GridSpec(0, 40, -10, 10, 1.0), uses_return_heights=True)
+    other = Architecture(image_size=(48, 160), grid=GridSpec(0.0, 71.0, -15.5, 15.5, 1.0), uses_return_heights=True)
     save_net(build_net(other, camera), tmp_path / "net.safetensors")
     save_net(build_net(other, camera, seed=1), tmp_path / "image_stage.safetensors")
     result = evaluate(root, tmp_path / "net.safetensors", confusions_file=tmp_path / "confusions.npz")
@@ -171,7 +171,7 @@ def test_evaluates_a_network_from_disk_at_its_own_sizes(tmp_path, monkeypatch):
     assert kept.drives == ("2026_01_01 0003",)
     for method, confusion in result["confusion"].items():
         assert kept.of(method, "true").total(method).tolist() == confusion
-        assert np.sum(confusion) == 40 * 20, method  # every cell has a class
+        assert np.sum(confusion) == 71 * 31, method  # every cell has a class
     save_net(build_net(Architecture(), camera), tmp_path / "image_stage.safetensors")
     with pytest.raises(ArgumentError, match=r"image_stage\.safetensors: expected image size \(48, 160\)"):
         evaluate(root, tmp_path / "net.safetensors")
