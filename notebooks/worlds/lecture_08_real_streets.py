@@ -244,7 +244,13 @@ class _Subset(TrainingSet):
 
 
 def _networks(
-    name: str, rounds: list[Round], streets: dict, split: Path, seeds: range, k: int, fabric: "Fabric"
+    name: str,
+    rounds: list[Round],
+    streets: dict[tuple[int, int], list[TrainingSet]],
+    split: Path,
+    seeds: range,
+    k: int,
+    fabric: "Fabric",
 ) -> dict[str, Path]:
     """Return the files of the weights that are learned in each round with seed k, by the names of their runs."""
     way, files = WAYS[name], {}
