@@ -6,7 +6,7 @@ from pathlib import Path
 import torch
 
 from semgrid_edu.datasets.training_arrays import SEED
-from semgrid_edu.datasets.training_set import FRAMES, Sample
+from semgrid_edu.datasets.training_set import EXCERPT, FRAMES
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import TrainingSet
 from semgrid_edu.storage.provenance import write_provenance
@@ -37,7 +37,7 @@ def write_excerpt(dataset_dir: str | Path, n_frames: int, folder: str | Path) ->
     if not 1 <= n_frames <= len(training):
         raise ArgumentError("n_frames", f"1 to {len(training)} frames", n_frames)
     chosen = [training[k * len(training) // n_frames] for k in range(n_frames)]
-    tensors = dict(zip(Sample._fields, map(torch.stack, zip(*chosen, strict=True)), strict=True))
+    tensors = {name: torch.stack([getattr(frame, name) for frame in chosen]) for name in EXCERPT}
     write_tensors(folder / FRAMES, tensors)
     command = f"python data_samples/make_frames.py {Path(dataset_dir).name} {n_frames} {folder.name}"
     write_provenance(folder, command, SEED, ("numpy", "torch", "numba"))

@@ -106,8 +106,8 @@ def run_frame(frame: Frame, stages: Stages) -> FrameResult:
     clock.lap("sample")
 
     # (p, o) -> g: a small network fuses planes and occupancy into the semantic grid (section 3.4).
-    scan = {"heights": stages.heights(frame)} if stages.wants_heights else {}  # the paper's network sees no heights
-    log_grid = stages.fuse(planes, occupancy, **scan)
+    # Return heights are only for a stage that asks for them, as the paper's network doesn't.
+    log_grid = stages.fuse(planes, occupancy, *stages.return_heights(frame))
     clock.lap("fuse")
 
     # g -> g: a fully connected CRF refines the grid (section 3.5, equations (3) and (4)).

@@ -673,7 +673,7 @@ def learn_here(lesson, steps=6, seed=0):
     fusion = copy.deepcopy(net.fusion).requires_grad_(True).train()
     optimiser = torch.optim.AdamW(fusion.parameters(), lr=1e-3)
     for k in np.random.default_rng(seed).integers(len(lesson), size=steps):
-        logits = fusion(inputs.planes[[k]], inputs.o[[k]])
+        logits = fusion(*(part[[k]] for part in inputs))
         loss = F.cross_entropy(logits, lesson[[k]], ignore_index=IGNORE)
         optimiser.zero_grad()
         loss.backward()

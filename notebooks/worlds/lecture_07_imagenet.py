@@ -159,6 +159,8 @@ def start_from(start: str, seed: int, normalised: bool = False) -> Segmenter:
     net = build_segmenter("efficientnet", len(KITTI_14), "compact", seed)
     if not normalised:
         net.lateral = nn.ModuleList(convolution for convolution, _ in net.lateral)
+        for layer in net.lateral:
+            layer.bias = nn.Parameter(torch.zeros(layer.out_channels))  # which the normalisation would have taken away
     for layer in net.modules():
         if isinstance(layer, nn.BatchNorm2d):
             layer.momentum = 0.1  # the published 0.01 would need hundreds of steps to forget its first statistics

@@ -157,7 +157,7 @@ def _image_scores(parts: list[Part], weights: Path) -> ImageScores:
         net = load_net(weights, frames.camera)
         for k in numbers:
             scores = net.segment(unit_image(frames[k].image)[None])
-            planes.append(net.sampler(scores).half())
+            planes.append(net.sample(scores).half())
             probability = scores[0].softmax(dim=0).numpy()
             at_returns.append(scores_of_returns(probability, *frames.returns(k), frames.spec))
     return ImageScores(torch.cat(planes), np.stack(at_returns))

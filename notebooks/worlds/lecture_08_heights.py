@@ -31,7 +31,7 @@ def scan_heights(points: NDArray, spec: GridSpec) -> NDArray[np.float64]:
 
     Parameters are those of `cell_heights`.
     """
-    return above_ground(torch.from_numpy(cell_heights(points, spec))).numpy()
+    return above_ground(torch.from_numpy(cell_heights(points, spec)), spec.cell).numpy()
 
 
 def height_rule(heights: NDArray) -> NDArray[np.uint8]:

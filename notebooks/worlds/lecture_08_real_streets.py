@@ -137,7 +137,8 @@ def compare_real(
     runs = Path(runs) / scene
     sizes = {Architecture.image_size, *map(image_size_of, WAYS)}
     of_size = {size: splits(open_views(root, scene, runs, size)) for size in sizes}
-    streets = TrainingSet.by_camera(simulated, "train")
+    simulated_sizes = {image_size_of(name) for name, way in WAYS.items() if way.with_simulated}
+    streets = {size: TrainingSet.by_camera(simulated, "train", image_size=size) for size in simulated_sizes}
     found, weights, seeds = {}, {}, range(seed, seed + TABLE["seeds"])
     for split, usual in of_size[Architecture.image_size].items():
         table = _joined(_count_states(*one) for one in usual)[STATE_TABLE]
@@ -243,7 +244,13 @@ class _Subset(TrainingSet):
 
 
 def _networks(
-    name: str, rounds: list[Round], streets: list[TrainingSet], split: Path, seeds: range, k: int, fabric: "Fabric"
+    name: str,
+    rounds: list[Round],
+    streets: dict[tuple[int, int], list[TrainingSet]],
+    split: Path,
+    seeds: range,
+    k: int,
+    fabric: "Fabric",
 ) -> dict[str, Path]:
     """Return the files of the weights that are learned in each round with seed k, by the names of their runs."""
     way, files = WAYS[name], {}
@@ -252,7 +259,8 @@ def _networks(
         starts = of_runs or ([sample_weights(way.start)] if way.start else [])
         folder = split.with_name(f"{split.name} {r}, {name}, {k}")
         if way.params and not (folder / WEIGHTS).exists():
-            mixture = Mixture([[_Subset(*part) for part in training], *([streets] if way.with_simulated else [])])
+            simulated = [streets[image_size_of(name)]] if way.with_simulated else []
+            mixture = Mixture([[_Subset(*part) for part in training], *simulated])
             _train(way, starts, mixture, folder, k, fabric)
         files[folder.name] = folder / WEIGHTS if way.params else starts[0]
     return files

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -15,30 +14,18 @@ from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.networks.build import plane_sampler
 from semgrid_edu.pipeline import network_image
-from semgrid_edu.planes import plane_heights, plane_pixels
+from semgrid_edu.planes import cell_heights
 from semgrid_edu.workshop.course.street import best_table
 from worlds.lecture_08_heights import height_rule, scan_heights
 
 
-class Inputs(NamedTuple):
-    """Some frames, as the fusion network takes them.
-
-    Parameters
-    ----------
-    planes : (N, C, D, H, W) float32
-        The image network's scores on the planes.
-    o : (N, 4, H, W) float32
-        The occupancy grids.
-    """
-
-    planes: Tensor
-    o: Tensor
-
-
 @torch.no_grad()
-def fusion_inputs(net: SemanticGridNet, frames: Sequence[Frame], beliefs: Sequence[NDArray]) -> Inputs:
-    """Return what the fusion network sees of some frames.
+def fusion_inputs(net: SemanticGridNet, frames: Sequence[Frame], beliefs: Sequence[NDArray]) -> tuple[Tensor, ...]:
+    """Return what the fusion network sees of some frames: p (N, C, D, H, W) and o (N, 4, H, W).
+
+    A network with `uses_return_heights` also sees these, (N, 2, H, W).
 
     Parameters
     ----------
@@ -51,28 +38,31 @@ def fusion_inputs(net: SemanticGridNet, frames: Sequence[Frame], beliefs: Sequen
     """
     size, spec = net.architecture.image_size, net.architecture.grid
     planes, camera = [], None
+    beside = [np.stack(beliefs)]
+    if net.uses_return_heights:
+        beside.append(np.stack([cell_heights(frame.points_grid, spec) for frame in frames]))
     for frame in frames:
         if frame.camera is not camera:
             camera = frame.camera
-            sampler = PlaneSampler(*plane_pixels(spec, plane_heights(), camera.resized(size)), size)
-        planes.append(sampler(net.segmenter(torch.from_numpy(network_image(frame, size))[None])))
-    return Inputs(torch.cat(planes), torch.from_numpy(np.stack(beliefs).astype(np.float32)))
+            sampler = plane_sampler(net.architecture, camera, PlaneSampler)
+        planes.append(net.sample(net.segment(torch.from_numpy(network_image(frame, size))[None]), sampler))
+    return torch.cat(planes), *(torch.from_numpy(part.astype(np.float32)) for part in beside)
 
 
 @torch.no_grad()
-def semantic_grids(fusion: nn.Module, inputs: Inputs) -> NDArray[np.float32]:
+def semantic_grids(fusion: nn.Module, inputs: Sequence[Tensor]) -> NDArray[np.float32]:
     """Return the class probabilities of each cell, (N, C, H, W).
 
     Parameters
     ----------
     fusion : Module
         A fusion network; it is in evaluation mode afterwards.
-    inputs : Inputs
-        What it sees.
+    inputs : sequence of Tensor
+        What it sees, from `fusion_inputs`.
     """
     fusion.eval()
-    pairs = zip(inputs.planes.split(1), inputs.o.split(1), strict=True)
-    return torch.cat([torch.softmax(fusion(*pair), dim=1) for pair in pairs]).numpy()
+    of_frames = zip(*(part.split(1) for part in inputs), strict=True)
+    return torch.cat([torch.softmax(fusion(*seen), dim=1) for seen in of_frames]).numpy()
 
 
 def without_unknown(grids: NDArray) -> NDArray[np.float32]:

@@ -62,8 +62,8 @@ def drive_arrays(drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRec
     -------
     list of dict of str to array
         For each labelled frame "image" (3, h, w) uint8, "labels" (h, w) uint8, "occupancy" (4, H, W) float32, "truth"
-        (H, W) uint8, "heights" (2, H, W) float32 from `cell_heights`, and "return_pixels" and "return_cells" from
-        `seen_returns`.
+        (H, W) uint8, "return_heights" (2, H, W) float32 from `cell_heights`, and "return_pixels" and "return_cells"
+        from `seen_returns`.
     """
     read = getattr(drive, "without_labels", drive.__getitem__)  # `image_labels` and `truth` make the labels
     numbers = tqdm(range(max(labelled) + 1), desc=drive.name, unit="frame", leave=False)
@@ -89,7 +89,7 @@ def _frame_arrays(
         "labels": drive.image_labels(k, recipe.image_size),
         "occupancy": occupancy.astype(np.float32),
         "truth": truth_to_learn(drive, k, occupancy, recipe.spec),
-        "heights": cell_heights(frame.points_grid, recipe.spec).astype(np.float32),
+        "return_heights": cell_heights(frame.points_grid, recipe.spec).astype(np.float32),
         "return_pixels": pixels,
         "return_cells": cells,
     }

@@ -53,8 +53,8 @@ def cached_arrays(
     -------
     dict of str to array
         For N frames "image" (N, 3, h, w) uint8, "labels" (N, h, w) uint8, "occupancy" (N, 4, H, W) float32, "truth" and
-        "true" (N, H, W) uint8: the result of `truth`, and the data set's own truth. "heights" (N, 2, H, W) float32 are
-        from `cell_heights`. From `seen_returns` come "return_pixels" and "return_cells", whose entries from
+        "true" (N, H, W) uint8: the result of `truth`, and the data set's own truth. "return_heights" (N, 2, H, W)
+        float32 are from `cell_heights`. From `seen_returns` come "return_pixels" and "return_cells", whose entries from
         return_ends[k] to return_ends[k + 1] belong to frame k, and "return_ends" (N + 1,).
 
     Raises

@@ -40,16 +40,20 @@ class Sample(NamedTuple):
         Probability of FREE, STATIC, DYNAMIC and UNKNOWN.
     truth : (H, W) uint8
         The class of each cell.
-    heights : (2, H, W) float32, or None
-        The lowest and the highest return of each cell, metres, from `cell_heights`; only networks with `uses_heights`
-        need them.
+    return_heights : (2, H, W) float32, or None
+        The lowest and the highest return of each cell, metres, from `cell_heights`; only networks with
+        `uses_return_heights` need them, and the shipped excerpt lacks them.
     """
 
     image: Tensor
     labels: Tensor
     occupancy: Tensor
     truth: Tensor
-    heights: Tensor | None = None
+    return_heights: Tensor | None = None
+
+
+EXCERPT = Sample._fields[:4]
+"""The fields that an excerpt of a data set holds: all but `return_heights`."""
 
 
 class TrainingSet(Dataset[Sample]):
@@ -154,7 +158,7 @@ class TrainingSet(Dataset[Sample]):
 
     def __getitem__(self, k: int) -> Sample:
         """Return frame k, by drive in the order of the index."""
-        return Sample(**{n: torch.from_numpy(np.array(self.arrays[n][k])) for n in Sample._fields if n in self.arrays})
+        return Sample(*(torch.from_numpy(np.array(self.arrays[name][k])) for name in Sample._fields))
 
     def returns(self, k: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Return the pixel and the cell of each LIDAR return that the camera sees in a frame.
@@ -255,8 +259,7 @@ def read_excerpt(folder: str | Path) -> list[Sample]:
     """
     path = Path(folder) / FRAMES
     _, tensors = read_tensors(path)
-    names = [name for name in Sample._fields if name in tensors or name not in Sample._field_defaults]
     try:
-        return [Sample(*frame) for frame in zip(*(tensors[name] for name in names), strict=True)]
+        return [Sample(*frame) for frame in zip(*(tensors[name] for name in EXCERPT), strict=True)]
     except (KeyError, ValueError) as error:
-        raise DataError(path, f"labelled frames: {', '.join(names)}", error) from error
+        raise DataError(path, f"labelled frames: {', '.join(EXCERPT)}", error) from error

@@ -92,7 +92,7 @@ class EfficientNet(Segmenter):
         """
         self.backbone = LiteEncoder()
         self.lateral = nn.ModuleList(
-            nn.Sequential(nn.Conv2d(n_in, width, 1), nn.BatchNorm2d(width)) for n_in in self.backbone.widths
+            nn.Sequential(nn.Conv2d(n_in, width, 1, bias=False), nn.BatchNorm2d(width)) for n_in in self.backbone.widths
         )
         self.smooth = nn.ModuleList(conv_bn_relu(width, width) for _ in self.backbone.widths[1:])
         self.score = nn.Sequential(nn.BatchNorm2d(width), nn.ReLU(inplace=True), nn.Conv2d(width, n_classes, 1))

@@ -28,6 +28,8 @@ class ReturnsFusion(nn.Module):
         Number of classes scored on the planes.
     heights : (D,) float
         delta_i, the heights of the planes, from the lowest up, metres.
+    cell : float
+        Side of a cell, metres.
     n_classes : int
         C, the number of classes of the semantic grid.
     seed : int
@@ -37,16 +39,23 @@ class ReturnsFusion(nn.Module):
     """
 
     def __init__(
-        self, n_scores: int, heights: Sequence[float], n_classes: int, seed: int = 0, uses_occupancy: bool = True
+        self,
+        n_scores: int,
+        heights: Sequence[float],
+        cell: float,
+        n_classes: int,
+        seed: int = 0,
+        uses_occupancy: bool = True,
     ) -> None:
         super().__init__()
-        self.plane_heights = tuple(heights)
+        self.heights = tuple(heights)
+        self.cell = cell
         self.uses_occupancy = uses_occupancy
         n_in = 2 * n_scores + N_STATES + 3
         with fresh_weights(self, seed):
             self.conv_deconv = ConvDeconv(n_in, n_classes, FusionNet.WIDTHS, FusionNet.DEPTHS, skips=True)
 
-    def forward(self, planes: Tensor, occupancy: Tensor, heights: Tensor) -> Tensor:
+    def forward(self, planes: Tensor, occupancy: Tensor, return_heights: Tensor) -> Tensor:
         """Return the logits of the semantic grid; a soft-max over C makes them probabilities.
 
         Parameters
@@ -55,7 +64,7 @@ class ReturnsFusion(nn.Module):
             p, the image's class probabilities on the planes.
         occupancy : (B, 4, H, W) float
             o, the probabilities of the four states; they sum to 1 in each cell.
-        heights : (B, 2, H, W) float
+        return_heights : (B, 2, H, W) float
             The lowest and the highest return of each cell, from `cell_heights`.
 
         Returns
@@ -63,9 +72,9 @@ class ReturnsFusion(nn.Module):
         (B, C, H, W) float
             g before the soft-max.
         """
-        return self.fuse(self.reduce(planes, heights), occupancy, heights)
+        return self.fuse(self.reduce(planes, return_heights), occupancy, return_heights)
 
-    def reduce(self, planes: Tensor, heights: Tensor) -> Tensor:
+    def reduce(self, planes: Tensor, return_heights: Tensor) -> Tensor:
         """Pick the scores at the heights of the returns. Parameters are those of `ReturnsFusion.forward`.
 
         Returns
@@ -73,9 +82,9 @@ class ReturnsFusion(nn.Module):
         (B, 2 n_scores, 1, H, W) float
             From `pick_planes`.
         """
-        return pick_planes(planes, heights, self.plane_heights).unsqueeze(2)
+        return pick_planes(planes, return_heights, self.heights).unsqueeze(2)
 
-    def fuse(self, reduced: Tensor, occupancy: Tensor, heights: Tensor) -> Tensor:
+    def fuse(self, reduced: Tensor, occupancy: Tensor, return_heights: Tensor) -> Tensor:
         """Return the logits, as `forward` does, from scores that are already picked.
 
         Parameters
@@ -84,7 +93,7 @@ class ReturnsFusion(nn.Module):
             The result of `reduce`.
         occupancy : (B, 4, H, W) float
             o, the probabilities of the four states; they sum to 1 in each cell.
-        heights : (B, 2, H, W) float
+        return_heights : (B, 2, H, W) float
             The lowest and the highest return of each cell, from `cell_heights`.
 
         Returns
@@ -92,9 +101,9 @@ class ReturnsFusion(nn.Module):
         (B, C, H, W) float
             g before the soft-max.
         """
-        return self.conv_deconv(self.joined(reduced, occupancy, heights))
+        return self.conv_deconv(self.joined(reduced, occupancy, return_heights))
 
-    def joined(self, reduced: Tensor, occupancy: Tensor, heights: Tensor) -> Tensor:
+    def joined(self, reduced: Tensor, occupancy: Tensor, return_heights: Tensor) -> Tensor:
         """Append occupancy and heights to the picked scores. Parameters are those of `ReturnsFusion.fuse`.
 
         Returns
@@ -104,6 +113,6 @@ class ReturnsFusion(nn.Module):
         """
         if not self.uses_occupancy:
             occupancy = no_scan(occupancy)
-        above = above_ground(heights).nan_to_num(nan=0.0).clamp(0, HIGHEST) / HALF
-        has_return = ~heights[:, :1].isnan()
+        above = above_ground(return_heights, self.cell).nan_to_num(nan=0.0).clamp(0, HIGHEST) / HALF
+        has_return = ~return_heights[:, :1].isnan()
         return torch.cat([reduced.squeeze(2), occupancy, above, has_return.to(above.dtype)], dim=1)

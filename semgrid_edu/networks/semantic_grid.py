@@ -48,10 +48,10 @@ class Architecture:
         Whether the 1x1 convolution reduces the planes. Otherwise the conv-deconv network takes all D x C of them.
     n_segmenters : int
         How many image networks score an image, 1 to 9; s is the mean of their scores, see `MeanSegmenter`.
-    uses_heights : bool
+    uses_return_heights : bool
         Whether the fusion network sees the heights of the scan's returns, and the scores at these heights alone, see
-        `ReturnsFusion`; then `reduces` has no effect. Its planes hold class probabilities, the soft-max of the scores:
-        it must compare them between views, and raw scores have another size in each.
+        `ReturnsFusion`. Its planes hold class probabilities, the soft-max of the scores: it must compare them between
+        views, and raw scores have another size in each.
     """
 
     segmenter: str = "segnet"
@@ -63,11 +63,11 @@ class Architecture:
     uses_occupancy: bool = True
     reduces: bool = True
     n_segmenters: int = 1
-    uses_heights: bool = False
+    uses_return_heights: bool = False
 
     @types_named
     def __post_init__(self) -> None:
-        """Raise an `ArgumentError` for sizes that no computer has the memory for."""
+        """Raise an `ArgumentError` for sizes that no computer has the memory for, and for options that don't fit."""
         height, width = self.image_size
         if not (height >= 1 and width >= 1 and height * width <= MOST_PIXELS):
             raise ArgumentError("image_size", f"two whole numbers, 1 to {MOST_PIXELS} pixels", self.image_size)
@@ -77,13 +77,15 @@ class Architecture:
         if rows * columns * len(self.heights) > MOST_POINTS:
             found = f"{rows} x {columns} cells on {len(self.heights)} planes"
             raise ArgumentError("grid, heights", f"at most {MOST_POINTS} points of planes", found)
-        if self.uses_heights and list(self.heights) != sorted(set(self.heights)):
-            raise ArgumentError("heights", "planes from the lowest up, with uses_heights", self.heights)
+        if self.uses_return_heights and not self.reduces:
+            raise ArgumentError("reduces", "True with uses_return_heights, which reduces the planes to two", False)
+        if self.uses_return_heights and list(self.heights) != sorted(set(self.heights)):
+            raise ArgumentError("heights", "planes from the lowest up, with uses_return_heights", self.heights)
 
     @property
     def layout(self) -> tuple[str, tuple[int, int], GridSpec, tuple[float, ...], bool]:
         """Label set, image size, grid, planes, and what these hold. Equal ones can exchange their stages."""
-        return self.label_set, self.image_size, self.grid, self.heights, self.uses_heights
+        return self.label_set, self.image_size, self.grid, self.heights, self.uses_return_heights
 
 
 class NetOutputs(NamedTuple):
@@ -94,7 +96,7 @@ class NetOutputs(NamedTuple):
     scores : (B, C, h, w) float
         s, the scores of each class at each pixel, before any soft-max.
     planes : (B, C, D, H, W) float
-        p, the scores on the planes; class probabilities with `uses_heights`.
+        p, the scores on the planes; class probabilities with `uses_return_heights`.
     logits : (B, C, H, W) float
         g before the soft-max.
     """
@@ -141,9 +143,12 @@ class SemanticGridNet(nn.Module):
         self.architecture = architecture
         n_scores = getattr(segmenter, "n_classes", n_classes)
         options = architecture or Architecture()
-        self.uses_heights = options.uses_heights
-        if self.uses_heights:
-            self.fusion = ReturnsFusion(n_scores, options.heights, n_classes, seed, options.uses_occupancy)
+        self.uses_return_heights = options.uses_return_heights
+        if self.uses_return_heights:
+            if sampler.planes_shape[0] != len(options.heights):
+                raise ArgumentError("sampler", f"{len(options.heights)} planes", sampler.planes_shape[0])
+            heights, cell = options.heights, options.grid.cell
+            self.fusion = ReturnsFusion(n_scores, heights, cell, n_classes, seed, options.uses_occupancy)
         else:
             self.fusion = FusionNet(
                 n_scores,
@@ -167,7 +172,7 @@ class SemanticGridNet(nn.Module):
         occupancy: Tensor,
         mirrored: bool = False,
         sampler: PlaneSampler | None = None,
-        heights: Tensor | None = None,
+        return_heights: Tensor | None = None,
     ) -> NetOutputs:
         """Return the result of every stage, from the scores to the semantic grid.
 
@@ -183,9 +188,9 @@ class SemanticGridNet(nn.Module):
             symmetric, so in a mirrored image equation (1) would give the wrong pixels.
         sampler : PlaneSampler, optional
             s -> p for the camera that took these images; the network's own sampler when left out.
-        heights : (B, 2, H, W) float, optional
-            The lowest and the highest return of each cell, from `cell_heights`. A network with `uses_heights` needs
-            them; others don't look.
+        return_heights : (B, 2, H, W) float, optional
+            The lowest and the highest return of each cell, from `cell_heights`. A network with
+            `uses_return_heights` needs them; others don't look.
 
         Returns
         -------
@@ -195,17 +200,17 @@ class SemanticGridNet(nn.Module):
         Raises
         ------
         ArgumentError
-            When a shape is wrong, or heights are missing.
+            When a shape is wrong, or return heights are missing.
         """
         _check("image", image, (3, *self.sampler.image_size))
         _check("occupancy", occupancy, (N_STATES, *self.sampler.planes_shape[1:]))
         if len(image) != len(occupancy):
             raise ArgumentError("occupancy", f"one for each of the {len(image)} images", len(occupancy))
-        if self.uses_heights:
-            self._check_heights(heights, len(image))  # before the image network, which takes longest
+        if self.uses_return_heights:
+            self.check_return_heights(return_heights, len(image))  # before the image network, which takes longest
         scores = self.segment(image, mirrored)
         planes = self.sample(scores, sampler)
-        return NetOutputs(scores, planes, self.fuse(planes, occupancy, mirrored, heights))
+        return NetOutputs(scores, planes, self.fuse(planes, occupancy, mirrored, return_heights))
 
     def segment(self, image: Tensor, mirrored: bool = False) -> Tensor:
         """Return s, the image network's scores. Parameters are those of `SemanticGridNet.stages`.
@@ -218,7 +223,7 @@ class SemanticGridNet(nn.Module):
         return _flip(self.segmenter(_flip(image, mirrored)), mirrored)
 
     def sample(self, scores: Tensor, sampler: PlaneSampler | None = None) -> Tensor:
-        """Return p, the scores on the planes; with `uses_heights` the class probabilities, see `Architecture`.
+        """Return p, the scores on the planes; with `uses_return_heights` the class probabilities, see `Architecture`.
 
         The other Parameters are those of `SemanticGridNet.stages`.
 
@@ -231,9 +236,11 @@ class SemanticGridNet(nn.Module):
         -------
         (B, C, D, H, W) float
         """
-        return (sampler or self.sampler)(scores.softmax(dim=1) if self.uses_heights else scores)
+        return (sampler or self.sampler)(scores.softmax(dim=1) if self.uses_return_heights else scores)
 
-    def fuse(self, planes: Tensor, occupancy: Tensor, mirrored: bool = False, heights: Tensor | None = None) -> Tensor:
+    def fuse(
+        self, planes: Tensor, occupancy: Tensor, mirrored: bool = False, return_heights: Tensor | None = None
+    ) -> Tensor:
         """Return the logits of the semantic grid from the sampled planes: (p, o) -> g.
 
         The other Parameters are those of `SemanticGridNet.stages`.
@@ -248,19 +255,27 @@ class SemanticGridNet(nn.Module):
         (B, C, H, W) float
             g before the soft-max.
         """
-        scan = (self._check_heights(heights, len(planes)),) if self.uses_heights else ()
+        scan = (self.check_return_heights(return_heights, len(planes)),) if self.uses_return_heights else ()
         # What reduces the planes sees one cell at a time, so we mirror after it, when there is less data to move.
         reduced = _flip(self.fusion.reduce(planes, *scan), mirrored)
         mirrored_scan = (_flip(part, mirrored) for part in (occupancy, *scan))
         return _flip(self.fusion.fuse(reduced, *mirrored_scan), mirrored)
 
-    def _check_heights(self, heights: Tensor | None, n_frames: int) -> Tensor:
-        """Return the heights that the network needs, or raise an `ArgumentError` if they are missing or don't fit."""
+    def check_return_heights(self, return_heights: Tensor | None, n_frames: int) -> Tensor:
+        """Return them in single precision, or raise an `ArgumentError` if they are missing or don't fit.
+
+        Parameters
+        ----------
+        return_heights : (B, 2, H, W) float, or None
+            What was given to a network with `uses_return_heights`.
+        n_frames : int
+            B, the number of frames.
+        """
         expected = (n_frames, 2, *self.sampler.planes_shape[1:])
-        if heights is None or tuple(heights.shape) != expected:
-            found = "none" if heights is None else tuple(heights.shape)
-            raise ArgumentError("heights", f"shape {expected}: the network uses the heights of returns", found)
-        return heights
+        if return_heights is None or tuple(return_heights.shape) != expected:
+            found = "none" if return_heights is None else tuple(return_heights.shape)
+            raise ArgumentError("return_heights", f"shape {expected}: the network uses return heights", found)
+        return return_heights.float()
 
     def with_sampler(self, sampler: nn.Module) -> "SemanticGridNet":
         """Return a network of the same layers, which are shared, with another sampler.
@@ -274,7 +289,7 @@ class SemanticGridNet(nn.Module):
         other.fusion = self.fusion
         return other.train(self.training)
 
-    def forward(self, image: Tensor, occupancy: Tensor, heights: Tensor | None = None) -> Tensor:
+    def forward(self, image: Tensor, occupancy: Tensor, return_heights: Tensor | None = None) -> Tensor:
         """Return the logits of the semantic grid. Parameters and errors are those of `SemanticGridNet.stages`.
 
         Returns
@@ -282,7 +297,7 @@ class SemanticGridNet(nn.Module):
         (B, C, H, W) float
             g before the soft-max.
         """
-        return self.stages(image, occupancy, heights=heights).logits
+        return self.stages(image, occupancy, return_heights=return_heights).logits
 
 
 def _flip(x: Tensor, mirrored: bool) -> Tensor:

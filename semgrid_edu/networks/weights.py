@@ -41,7 +41,7 @@ def save_net(net: SemanticGridNet, path: str | Path, half: bool = False) -> None
         If the network has no architecture, because it couldn't be rebuilt from the file.
     """
     description = asdict(net.need_architecture())
-    for name in ("uses_occupancy", "reduces", "n_segmenters", "uses_heights"):
+    for name in ("uses_occupancy", "reduces", "n_segmenters", "uses_return_heights"):
         # Omit defaults, so that files older than these fields keep their checksums when they are rewritten.
         if description[name] == getattr(Architecture, name):
             del description[name]

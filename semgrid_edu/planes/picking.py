@@ -6,25 +6,28 @@ import torch
 import torch.nn.functional as F
 from torch import Tensor
 
-NEIGHBOURS = 9
-"""Side of the square of cells whose lowest return is taken for the ground: 4.5 m in cells of 0.5 m."""
+REACH = 2.0
+"""The lowest return up to this many metres ahead, behind, to the left and to the right is taken for the ground."""
 
 
-def above_ground(heights: Tensor) -> Tensor:
-    """Return how far returns are above the lowest one within 9 x 9 cells, metres; NaN in a cell without a return.
+def above_ground(return_heights: Tensor, cell: float) -> Tensor:
+    """Return how far returns are above the lowest one in the cells around, metres; NaN in a cell without a return.
 
     Parameters
     ----------
-    heights : (..., 2, H, W) float
+    return_heights : (B, 2, H, W) or (2, H, W) float
         The lowest and the highest return of each cell, from `cell_heights`.
+    cell : float
+        Side of a cell, metres; of 0.5 m, 9 x 9 cells are looked at.
 
     Returns
     -------
-    (..., 2, H, W) float
+    (B, 2, H, W) or (2, H, W) float
     """
-    lowest = heights[..., :1, :, :].nan_to_num(nan=torch.inf)
-    ground = -F.max_pool2d(-lowest, NEIGHBOURS, stride=1, padding=NEIGHBOURS // 2)
-    return heights - ground
+    reach = round(REACH / cell)
+    lowest = return_heights[..., :1, :, :].nan_to_num(nan=torch.inf)
+    ground = -F.max_pool2d(-lowest, 2 * reach + 1, stride=1, padding=reach)
+    return return_heights - ground
 
 
 def pick_planes(planes: Tensor, z: Tensor, heights: Tensor | Sequence[float]) -> Tensor:

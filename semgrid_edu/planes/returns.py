@@ -4,28 +4,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy.sensor import SensorModel, edge_of_splits, without_own_returns
 
 
 def cell_heights(points: NDArray, spec: GridSpec) -> NDArray[np.float64]:
     """Return the lowest and the highest return of each cell, (2, H, W), metres above flat ground.
 
-    NaN in a cell without a return.
+    NaN in a cell without a return. The vehicle's own returns are left out, as the filter's default `SensorModel` does.
 
     Parameters
     ----------
     points : (N, 3+) float
-        Returns in the grid frame, as `Frame.points_grid` has them: where there is a fifth column, it marks the returns
-        of the vehicle itself, which are left out.
+        Returns in the grid frame, as `Frame.points_grid` has them.
     spec : GridSpec
         The grid, (H, W) cells.
 
     Examples
     --------
-    >>> cell_heights(np.array([[0.5, 0.5, 0.1], [0.2, 0.7, 1.4]]), GridSpec(0, 1, 0, 1, 1.0)).ravel()
+    >>> cell_heights(np.array([[9.5, 0.5, 0.1], [9.2, 0.7, 1.4]]), GridSpec(9, 10, 0, 1, 1.0)).ravel()
     array([0.1, 1.4])
     """
-    if points.shape[1] > 4:
-        points = points[points[:, 4] == 0]
+    sensor = SensorModel()
+    points = without_own_returns(points, sensor.vehicle, edge_of_splits(points, sensor.edge), sensor.obstacle_min)
     rows, cols, inside = spec.cells(points)
     cells = rows[inside], cols[inside]
     z = points[inside, 2].astype(np.float64)

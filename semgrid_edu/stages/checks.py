@@ -34,11 +34,16 @@ class CheckedStage:
         Shape that the result must have.
     first_frame : int
         Number of the frame of the first call, for messages; each call counts one on.
+    of_probabilities : bool
+        Whether the result of `sample` must be class probabilities.
     """
 
-    def __init__(self, name: str, stage: Any, shape: tuple[int, ...], first_frame: int = 0) -> None:
+    def __init__(
+        self, name: str, stage: Any, shape: tuple[int, ...], first_frame: int = 0, of_probabilities: bool = False
+    ) -> None:
         self.name = name
-        self.stage = stage
+        self.stage = self.__wrapped__ = stage  # so that `inspect.signature` gives the stage's own
+        self.of_probabilities = of_probabilities
         self.shape = shape
         self.frame = first_frame - 1
         module = getattr(stage, "__module__", None) or type(stage).__module__
@@ -48,15 +53,13 @@ class CheckedStage:
         """Say which stage, where it is written, and at which frame: "refine (my_stages.py, line 12), frame 3"."""
         return f"{self.name} ({where(self.stage)}), frame {self.frame}"
 
-    def __call__(self, *inputs: NDArray, **named: NDArray) -> NDArray[np.float32]:
+    def __call__(self, *inputs: NDArray) -> NDArray[np.float32]:
         """Call the stage and check what it returns.
 
         Parameters
         ----------
         *inputs : array
             What the stage takes.
-        **named : array
-            What `fuse` takes by name: heights, if it asks for them.
 
         Returns
         -------
@@ -66,10 +69,13 @@ class CheckedStage:
         self.frame += 1
         given = inputs if self.is_ours else [np.copy(array) for array in inputs]
         with self.blamed():
-            value = self.stage(*given, **{name: np.copy(array) for name, array in named.items()})
+            value = self.stage(*given)
         result = self.array(value, self.shape)
         if self.name == "segment":
             self.finite(result)
+        elif self.of_probabilities and not (result.min() >= -TOLERANCE and result.max() <= 1 + TOLERANCE):
+            found = f"{result.min():.4g} to {result.max():.4g}: sample the soft-max of s over axis 0"
+            raise self.error("class probabilities, because the network uses return heights", found)
         elif self.name == "fuse":
             self.log_probabilities(result, inputs[0])
         elif self.name == "refine":

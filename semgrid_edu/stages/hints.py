@@ -23,7 +23,7 @@ STAGES = {
 }
 """The names of the paper's stages, in their order, and of the arguments that a function for each of them takes."""
 
-HEIGHTS = "heights"
+RETURN_HEIGHTS = "return_heights"
 """A third argument that a function for `fuse` may take: the lowest and the highest return of each cell."""
 
 REMEMBER = {"remember": ("views", "spec")}
@@ -47,7 +47,9 @@ def check_usage(name: str, stage: object) -> None:
     """
     takes = (STAGES | REMEMBER)[name]
     usage = f"a function {name}({', '.join(takes)})"
-    named = {HEIGHTS: None} if name == "fuse" and takes_heights(stage) else {}
+    if name == "fuse":
+        usage += f" or fuse(p, o, {RETURN_HEIGHTS})"
+        takes += (RETURN_HEIGHTS,) * takes_return_heights(stage)
     if "spec" in takes:
         usage += " or an object with step(frame)"
     if isinstance(stage, type):
@@ -61,13 +63,13 @@ def check_usage(name: str, stage: object) -> None:
     except ValueError:  # some functions written in C don't say what they take
         return
     try:
-        signature.bind(*takes, **named)
+        signature.bind(*takes)
     except TypeError as error:
         raise ArgumentError(name, usage, f"{name}{signature}") from error
 
 
-def takes_heights(fuse: object) -> bool:
-    """Return whether a stage `fuse` has an argument named `heights`.
+def takes_return_heights(fuse: object) -> bool:
+    """Return whether a stage `fuse` has an argument named `return_heights`.
 
     Parameters
     ----------
@@ -75,7 +77,7 @@ def takes_heights(fuse: object) -> bool:
         What may be a function, or a `CheckedStage` around one.
     """
     try:
-        return HEIGHTS in inspect.signature(getattr(fuse, "stage", fuse)).parameters
+        return RETURN_HEIGHTS in inspect.signature(fuse).parameters
     except (TypeError, ValueError):  # not a function, or one written in C
         return False
 

@@ -6,7 +6,8 @@
 import copy
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import wraps
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,7 +25,7 @@ from semgrid_edu.memory import ClassMemory, MemoryParams
 from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
 from semgrid_edu.occupancy import CmcdotParams, DriveTracker
 from semgrid_edu.planes import cell_heights
-from semgrid_edu.stages.hints import REMEMBER, STAGES, check_usage, takes_heights
+from semgrid_edu.stages.hints import REMEMBER, STAGES, check_usage, takes_return_heights
 from semgrid_edu.stages.stepping import checked
 
 
@@ -56,10 +57,11 @@ class Stages:
     segment : callable, optional
         i -> s: `segment(image (3, h, w))` returns scores (C, h, w) float without soft-max; the image is RGB, 0..1.
     sample : callable, optional
-        s -> p: `sample(s (C, h, w))` returns the scores on the planes, (C, D, H, W) float.
+        s -> p: `sample(s (C, h, w))` returns the scores on the planes, (C, D, H, W) float. Of a network with
+        `uses_return_heights` it returns class probabilities: the soft-max of s, sampled.
     fuse : callable, optional
         (p, o) -> g: `fuse(p (C, D, H, W), o (4, H, W))` returns log g (C, H, W) float, natural logarithms of
-        probabilities: exp(log g) sums to 1 in each cell. A function with a third argument called `heights` also gets
+        probabilities: exp(log g) sums to 1 in each cell. A function with a third argument `return_heights` also gets
         the lowest and the highest return of each cell, (2, H, W) metres, NaN without a return (`cell_heights`).
     refine : callable, optional
         g -> g: `refine(log_g (C, H, W), o (4, H, W))` returns g (C, H, W) float, probabilities that sum to 1 in each
@@ -71,11 +73,6 @@ class Stages:
         g -> g over frames: an object whose `step(view)` returns (C, H, W) float, probabilities that sum to 1 in each
         cell, for a `View` (frame, belief and g of that frame alone). Or a generator function `remember(views, spec)`.
         Without it nothing is remembered.
-
-    Attributes
-    ----------
-    wants_heights : bool
-        Whether `fuse` has the argument `heights`.
 
     Raises
     ------
@@ -97,13 +94,11 @@ class Stages:
     refine: Callable[[NDArray, NDArray], NDArray] | None = None
     architecture: Architecture | None = None
     remember: Tracker | Callable | None = None
-    wants_heights: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         """Reject what can't be called as its stage is."""
         for name in self.given:
             check_usage(name, getattr(self, name))
-        object.__setattr__(self, "wants_heights", takes_heights(self.fuse))
 
     @property
     def given(self) -> tuple[str, ...]:
@@ -155,13 +150,11 @@ class Stages:
         architecture = net.need_architecture()
         crf = crf or CrfParams.for_cells(architecture.grid.cell)
 
-        def log_grid(planes: Tensor, occupancy: Tensor, heights: Tensor | None = None) -> Tensor:
-            return net.fuse(planes, occupancy, heights=heights).log_softmax(dim=1)
+        def fuse(p: Tensor, o: Tensor) -> Tensor:
+            return net.fuse(p, o).log_softmax(dim=1)
 
-        fuse = _on_arrays(log_grid)
-
-        def fuse_with_heights(p: NDArray, o: NDArray, heights: NDArray) -> NDArray:
-            return fuse(p, o, heights)
+        def fuse_at_returns(p: Tensor, o: Tensor, return_heights: Tensor) -> Tensor:
+            return net.fuse(p, o, return_heights=return_heights).log_softmax(dim=1)
 
         def refine(log_g: NDArray, o: NDArray) -> NDArray:
             return mean_field(-log_g, o, crf)
@@ -170,7 +163,7 @@ class Stages:
             track=DriveTracker(architecture.grid, occupancy, seed, keep_steps),
             segment=_on_arrays(net.segment),
             sample=_on_arrays(net.sample),
-            fuse=fuse_with_heights if architecture.uses_heights else fuse,
+            fuse=_on_arrays(fuse_at_returns if architecture.uses_return_heights else fuse),
             refine=refine,
             architecture=architecture,
             remember=_memory(memory, architecture),
@@ -239,15 +232,17 @@ class Stages:
             return stages
         return stages.over(cls.fast(load_net(sample_weights(), camera), memory=memory, **options))
 
-    def heights(self, frame: Frame) -> NDArray[np.float64]:
-        """Return the lowest and the highest return of each cell, (2, H, W) metres, from `cell_heights`.
+    def return_heights(self, frame: Frame) -> tuple[NDArray[np.float64], ...]:
+        """Return what `fuse` takes after p and o: the result of `cell_heights` if it asks for it, otherwise nothing.
 
         Parameters
         ----------
         frame : Frame
             A frame with a scan.
         """
-        return cell_heights(frame.points_grid, (self.architecture or Architecture()).grid)
+        if not takes_return_heights(self.fuse):
+            return ()
+        return (cell_heights(frame.points_grid, (self.architecture or Architecture()).grid),)
 
     def need_ready(self) -> None:
         """Raise an `ArgumentError` unless `run_frame` can run these stages: all five, and no generator among them."""
@@ -275,6 +270,7 @@ def _on_arrays(function: Callable) -> Callable:
     """Return a function of batches as one of numpy arrays, for one frame at a time, without gradients."""
 
     @torch.inference_mode()
+    @wraps(function)
     def stage(*arrays: NDArray) -> NDArray:
         batches = [torch.from_numpy(np.asarray(array, dtype=np.float32))[None] for array in arrays]
         return function(*batches)[0].numpy()

@@ -38,7 +38,8 @@ def checked(name: str, stage: Any, architecture: Architecture) -> CheckedStage:
         "fuse": (n_classes, *spec.shape),
         "refine": (n_classes, *spec.shape),
     }
-    return CheckedStage(name, stage, shapes[name])
+    of_probabilities = name == "sample" and architecture.uses_return_heights
+    return CheckedStage(name, stage, shapes[name], of_probabilities=of_probabilities)
 
 
 class CheckedTracker(CheckedStage):

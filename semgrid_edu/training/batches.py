@@ -70,7 +70,8 @@ def draw_batch(
     part, turn = dataset.turn(iteration) if isinstance(dataset, Mixture) else (dataset, iteration)
     chosen = frames_of_step(len(part), size, turn, seed)
     fields = zip(*(part[i] for i in chosen.tolist()), strict=True)
-    frames = Sample(*(None if field[0] is None else torch.stack(field) for field in fields))
+    # Where some frames lack return heights, the network doesn't use them: see `train`.
+    frames = Sample(*(None if any(part is None for part in field) else torch.stack(field) for field in fields))
     rng = np.random.default_rng((seed, 1, iteration))
     contrast, brightness = rng.uniform(-jitter, jitter, (2, size, 1, 1, 1)).astype(np.float32)
     image = (unit_image(frames.image) - 0.5) * (1 + torch.from_numpy(contrast)) + 0.5 + torch.from_numpy(brightness)
@@ -152,4 +153,4 @@ def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
         The logits, unmirrored.
     """
     frames = batch.frames
-    return net.stages(frames.image, frames.occupancy, batch.mirrored, batch.sampler, frames.heights).logits
+    return net.stages(frames.image, frames.occupancy, batch.mirrored, batch.sampler, frames.return_heights).logits

@@ -213,7 +213,7 @@ def _check_finite(step: Step, learning_rate: float) -> None:
 
 def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams, n_processes: int) -> None:
     """Check that the network can be saved, that the frames fit it, and that processes can share a batch."""
-    uses_heights = net.need_architecture().uses_heights
+    architecture = net.need_architecture()
     for part in dataset.parts if isinstance(dataset, Mixture) else (dataset,):
         if len(part) < params.batch_size:
             raise ArgumentError("dataset", f"at least one batch of {params.batch_size} frames", f"{len(part)} frames")
@@ -223,8 +223,8 @@ def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: Trai
     shape = net.sampler.planes_shape[1:]
     expected = Sample((3, *size), size, (N_STATES, *shape), shape, (2, *shape))
     for k, sample in enumerate(dataset):
-        if uses_heights and sample.heights is None:
-            raise ArgumentError("dataset", "heights of returns, which the network uses", f"none in frame {k}")
+        if architecture.uses_return_heights and sample.return_heights is None:
+            raise ArgumentError("dataset", "return heights, which the network uses", f"none in frame {k}")
         for name, part, want in zip(Sample._fields, sample, expected, strict=True):
-            if part is not None and tuple(part.shape) != want:
+            if (part is not None or name != "return_heights") and tuple(part.shape) != want:
                 raise ArgumentError("dataset", f"{name} of shape {want}", f"{tuple(part.shape)} in frame {k}")

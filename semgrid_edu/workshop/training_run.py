@@ -33,7 +33,10 @@ PAPER_IMAGE = (375, 1242)
 
 
 def architecture(
-    segmenter: str, preset: str = "compact", uses_heights: bool = False, image_size: tuple[int, int] | None = None
+    segmenter: str,
+    preset: str = "compact",
+    uses_return_heights: bool = False,
+    image_size: tuple[int, int] | None = None,
 ) -> Architecture:
     """Return the architecture of a preset, with its image size and its grid.
 
@@ -43,7 +46,7 @@ def architecture(
         Name of the image network, a key of `SEGMENTERS`.
     preset : str
         "compact" for the CPU; "paper" for the published networks, KITTI's images at full size, and 0.2 m cells.
-    uses_heights : bool
+    uses_return_heights : bool
         Whether the fusion network sees the heights of returns, see `Architecture`.
     image_size : (int, int), optional
         Height and width of the images, pixels; the preset's when left out.
@@ -59,7 +62,7 @@ def architecture(
         usual = Architecture(segmenter, preset, image_size=PAPER_IMAGE, grid=GridSpec.paper())
     else:
         raise ArgumentError("--preset", "compact or paper", repr(preset))
-    return replace(usual, uses_heights=uses_heights, image_size=image_size or usual.image_size)
+    return replace(usual, uses_return_heights=uses_return_heights, image_size=image_size or usual.image_size)
 
 
 def chosen_size(text: str | None) -> tuple[int, int] | None:
@@ -148,7 +151,7 @@ def train_network(
     truth: LidarTruth | None = None,
     start: str | Path | Sequence[str | Path] = (),
     half: bool = False,
-    uses_heights: bool = False,
+    uses_return_heights: bool = False,
     image_size: tuple[int, int] | None = None,
 ) -> None:
     """Train a network on the split "train" of data sets; under torchrun, in all of its processes.
@@ -181,7 +184,7 @@ def train_network(
         weights are fresh.
     half : bool
         Whether the trained network's convolutions are written in 16 bits, see `save_net`.
-    uses_heights, image_size
+    uses_return_heights, image_size
         As `architecture` takes them.
 
     Raises
@@ -197,7 +200,7 @@ def train_network(
     folders = [data] if isinstance(data, str | Path) else list(data)
     folder = Path(folder)
     began = datetime.now(UTC)
-    description = architecture(segmenter, preset, uses_heights, image_size)
+    description = architecture(segmenter, preset, uses_return_heights, image_size)
     if len(starts) > 1:
         params = replace(params, image_iterations=0)
     # All that can be wrong is found before the data are prepared, which takes minutes.
@@ -298,7 +301,7 @@ def _command(
         *(f"--data {_name(data)}" for data in folders),
         f"--out {_name(folder)} --segmenter {description.segmenter}",
         f"--preset {description.preset}" if description.preset != Architecture.preset else "",
-        "--heights" if description.uses_heights else "",
+        "--return-heights" if description.uses_return_heights else "",
         "" if size == architecture(description.segmenter, description.preset).image_size else f"--image-size {h}x{w}",
         f"--imagenet {_name(imagenet)}" if imagenet else "",
         *(f"--from {_name(Path(path).parent)}/{_name(path)}" for path in start),

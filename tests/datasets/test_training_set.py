@@ -54,7 +54,7 @@ class TestBuilt:
             *_, belief = track_drive(drive, spec, seed=0)
             np.testing.assert_array_equal(sample.occupancy, belief.probability)
             heights = cell_heights(drive[2].points_grid, spec)
-            np.testing.assert_array_equal(sample.heights, heights.astype(np.float32))
+            np.testing.assert_array_equal(sample.return_heights, heights.astype(np.float32))
             np.testing.assert_array_equal(sample.truth, grid_truth(drive[2].labels, belief.probability, spec))
             blocks = drive[2].image.reshape(6, 2, 20, 2, 3).mean(axis=(1, 3)).transpose(2, 0, 1)
             np.testing.assert_allclose(sample.image.numpy(), blocks, atol=1)

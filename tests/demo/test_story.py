@@ -127,7 +127,7 @@ class TestContributions:
 
     def test_of_a_network_with_heights_leave_the_part_of_the_heights_in_the_rest(self, last_labelled, make_net):
         """Gradient times input by a backward pass; without a scan it takes every score on the ground."""
-        net = make_net(last_labelled.camera, uses_heights=True)
+        net = make_net(last_labelled.camera, uses_return_heights=True)
         result = list(run_pipeline(last_labelled, Stages.fast(net, PARAMS)))[-1]
         told = frame_story(result, net)
         heights = cell_heights(result.frame.points_grid, SPEC)
@@ -147,6 +147,8 @@ class TestContributions:
         unknown[:, State.UNKNOWN] = 1
         blind = net.fusion(planes, unknown, torch.full_like(z, torch.nan))[0].argmax(dim=0)
         np.testing.assert_array_equal(told.otherwise["no occupancy"], blind)
+        with pytest.raises(ArgumentError, match=r"return_heights: expected shape .*found none"):
+            contributions(net, result.scores, result.belief.probability)
 
     def test_a_network_in_training_mode_is_refused(self, last_labelled, told):
         net = build_net(Architecture(), last_labelled.camera)

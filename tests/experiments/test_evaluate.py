@@ -9,6 +9,7 @@ from tiny_drive import write_tiny_dataset
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets import KittiRawDrive, training_cache
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import METRICS, pixel_accuracy
@@ -67,7 +68,7 @@ class AlwaysRoad:
     def need_architecture(self):
         return Architecture()
 
-    def __call__(self, image, occupancy):
+    def __call__(self, image, occupancy, return_heights):
         return self.segmenter(image)
 
     def segmenter(self, image):
@@ -152,12 +153,13 @@ def test_intervals_are_those_of_the_drives():
         assert found[cells]["pixel accuracy"] == list(drive_interval(by_drive[None], pixel_accuracy))
 
 
-def test_evaluates_a_network_from_disk(tmp_path, monkeypatch):
+def test_evaluates_a_network_from_disk_at_its_own_sizes(tmp_path, monkeypatch):
     monkeypatch.setattr(training_cache, "WORKERS", 1)
     root = write_tiny_dataset(tmp_path / "tiny")
     camera = KittiRawDrive(root, "2026_01_01", "0001").camera
-    save_net(build_net(Architecture(), camera), tmp_path / "net.safetensors")
-    save_net(build_net(Architecture(), camera, seed=1), tmp_path / "image_stage.safetensors")
+    other = Architecture(image_size=(48, 160), grid=GridSpec(0.0, 71.0, -15.5, 15.5, 1.0), uses_return_heights=True)
+    save_net(build_net(other, camera), tmp_path / "net.safetensors")
+    save_net(build_net(other, camera, seed=1), tmp_path / "image_stage.safetensors")
     result = evaluate(root, tmp_path / "net.safetensors", confusions_file=tmp_path / "confusions.npz")
     assert {"geometry, end-to-end labels", "geometry, image-stage labels"} < result["scores"].keys()
     assert result == json.loads(json.dumps(result))
@@ -169,4 +171,7 @@ def test_evaluates_a_network_from_disk(tmp_path, monkeypatch):
     assert kept.drives == ("2026_01_01 0003",)
     for method, confusion in result["confusion"].items():
         assert kept.of(method, "true").total(method).tolist() == confusion
-        assert np.sum(confusion) == 142 * 62, method  # every cell has a class
+        assert np.sum(confusion) == 71 * 31, method  # every cell has a class
+    save_net(build_net(Architecture(), camera), tmp_path / "image_stage.safetensors")
+    with pytest.raises(ArgumentError, match=r"image_stage\.safetensors: expected image size \(48, 160\)"):
+        evaluate(root, tmp_path / "net.safetensors")

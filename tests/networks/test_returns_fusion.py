@@ -12,7 +12,8 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture, build_net, load_net, save_net
 from semgrid_edu.planes import above_ground, pick_planes
 
-SMALL = Architecture(image_size=(24, 80), grid=GridSpec(2, 26, -6, 6, 1.0), heights=(0.0, 0.5, 1.0), uses_heights=True)
+GRID = GridSpec(2, 26, -6, 6, 1.0)
+SMALL = Architecture(image_size=(24, 80), grid=GRID, heights=(0.0, 0.5, 1.0), uses_return_heights=True)
 
 
 @pytest.fixture
@@ -34,10 +35,10 @@ def inputs():
 
 def test_the_conv_deconv_network_sees_picked_probabilities_states_and_heights(net, inputs):
     image, occupancy, heights = inputs
-    seen = net.stages(image, occupancy, heights=heights)
+    seen = net.stages(image, occupancy, return_heights=heights)
     torch.testing.assert_close(seen.planes, net.sampler(seen.scores.softmax(dim=1)))
     picked = pick_planes(seen.planes, heights, SMALL.heights)
-    above = above_ground(heights).nan_to_num(0).clamp(0, 5) / 2.5
+    above = above_ground(heights, 1.0).nan_to_num(0).clamp(0, 5) / 2.5
     joined = torch.cat([picked, occupancy, above, (~heights[:, :1].isnan()).float()], dim=1)
     assert joined.shape[1] == 2 * 14 + 4 + 3
     torch.testing.assert_close(seen.logits, net.fusion.conv_deconv(joined))
@@ -46,7 +47,7 @@ def test_the_conv_deconv_network_sees_picked_probabilities_states_and_heights(ne
 
 def test_mirrored_it_sees_the_mirror_of_everything(net, inputs):
     image, occupancy, heights = inputs
-    seen = net.stages(image, occupancy, mirrored=True, heights=heights)
+    seen = net.stages(image, occupancy, mirrored=True, return_heights=heights)
     mirror = net.fusion(*(part.flip(-1) for part in (seen.planes, occupancy, heights)))
     torch.testing.assert_close(seen.logits, mirror.flip(-1))
     assert not torch.allclose(seen.logits, net(image, occupancy, heights))
@@ -82,20 +83,35 @@ def test_weights_come_back_bit_for_bit(net, camera, tmp_path, inputs):
 
 
 def test_other_networks_ignore_heights_and_their_files_do_not_mention_them(camera, tmp_path, inputs):
-    usual = build_net(replace(SMALL, uses_heights=False), camera, seed=3).eval()
+    usual = build_net(replace(SMALL, uses_return_heights=False), camera, seed=3).eval()
     assert torch.equal(usual(*inputs), usual(*inputs[:2]))
     save_net(usual, tmp_path / "net.safetensors")
     with safe_open(tmp_path / "net.safetensors", "pt") as file:
-        assert "uses_heights" not in str(file.metadata())
+        assert "uses_return_heights" not in str(file.metadata())
 
 
 @pytest.mark.parametrize("spoil", [lambda heights: None, lambda heights: heights[:, :1], lambda heights: heights[:1]])
 def test_missing_and_misshapen_heights_are_refused(net, inputs, spoil):
     image, occupancy, heights = inputs
-    with pytest.raises(ArgumentError, match=r"heights: expected shape \(2, 2, 24, 12\).*uses the heights of returns"):
+    with pytest.raises(ArgumentError, match=r"return_heights: expected shape \(2, 2, 24, 12\).*uses return heights"):
         net(image, occupancy, spoil(heights))
-    with pytest.raises(ArgumentError, match="heights: "):
-        net.fuse(torch.rand(2, 14, 3, 24, 12), occupancy, heights=spoil(heights))
+    with pytest.raises(ArgumentError, match="return_heights: "):
+        net.fuse(torch.rand(2, 14, 3, 24, 12), occupancy, return_heights=spoil(heights))
+
+
+def test_heights_in_double_precision_are_those_in_single_precision(net, inputs):
+    assert torch.equal(net(*inputs[:2], inputs[2].double()), net(*inputs))
+
+
+def test_a_sampler_of_other_planes_is_refused(net, camera):
+    other = build_net(replace(SMALL, heights=(0.0, 0.5)), camera).sampler
+    with pytest.raises(ArgumentError, match="sampler: expected 3 planes, found 2"):
+        net.with_sampler(other)
+
+
+def test_unreduced_planes_are_refused():
+    with pytest.raises(ArgumentError, match="reduces: expected True"):
+        replace(SMALL, reduces=False)
 
 
 def test_planes_in_any_other_order_are_refused():

@@ -16,7 +16,7 @@ from semgrid_edu.pipeline import StageError, Stages, network_image, run_frame, r
 from semgrid_edu.planes import cell_heights
 
 FEW = CmcdotParams(n_particles=2000)
-ARCHITECTURE = Architecture(uses_heights=True)
+ARCHITECTURE = Architecture(uses_return_heights=True)
 
 
 @pytest.fixture(scope="module")
@@ -55,14 +55,14 @@ def test_the_returns_of_the_vehicle_itself_are_not_seen(drive, net):
     mine = np.arange(len(frame.points) + len(ghosts)) >= len(frame.points)
     marked = replace(frame, points=np.concatenate([frame.points, ghosts]), vehicle_returns=mine)
     stages = Stages.fast(net, FEW)
-    np.testing.assert_array_equal(stages.heights(marked), stages.heights(frame))
+    np.testing.assert_array_equal(stages.return_heights(marked), stages.return_heights(frame))
 
 
 def test_a_stage_of_ones_own_gets_heights_only_if_it_asks(drive, net):
     frame, given = drive[0], []
 
-    def asks(p, o, heights):
-        given.append(heights)
+    def asks(p, o, return_heights):
+        given.append(return_heights)
         return even(p, o)
 
     def optional(p, o, scale=1.0):
@@ -78,11 +78,32 @@ def test_a_stage_of_ones_own_gets_heights_only_if_it_asks(drive, net):
 
 
 def test_errors_of_a_stage_that_asks_for_heights(drive, net):
-    with pytest.raises(ArgumentError, match=r"fuse: expected a function fuse\(p, o\).*found fuse\(p, heights\)"):
-        Stages(fuse=lambda p, heights: even(p, heights))
-    stages = replace(Stages.fast(net, FEW), fuse=lambda p, o, heights: heights)
+    usage = r"fuse: expected a function fuse\(p, o\) or fuse\(p, o, return_heights\), found fuse\(p, return_heights\)"
+    with pytest.raises(ArgumentError, match=usage):
+        Stages(fuse=lambda p, return_heights: even(p, return_heights))
+    stages = replace(Stages.fast(net, FEW), fuse=lambda p, o, return_heights: return_heights)
     with pytest.raises(StageError, match=r"fuse .*expected shape \(14, 142, 62\)"):
         next(run_pipeline(drive, stages))
+
+
+def test_an_object_around_a_stage_is_judged_by_its_own_arguments(drive, net):
+    class Around:
+        stage = staticmethod(lambda p, o, return_heights: None)
+
+        def __call__(self, p, o):
+            return even(p, o)
+
+    (result,) = run_pipeline([drive[0]], replace(Stages.fast(net, FEW), fuse=Around()))
+    np.testing.assert_allclose(result.grid, 1 / 14, rtol=1e-5)
+
+
+def test_raw_scores_on_the_planes_are_refused(drive, net):
+    own = Stages.fast(net, FEW)
+    (result,) = run_pipeline([drive[0]], replace(own, sample=lambda s: own.sample(s)))
+    (usual,) = run_pipeline([drive[0]], own)
+    np.testing.assert_array_equal(result.grid, usual.grid)
+    with pytest.raises(StageError, match=r"sample .*expected class probabilities.*found .*: sample the soft-max"):
+        next(run_pipeline(drive, replace(own, sample=lambda s: 9 * own.sample(s))))
 
 
 def test_stages_of_networks_whose_planes_hold_other_numbers_are_not_mixed(net, drive):

@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.occupancy import SensorModel, scan_evidence
 from semgrid_edu.planes import above_ground, cell_heights, pick_planes
 
 SPEC = GridSpec(0, 12, -1, 1, 1.0)  # 12 rows, 2 columns; row 11 is the nearest
@@ -32,10 +33,36 @@ def test_heights_above_ground_are_above_the_lowest_return_within_four_cells():
     heights[:, 11, 0] = torch.tensor([0.5, 2.0])
     heights[:, 7, 1] = -0.25
     heights[:, 2, 0] = 7.0
-    above = above_ground(heights)
+    above = above_ground(heights, 0.5)
     assert above[:, [11, 7, 2], [0, 1, 0]].tolist() == [[0.75, 0, 0], [2.25, 0, 0]]
     assert torch.equal(above.isnan(), heights.isnan())
-    assert torch.equal(above_ground(heights[None].expand(3, -1, -1, -1)).nan_to_num(-1)[1], above.nan_to_num(-1))
+    batch = above_ground(heights[None].expand(3, -1, -1, -1), 0.5)
+    assert torch.equal(batch.nan_to_num(-1)[1], above.nan_to_num(-1))
+
+
+@pytest.mark.parametrize("cell", [0.2, 0.5])
+def test_a_flat_roof_is_as_high_above_the_ground_in_small_cells(cell):
+    """The ground ends 1.8 m before the cell: more than four cells of 0.2 m."""
+    spec = GridSpec(0, 12, -1, 1, cell)
+    points = np.array([(4.3, 0.1, -0.1), (6.1, 0.1, 3.0)])
+    heights = torch.from_numpy(cell_heights(points, spec))
+    rows, cols, _ = spec.cells(points)
+    assert above_ground(heights, cell)[:, rows, cols].tolist() == [[0, 3.1], [0, 3.1]]
+
+
+@pytest.mark.parametrize("marked", [False, True])
+def test_own_returns_change_neither_occupancy_nor_heights(marked):
+    """Bonnet, mirror, and a dark return from a split beam; beyond the outline the filter keeps what isn't dark."""
+    street = np.array([(9.0, 0.5, 1.2, 0.4), (9.1, 0.5, 0.1, 0.4), (3.1, 0.3, 0.8, 0.4), (1.0, 0.5, 0.1, 0.4)])
+    own = np.array([(1.5, 0.4, 0.9, 0.4), (1.9, -0.9, 1.1, 0.4), (2.0, 1.5, 1.3, 0.0)])
+    scan = np.concatenate([street, own])
+    if marked:
+        street, scan = (np.column_stack([points, np.arange(len(points)) >= 4]) for points in (street, scan))
+    spec = GridSpec(0, 12, -2, 2, 0.5)
+    np.testing.assert_array_equal(cell_heights(scan, spec), cell_heights(street, spec))
+    with_own, without = (scan_evidence(points, spec, SensorModel()) for points in (scan, street))
+    np.testing.assert_array_equal(with_own.occupied, without.occupied)
+    np.testing.assert_array_equal(with_own.free, without.free)
 
 
 def test_scores_between_two_planes_below_above_and_without_a_return():

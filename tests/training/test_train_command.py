@@ -138,18 +138,18 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     write_text(data / "dataset.json", "{}")
     write_text(imagenet, "{}")
     options = ["--preset", "paper", "--imagenet", str(imagenet), "--seed", "2", "--iterations", "7", "--two-stage"]
-    options += ["--truth", truth, "--resume", "--heights", "--image-size", "192x640"]
+    options += ["--truth", truth, "--resume", "--return-heights", "--image-size", "192x640"]
     result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options, "--device", "cpu"])
     assert result.exit_code == 0, result.output
     usual = experiment.architecture("segnet", "paper")
-    assert given["net"] == replace(usual, uses_heights=True, image_size=(192, 640))
+    assert given["net"] == replace(usual, uses_return_heights=True, image_size=(192, 640))
     assert given["imagenet"] == (_Net.segmenter, str(imagenet))
     net, dataset, folder, params, seed, resume, fabric = given["train"]
     assert dataset.truth == LidarTruth(POLICIES[truth], TruthFlaws())
     assert (net, folder, seed, resume, fabric.device) == (_Net, out, 2, True, torch.device("cpu"))
     assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
     provenance = json.loads((out / "provenance.json").read_text())
-    written = "--segmenter segnet --preset paper --heights --image-size 192x640 --imagenet vgg16.safetensors"
+    written = "--segmenter segnet --preset paper --return-heights --image-size 192x640 --imagenet vgg16.safetensors"
     written += f" --seed 2 --iterations 7 --two-stage --truth {truth}"
     assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written}"
     assert provenance["resumed"] is False  # there was nothing to resume

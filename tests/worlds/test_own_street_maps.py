@@ -13,7 +13,8 @@ from worlds.lecture_13_map import (
 )
 
 from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_weights
-from semgrid_edu.fast import load_net
+from semgrid_edu.fast import build_net, load_net
+from semgrid_edu.networks import Architecture
 from semgrid_edu.pipeline import run_pipeline
 
 
@@ -22,7 +23,10 @@ def net():
     return load_net(sample_weights(), real_drive().camera).requires_grad_(False)
 
 
-def test_maps_are_those_of_the_pipeline(net):
+@pytest.mark.parametrize("with_heights", [False, True])
+def test_maps_are_those_of_the_pipeline(net, with_heights):
+    if with_heights:
+        net = build_net(Architecture(uses_return_heights=True), real_drive().camera).requires_grad_(False).eval()
     frames, spec = real_drive()[:2], net.architecture.grid
     beliefs = occupancy_grids(frames, spec)
     grids = semantic_grids(net.fusion, fusion_inputs(net, frames, beliefs))

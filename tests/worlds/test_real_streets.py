@@ -65,8 +65,7 @@ def streets(tmp_path_factory):
     """The first frame of the shipped simulated drive."""
     frame = LabelledFrame(("2026_01_01", "0001"), 0)
     cache = tmp_path_factory.mktemp("sample")
-    index = DatasetIndex(samples_dir() / "sample", "sample", KITTI_14, {"train": (frame,)}, folder=cache)
-    return TrainingSet(index, "train")
+    return DatasetIndex(samples_dir() / "sample", "sample", KITTI_14, {"train": (frame,)}, folder=cache)
 
 
 MEAN_OF_THREE = "simulated, then real, mean of three image networks"
@@ -74,11 +73,13 @@ MEAN_OF_THREE = "simulated, then real, mean of three image networks"
 
 @pytest.fixture
 def small(monkeypatch, streets):
-    """Two cameras, four ways: two steps, one with simulated frames; one fuses their scores; one sees heights."""
+    """Two cameras, four ways: two steps, one on simulated frames; one fuses their scores; one of another size."""
     once = WayToTrain(Architecture(), params=TrainingParams(1, 1), with_simulated=True)
-    tall = WayToTrain(Architecture(uses_heights=True, image_size=(48, 160)), params=TrainingParams(0, 1))
+    described = Architecture(uses_return_heights=True, image_size=(48, 160))
+    tall = WayToTrain(described, params=TrainingParams(0, 1), with_simulated=True)
     mean = WayToTrain(Architecture(), mean_of="once", params=TrainingParams(0, 1, end_to_end=False))
-    monkeypatch.setattr(real_streets.TrainingSet, "by_camera", lambda *_: [streets])
+    by_camera = lambda *_, image_size: [TrainingSet(streets, "train", image_size=image_size)]  # noqa: E731
+    monkeypatch.setattr(real_streets.TrainingSet, "by_camera", by_camera)
     monkeypatch.setattr(real_streets, "CAMERAS", ("front_camera", "left_camera"))
     monkeypatch.setattr(
         real_streets,
@@ -113,7 +114,7 @@ def test_the_mean_is_of_the_image_networks_of_all_seeds_of_the_same_round(monkey
     started = []
     monkeypatch.setattr(real_streets, "Mixture", lambda parts: parts)
     monkeypatch.setattr(real_streets, "_train", lambda way, starts, *_: started.append(starts))
-    found = real_streets._networks(MEAN_OF_THREE, [([], []), ([], [])], [], tmp_path / LEFT_OUT, range(3, 6), 4, "cpu")
+    found = real_streets._networks(MEAN_OF_THREE, [([], []), ([], [])], {}, tmp_path / LEFT_OUT, range(3, 6), 4, "cpu")
     runs = [[f"{LEFT_OUT} {r}, simulated, then real, two stages, {seed}" for seed in (3, 4, 5)] for r in (0, 1)]
     assert started == [[tmp_path / run / IMAGE_STAGE for run in one] for one in runs]
     assert list(found) == [f"{LEFT_OUT} {r}, {MEAN_OF_THREE}, 4" for r in (0, 1)]

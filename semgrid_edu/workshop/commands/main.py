@@ -134,7 +134,7 @@ def train(
     out: Annotated[Path, typer.Option(help="A folder for the weights, the log and their provenance.")],
     segmenter: Annotated[str, typer.Option(help="The image network.")] = "segnet",
     preset: Annotated[str, typer.Option(help="compact or paper (published size, 0.2 m cells).")] = "compact",
-    heights: Annotated[bool, typer.Option("--heights", help="Let the fusion see the heights of returns.")] = False,
+    heights: Annotated[bool, typer.Option("--return-heights", help="Let the fusion see return heights.")] = False,
     image_size: Annotated[str | None, typer.Option(help="Height x width of the images, such as 192x640.")] = None,
     imagenet: Annotated[
         str | None, typer.Option(help="ImageNet weights to start from: a file; for efficientnet `installed`.")
@@ -160,7 +160,7 @@ def train(
     from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
     from semgrid_edu.workshop.training_run import chosen_size, chosen_truth, train_network, training_params
 
-    kind = {"preset": preset, "uses_heights": heights, "image_size": chosen_size(image_size)}
+    kind = {"preset": preset, "uses_return_heights": heights, "image_size": chosen_size(image_size)}
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
     choices = kind | {"imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}

@@ -25,8 +25,8 @@ class Contributions:
     that the convolutions carry to this one are included. In evaluation mode the fusion network consists of
     convolutions, shifts, ReLUs and maxima, so near its present input it is linear plus a constant. The parts are the
     linear share, without any approximation. The constant, `rest`, comes from the biases and the batch normalisations:
-    it is what the network says whatever the input, as long as the same ReLUs are active. Of a network that sees the
-    heights of returns, `rest` also has their part.
+    it is what the network says whatever the input, as long as the same ReLUs are active. Of a network with
+    `uses_return_heights`, `rest` also has their part.
 
     A part isn't the change that follows if its input is removed, because then other ReLUs would be active. Parts of
     opposite signs can be much larger than the score that they sum to. Then they say little about causes.
@@ -84,7 +84,7 @@ class Contributions:
 
 
 def contributions(
-    net: SemanticGridNet, scores: NDArray, occupancy: NDArray, heights: NDArray | None = None
+    net: SemanticGridNet, scores: NDArray, occupancy: NDArray, return_heights: NDArray | None = None
 ) -> Contributions:
     """Split the logit of every class in every cell into the parts of planes, image classes and occupancy.
 
@@ -100,8 +100,8 @@ def contributions(
         s, the image network's scores.
     occupancy : (4, H, W) float32
         o, the probabilities of the four states.
-    heights : (2, H, W) float32, optional
-        The lowest and the highest return of each cell, for a network with `uses_heights`.
+    return_heights : (2, H, W) float32, optional
+        The lowest and the highest return of each cell, for a network with `uses_return_heights`.
 
     Returns
     -------
@@ -111,11 +111,11 @@ def contributions(
     Raises
     ------
     ArgumentError
-        When the network is in training mode, in which each batch is normalised by itself.
+        When the network is in training mode, in which each batch is normalised by itself, or needs return heights.
     """
     if net.training:
         raise ArgumentError("net", "a network in evaluation mode, see `net.eval()`", "one in training mode")
-    planes, o, *scan = fusion_inputs(net, scores, occupancy, heights)
+    planes, o, *scan = fusion_inputs(net, scores, occupancy, return_heights)
     last_layers = net.fusion.conv_deconv
 
     def reduce(planes: Tensor) -> Tensor:
@@ -146,7 +146,7 @@ def contributions(
 
 
 def fusion_inputs(
-    net: SemanticGridNet, scores: NDArray, occupancy: NDArray, heights: NDArray | None = None
+    net: SemanticGridNet, scores: NDArray, occupancy: NDArray, return_heights: NDArray | None = None
 ) -> tuple[Tensor, ...]:
     """Return what the fusion network is given in a frame. Parameters are those of `contributions`.
 
@@ -156,11 +156,13 @@ def fusion_inputs(
         p, the scores on the planes.
     occupancy : (1, 4, H, W) float32
         o.
-    heights : (1, 2, H, W) float32
-        Only for a network with `uses_heights`.
+    return_heights : (1, 2, H, W) float32
+        Only for a network with `uses_return_heights`.
     """
-    given = (scores, occupancy, heights) if net.uses_heights else (scores, occupancy)
-    scores, *scan = (torch.tensor(np.asarray(part, np.float32))[None] for part in given)
+    given = (scores, occupancy, return_heights) if net.uses_return_heights else (scores, occupancy)
+    scores, *scan = (None if part is None else torch.tensor(np.asarray(part, np.float32))[None] for part in given)
+    if net.uses_return_heights:
+        net.check_return_heights(scan[1], 1)
     with torch.no_grad():
         return net.sample(scores), *scan
 

@@ -207,7 +207,8 @@ def story_data(net: SemanticGridNet, camera: Camera, frame_layout: dict[str, lis
     Returns
     -------
     dict of str to object
-        The grid, the images' width, heights of the planes, names and colours, the rounding, and the maps of all frames.
+        The grid, the images' width, heights of the planes, whether the network sees those of returns, names and
+        colours, the rounding, and the maps of all frames.
     """
     architecture = net.need_architecture()
     spec, label_set = architecture.grid, LABEL_SETS[architecture.label_set]
@@ -216,6 +217,7 @@ def story_data(net: SemanticGridNet, camera: Camera, frame_layout: dict[str, lis
         "grid": {**asdict(spec), "rows": spec.shape[0], "cols": spec.shape[1]},
         "width": camera.size[1],
         "heights": list(architecture.heights),
+        "uses_return_heights": architecture.uses_return_heights,
         "names": label_set.names,
         "flat": label_set.flat,
         "colours": {"classes": label_set.rgb, "states": STATE_COLOURS},

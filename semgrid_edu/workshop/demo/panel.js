@@ -130,8 +130,8 @@ function partStory(cell, read, label, rival) {
   const before = read("classes", cell)[2] === label ? "Why" : "Before the CRF: why";
   return `<h3>${before} ${escaped(story.names[label])} and not ${escaped(story.names[rival])}?</h3>
 <p>In the semantic grid ${swatch(label)} is about ${often} times as probable as ${swatch(rival)}: its fused score is higher by ${score.toFixed(1)}. Gradient times input splits this difference:</p>
-${bars(["image, on the planes", "occupancy", "constants", "sum"], of.totals)}
-<p>The constants are biases and normalisations that the open ReLUs let pass: no input has a share in them. Image and occupancy count in all cells around that the network looks at. A part isn't what would change if its input were missing, and parts that cancel may be much larger than their sum. Below, each table has its own scale.</p>
+${bars(["image, on the planes", "occupancy", story.uses_return_heights ? "constants and heights" : "constants", "sum"], of.totals)}
+<p>The constants are biases and normalisations that the open ReLUs let pass: no input has a share in them.${story.uses_return_heights ? " The part of the returns' heights is in the same row." : ""} Image and occupancy count in all cells around that the network looks at. A part isn't what would change if its input were missing, and parts that cancel may be much larger than their sum. Below, each table has its own scale.</p>
 <div class="two"><div><h4>Image, by class of its scores</h4>${bars(byClass.map((i) => escaped(story.names[i])), byClass.map((i) => of.scores[i]))}<h4>Occupancy, by state</h4>${bars(stateNames, of.occupancy)}</div>
 <div><h4>Image, by height of the plane</h4>${bars([...heights].reverse(), [...of.planes].reverse())}</div></div>`;
 }

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from semgrid_edu.datasets.training_arrays import SEED
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import TrainingSet, load_net
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS
@@ -56,17 +57,20 @@ def evaluate(
     Raises
     ------
     ArgumentError
-        When the data set lacks a split, or the network expects other grids.
+        When the data set lacks a split, or the image network beside it takes images of another size.
     DataError
         When a file is missing or damaged.
     StageError
         When `refine` raises an error, or its result isn't probabilities.
     """
-    size = read_architecture(weights).image_size
-    training, test = (TrainingSet(dataset_dir, split, image_size=size) for split in ("train", "test"))
+    described = read_architecture(weights)
+    size = described.image_size
+    image_stage = Path(weights).with_name(IMAGE_STAGE)
+    if image_stage.exists() and (found := read_architecture(image_stage).image_size) != size:
+        raise ArgumentError(IMAGE_STAGE, f"image size {size}, as {Path(weights).name}", found)
+    training, test = (TrainingSet(dataset_dir, split, described.grid, size) for split in ("train", "test"))
     net = load_net(weights, test.camera)
     segmenters = {"end-to-end": net.segmenter}
-    image_stage = Path(weights).with_name(IMAGE_STAGE)
     if image_stage.exists():
         segmenters["image-stage"] = load_net(image_stage, test.camera).segmenter
     counted = count_methods(net, training, test, segmenters, refine)

@@ -87,10 +87,8 @@ def learned_log_g(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
     sample : Sample
         The frame.
     """
-    scan = [sample.occupancy[None]]
-    if getattr(net, "uses_heights", False) and sample.heights is not None:
-        scan.append(sample.heights[None])
-    return net(unit_image(sample.image)[None], *scan)[0].log_softmax(dim=0).numpy()
+    frames = Sample(*(None if part is None else part[None] for part in sample))
+    return net(unit_image(frames.image), frames.occupancy, frames.return_heights)[0].log_softmax(dim=0).numpy()
 
 
 def crf_refinement(cell: float) -> Refine:
