@@ -302,7 +302,7 @@ calls = (
     "fuse(planes, occupancy)",
     "refine(log_grid, occupancy)",
 )
-assert all(f" = stages.{call}\n" in inspect.getsource(run_frame) for call in calls)
+assert all(f" = stages.{call[:-1]}" in inspect.getsource(run_frame) for call in calls)
 before, after = grid.argmax(axis=0), refined.argmax(axis=0)
 changed = np.where(after != before, after, 255)
 plotting.label_maps(spec, {"before": before, "after": after, "what changed, and to what": changed}, KITTI_14)
