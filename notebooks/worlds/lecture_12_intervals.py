@@ -135,8 +135,8 @@ def some_drives(rng: np.random.Generator, n: int, share: float) -> NDArray[np.in
     return np.array([[a, x], [y, b]]).transpose(2, 0, 1)
 
 
-def tried(share: float, interval: Callable, metric: Callable, n: int = 20, trials: int = 200) -> NDArray[np.int64]:
-    """Return for each experiment how many drives had the second class, and whether the interval contains the truth.
+def tried(share: float, interval: Callable, metric: Callable, n: int = 20, trials: int = 200) -> NDArray[np.float64]:
+    """Return for each experiment how many drives had the second class, whether the truth is inside, and the half-width.
 
     Parameters
     ----------
@@ -153,16 +153,17 @@ def tried(share: float, interval: Callable, metric: Callable, n: int = 20, trial
 
     Returns
     -------
-    (E, 2) int
-        Number of drives with the second class; 1 if the interval contains the true score, else 0.
+    (E, 3) float
+        Number of drives with the second class; 1 if the interval contains the true score, else 0; how far it reaches to
+        each side.
     """
     truth = metric(some_drives(np.random.default_rng(0), 100_000, 0.99).sum(axis=0))
     rng, found = np.random.default_rng(1), []
     for _ in range(trials):
         matrices = some_drives(rng, n, share)
         low, _, high = interval(matrices, metric)
-        found.append((matrices[:, 1].any(axis=1).sum(), low <= truth <= high))
-    return np.array(found, dtype=np.int64)
+        found.append((matrices[:, 1].any(axis=1).sum(), low <= truth <= high, (high - low) / 2))
+    return np.array(found, dtype=np.float64)
 
 
 def half_width(differences: Callable, counts: Sequence[NDArray], seeds: int = 1, drives: int = 1) -> float:

@@ -49,7 +49,7 @@ def _three(result, name):
 #
 # Complete `drive_scores`: it returns a dictionary that gives for each drive its class accuracy. First the matrices of its frames are *summed*, then the metric is
 # taken: the mean over classes of the share of the class's cells that are called right. But three cells say little about a class. So a class with fewer than `least` true
-# cells in the drive (all its frames together) is left out of the mean; each drive has a class with more. `least` is at least 1.
+# cells in the drive (all its frames together) is left out of the mean; each drive has a class with at least `least`. `least` is at least 1.
 
 
 # %% nbgrader={"grade": false, "grade_id": "drive-scores", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -67,10 +67,8 @@ def drive_scores(counts, drives, least=1):
 
 # %% nbgrader={"grade": true, "grade_id": "drive-scores-test", "locked": true, "points": 2, "schema_version": 3, "solution": false, "task": false} jupyter={"source_hidden": true}
 def _test():
-    counts = np.array([[[8, 2], [0, 0]], [[6, 2], [0, 0]], [[1, 9], [2, 2]]])
-    got = drive_scores(
-        counts.copy(), ["a", "b", "a"]
-    )  # by hand, drive a: [[9, 11], [2, 2]], so (9/20 + 2/4) / 2 = 0.475
+    counts, drives = np.array([[[8, 2], [0, 0]], [[6, 2], [0, 0]], [[1, 9], [2, 2]]]), ["a", "b", "a"]
+    got = drive_scores(counts.copy(), list(drives))  # by hand, drive a: [[9, 11], [2, 2]], so (9/20 + 2/4) / 2 = 0.475
     assert got is not None, "drive_scores returned nothing: did you forget `return`?"
     assert isinstance(got, dict), f"return a dictionary, a score by each drive's name, not {type(got).__name__}"
     assert set(got) == {"a", "b"}, f"expected the drives a and b, got {list(got)}"
@@ -89,11 +87,14 @@ def _test():
     _explain("drive b:", b, {0.375: as_zero, 0.875: as_zero.replace("as 0", "as 1")}, 1e-3)
     assert not np.isnan(b), "drive b: not a number: you divide by the 0 cells of a class that doesn't occur"
     assert np.isclose(b, 0.75), f"drive b: {b:.4f}, by hand 6/8 = 0.75"
-    drives = ["a", "b", "a"]
     few, enough = (answer_number(drive_scores(counts.copy(), drives, least)["a"], "a score") for least in (5, 4))
     assert not np.isclose(few, 0.475), "drive a has 4 cells of the second class, fewer than 5: leave it out of the mean"
     assert np.isclose(few, 0.45), f"drive a, least=5: {few:.4f}, by hand 9/20 = 0.45"
     assert np.isclose(enough, 0.475), f"drive a, least=4: {enough:.4f}; 4 cells aren't fewer than 4, so 0.475"
+    split = np.array([[[3, 1], [0, 3]], [[4, 0], [1, 1]]])  # one drive, whose second class has 3 + 2 cells
+    both = answer_number(drive_scores(split, ["c", "c"], 4)["c"], "a score")
+    assert not np.isclose(both, 0.875), "count a class's cells in all frames of the drive: 3 + 2 is more than 4"
+    assert np.isclose(both, 0.8375), f"drive c, least=4: {both:.4f}, by hand (7/8 + 4/5) / 2 = 0.8375"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import experiments
 
@@ -107,8 +108,8 @@ _test()
 # %% [markdown]
 # ## Task 2: which statements to reject (2 points)
 #
-# `p_values` holds the p-value of each statement of a claim, in the claim's own order. Holm's correction, the lecture's, goes from the smallest p-value upwards and stops at the first that isn't rejected. **Hochberg's** goes
-# downwards, with the same limits. It rejects at least as many, and is as safe where statements are independent. Sort them, *largest* p-value first. If the first is at most level, reject all of them. Otherwise it stays; if the second is at
+# `p_values` holds the p-value of each statement of a claim, in the claim's own order. Holm's correction, named in the lecture, goes from the smallest p-value upwards and stops at the first that isn't rejected. **Hochberg's** goes
+# downwards, with the same limits. It rejects at least as many, and is as safe where statements are independent. Holm's rejects none when Bonferroni's rejects none; Hochberg's still may, so it can change a verdict. Sort them, *largest* p-value first. If the first is at most level, reject all of them. Otherwise it stays; if the second is at
 # most level / 2, reject this one **and all smaller ones**. Otherwise it stays as well; then comes the third, against level / 3, and so on.
 #
 # Complete `hochberg`: it returns for each statement, in the order of `p_values`, whether Hochberg's correction rejects it.
@@ -232,6 +233,10 @@ def _test():
     _explain("it reaches to each side by", half, _HALF_WIDTHS, 4e-4)
     assert np.isclose(score - low, high - score), "the interval isn't symmetric around the score"
     assert np.isclose(half, 0.3026, atol=1e-3), f"it reaches {half:.4f} to each side; expected 0.3026"
+    low, _, high = _three(town_interval(matrices.copy(), list(towns), pixel_accuracy, level=0.9), "town_interval")
+    half = (high - low) / 2
+    assert not np.isclose(half, 0.3026, atol=1e-3), "with level=0.9 the interval must be narrower: use `level`"
+    assert np.isclose(half, 0.2238, atol=1e-3), f"with level=0.9 it reaches {half:.4f} to each side; expected 0.2238"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import experiments
 
@@ -347,12 +352,12 @@ _test()
 #
 # A colleague writes: "We tried eight variants. The best of them gains 1.2 points of class accuracy over the usual network: the 95 % interval over our 4000 test frames goes from 0.9 to
 # 1.5. So our part is a clear improvement. Another part changed nothing (interval from -2 to 2), so it can be left out." You learn that the frames come from twelve drives, and
-# that each variant was trained once. Name four things that are wrong with these conclusions, and say for each what you would do in its place. Six sentences are enough.
+# that each variant was trained once. Name four things that are wrong with these conclusions, and say for each what you would do in its place. Give one number: with what probability does at least one of eight equal, independent variants get a 95 % interval that excludes zero? Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "four-things", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # (1) Frames of a drive aren't independent: the interval must be over the twelve drives, and will be much wider. (2) One seed: nothing is known of how training runs differ, so both networks
 # must be trained with at least three seeds, the same for both, and the difference paired. (3) The best of eight on the test drives is partly luck: choose on validation drives and test the
-# chosen one once, or correct the level for eight comparisons. (4) An interval from -2 to 2 doesn't show that nothing changed, only that up to two points couldn't be seen: state beforehand
+# chosen one once, or correct the level for eight comparisons. (1 - 0.95^8 = 34 %.) (4) An interval from -2 to 2 doesn't show that nothing changed, only that up to two points couldn't be seen: state beforehand
 # how large a loss is acceptable, and ask whether the interval lies above that. (Also welcome: a class in few drives may decide class accuracy; which drives were left out of training;
 # the rule should have been written before the numbers.)
 # Half a point for each of four, with what to do in its place: drives instead of frames, more seeds, the best of eight, no difference seen.
