@@ -7,7 +7,7 @@ import copy
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import wraps
+from functools import cached_property, wraps
 from typing import Any, Protocol
 
 import numpy as np
@@ -104,6 +104,11 @@ class Stages:
     def given(self) -> tuple[str, ...]:
         """The names of the stages that weren't left out, in their order."""
         return tuple(name for name in STAGES | REMEMBER if getattr(self, name) is not None)
+
+    @cached_property
+    def wants_return_heights(self) -> bool:
+        """Whether `fuse` has the argument `return_heights`."""
+        return takes_return_heights(self.fuse)
 
     @property
     def image_size(self) -> tuple[int, int]:
@@ -240,7 +245,7 @@ class Stages:
         frame : Frame
             A frame with a scan.
         """
-        if not takes_return_heights(self.fuse):
+        if not self.wants_return_heights:
             return ()
         return (cell_heights(frame.points_grid, (self.architecture or Architecture()).grid),)
 
