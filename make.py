@@ -61,9 +61,9 @@ def test() -> None:
     notebooks = [
         str(path.relative_to(CLONE)) for path in sorted([*folder.glob("*.ipynb"), *folder.glob("deeper/*.ipynb")])
     ]
-    # Six processes for two cores: most wait for a kernel, a subprocess or the disk most of the time. The files that
+    # Four processes for two cores: two wait for a kernel, a subprocess or the disk most of the time. The files that
     # take minutes come first, so that no process ends long before the others. Graders are one class an exercise.
-    pool = ("-n", "6", "--dist", "loadscope", "--no-loadscope-reorder", "-p", "no:cacheprovider")
+    pool = ("-n", "4", "--dist", "loadscope", "--no-loadscope-reorder", "-p", "no:cacheprovider")
     nbval = ("--nbval", "--nbval-current-env", "--nbval-cell-timeout=300")
     _pytest(*pool, *nbval, "--ignore=tests/browser", *notebooks, "tests")
 
