@@ -11,8 +11,8 @@ from semgrid_edu.networks.segmenter import fresh_weights
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.planes import above_ground, pick_planes
 
-HIGHEST, HALF = 5.0, 2.5
-"""Metres: heights above the ground are clipped to 5 m, and divided by half of that, so that they are 0..2."""
+HIGHEST = 5.0
+"""Height above the ground to which heights are clipped, metres; the network sees them as 0..2."""
 
 
 class ReturnsFusion(nn.Module):
@@ -113,6 +113,6 @@ class ReturnsFusion(nn.Module):
         """
         if not self.uses_occupancy:
             occupancy = no_scan(occupancy)
-        above = above_ground(return_heights, self.cell).nan_to_num(nan=0.0).clamp(0, HIGHEST) / HALF
+        above = above_ground(return_heights, self.cell).nan_to_num(nan=0.0).clamp(0, HIGHEST) / (HIGHEST / 2)
         has_return = ~return_heights[:, :1].isnan()
         return torch.cat([reduced.squeeze(2), occupancy, above, has_return.to(above.dtype)], dim=1)

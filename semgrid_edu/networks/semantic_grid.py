@@ -147,8 +147,14 @@ class SemanticGridNet(nn.Module):
         if self.uses_return_heights:
             if sampler.planes_shape[0] != len(options.heights):
                 raise ArgumentError("sampler", f"{len(options.heights)} planes", sampler.planes_shape[0])
-            heights, cell = options.heights, options.grid.cell
-            self.fusion = ReturnsFusion(n_scores, heights, cell, n_classes, seed, options.uses_occupancy)
+            self.fusion = ReturnsFusion(
+                n_scores,
+                options.heights,
+                options.grid.cell,
+                n_classes,
+                seed=seed,
+                uses_occupancy=options.uses_occupancy,
+            )
         else:
             self.fusion = FusionNet(
                 n_scores,

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tiny_drive import DATE, write_tiny_drive
 
-from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import build_net
 from semgrid_edu.networks import Architecture
@@ -17,13 +15,6 @@ from semgrid_edu.planes import cell_heights
 
 FEW = CmcdotParams(n_particles=2000)
 ARCHITECTURE = Architecture(uses_return_heights=True)
-
-
-@pytest.fixture(scope="module")
-def drive(tmp_path_factory):
-    root = tmp_path_factory.mktemp("drive")
-    write_tiny_drive(root)
-    return KittiRawDrive(root, DATE, "0001")
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tiny_drive import DATE, write_tiny_drive
 
-from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.memory import MemoryParams, View, remember_drive
 from semgrid_edu.networks import Architecture, build_net
@@ -14,13 +12,6 @@ from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.pipeline import StageError, Stages, run_pipeline
 
 FEW = CmcdotParams(n_particles=2000)
-
-
-@pytest.fixture(scope="module")
-def drive(tmp_path_factory):
-    root = tmp_path_factory.mktemp("drive")
-    write_tiny_drive(root)
-    return KittiRawDrive(root, DATE, "0001")
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from tiny_drive import DATE, write_tiny_drive
 
 from semgrid_edu.crf import CrfParams
-from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.samples import real_weights, sample_weights
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import build_net, load_net, mean_field, track_drive
@@ -18,13 +16,6 @@ from semgrid_edu.occupancy import CmcdotParams
 from semgrid_edu.pipeline import STAGES, Stages, network_image, run_frame, run_pipeline
 
 FEW = CmcdotParams(n_particles=2000)
-
-
-@pytest.fixture(scope="module")
-def drive(tmp_path_factory):
-    root = tmp_path_factory.mktemp("drive")
-    write_tiny_drive(root)
-    return KittiRawDrive(root, DATE, "0001")
 
 
 @pytest.fixture(scope="module")

@@ -136,7 +136,8 @@ def _write_drive(folder: Path, bag: Bag, topics: Topics, told: Survey, matches: 
     """Write images, scans, packets and time stamps."""
     for name in ("image_02", "velodyne_points", "oxts"):
         (folder / name / "data").mkdir(parents=True)
-    scans, images = told.scans[matches.scans], told.images[matches.images]
+    scans = told.scans[matches.scans]
+    images = told.images[matches.images]
     for name, stamps in (("image_02", images), ("velodyne_points", scans), ("oxts", scans)):
         lines = (str(stamp).replace("T", " ") + "\n" for stamp in stamps.astype("datetime64[ns]"))
         (folder / name / "timestamps.txt").write_text("".join(lines))

@@ -117,7 +117,8 @@ def cloud_of(message: Any, place: str) -> Cloud:
     points = np.stack([records[name] for name in "xyz"], axis=-1).astype(np.float64)
     bright = records[brightness].astype(np.float64) if brightness else np.zeros(len(points))
     real = np.isfinite(points).all(axis=1) & points.any(axis=1)
-    points, bright = points[real], np.where(np.isnan(bright), 0, bright)[real]
+    points = points[real]
+    bright = np.where(np.isnan(bright), 0, bright)[real]
     if not ((bright >= 0) & np.isfinite(bright)).all():
         raise DataError(place, "a finite brightness from 0 up", f"{bright.min():g} to {bright.max():g}")
     far = np.linalg.norm(points, axis=1) > FARTHEST

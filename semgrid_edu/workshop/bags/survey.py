@@ -296,7 +296,8 @@ def matched(told: Survey, longest: float) -> Matches:
     longest : float
         The longest time between the two poses around a scan, seconds.
     """
-    scans, images = told.scans, told.images
+    scans = told.scans
+    images = told.images
     half = min(np.median(np.diff(scans)) / 2, LONGEST_GAP * NS)
     after = np.clip(np.searchsorted(images, scans), 1, len(images) - 1)
     nearest = np.where(scans - images[after - 1] <= images[after] - scans, after - 1, after)

@@ -148,7 +148,8 @@ class RecordedPath:
         """
         k = int(self._before(stamp))
         share = (stamp - self.stamps[k]) / (self.stamps[k + 1] - self.stamps[k])
-        first, second = self.poses[k], self.poses[k + 1]
+        first = self.poses[k]
+        second = self.poses[k + 1]
         turn = Rotation.from_matrix(first[:3, :3].T @ second[:3, :3]).as_rotvec()
         rotation = first[:3, :3] @ Rotation.from_rotvec(share * turn).as_matrix()
         return rigid_transform(rotation, first[:3, 3] + share * (second[:3, 3] - first[:3, 3]))

@@ -75,7 +75,8 @@ def _log_once(rr: ModuleType, stream: object, camera: Camera, label_set: LabelSe
 
 def _log_frame(rr: ModuleType, stream: object, spec: GridSpec, result: FrameResult) -> None:
     """Log a frame at its time. What isn't known is cleared: the viewer would go on showing the last one."""
-    frame, belief = result.frame, result.belief
+    frame = result.frame
+    belief = result.belief
     stream.set_time("time", duration=frame.time)
     stream.log("world/lidar", _transform(rr, frame.T_world_from_lidar))
     stream.log(CAMERA, _transform(rr, invert_rigid(frame.camera.T_camera_from_lidar)))

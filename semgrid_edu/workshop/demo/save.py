@@ -137,7 +137,8 @@ def frame_arrays(result: FrameResult) -> dict[str, NDArray]:
         and `grid_probability` (H, W), also for `refined` and with memory `remembered`; `T_world_from_lidar` (4, 4);
         `time`, seconds.
     """
-    frame, belief = result.frame, result.belief
+    frame = result.frame
+    belief = result.belief
     arrays = {"occupancy": belief.probability.astype(np.float16), "velocity": belief.velocity.astype(np.float16)}
     for name in ESTIMATES:
         if (grid := getattr(result, name)) is not None:
