@@ -107,6 +107,17 @@ def _test():
     swapped = "the axes of g stand the other way round: sort them by name, not by place"
     _explain(table, {((1.0, 20.0), (0.3, 0.0)): swapped})
     np.testing.assert_allclose(table, [[1, 2], [3, 0]], err_msg="at m1 = 0, m2 = 1: f says 200 and g says 100")
+    f = ("z", "a", "m"), np.arange(12.0, 36.0).reshape(2, 3, 4)
+    for g in ((("m", "z"), np.arange(1.0, 9.0).reshape(4, 2)), ((), np.array(4.0))):
+        names, table = divide(f, g)
+        table = answer_array(table, f"for the table divide, where g has the names {g[0]},")
+        assert sorted(names) == ["a", "m", "z"], f"the quotient is over z, a and m, yours is over {names}"
+        size = {"z": 2, "a": 3, "m": 4}
+        wanted = tuple(size[name] for name in names)
+        assert table.shape == wanted, f"your names {tuple(names)} ask for the shape {wanted}, got {table.shape}"
+        table = np.transpose(table, [list(names).index(name) for name in f[0]])
+        below = g[1].T[:, None] if g[0] else g[1]
+        np.testing.assert_allclose(table, f[1] / below, err_msg=f"three variables in f, and g has the names {g[0]}")
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
@@ -223,7 +234,9 @@ _test()
 #
 # `parents` describes a directed graph: for each variable the tuple of its parents, `()` for one without. Complete `separated`: it returns `True` when every path between
 # `a` and `b` is blocked once the variables in `given` are known, and `False` otherwise. Some variables may be **exact**: each of those in `exact` is a function of its parents, without noise,
-# as the pixel of a point is a function of the camera's pose. So as soon as all its parents are known, it is known as well. (One without parents is known from the start.) `a` and `b` are two different variables
+# as the pixel of a point is a function of the camera's pose. So as soon as all its parents are known, it is known as well. (One without parents is known from the start.)
+# For example, let arrows lead from *pose* to *pixel*, and from *pixel* to the readings *z1* and *z2*. If only the pose is known, z1 tells about z2. If the pixel is exact, it is known too, and blocks.
+# `a` and `b` are two different variables
 # that aren't known, not even after this step.
 #
 # First add to what is known whatever is exact and has no unknown parent, again and again. Then use the lecture's rule: look at every path from `a` to `b`, and at every variable inside it. Two helpers do the walking:
@@ -289,6 +302,7 @@ _EXACT_FOUR = (
     (_PIXEL, "z1", "z2", ("pose",), ("pixel",), True, "pixel is exact and its parent known, so pixel is known too, and blocks"),
     (_PIXEL, "z1", "z2", ("pose",), (), False, "pixel isn't exact here: pose alone doesn't say what it is"),
     (_PIXEL, "z1", "z2", (), ("pixel",), False, "nothing is known: pixel is exact, but its parent isn't known"),
+    (_FORK, "z1", "z2", (), ("m",), True, "m is exact and has no parent, so it is known from the start, and blocks"),
 )  # fmt: skip
 
 
@@ -465,6 +479,13 @@ def _test():
     right = 0.264 / 0.52, 0.264 / 0.6
     by_hand = "scan 0: without it 0.5 * 0.28, 0.5 * 0.76; with it 0.8 and 0.4 times as much"
     np.testing.assert_allclose(got, right, atol=1e-9, err_msg=by_hand)
+    three = np.array([[0.8, 0.4], [0.3, 0.9], [0.2, 1.0]])
+    got = answer_array(credible(_PRIOR.copy(), _M.copy(), three), "credible")
+    assert got.shape == (3,), f"one number for each of the 3 scans, shape (3,), got {got.shape}"
+    _explain(got[1], {0.48: "the scan of time 1 is between two others: what comes from the right is missing"})
+    right = 0.1584 / np.array([0.324, 0.2544, 0.288])
+    by_hand = "scan 1: without it 0.42 * 0.28, 0.18 * 0.76; with it 0.3 and 0.9 times as much"
+    np.testing.assert_allclose(got, right, atol=1e-9, err_msg=by_hand)
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import graphical_models
 
@@ -478,10 +499,15 @@ _test()
 # %% [markdown]
 # ## Task 5: in your own words (2 points)
 #
-# Two cells are one behind the other on the way of a coarse beam. A return says "at least one of you is occupied", and not which; it never errs. A second beam along the same way returns, too.
-# An occupancy grid keeps one probability per cell: after each beam it updates both cells separately, by Bayes' rule with that beam's likelihood for each cell. Which edges does the true graph of
-# two cells and two beams have, and which dependence does the grid forget after the first beam? Another sensor now reports for certain that the front cell is *free*.
-# What should happen to the probability of the rear cell, and what happens in the grid? Suppose that ten more of the coarse beams had returned before this report, so that the grid is nearly sure of the rear cell. Is the grid right now, and for the right reason? Six sentences are enough.
+# Two cells are one behind the other on the way of a coarse beam. Before any beam each is occupied with probability 0.2, whatever the other is. A return says "at least one of you is occupied", and not
+# which; it never errs. A second beam along the same way returns, too. An occupancy grid (lecture 02) keeps one probability per cell. At each return it updates both cells separately, by Bayes' rule with
+# the likelihood 1 if the cell is occupied and 0.2 if it is free.
+#
+# 1. Which edges does the true graph of two cells and two beams have, and which dependence does the grid forget after the first beam?
+# 2. Another sensor now reports for certain that the front cell is *free*. What should happen to the probability of the rear cell, and what happens in the grid?
+# 3. Suppose that ten more of the coarse beams had returned before this report, so that the grid is nearly sure of the rear cell. Is the grid right now, and for the right reason?
+#
+# Six sentences are enough.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "dropped-edge", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # Each return has arrows from both cells, so each is a collider, and once the returns are known the two cells depend on each other. The grid keeps only the two marginals after each beam, so it drops the coupling "at
