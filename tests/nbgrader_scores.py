@@ -16,9 +16,13 @@ from semgrid_edu.workshop.course.notebooks.build import read_percent, write_note
 
 @pytest.fixture(scope="session", autouse=True)
 def alembic_asked_once():
-    """Let nbgrader ask for the version of its tables once: it starts alembic, for three seconds, for each gradebook."""
+    """Let nbgrader ask for the version of its tables once: it starts alembic, for three seconds, for each gradebook.
+
+    Nor does it compile its queries anew each of the twelve times that it opens a gradebook to grade one notebook.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(nbgrader.api, "get_alembic_version", cache(nbgrader.api.get_alembic_version))
+        patch.setattr(nbgrader.api, "create_engine", cache(nbgrader.api.create_engine))
         yield
 
 

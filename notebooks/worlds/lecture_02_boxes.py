@@ -82,20 +82,20 @@ def scan_boxes(
     azimuth = azimuth.ravel()
     elevation = elevation.ravel()
     flat = np.cos(elevation)
-    ray = np.stack([flat * np.cos(azimuth + yaw), flat * np.sin(azimuth + yaw), np.sin(elevation)], axis=1)
+    ray = np.stack([flat * np.cos(azimuth + yaw), flat * np.sin(azimuth + yaw), np.sin(elevation)])
     ray[ray == 0] = 1e-12
-    start = np.array([x, y, KITTI_LIDAR_HEIGHT])
-    length = np.where(ray[:, 2] < 0, -start[2] / ray[:, 2], np.inf)
+    start = np.array([[x], [y], [KITTI_LIDAR_HEIGHT]])
+    length = np.where(ray[2] < 0, -start[2] / ray[2], np.inf)
     for box in boxes:
         # A ray is in the box from the last entry to the first exit through the three pairs of faces.
-        first = (np.array([box.x_min, box.y_min, 0]) - start) / ray
-        second = (np.array([box.x_max, box.y_max, box.height]) - start) / ray
-        enters = np.minimum(first, second).max(axis=1)
-        leaves = np.maximum(first, second).min(axis=1)
+        first = (np.array([[box.x_min], [box.y_min], [0]]) - start) / ray
+        second = (np.array([[box.x_max], [box.y_max], [box.height]]) - start) / ray
+        enters = np.minimum(first, second).max(axis=0)
+        leaves = np.maximum(first, second).min(axis=0)
         length = np.where((enters > 0) & (enters < leaves), np.minimum(length, enters), length)
     hit = length < farthest
     length = length[hit] + (rng.normal(0, noise, hit.sum()) if noise else 0)
-    points = start * [0, 0, 1] + ray[hit] * length[:, None]
+    points = (start * [[0], [0], [1]] + ray[:, hit] * length).T
     cos, sin = np.cos(yaw), np.sin(yaw)
     points[:, :2] = points[:, :2] @ np.array([[cos, -sin], [sin, cos]])
     return points.astype(np.float32)

@@ -1,5 +1,8 @@
 """What the demo's tests share: a tiny drive, a network, its results, and the stories of some cells."""
 
+from functools import cache
+from types import SimpleNamespace
+
 import pytest
 import torch
 from tiny_drive import DATE, write_tiny_drive
@@ -8,7 +11,7 @@ from torch import nn
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.networks import Architecture, build_net
 from semgrid_edu.pipeline import Stages, run_pipeline
-from semgrid_edu.workshop.demo import cell_story, record
+from semgrid_edu.workshop.demo import cell_story, record, run
 from semgrid_edu.workshop.demo import stories as stories_module
 from semgrid_edu.workshop.demo.stories import frame_story
 
@@ -81,9 +84,16 @@ def story(request, stories):
 
 @pytest.fixture(scope="session")
 def first_details():
-    """The maps of the first frame that asks for some, for all that ask later."""
+    """The maps of the first frame that asks for some, for all that ask later; they are packed once."""
     found, original = [], record.frame_details
-    return lambda *arguments: found[0] if found else found.append(original(*arguments)) or found[0]
+
+    def details(*arguments):
+        if not found:
+            maps = original(*arguments)
+            found.append(SimpleNamespace(layout=maps.layout, packed=cache(maps.packed)))
+        return found[0]
+
+    return details
 
 
 @pytest.fixture(scope="module")
@@ -92,3 +102,9 @@ def few_stories(first_details):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(record, "frame_details", first_details)
         yield
+
+
+@pytest.fixture
+def no_overview(monkeypatch):
+    """Leave out the picture, which takes longer than the page of a tiny drive, where no test looks at it."""
+    monkeypatch.setattr(run, "save_overview", lambda *_: None)

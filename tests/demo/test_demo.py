@@ -206,6 +206,7 @@ class TestMemory:
             assert more.tobytes() != fewer.tobytes()
 
 
+@pytest.mark.usefixtures("no_overview")
 class TestWithoutTruth:
     def test_says_what_to_expect_of_the_semantics(self, blank, html):
         assert "Expect poor semantics" in blank
@@ -349,6 +350,7 @@ class TestPanels:
         assert json.loads(page.text["frames"])[0]["texts"] == texts
 
 
+@pytest.mark.usefixtures("no_overview")
 class TestMistakes:
     def test_an_unknown_drive_is_named(self, drive):
         root = drive.folder.parents[1]
@@ -405,6 +407,7 @@ class TestMistakes:
             write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path / "file" / "out")
 
 
+@pytest.mark.usefixtures("no_overview")
 class TestChoice:
     """`--frames`, `--weights` and `--camera`."""
 

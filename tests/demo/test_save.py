@@ -230,6 +230,7 @@ def test_nothing_is_left_of_writing_that_fails(weights, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("no_overview")
 class TestDemo:
     @pytest.fixture
     @staticmethod

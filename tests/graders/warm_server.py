@@ -12,6 +12,8 @@ import tempfile
 from importlib import import_module
 from pathlib import Path
 
+from nbformat.v4 import new_code_cell
+
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.values import Wire
 from semgrid_edu.workshop.course.sandbox.worker import Shell, Worker
@@ -24,6 +26,8 @@ def hatch(nursery):
     """Fork a server for each exercise and socket that come in."""
     for name in LIBRARIES:
         import_module(name)
+    new_code_cell()  # compiles the schema of notebooks
+    gc.freeze()  # or the first full collection of each process would touch, and so copy, all that is loaded
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
     while True:
         source, sockets, _, _ = socket.recv_fds(nursery, 4096, 1)
@@ -53,7 +57,7 @@ def run(source):
 def serve(server):
     """Fork a process whenever one is asked for, and reply with its number."""
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)
-    gc.freeze()  # or the first full collection of each process would touch, and so copy, all that the exercise loaded
+    gc.freeze()  # what the exercise loaded, too
     server.send(b"!")
     while True:
         folder, pipes, _, _ = socket.recv_fds(server, 4096, 2)

@@ -49,14 +49,20 @@ def places_right_of_lane(drive, kind: Kind) -> np.ndarray:
 
 
 def only_ground(plan, rng) -> Builder:
-    """Scenery that is quick to build, for tests of the plan alone."""
+    """Scenery that is quick to build, for tests of the plan and of road users."""
     builder = Builder(plan, rng)
     builder.solid.append((ground_mesh(plan.road, plan.start, plan.end), 0))
     return builder
 
 
-def test_the_car_passes_a_border_at_12_to_14_metres_a_second(monkeypatch):
+@pytest.fixture
+def no_scenery(monkeypatch):
+    """Let streets have a ground and road users only: most of the time goes into houses, trees and fences."""
     monkeypatch.setattr(drive, "build_scenery", only_ground)
+
+
+@pytest.mark.usefixtures("no_scenery")
+def test_the_car_passes_a_border_at_12_to_14_metres_a_second():
     offenders = []
     for name, seed in product(FENCED, SEEDS):
         bare = simulate(seed, 2, name)
@@ -92,6 +98,7 @@ def test_there_are_cross_walls_behind_gaps():
     assert len(across) > 5
 
 
+@pytest.mark.usefixtures("no_scenery")
 def test_the_gaps_of_a_convoy_are_8_to_20_metres():
     offenders = []
     for seed in SEEDS:
@@ -110,11 +117,13 @@ def test_the_gaps_of_a_convoy_are_8_to_20_metres():
     assert offenders == []
 
 
+@pytest.mark.usefixtures("no_scenery")
 def test_pedestrians_walk_along_and_across():
     ways = {(a.trajectory.along, abs(a.trajectory.across)) for a in simulate(0, 36, "pedestrians").moving}
     assert {(1, 0), (-1, 0), (0, 1)} <= ways
 
 
+@pytest.mark.usefixtures("no_scenery")
 def test_slow_starters_wait_for_a_second_and_then_move():
     drive = simulate(0, 36, "slow starters")
     kinds = {actor.kind for actor in drive.moving}
@@ -123,6 +132,7 @@ def test_slow_starters_wait_for_a_second_and_then_move():
     assert all(np.hypot(*velocity) > 0.9 for velocity in drive.velocities(3.4).values())
 
 
+@pytest.mark.usefixtures("no_scenery")
 def test_cars_cross_in_both_directions():
     ways = {seed: {a.trajectory.across for a in simulate(seed, 36, "crossing cars").moving} for seed in SEEDS}
     assert ways == {seed: {-1, 1} for seed in SEEDS}
@@ -136,6 +146,7 @@ def test_seed_and_name_decide_the_street():
     assert one.shape != elsewhere.shape or not np.array_equal(one, elsewhere)
 
 
+@pytest.mark.usefixtures("no_scenery")
 def test_poses_come_from_packets_up_to_5_ms_away():
     drive = simulate(0, 8, "mesh")
     errors = [np.linalg.norm(drive.scan(k).T_world_from_lidar[:2, 3] - drive.pose(k * PERIOD)[:2, 3]) for k in range(8)]
