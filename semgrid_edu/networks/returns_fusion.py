@@ -14,6 +14,9 @@ from semgrid_edu.planes import above_ground, pick_planes
 HIGHEST = 5.0
 """Height above the ground to which heights are clipped, metres; the network sees them as 0..2."""
 
+CERTAIN = 20.0
+"""How far the logits of the unknown classes are lowered in a cell that both sensors see."""
+
 
 class ReturnsFusion(nn.Module):
     """Fuse the image's scores at the heights of the scan's returns with occupancy grid and heights: (p, o, l) -> g.
@@ -21,6 +24,9 @@ class ReturnsFusion(nn.Module):
     The four numbers of o don't say how high a cell is occupied, and D planes of scores are many to learn from few
     frames. Here the scan chooses the planes: nothing reduces them, and the conv-deconv network sees the scores at each
     cell's lowest and highest return, the occupancy grid, how far both are above the ground, and whether there is any.
+
+    A cell in the camera's view from which a beam came back is never called unknown. Otherwise the network learns where
+    the views of its cameras end, and takes cells beyond that border for unknown when another camera sees them.
 
     Parameters
     ----------
@@ -101,7 +107,11 @@ class ReturnsFusion(nn.Module):
         (B, C, H, W) float
             g before the soft-max.
         """
-        return self.conv_deconv(self.joined(reduced, occupancy, return_heights))
+        logits = self.conv_deconv(self.joined(reduced, occupancy, return_heights))
+        # The last classes are the unknown ones, one for each state. Out of view all scores are zero.
+        semantic, unknown = logits.split([logits.shape[1] - N_STATES, N_STATES], dim=1)
+        seen = (reduced != 0).any(dim=1) & ~return_heights[:, :1].isnan()
+        return torch.cat([semantic, unknown - CERTAIN * seen], dim=1)
 
     def joined(self, reduced: Tensor, occupancy: Tensor, return_heights: Tensor) -> Tensor:
         """Append occupancy and heights to the picked scores. Parameters are those of `ReturnsFusion.fuse`.

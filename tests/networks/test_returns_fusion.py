@@ -9,6 +9,7 @@ from safetensors import safe_open
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import with_fast_sampler
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, load_net, save_net
 from semgrid_edu.planes import above_ground, pick_planes
 
@@ -41,8 +42,26 @@ def test_the_conv_deconv_network_sees_picked_probabilities_states_and_heights(ne
     above = above_ground(heights, 1.0).nan_to_num(0).clamp(0, 5) / 2.5
     joined = torch.cat([picked, occupancy, above, (~heights[:, :1].isnan()).float()], dim=1)
     assert joined.shape[1] == 2 * 14 + 4 + 3
-    torch.testing.assert_close(seen.logits, net.fusion.conv_deconv(joined))
+    both = (picked > 0).any(dim=1, keepdim=True) & ~heights[:, :1].isnan()
+    lowered = torch.zeros_like(seen.logits)
+    lowered[:, KITTI_14.n_semantic :] = 20 * both
+    torch.testing.assert_close(seen.logits, net.fusion.conv_deconv(joined) - lowered)
     assert torch.equal(seen.logits, net(image, occupancy, heights))
+
+
+def test_only_a_cell_in_view_with_a_return_must_have_a_name(net, inputs):
+    """With weights that call everything unknown, cells that a sensor misses stay unknown, the others don't."""
+    image, occupancy, heights = inputs
+    last = net.fusion.conv_deconv.decoder[0][-1].bias
+    with torch.no_grad():
+        last[KITTI_14.n_semantic :] += 10
+    called = net(image, occupancy, heights).argmax(dim=1)
+    visible = torch.as_tensor(net.sampler.visible)
+    in_view, out_of_view = visible.all(dim=0), ~visible.any(dim=0)
+    has_return = ~heights[:, 0].isnan()
+    assert (called[has_return & in_view] < KITTI_14.n_semantic).all()
+    assert (called[~has_return | out_of_view] >= KITTI_14.n_semantic).all()
+    assert (has_return & in_view).any()
 
 
 def test_mirrored_it_sees_the_mirror_of_everything(net, inputs):
