@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -24,8 +24,6 @@ from semgrid_edu.occupancy import (
     bof_update,
     smear_area,
 )
-from semgrid_edu.occupancy.bof_state import whole_cells
-from semgrid_edu.occupancy.planar_motion import shift
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
 
 STEADY = WorldModel(rates=((0.0,) * 4,) * 4, stop_rate=0, max_acceleration=0, walls=None)
@@ -41,9 +39,6 @@ NOTHING_MOVES = WorldModel(
     rates=tuple((*row[:2], 0.0, row[3]) for row in WorldModel.rates), first_sight=STANDS, walls=None
 )
 """A world in which things stand, appear, vanish and are forgotten, but never move."""
-
-KEEPS_MOVING = WorldModel(rates=(*WorldModel.rates[:2], (0.0,) * 4, WorldModel.rates[3]), stop_rate=0, walls=None)
-"""A world in which what moves goes on moving: it doesn't stop, doesn't vanish and isn't forgotten."""
 
 
 def unchanging(world: WorldModel) -> WorldModel:
@@ -85,104 +80,36 @@ def scans_of(
 
 
 @cache
-def _bus_scans(columns: int, first: float) -> tuple[NDArray, list[Evidence]]:
-    """Return the times of the scans of the bus, from the first one on, and what they tell."""
-    times = np.arange(round(10 * first), 29) / 10
-    return times, scans_of(bus_at, BUS, times, columns)
+def _bus_scans() -> tuple[NDArray, list[Evidence]]:
+    """Return the times of the scans of the bus and what they tell."""
+    times = np.arange(29) / 10
+    return times, scans_of(bus_at, BUS, times, columns=1000)
 
 
-def watch(scans: list[Evidence], spec: GridSpec, params: BofParams, predict: Callable = bof_predict) -> list[BofState]:
+def watch(scans: list[Evidence], spec: GridSpec, params: BofParams) -> list[BofState]:
     """Return what BOF believes after each of some scans, a tenth of a second apart."""
     state, states = BofState.nothing_known(spec, params.lattice), []
     for scan in scans:
-        state = bof_update(predict(state, spec, params, 0.1), spec, scan, params)
+        state = bof_update(bof_predict(state, spec, params, 0.1), spec, scan, params)
         states.append(state)
     return states
 
 
-def pass_by(columns: int, first: float = 0.0, world: WorldModel = PAPER, mend: str = "") -> tuple[NDArray, NDArray]:
+def pass_by(first: float = 0.0, world: WorldModel = PAPER) -> tuple[NDArray, NDArray]:
     """Let the bus pass: return the times of the scans (T,) and the four states along its flank, (4, T, H).
 
     Parameters
     ----------
-    columns : int
-        Directions of the scanner in its half circle.
     first : float
         When the filter is switched on, seconds.
     world : WorldModel
         What the filter assumes.
-    mend : str
-        What to change in cells that the flank covers: with "free" those that look free tell nothing, with "hit" all of
-        them are hit, with "" nothing changes.
     """
-    times, scans = _bus_scans(columns, first)
+    times, scans = _bus_scans()
+    begin = round(10 * first)
     (_,), (col,), _ = BUS.cells(np.array([[1.0, FLANK]]))
-    if mend:
-        scans = [_mended(scan, t, col, mend) for t, scan in zip(times, scans, strict=True)]
-    states = watch(scans, BUS, BofParams(VelocityLattice(8, spacing=2), world))
-    return times, np.stack([state.probability[:, ::-1, col] for state in states], axis=1)
-
-
-def _mended(scan: Evidence, t: float, col: int, mend: str) -> Evidence:
-    """Return a scan in which cells that the flank covers don't look free ("free"), or are all hit ("hit")."""
-    occupied, free = scan.occupied.copy(), scan.free.copy()
-    x = BUS.centers()[:, col, 0]
-    covered = np.zeros(BUS.shape, bool)
-    covered[:, col] = (x > 24 - 8 * t) & (x < 36 - 8 * t)
-    sensor = WorldModel().sensor
-    if mend == "free":
-        change, to = covered & (occupied < free), (1.0, 1.0)
-    else:
-        change, to = covered & (occupied <= free), (sensor.p_hit_occupied, sensor.p_hit_free)
-    occupied[change], free[change] = to
-    return Evidence(occupied, free)
-
-
-class OnlyTheBus(VelocityLattice):
-    """A lattice on which everything that moves has the velocity of the bus, so that nothing is spread over others."""
-
-    @cached_property
-    def prior(self) -> NDArray[np.float64]:
-        """(V,): all mass on the velocity of the bus."""
-        return (self.velocities == (-8, 0)).all(axis=1).astype(float)
-
-
-def late(odds: float, spread: bool, strike_out: bool) -> NDArray[np.float64]:
-    """Return P(DYNAMIC | occupied) after each scan, (11,), in the middle of a bus that was in view from the start.
-
-    It is the mean over the cells that the bus has covered since the first scan, but for its last two metres. In this
-    world nothing starts, stops, is forgotten or changes its velocity.
-
-    Parameters
-    ----------
-    odds : float
-        P(STATIC) : P(DYNAMIC) at first sight.
-    spread : bool
-        Whether moving mass is spread over all velocities of a lattice, or has that of the bus.
-    strike_out : bool
-        Whether what stands and what arrives are struck out as a pair. If not, each antecedent keeps its mass.
-    """
-    static = 0.048 * odds / (1 + odds)
-    world = WorldModel(STEADY.rates, 0, STEADY.stop_speed, 0, (0.952, static, 0.048 - static), None)
-    params = BofParams(VelocityLattice(8, spacing=2) if spread else OnlyTheBus(8, spacing=8), world)
-    times, scans = _bus_scans(1000, 1.6)
-    states = watch(scans[:11], BUS, params, bof_predict if strike_out else _fly_alone)
-    (_,), (col,), _ = BUS.cells(np.array([[1.0, FLANK]]))
-    x, told = BUS.centers()[:, col, 0], []
-    for t, state in zip(times, states, strict=False):
-        here = (x > 30 - 8 * times[0] - 6) & (x < 30 - 8 * t + 6 - 2)
-        probability = state.probability[:, here, col]
-        told.append(probability[State.DYNAMIC].sum() / probability[[State.STATIC, State.DYNAMIC]].sum())
-    return np.array(told)
-
-
-def _fly_alone(state: BofState, spec: GridSpec, params: BofParams, dt: float) -> BofState:
-    """Predict for `STEADY` without the strike-out: each velocity shifts its mass, sums above 1 are scaled down."""
-    cells, remainder = whole_cells(state, spec, dt)
-    occupied = np.stack([shift(mass, way) for mass, way in zip(state.occupied, cells, strict=True)])
-    occupied /= np.maximum(occupied.sum(axis=0) / 0.999, 1)
-    unknown = np.minimum(state.unknown, 1 - occupied.sum(axis=0))
-    return BofState(1 - occupied.sum(axis=0) - unknown, unknown, occupied, state.velocity, remainder)
+    states = watch(scans[begin:], BUS, BofParams(VelocityLattice(8, spacing=2), world))
+    return times[begin:], np.stack([state.probability[:, ::-1, col] for state in states], axis=1)
 
 
 WALK = np.arange(41) / 10
@@ -269,19 +196,18 @@ def move_outline(lines: list[Line2D], boxes: list[Box]) -> None:
 
 
 def draw_flank(ax: Axes, times: NDArray, states: NDArray, title: str) -> None:
-    """Draw the cells along the flank over time: a row per scan, and the front and rear of the bus as lines."""
-    picture = plotting.occupancy_colours(states)
-    extent = (BUS.x_min, BUS.x_max, times[0] - 0.05, times[-1] + 0.05)
+    """Draw the cells along the flank over time: a column per scan, and the front and rear of the bus as lines."""
+    picture = plotting.occupancy_colours(states).swapaxes(0, 1)
+    extent = (times[0] - 0.05, times[-1] + 0.05, BUS.x_min, BUS.x_max)
     ax.imshow(picture, extent=extent, origin="lower", aspect="auto", interpolation="nearest")
     if times[0] > 0:
-        ax.axhspan(0, times[0] - 0.05, facecolor="white", edgecolor="0.75", hatch="///", linewidth=0)
-        ax.text(
-            1, times[0] / 2, "not yet switched on", fontsize=9, va="center", bbox={"facecolor": "white", "linewidth": 0}
-        )
+        ax.axvspan(0, times[0] - 0.05, facecolor="white", edgecolor="0.75", hatch="///", linewidth=0)
+        box = {"facecolor": "white", "linewidth": 0}
+        ax.text(times[0] / 2, 2, "not yet on", fontsize=9, ha="center", va="center", bbox=box)
     span = np.array([0, 3])
     for end, style in ((24, "-"), (36, "--")):
-        ax.plot(end - 8 * span, span, style, color="#c000c0", linewidth=2)
-    ax.set(xlim=(0, 18), ylim=(0, 2.85), xticks=range(0, 19, 3), xlabel="x, forward [m]", facecolor="white")
+        ax.plot(span, end - 8 * span, style, color="#c000c0", linewidth=2)
+    ax.set(xlim=(0, 2.85), ylim=(0, 18), yticks=range(0, 19, 3), xlabel="time [s]", facecolor="white")
     ax.set_title(title, fontsize=10)
 
 
@@ -292,7 +218,7 @@ def draw_flanks(passed: dict[str, tuple[NDArray, NDArray]]) -> None:
     fig, axes = plt.subplots(1, len(passed), figsize=(8.6, 3.5), layout="constrained", sharex=True, sharey=True)
     for ax, (name, run) in zip(axes, passed.items(), strict=True):
         draw_flank(ax, *run, name)
-    axes[0].set_ylabel("time [s]")
+    axes[0].set_ylabel("x, forward [m]")
     flank_legend(fig)
 
 

@@ -55,8 +55,29 @@ def class_of_each_row(truths: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.array([np.bincount(row[row != IGNORE], minlength=1).argmax() for row in rows], np.uint8)
 
 
+def widths_across(there: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return for each pixel that is there how many such pixels stand side by side in its row, and 0 elsewhere.
+
+    Parameters
+    ----------
+    there : (..., w) bool
+        Where something is.
+
+    Examples
+    --------
+    >>> widths_across(np.array([[True, False, True, True]]))
+    array([[1, 0, 2, 2]])
+    """
+    widths = np.zeros(there.shape, np.int64)
+    for row, found in zip(there.reshape(-1, there.shape[-1]), widths.reshape(-1, there.shape[-1]), strict=True):
+        ends = np.flatnonzero(np.diff(row, prepend=False, append=False))
+        for start, end in zip(ends[::2], ends[1::2], strict=True):
+            found[start:end] = end - start
+    return widths
+
+
 def draw_ways(posts: Mapping[int, int]) -> Figure:
-    """Draw bright posts, and what indices, skips and atrous kernels make of them.
+    """Draw what indices, skips and atrous kernels make of bright posts.
 
     Parameters
     ----------
@@ -67,9 +88,14 @@ def draw_ways(posts: Mapping[int, int]) -> Figure:
     for column, width in posts.items():
         picture[2:14, column : column + width] = 1
     fig, axes = plt.subplots(2, 4, figsize=(9.2, 2.9), layout="constrained", sharex=True, height_ratios=(1, 0.8))
-    ways = {"A: three posts": None, "B: indices": "indices", "C: skips": "skips", "D: atrous": "atrous"}
+    ways = {
+        "A: indices": "indices",
+        "B: skips, finest 1/2": "half skips",
+        "C: skips, finest 1/1": "skips",
+        "D: atrous": "atrous",
+    }
     for (above, below), (title, way) in zip(axes.T, ways.items(), strict=True):
-        shown = picture if way is None else apply_mechanism(picture, way)
+        shown = apply_mechanism(picture, way)
         above.imshow(shown, cmap="magma", vmin=0, vmax=1)
         above.set_title(title, fontsize=10)
         above.set(yticks=[])
@@ -77,7 +103,7 @@ def draw_ways(posts: Mapping[int, int]) -> Figure:
         for column, width in posts.items():
             below.axvspan(column - 0.5, column + width - 0.5, color="tab:orange", alpha=0.4, linewidth=0)
         below.set(ylim=(0, 1.05), xlabel="column", yticks=[0, 0.5, 1] if below is axes[1, 0] else [])
-    axes[1, 0].set_ylabel("brightness")
+    axes[1, 0].set_ylabel("maximum\nof column")
     return fig
 
 
@@ -97,12 +123,14 @@ def draw_reached(reached: Mapping[Way, tuple[int, ...]], short: Mapping[Way, tup
         mean = np.mean(overlaps)
         ax.bar(k, mean, color=colours[way.down], hatch=hatches.get(way.down), edgecolor="0.3", width=0.7)
         ax.plot(np.full(len(overlaps), k), overlaps, "o", color="black", markersize=3,
-                label="one network" if k == 0 else None)  # fmt: skip
+                label="five networks" if k == 0 else None)  # fmt: skip
         ax.plot(k, np.mean(short[way]), "D", color="white", markeredgecolor="black", markersize=6,
                 label="mean after a quarter of the steps" if k == 0 else None)  # fmt: skip
         ax.text(
             k, 3, f"{mean:.0f}", ha="center", fontsize=10, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1}
         )
+    for k in (1.5, 3.5, 5.5):  # between the pairs that differ in pooling and strides alone
+        ax.axvline(k, color="0.7", linewidth=0.8)
     ax.axhline(alone, color="tab:red", linestyle="--", linewidth=1.2, label="a single convolution")
     ax.set_xticks(range(len(reached)), [f"{way.down}\n{way.up}" for way in reached], fontsize=9)
     ax.set(ylabel="overlap (IoU) [%]", ylim=(0, 103))
@@ -147,7 +175,7 @@ def draw_pretrained() -> Figure:
         ax.bar(k, reached.others, color=colour, hatch=hatch, edgecolor="0.3", width=0.6)
         ends = [[reached.others - reached.low], [reached.high - reached.others]]
         ax.errorbar(k, reached.others, ends, color="black", capsize=6, linewidth=1.5,
-                    label="other cameras, 95 % interval" if k == 0 else None)  # fmt: skip
+                    label="other cameras, 95 % interval\nover six cameras" if k == 0 else None)  # fmt: skip
         ax.plot(k, reached.own, "D", color="white", markeredgecolor="black", markersize=8,
                 label="the images learned from" if k == 0 else None)  # fmt: skip
         ax.text(k, 3, f"{reached.others}", ha="center", fontsize=10,
@@ -157,4 +185,27 @@ def draw_pretrained() -> Figure:
     ax.set_xticks(range(3), pretrained.REACHED)
     ax.set(ylim=(0, 100), ylabel="pixel accuracy [%]")
     fig.legend(loc="outside right upper", fontsize=9)
+    return fig
+
+
+def draw_moves(image: NDArray[np.uint8], labels: NDArray[np.uint8], along: NDArray[np.bool_], columns: slice) -> Figure:
+    """Draw a photograph, its labels, and in black those that don't move along.
+
+    Parameters
+    ----------
+    image : (h, w, 3) uint8
+        The photograph.
+    labels : (h, n) uint8
+        Labels of a wider strip.
+    along : (h, n) bool
+        Where the label moves along.
+    columns : slice
+        The strip's columns that show the photograph.
+    """
+    fig, axes = plt.subplots(3, 1, figsize=(6.4, 6.3), layout="constrained")
+    draw_image(image, ax=axes[0]).set_title("A: the image", fontsize=10)
+    draw_image(KITTI_14.colours(labels[:, columns]), ax=axes[1]).set_title("B: SegNet's labels", fontsize=10)
+    draw_image(along[:, columns], ax=axes[2], cmap="gray", vmin=0, vmax=1)
+    axes[2].set_title("C: labels that don't move along (black)", fontsize=10)
+    plotting.class_legend(axes[1], KITTI_14, labels[:, columns])
     return fig

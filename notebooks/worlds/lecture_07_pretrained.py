@@ -36,3 +36,6 @@ ROWS = 41
 
 ADDED = (17, 9, 25)
 """What ImageNet's weights add to fresh ones: mean, and ends of the interval of the paired difference."""
+
+LONGER = (65, 74)
+"""Fresh weights on other cameras after 100 steps and after 300, without that normalisation."""

@@ -14,9 +14,10 @@ from semgrid_edu.networks.deeplab import interpolate
 from semgrid_edu.networks.fcn import enlarge
 from semgrid_edu.networks.segmenter import fresh_weights
 
-MECHANISMS = ("nearest", "indices", "skips", "atrous")
+MECHANISMS = ("nearest", "indices", "half skips", "skips", "atrous")
 """Ways to see far and still score at full resolution: max-pooling, then enlarging its result, unpooling it by its
-indices (SegNet), or adding finer maps to it (FCN); holes instead of halving (DeepLab)."""
+indices (SegNet), or adding finer maps to it, up to half the size as FCN does or up to full size as U-Net does; holes
+instead of halving (DeepLab)."""
 
 
 class Way(NamedTuple):
@@ -37,9 +38,9 @@ class Way(NamedTuple):
 
 WAYS = (
     *(Way(down, up) for up in ("at once", "decoder") for down in ("pooling", "strides")),
-    Way("pooling", "indices"),
-    Way("strides", "skips"),
     Way("pooling", "skips"),
+    Way("strides", "skips"),
+    Way("pooling", "indices"),
     Way("atrous", ""),
 )
 """The networks that are compared."""
@@ -49,9 +50,9 @@ SHORT = {
     Way("strides", "at once"): (41, 42, 41, 40, 41),
     Way("pooling", "decoder"): (56, 65, 50, 65, 51),
     Way("strides", "decoder"): (64, 76, 59, 60, 67),
-    Way("pooling", "indices"): (82, 89, 85, 85, 82),
-    Way("strides", "skips"): (96, 96, 94, 94, 95),
     Way("pooling", "skips"): (96, 96, 96, 94, 95),
+    Way("strides", "skips"): (96, 96, 94, 94, 95),
+    Way("pooling", "indices"): (82, 89, 85, 85, 82),
     Way("atrous", ""): (95, 94, 93, 93, 95),
 }
 """Overlap of each way's networks on new images by seed, per cent, after `SHORT_STEPS`."""
@@ -61,9 +62,9 @@ REACHED = {
     Way("strides", "at once"): (44, 45, 45, 45, 46),
     Way("pooling", "decoder"): (65, 86, 75, 82, 84),
     Way("strides", "decoder"): (89, 87, 86, 86, 87),
-    Way("pooling", "indices"): (94, 93, 94, 91, 91),
-    Way("strides", "skips"): (98, 98, 98, 98, 98),
     Way("pooling", "skips"): (98, 98, 98, 98, 98),
+    Way("strides", "skips"): (98, 98, 98, 98, 98),
+    Way("pooling", "indices"): (94, 93, 94, 91, 91),
     Way("atrous", ""): (99, 99, 99, 99, 99),
 }
 """The same after `STEPS`; `python -m worlds.lecture_07_thin_pole` prints both."""
@@ -94,8 +95,9 @@ def apply_mechanism(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
         Any image whose sides are multiples of 4.
     mechanism : str
         One of `MECHANISMS`. "nearest": the image is max-pooled twice, then each value is spread over its 4 x 4 pixels.
-        "indices": values go back to where the maxima were. "skips": as in FCN, each map on the way up is added to the
-        one of its size on the way down; here the result is the mean of all three. "atrous": the image stays at full
+        "indices": values go back to where the maxima were. "skips": each map on the way up is added to the one of its
+        size on the way down, and the result is the mean of all three; "half skips" leaves the full size out, as FCN
+        leaves out its finest maps. "atrous": the image stays at full
         size and is filtered with the binomial kernel (1, 2, 1)/4 in both directions, and again with holes in it.
 
     Returns
@@ -117,6 +119,8 @@ def apply_mechanism(image: ArrayLike, mechanism: str) -> NDArray[np.float64]:
         return _apply_kernels(x)[0, 0].numpy()
     half, where_half = F.max_pool2d(x, 2, return_indices=True)
     quarter, where_quarter = F.max_pool2d(half, 2, return_indices=True)
+    if mechanism == "half skips":
+        return (enlarge(enlarge(quarter, 2, half.shape[2:]) + half, 2, x.shape[2:]) / 2)[0, 0].numpy()
     whole = _double(mechanism, _double(mechanism, quarter, half, where_quarter), x, where_half)
     return (whole / 3 if mechanism == "skips" else whole)[0, 0].numpy()
 

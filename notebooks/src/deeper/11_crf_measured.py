@@ -144,7 +144,7 @@ Markdown("\n".join(lines))
 
 # %% [markdown]
 # A CRF that gains pixel accuracy costs class accuracy. A CRF that doesn't cost class accuracy hardly does anything.
-# As in lecture 11, it is a trade.
+# So for these prices it is a trade.
 #
 # ## What this does not show
 #

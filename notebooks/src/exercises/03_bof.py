@@ -281,8 +281,8 @@ _test()
 #
 # Two opinions meet in a cell. Its own is `own` (4, H, W): FREE, STATIC, DYNAMIC, UNKNOWN, which sum to 1. Its neighbours say: with the probability
 # `arrives` (H, W) something moving arrives here. Take the two as independent, and write down the probability of each pair (own state; arrives or not).
-# Here DYNAMIC is what moves so slowly that it is still in the cell, and two solid things can't share a cell. So **two** pairs are impossible: nothing arrives where
-# something STATIC stands, nor where something DYNAMIC still is. Strike both out. In the pairs that are left, what arrives makes the cell DYNAMIC, and where nothing arrives the cell keeps its state.
+# In this task alone, DYNAMIC in `own` is what moves but is still in its cell, because it is slow. (In the filter at the end all that moves leaves its cell, so DYNAMIC
+# of `own` is 0 there.) Two solid things can't share a cell. So **two** pairs are impossible: nothing arrives where something STATIC stands, nor where something DYNAMIC still is. Strike both out. In the pairs that are left, what arrives makes the cell DYNAMIC, and where nothing arrives the cell keeps its state.
 #
 # Complete `arrive`: it returns the belief (4, H, W) that is left, and leaves its arguments as they are.
 
@@ -342,7 +342,7 @@ _test()
 # on a line and exactly one thing. At scan 0 it is in cell `start`. It has one of V velocities and keeps it: `steps` (V,) says by how many cells it moves
 # from each scan to the next, to the right if positive, and `prior` (V,) how probable that is. Then come T scans. Scan number t = 0, 1, ... T - 1 of the arrays
 # is made after t + 1 steps; of each cell it says P(z | occupied) and P(z | free): `if_occupied` and `if_free`, both (T, K). Cells are seen independently of
-# each other, once it is known which of them is occupied. A thing that has left the line occupies no cell of it.
+# each other, once it is known which of them is occupied. A thing that has left the line occupies no cell of it, so then all cells are free.
 #
 # Complete `follow`: it returns the probability of each velocity, given all scans, (V,). Leave the arguments as they are.
 
@@ -386,6 +386,11 @@ def _test():
     np.testing.assert_allclose(got, np.array([0.015, 0.015, 0.56]) / 0.59, rtol=1e-5, err_msg=by_hand)
     uneven = answer_array(follow(2, steps, np.array([0.1, 0.1, 0.8]), np.ones((1, 6)), np.ones((1, 6))), "follow")
     assert np.allclose(uneven, [0.1, 0.1, 0.8]), "a scan that says nothing leaves the prior as it was"
+    occupied, free = np.full((2, 6), 0.3), np.full((2, 6), 0.7)
+    occupied[0, 5], free[0, 5] = 0.8, 0.05
+    left = answer_array(follow(4, np.array([0, 1]), np.full(2, 0.5), occupied, free), "follow")
+    why = "what has left leaves all cells free; by hand: it stands 0.3 * 0.05 * 0.3, it drives 0.8 * 0.7 * 0.7"
+    assert np.allclose(left, np.array([0.0045, 0.392]) / 0.3965, rtol=1e-5), why
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import bof
 
@@ -498,10 +503,10 @@ def light_up():
 # ## Task 6: in your own words (2 points)
 #
 # A train of small cars passes you on your left at 20 m/s. Each car carries one thin post, and the posts follow each other at a distance of exactly 2 m. Your
-# scanner turns ten times a second and sees the posts alone. The lattice has velocities 5 m/s apart, up to 20 m/s. Among the posts that have been in view from
-# the beginning, what will the filter say of their velocity? Which velocities of the lattice explain all scans of them alike, and which parts of the filter decide between these? The first
-# post of the train drives into free road, where the filter sees that it moves: what does BOF forget, so that this helps the posts behind it late or not at all?
-# And name one change to the scanner that would help. Six sentences are enough.
+# scanner turns ten times a second and sees the posts alone. The lattice has velocities 5 m/s apart, up to 20 m/s. Answer in about six sentences:
+#
+# 1. Take the posts that were in view from the beginning. Which velocities of the lattice explain all their scans alike, and what does the filter make of them, and why?
+# 2. The first post drives into free road, where the filter sees that it moves. What does BOF forget, so that this helps the posts behind it late or not at all? Name one change to the scanner that would help.
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "posts", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # In a tenth of a second each post moves by 2 m, to where the next one was. So each scan looks like the one before, and the antecedents of a post's cell hold a post for 0 m/s,

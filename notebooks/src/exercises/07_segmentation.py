@@ -294,7 +294,7 @@ _test()
 #
 # `period(label, image, margin)` returns the smallest shift out of 1, 2, 4, 8, 16, 32, 64 with which *all* labels move along, or 0 if there is none.
 #
-# One point is for the share, two are for the period. The last test asks the three shipped networks. Write down what you expect for each before you run it; the lecture's drawings are enough.
+# One point is for the share, two are for the period. The last test asks the three shipped networks; on a slow machine it takes a minute or more. Write down what you expect for each before you run it; the lecture's drawings are enough.
 
 
 # %% nbgrader={"grade": false, "grade_id": "moved", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -438,7 +438,7 @@ _test()
 #
 # Complete `name_mechanism`: it returns one of the four. You may feed the box as many images as you like. Don't compare with the lecture's numbers, because the boxes of the
 # tests have other kernels, weights and depths. Ask for *properties*: what is true of every box of a kind, and of no box of the others? Is the answer to a sum the sum of the
-# answers? What becomes of the answer when the image moves by one pixel? How many pixels of it are zero? One point is for boxes like the lecture's, two are for strange ones.
+# answers? What becomes of the answer when the image moves by one pixel? (Keep away from the border: put what you move in the middle.) One point is for boxes like the lecture's, two are for strange ones.
 
 
 # %% nbgrader={"grade": false, "grade_id": "box-maker", "locked": true, "schema_version": 3, "solution": false, "task": false}
@@ -586,8 +586,8 @@ _test()
 #     return -np.log(P[one_hot]).sum() / truth.size, P - one_hot
 # ```
 #
-# It runs on any image and raises no error. Look at four places: the soft-max; unlabelled pixels, which spoil the loss and the gradient alike; the gradient of a *mean*; and
-# large scores. Write it rightly. The mistakes aren't independent: mending one may show the next. `scores` stays as it is.
+# It runs on any image and raises no error, yet it has at least four mistakes. Write it rightly. The mistakes aren't independent: mending one may show the next. `scores`
+# stays as it is.
 #
 # For the last point both results must stay right where scores are ten thousands, of either sign, or thousands apart: adding the same to all scores of a pixel changes
 # nothing, so add something that keeps $e^s$ small.
