@@ -4,6 +4,7 @@ import struct
 import time
 import zlib
 from base64 import b64encode
+from html import unescape
 
 import pytest
 from nbgrader.server_extensions.formgrader import handlers
@@ -52,6 +53,22 @@ PICTURE, HUGE = f"data:image/png;base64,{png(8)}", png(50_000)
 )
 def test_what_could_act_in_a_browser_is_gone(html, gone):
     assert gone not in without_scripts(html)
+
+
+@pytest.mark.parametrize(
+    ("formula", "macro"),
+    [
+        (r"\\href{a}{x}", "href"),
+        (r"\href1", "href"),
+        (r"\hr<!-- -->ef{a}{x}", "href"),
+        (r"\&#104;r&#x65;&#x66;{a}{x}", "href"),
+        ("&bsol;style{a}{x} &#92;href{a}{x}", "style"),
+        (r"\mmlToken{mi}[href='a']{x}", "mmlToken"),
+        (r"\bbox[background: url(a)]{x}", "bbox"),
+    ],
+)
+def test_no_way_of_writing_a_macro_keeps_it(formula, macro):
+    assert "\\" + macro not in unescape(without_scripts(f"<p>${formula}$</p>"))
 
 
 @pytest.mark.parametrize(

@@ -185,6 +185,7 @@ def test_each_student_of_a_platform_gets_a_folder(course):
             file.writestr(name.format("silva").replace("00_tiny.ipynb", f"{kind}.zip"), inner.getvalue())
             file.writestr(name.format("silva").replace("00_tiny.ipynb", hers), "hers")
             file.writestr(f"silva/deep/{hers}", "hers")
+            file.writestr(name.format("silva").replace("00_tiny.ipynb", f"x\\{hers}"), "hers")
         file.writestr(name.format("large"), bytes(gradebook.MAX_BYTES + 1), zipfile.ZIP_DEFLATED)
     option = "--FileNameCollectorPlugin.named_regexp=" + re.search(r"named_regexp='(.*)'", GUIDE)[1]
     command = [sys.executable, "-m", "nbgrader", "zip_collect", TINY, option]

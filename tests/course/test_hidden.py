@@ -1,13 +1,18 @@
 """The instructor's decorator: whatever a student's function does, one sentence comes back."""
 
 import ast
+import copy
+import re
 import sys
 
 import numpy as np
 import pytest
+from nbgrader.utils import is_grade, is_solution
 
 from semgrid_edu.workshop.course.checks import instructor_problems
-from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
+from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
+from semgrid_edu.workshop.course.nbgrader.preprocessors import use_instructor
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.session import AnswerTimeoutError
 
 
@@ -112,6 +117,88 @@ def test_hidden_inputs_are_drawn_for_each_student_or_the_guide_says_so():
             calls = {name: found.union(*(calls[one] for one in found & calls.keys())) for name, found in calls.items()}
         same = [name for name, found in calls.items() if name.startswith("check_") and "generator" not in found]
         assert [name for name in same if f"`{name.removeprefix('check_')}`" not in guide] == [], path.name
+
+
+BY_ITSELF = {
+    "01_bayes": ["check_predict_wall"],
+    "02_grids": ["check_fuse_many", "check_clamp"],
+    "03_bof": ["check_no_mass"],
+    "04_cmcdot": ["check_update_limits", "check_track"],
+    "05_pixels": ["check_impossible"],
+    "07_segmentation": ["check_large"],
+    "08_fusion": ["check_large_logits"],
+    "10_crf": ["check_update_limits", "check_free_energy_limits"],
+}
+"""Checks of limits, which compare what an answer says with what it says elsewhere; and one that takes minutes."""
+
+
+class Replay:
+    """An answer that gives back what was right for another student, by the shapes and the order of the inputs."""
+
+    def __init__(self, answer):
+        self.answer, self.__name__, self.said, self.replays = answer, answer.__name__, {}, False
+
+    def __call__(self, *arguments, **named):
+        said = self.said.setdefault(shapes((arguments, named)), [])
+        if self.replays:
+            return said.pop(0) if said else 0
+        said.append(copy.deepcopy(self.answer(*arguments, **named)))
+        return copy.deepcopy(said[-1])
+
+
+def shapes(value):
+    """What code can tell an input by that looks at no number in it, but at counts and texts."""
+    if isinstance(value, dict):
+        return shapes(list(value.items()))
+    if isinstance(value, list | tuple):
+        return tuple(map(shapes, value))
+    return value if isinstance(value, int | str) else np.shape(value)
+
+
+@pytest.mark.parametrize("source", exercise_sources(), ids=lambda source: source.stem)
+def test_what_was_right_for_another_student_earns_nothing(source):
+    names, earned = {"__name__": "__main__"}, []
+    for cell in (cell for cell in read_percent(source).cells if cell.cell_type == "code"):
+        if is_solution(cell) or not is_grade(cell):
+            exec(cell.source, names)
+            continue
+        (imported,) = re.findall(r"from semgrid_instructor import .*", cell.source)
+        ((check, answers),) = re.findall(r"complaint = \w+\.(check_\w+)\((.*)\)", cell.source)
+        if check in BY_ITSELF.get(source.stem, []):
+            continue
+        replays = {name: Replay(names[name]) for name in answers.split(", ")}
+        judge = re.search(r"complaint = .*", cell.source)[0]
+        use_instructor(NOTEBOOKS / "instructor")
+        exec(f"{imported}\n{judge}", right := names | replays)
+        assert right["complaint"] == ""
+        for one in replays.values():
+            one.replays = True
+        use_instructor(NOTEBOOKS / "instructor", 1)
+        exec(judge, right)
+        earned += [] if right["complaint"] else [check]
+    use_instructor(NOTEBOOKS / "instructor")
+    assert earned == []
+
+
+def test_two_made_up_answers_that_agree_earn_nothing():
+    """Task 4 of exercise 12 forgives what is wrong in task 3, but doesn't take whatever both say."""
+
+    def made_up(*_):
+        return 1e-6, 2e-6, 3e-6
+
+    use_instructor(NOTEBOOKS / "instructor")
+    from semgrid_instructor import experiments
+
+    assert experiments.check_paired(made_up, made_up) != ""
+
+
+def test_no_answer_can_change_what_a_function_that_it_gets_relies_on():
+    """A default of a function within a check is an argument that the answer may give as well."""
+    for path in (NOTEBOOKS / "instructor" / "semgrid_instructor").glob("*.py"):
+        module = ast.parse(path.read_text(encoding="utf-8"))
+        functions = [one for outer in module.body for one in ast.walk(outer) if isinstance(one, ast.FunctionDef)]
+        inner = [one for one in functions if one not in module.body]
+        assert [one.name for one in inner if one.args.defaults or one.args.kw_defaults] == [], path.name
 
 
 def test_hidden_tests_compare_by_the_helper_alone(tmp_path):

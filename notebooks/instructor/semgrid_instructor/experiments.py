@@ -104,7 +104,7 @@ def _share(metric: Callable) -> Callable:
 
 def _is_share(got: NDArray, wanted: float) -> bool:
     """Return whether these may be the ends and the middle of an interval that is made with a wrong jackknife."""
-    return got.shape == (3,) and np.ptp(got) > 0 and np.abs(got - wanted).min() < abs(wanted)
+    return got.shape == (3,) and np.ptp(got) > 0 and np.abs(got - wanted).min() < abs(wanted) / 2
 
 
 def _by_own(jackknife: Callable, a: NDArray, b: NDArray, share: Callable, level: float) -> NDArray:

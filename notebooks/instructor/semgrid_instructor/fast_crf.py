@@ -70,6 +70,19 @@ def check_lattice_filter(lattice_filter: Callable) -> None:
         )
 
 
+def _counting(kernel: NDArray, columns: int) -> Callable:
+    """Return a filter with this kernel, (N, N), that stops when it gets more columns than it may get."""
+    left = [columns]
+
+    def blur(values: NDArray) -> NDArray:
+        values = np.asarray(values, float)
+        left[0] -= values.size // len(kernel)
+        assert left[0] >= 0, "blur got more columns than it may get"
+        return kernel @ values
+
+    return blur
+
+
 @hidden
 def check_others_say(others_say: Callable) -> None:
     """Other maps, reaches and numbers of classes; filters that aren't symmetric, as short-sighted as they may be."""
@@ -78,15 +91,7 @@ def check_others_say(others_say: Callable) -> None:
         place = np.indices(shape).reshape(2, -1).T
         near = np.abs(place[:, None] - place).max(axis=-1) <= reach
         kernel, Q = near * rng.uniform(0.2, 1, near.shape), rng.random((len(place), classes))
-        left = [classes + (2 * reach + 1) ** 2]
-
-        def blur(values: NDArray, kernel: NDArray = kernel, left: list[int] = left) -> NDArray:
-            values = np.asarray(values, float)
-            left[0] -= values.size // len(kernel)
-            assert left[0] >= 0, "blur got more columns than it may get"
-            return kernel @ values
-
-        got = answer_array(others_say(blur, Q.copy(), shape, reach))
+        got = answer_array(others_say(_counting(kernel, classes + (2 * reach + 1) ** 2), Q.copy(), shape, reach))
         assert got.shape == Q.shape, "another shape"
         wanted = (kernel - np.diag(np.diag(kernel))) @ Q
         assert close(got, wanted, atol=1e-5), "wrong sums on another map, with another reach"

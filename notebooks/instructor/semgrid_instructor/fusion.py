@@ -197,6 +197,7 @@ def check_rate_and_momentum(rate_and_momentum: Callable) -> None:
     for seed, (eta, kappa, steps, n) in enumerate(
         [(0.05, 0.9, 8, 3), (1.5, 0.0, 4, 2), (0.01, 0.99, 30, 1), (0.3, 0.5, 2, 5)]
     ):
+        eta, kappa = (eta, kappa) * generator(140 + seed).uniform(0.6, 1, 2)
         path, gradients = _trained(112 + seed, np.full(steps, eta), kappa, n)
         got = answer_array(rate_and_momentum(path, gradients)).ravel()
         assert close(got, [eta, kappa], rtol=1e-4, atol=1e-5), "wrong for another path"

@@ -37,7 +37,8 @@ def _plane(seed: int, slope: float, lean: float) -> tuple[NDArray, NDArray]:
 @hidden
 def check_slope_and_lean(slope_and_lean: Callable) -> None:
     """Both signs of both angles; walls on both sides."""
-    for seed, (slope, lean) in enumerate(((-3.0, 1.0), (2.5, 0.0), (0.5, -4.0), (4.0, 3.0), (0.0, 2.0))):
+    angles = generator(1320).uniform(-4, 4, (5, 2))
+    for seed, (slope, lean) in enumerate([*angles, (2.5, 0.0), (0.0, -2.0)]):
         got = answer_array(slope_and_lean(*_plane(1310 + seed, slope, lean))).ravel()
         assert got.shape == (2,), "not two numbers"
         assert close(got, np.array([slope, lean]), atol=0.1), "other angles for a street with noise and another wall"
@@ -48,6 +49,7 @@ def check_judge_motion(judge_motion: Callable) -> None:
     """Motions with a turn, large and small, claimed rightly, the wrong way round, or not at all."""
     for seed, (ahead, yaw) in enumerate(((2.0, 3.0), (0.02, 0.1), (0.6, -8.0), (0.0, 6.0), (1.0, 0.0))):
         rng = generator(1330 + seed)
+        ahead, yaw = rng.choice([-1, 1]) * np.array([ahead, yaw])
         T = rigid_transform(Rotation.from_euler("z", yaw, degrees=True).as_matrix(), np.array([ahead, 0.02, 0]))
         before = rng.uniform((5, -15, 0), (40, 15, 3), (300, 3))
         now = transform_points(invert_rigid(T), before) + rng.normal(0, 0.01, before.shape)

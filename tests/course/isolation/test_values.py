@@ -5,7 +5,7 @@ import math
 from array import array
 from collections import OrderedDict, deque
 from decimal import Decimal
-from enum import IntEnum
+from enum import Enum, IntEnum
 from fractions import Fraction
 
 import numpy as np
@@ -62,10 +62,22 @@ class State(IntEnum):
     STATIC = 1
 
 
-def test_numbers_with_names_pass_as_numbers():
-    got = decode(encode([State.STATIC]))[0]
-    assert got == 1
-    assert type(got) is int
+class Part(str, Enum):  # noqa: UP042 (a StrEnum's text is its value, this one's isn't)
+    """A text with a name."""
+
+    BETA = "beta"
+
+
+def test_numbers_and_texts_with_names_pass_as_what_they_equal():
+    for sent, plain in (
+        (State.STATIC, 1),
+        (Part.BETA, "beta"),
+        (type("Loud", (str,), {"__str__": str.upper})("a"), "a"),
+    ):
+        (got,) = decode(encode([sent]))
+        assert sent == plain
+        assert got == plain
+        assert type(got) is type(plain)
 
 
 def test_what_numpy_takes_for_an_array_passes_as_one():

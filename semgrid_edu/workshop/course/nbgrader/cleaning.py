@@ -1,7 +1,7 @@
 """Text cells of submissions made safe to show: the instructor who reads them is logged in."""
 
 import re
-from html import escape
+from html import escape, unescape
 
 import bleach
 from nbconvert.filters import strip_files_prefix
@@ -15,8 +15,11 @@ SHOWN_TAGS = (*bleach.ALLOWED_TAGS, *table_beside(__file__)["tags"])
 SHOWN_ATTRIBUTES: dict[str, str] = table_beside(__file__)["attributes"]
 """The pattern of an attribute's value, by its name or by tag and name."""
 
-MACROS = re.compile(rf"\\({'|'.join(table_beside(__file__)['macros'])})\b")
-"""The macros of formulas that aren't shown, with their backslash."""
+MACROS = re.compile(rf"\\+({'|'.join(table_beside(__file__)['macros'])})(?![A-Za-z])")
+"""The macros of formulas that aren't shown, with all backslashes before them: one that is left would make a macro."""
+
+REFERENCE = re.compile(r"&(#\w+|bsol);")
+"""The form in which HTML may hide a letter or the backslash of a macro."""
 
 MOST_TAGS = 1500
 """A text with more tags is shown as it was written, because cleaning may take quadratic time."""
@@ -31,10 +34,20 @@ def without_scripts(html: str) -> str:
         What nbconvert made of Markdown. This function replaces its filter `strip_files_prefix`, the last one that
         nbgrader applies.
     """
-    html = MACROS.sub(r"\1", strip_files_prefix(html))
+    html = REFERENCE.sub(_letter, strip_files_prefix(html))
     if html.count("<") > MOST_TAGS:
-        return f"<pre>{escape(html)}</pre>"
-    return bleach.clean(html, tags=SHOWN_TAGS, attributes=_is_shown, protocols={*bleach.ALLOWED_PROTOCOLS, "data"})
+        html = f"<pre>{escape(html)}</pre>"
+    else:
+        protocols = {*bleach.ALLOWED_PROTOCOLS, "data"}
+        html = bleach.clean(html, tags=SHOWN_TAGS, attributes=_is_shown, protocols=protocols)
+    # Afterwards, since removing a comment may join the parts of a macro.
+    return MACROS.sub(r"\1", html)
+
+
+def _letter(reference: re.Match[str]) -> str:
+    """Return the letter or backslash that a reference stands for; other references stay."""
+    meant = unescape(reference[0])
+    return meant if re.fullmatch(r"[A-Za-z\\]", meant) else reference[0]
 
 
 def _is_shown(tag: str, name: str, value: str) -> bool:

@@ -40,6 +40,7 @@ class UnpackNotebooks(ExtractorPlugin):
                     or len(name.parts) > MAX_DEPTH
                     or name.anchor
                     or ".." in name.parts
+                    or "\\" in name.name  # a pattern may take what stands before it for a folder
                     or size > MAX_BYTES
                 ):
                     self.log.warning("Left out, no notebook, too large or too deep: %s in %s", name, path)

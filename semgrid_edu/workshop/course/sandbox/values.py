@@ -133,7 +133,9 @@ def _tree(value: Any, arrays: list[NDArray], callbacks: list[Callable] | None) -
         return value
     if type(value) is list:
         return trees(value)
-    for kind in (int, float, str):
+    if isinstance(value, str) and not isinstance(value, np.generic):
+        return str.__str__(value)  # a text with a name may print that name
+    for kind in (int, float):
         if isinstance(value, kind) and not isinstance(value, np.generic):
             return kind(value)
     if isinstance(value, set | frozenset | dict) and len(value) > MAX_KEYS:
