@@ -16,8 +16,7 @@
 #
 # **Time.** 75 minutes, of which the computer needs less than one.
 #
-# **Paper.** Section 4 (experiments on KITTI). The checks are not in the paper. They are what one does before its
-# section 4 can begin.
+# **Paper.** Section 4 (experiments on KITTI). The checks are not in the paper.
 #
 # ## What is wrong with this map?
 #
@@ -62,9 +61,9 @@ from semgrid_edu.workshop.course import street
 from semgrid_edu.workshop.scoring.statistics import paired_interval
 from worlds import lecture_13_checks as checks
 from worlds import lecture_13_report_card as card
-from worlds.lecture_13_faults import FAULTS, YAWS, camera_turned, geometry_readings, image_mirrored
+from worlds.lecture_13_faults import FAULTS, YAWS, camera_turned, image_mirrored, lidar_turned
 from worlds.lecture_13_map import (
-    brighter, fusion_inputs, grey, ground_begins, occupancy_grids, semantic_grids, trivial_maps, with_rows, without_unknown,
+    brighter, fusion_inputs, ground_begins, occupancy_grids, semantic_grids, trivial_maps, with_rows, without_unknown,
 )  # fmt: skip
 from worlds.lecture_13_scan_borders import depth_edges, edge_contrast, on_image
 
@@ -86,8 +85,8 @@ print(f"{drive.folder.name}: {len(frames)} frames, {frames[-1].time:.1f} s, {'' 
 if drive.credit:
     print(drive.credit)
 
-# %% jupyter={"source_hidden": true} alt="a street image; A marks a white car just ahead, B parked cars to the right, C a house wall; below, the occupancy grid and the semantic grid of the same instant with the same letters, and V beside a green blob of vegetation on the road between us and A"
-LETTERS = {"A": (246, 78, 13, -0.3), "B": (360, 84, 16, -5.8), "C": (465, 55, 21, -10.5), "V": (None, None, 10, 6)}
+# %% jupyter={"source_hidden": true} alt="a street image; A marks a white car just ahead, B parked cars to the right, C a house wall; below, the occupancy grid and the semantic grid of the same instant with the same letters, and V in a green blob of vegetation on the road between us and A"
+LETTERS = {"A": (246, 78, 13, -0.3), "B": (360, 84, 15, -3), "C": (465, 55, 19, -7.7), "V": (None, None, 10, 1)}
 fig = plt.figure(figsize=(6.8, 5.3), layout="constrained")
 top, bottom = fig.subfigures(2, 1, height_ratios=[1.9, 3.2])
 image_axes = top.subplots()
@@ -108,7 +107,7 @@ plt.show()
 # %% [markdown]
 # The last image, and both grids of the same instant. The network learned on simulated streets. A is the white car ahead,
 # B a row of parked cars, C a house wall. The occupancy grid is occupied where you expect it. But look at V: just ahead of
-# us, on plain road, the semantic grid shows a green blob, *vegetation*. (Black is *unknown*: there the labels say nothing.)
+# us, on plain road, the semantic grid shows a green blob, *vegetation*. (The last four classes are *unknown*.)
 #
 # Is the data wrong, the network, or something between them? If the data is wrong, all thinking about the network is
 # wasted. So we check the data first. (The text speaks of the street that comes with the course.)
@@ -227,7 +226,8 @@ for name, points in {"this drive": frames[0].points, "simulated": sample_drive()
 
 # %% [markdown]
 # They aren't. KITTI's files, and ours from the simulator, are written ring by ring. PandaSet sorts returns by time, and the
-# next line is mostly another laser's. So `depth_edges` first puts the scan in order, ring by ring:
+# next line is mostly another laser's. So `depth_edges` first sorts the scan into strips of elevation, which are nearly rings,
+# and each strip from left to right:
 
 # %%
 contrast = np.mean([edge_contrast(frame, YAWS) for frame in some], axis=0)
@@ -239,16 +239,15 @@ if ours:
     assert YAWS[contrast.argmax()] == 0
     assert YAWS[wrong.argmax()] == 2
 
-# %% jupyter={"source_hidden": true} alt="left: contrast against the turn of the camera; returns in file order give a flat line near 0.5, a mirrored image one near 1.2; ring by ring there is a peak at 0, and for a camera turned by 2 degrees a peak at 2. right: two grey street images with orange dots; in file order most of them lie in rows across the road, ring by ring they follow the outlines of cars, trees and the wall"
+# %% jupyter={"source_hidden": true} alt="left: contrast against the turn of the camera; a dotted grey line at 1.23 is the null level; ring by ring there is a peak at 0, and for a camera turned by 2 degrees a peak at 2. right: two grey street images with orange dots; in file order most of them lie in rows across the road, ring by ring they follow the outlines of cars, trees and the wall"
 fig, axes = plt.subplot_mosaic(
     [["c", "f"], ["c", "r"]], figsize=(9.4, 3.4), layout="constrained", width_ratios=(1, 1.5)
 )
 axes["c"].plot(YAWS, contrast, "k-", label="ring by ring")
 axes["c"].plot(YAWS, wrong, color="#d95f02", linestyle="--", label="camera turned by 2°")
-axes["c"].plot(YAWS, in_file_order, color="0.5", linestyle=":", label="in file order")
-axes["c"].plot(YAWS, null, color="0.5", label="image mirrored: the null")
-axes["c"].set(xlabel="further turn that is tried [degrees]", ylabel="contrast at borders")
-axes["c"].legend(frameon=False, fontsize=9, loc="center left", bbox_to_anchor=(0, 0.4))
+axes["c"].axhline(null.max(), color="0.5", linestyle=":", label="null level")
+axes["c"].set(xlabel="further turn that is tried [degrees]", ylabel="contrast at borders", ylim=(1.0, 1.55))
+axes["c"].legend(frameon=False, fontsize=9, loc="upper left")
 for name, title, of in (("f", "in file order", borders_in_file_order), ("r", "ring by ring", depth_edges)):
     axes[name].imshow(frames[0].image.mean(axis=2) // 8 * 8, cmap="gray")
     axes[name].plot(*on_image(of(frames[0].points), frames[0]).T, ".", color="#ff7f0e", markersize=1.6)
@@ -257,24 +256,27 @@ for name, title, of in (("f", "in file order", borders_in_file_order), ("r", "ri
 plt.show()
 
 # %% [markdown]
-# Now many dots follow the outlines of the cars, and the peak names the turn. But what would borders reach that have nothing
-# to do with the image? The grey line tells: with a mirrored image 1.23, not 1. So the rule is: *can't tell* unless the peak
-# is above this **null level** and inside the range that we tried. Which errors does it see?
+# Now many dots follow the outlines of the cars, and the peak names the turn. How large is the contrast when scan and image
+# don't belong together? Mirror the image: it is still 1.23, not 1. So the rule is: *can't tell* unless the peak is above
+# this **null level** and inside the range that we tried. Which errors does it see? We put some into the calibration, and
+# ask ten frames, each alone:
 
 # %%
-ERRORS = {"yaw 5": (0, -5, 0), "pitch +1": (1, 0, 0), "pitch -1": (-1, 0, 0), "roll 5": (0, 0, 5)}  # degrees
+ERRORS = {"none": (0, 0, 0), "yaw 5": (0, -5, 0), "pitch +1": (1, 0, 0), "pitch -1": (-1, 0, 0), "roll 5": (0, 0, 5)}
+nulls = [edge_contrast(image_mirrored(frame), YAWS).max() for frame in frames[:10]]
 said = {}
 for name, degrees in ERRORS.items():
-    curve = np.mean([edge_contrast(camera_turned(frame, degrees), YAWS) for frame in some], axis=0)
-    said[name] = card.MARKS[card.border_verdict(curve, YAWS, null.max())][0]
-    print(f"{name:<9} largest contrast {curve.max():.2f}, at a yaw of {YAWS[curve.argmax()]:+.2f}: {said[name]}")
+    curves = [edge_contrast(camera_turned(frame, degrees), YAWS) for frame in frames[:10]]
+    said[name] = [card.border_verdict(curve, YAWS, level) for curve, level in zip(curves, nulls, strict=True)]
+    print(f"{name:<9}", ", ".join(f"{card.MARKS[one][0]} {said[name].count(one)}" for one in card.MARKS))
 if ours:
     assert card.border_verdict(contrast, YAWS, null.max())
-    assert [*said.values()] == ["can't tell", "ALARM", "can't tell", "passes"]
 
 # %% [markdown]
-# A yaw beyond our range is *can't tell*, as it should be. But a pitch of +1° alarms as a yaw of nearly 2, and a roll of 5°
-# *passes*. So *passes* means "no yaw between 0.5 and 3 degrees", and no more. Move the slider, and look as the check does.
+# A yaw of 5° is beyond our range, so it should be *can't tell*, and nearly always is. But a pitch of 1° passes in five frames
+# and alarms in four, and a roll of 5° mostly passes. So one frame is no verdict: the report card takes the mean of several.
+# And *passes* means "no yaw between 0.5 and 3 degrees, if pitch and roll are right". Move the slider, and look as the check
+# does.
 
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
@@ -293,21 +295,21 @@ _ = interact(with_turn, yaw=FloatSlider(value=0.0, min=-3, max=3, step=0.25))
 # ## Does the LIDAR lean, or does the street slope?
 #
 # Everything in this course that says "above the ground" believes that the LIDAR stands upright above a flat road. So
-# we fit a plane $z = -h + p\,x + r\,y$ to the returns of our own lane: $h$ is the LIDAR's height, $p$ the slope ahead, $r$
+# we fit a plane $z = -h + a\,x + b\,y$ to the returns of our own lane: $h$ is the LIDAR's height, $a$ the slope ahead, $b$
 # the slope to the left.
 
 # %% tags=["ground"]
 lane = np.array([[4, 0, -1.70], [14, 0, -1.60], [4, 1, -1.69]])  # three returns: 0.10 up in 10 m, 0.01 up in 1 m
-h, p, r = np.linalg.solve(np.column_stack([-np.ones(3), lane[:, :2]]), lane[:, 2])
-print(f"by hand: height {h:.2f} m, rises ahead by {np.degrees(p):.1f} degrees, to the left by {np.degrees(r):.1f}")
+h, a, b = np.linalg.solve(np.column_stack([-np.ones(3), lane[:, :2]]), lane[:, 2])
+print(f"by hand: height {h:.2f} m, rises ahead by {np.degrees(a):.1f} degrees, to the left by {np.degrees(b):.1f}")
 planes = np.array([checks.ground_plane(frame.points, frame.camera.lidar_height) for frame in frames])
-h, p, r = planes.mean(axis=0)  # by least squares, without what stands in the lane
-print(f"this drive: height {h:.2f} m, rises ahead by {p:.1f} degrees, to the left by {r:.1f}")
+h, a, b = planes.mean(axis=0)  # by least squares, without what stands in the lane
+print(f"this drive: height {h:.2f} m, rises ahead by {a:.1f} degrees, to the left by {b:.1f}")
 if ours:
     assert planes[:, 2].min() > 2
 
 # %% [markdown]
-# The ground seems to rise to the left by more than two degrees: an alarm. Carried on, this plane is a third of a metre
+# The ground seems to rise to the left by more than two degrees. Our limit is one, so this is an alarm. Carried on, this plane is a third of a metre
 # above the oncoming lane. There are two suspects: the **LIDAR leans** (L), or the **street slopes** (S), as streets
 # do so that rain runs off. The reading that the ground rises (R) alone can't tell. A second check looks whether house
 # walls lean (W). A leaning LIDAR changes it, a sloping street doesn't.
@@ -327,8 +329,9 @@ draw(diagnosis, ax, observed=("R", "W"), labels=names, positions=places)
 plt.show()
 
 # %% [markdown]
-# The numbers in the cell are made up, the arrows aren't: a sloping street doesn't make walls lean. The ground stays level
-# only if no cause makes it rise, each by itself (a **noisy or**).
+# The numbers in the cell are made up, the arrows aren't: a sloping street doesn't make walls lean. A leaning LIDAR leaves the
+# ground level in 5 % of cases, a sloping street in 20 %, both together in 1 %, as if each acted by itself (a **noisy
+# or**). With no cause it rises in 2 %.
 #
 # With the ground rising, the four combinations of (L, S) weigh 0.95 · 0.7 · 0.02 = 0.0133 (neither), 0.0333 (L alone),
 # 0.2291 (S alone) and 0.0149 (both). So P(L | R) = (0.0333 + 0.0149) / 0.2906 = 0.17, and P(S | R) = 0.84.
@@ -353,46 +356,59 @@ assert not d_separated(diagnosis, "L", "S", given="R")
 # %% [markdown]
 # L and S are independent until their common child is read; then they compete. That is explaining away, of lecture 01b.
 # So read the walls. `wall_lean` fits a plane to the house wall (C), and gives the angle by which the LIDAR leans if the
-# wall is upright.
+# wall is upright. Would it notice? We also lean the LIDAR ourselves, to either side:
 
 # %%
-WALL = (5, 20, -16, -7)  # where a wall stands: least and largest x, least and largest y [m]; another on your street
+WALL, leans = (5, 20, -16, -7), {}  # least and largest x, least and largest y of a wall [m]; another on your street
 try:
-    leans = [checks.wall_lean(frame, WALL) for frame in frames]
-    print(f"by the wall the LIDAR leans by {np.mean(leans):.1f} degrees, from {min(leans):.1f} to {max(leans):.1f}")
+    for turn in (0, 2, -2):
+        turned = [lidar_turned(frame, (turn, 0, 0)) for frame in frames]
+        leans[turn] = [checks.wall_lean(one, WALL) for one in turned]
+        rise = np.mean([checks.ground_plane(one.points, one.camera.lidar_height).roll for one in turned])
+        print(
+            f"leaned by {turn:+d}: the wall says {np.mean(leans[turn]):+.1f}, the ground rises by {rise:+.1f} degrees"
+        )
 except ValueError as error:
     print(error)
 if ours:
-    assert np.max(np.abs(leans)) < 0.5
+    assert np.max(np.abs(leans[0])) < 0.5
+    np.testing.assert_allclose([np.mean(leans[turn]) for turn in (2, -2)], [2, -2], atol=0.5)
+    assert abs(rise) < 1
 
-# %% jupyter={"source_hidden": true} alt="a cut across the street: grey returns from the road and the wall, side against height above the ground; the road left of us is level, our own lane rises towards the middle of the street along an orange line, and the wall on the right is upright"
+# %% jupyter={"source_hidden": true} alt="a cut across the street, ground returns in grey, side against height: from our lane the road rises to the left along an orange line; left of the middle it is level and then falls, while the line rises on"
 x, y, z = frames[0].points_grid[:, :3].T
 near, side = (x > 6) & (x < 14), np.array([-1.5, 12])
 fig, ax = plt.subplots(figsize=(8, 2.6), layout="constrained")
-ax.plot(y[near], z[near], ".", color="0.5", markersize=1.5)
 height, pitch, roll = planes[0]
+ground = near & (z < 0.25)
 at = drive.camera.lidar_height - height + np.tan(np.radians(pitch)) * 10 + np.tan(np.radians(roll)) * side
+ax.plot(y[ground], z[ground], ".", color="0.5", markersize=1.5)
 ax.plot(side, at, color="#d95f02", linestyle="--", label="the plane through our lane, carried on to the left")
-ax.set(xlim=(14, -14), ylim=(-1, 4), xlabel="y, to the left [m]", ylabel="height [m]", title="returns 6 to 14 m ahead")
+ax.set(xlim=(14, -9), ylim=(-0.3, 0.6), xlabel="y, to the left [m]", ylabel="height [m]")
+ax.set_title("returns near the ground, 6 to 14 m ahead")
 ax.legend(frameon=False, fontsize=9)
 plt.show()
 
 # %% [markdown]
-# The wall is upright, so the cause is the street. The picture agrees: our lane slopes to its gutter, and left of the
-# middle the road falls again, far below the dashed line. Such a **crown** is no fault of the data. A second check that
-# depends on one suspect alone has told the causes apart.
+# The wall is upright, and it follows when the LIDAR leans. So the likely cause is the street, and the picture agrees: our
+# lane slopes to its gutter, and left of the middle the road falls again, away from the dashed line. Such a **crown** is no
+# fault of the data.
+#
+# Look at the last line, too. A LIDAR that leans the other way hides the slope: the ground is silent while the LIDAR leans.
+# Two causes can cancel, which our noisy or doesn't know. The wall still tells, because it depends on one suspect alone.
 #
 # ## Does the vehicle move as its poses say?
 #
 # The filter moves its map by the poses. If they are wrong, walls smear. But the scans know how we moved, because most of what
-# they see stands still. So move the scan of now by the motion that the poses claim, and lay it over an earlier one. The
-# *overlay error* is the median distance to the nearest earlier return.
+# they see stands still. Take a scan, move it by the motion in the poses, and lay it over an earlier scan. If the poses are
+# right, walls fall on walls. The *overlay error* is the median distance to the nearest earlier return.
 #
 # By hand, on a line: two poles, first at 10 and 14 m, a metre later at 9 and 13. If the pose says "a metre ahead", we add
 # one, and both lie on poles. If it says "a metre back", both are two metres off.
 #
 # On real scans the error is never zero, since the beams hit other places of the same wall. So we compare with the
-# mistakes that people make: no motion, backwards, a quarter turn, left and right swapped.
+# mistakes that people make: no motion, or poses in axes that point backwards, are a quarter turn off, or have left and right
+# swapped. The poses pass if they fit better than every mistake by more than 5 cm.
 #
 # **Predict before you run.** Which of these will the scans of *this* street notice, where we wait in a queue? And which
 # on the simulated drive, where we drive straight on?
@@ -404,7 +420,7 @@ plt.show()
 #
 # </details>
 
-# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="two panels of bars, overlay error for five readings of the poses: on this drive all bars are only some centimetres long and alike; on the simulated drive the motion of the poses has the shortest bar, closely followed by the mirrored one, and the others are much longer"
+# %% jupyter={"outputs_hidden": true, "source_hidden": true} alt="two panels of bars, overlay error for five readings of the poses: on this drive all bars are only some centimetres long and alike; a dotted line 5 cm beyond the poses is right of all of them; on the simulated drive the motion of the poses has the shortest bar, closely followed by the mirrored one, and the others are much longer"
 found = {
     "this drive": checks.axes_errors(frames, thin=4),
     "simulated, straight on": checks.axes_errors(sample_drive()[:6], thin=4),
@@ -414,7 +430,8 @@ for ax, (title, errors) in zip(axes, found.items(), strict=True):
     ax.barh(list(errors), list(errors.values()), color=["#1b9e77", *["0.6"] * 4])
     for place, value in enumerate(errors.values()):
         ax.text(value * 1.02, place, f" {value:.3f} m", va="center", fontsize=9)
-    ax.set(title=f"{title}: {card.MARKS[card.motion_verdict(errors)][0]}", xlim=(0, 1.3 * max(errors.values())))
+    ax.axvline(errors["as the poses say"] + card.SHIFTED, color="0.3", linestyle=":")
+    ax.set(title=f"{title}: {card.MARKS[card.motion_verdict(errors)][0]}", xlim=(0, 1.3 * max(*errors.values(), 0.1)))
     ax.set_xlabel("overlay error [m]")
 axes[0].invert_yaxis()
 plt.show()
@@ -424,69 +441,39 @@ if ours:
     np.testing.assert_allclose(driven, 0.11, atol=0.005)
 
 # %% [markdown]
-# The rule: *passes* if the poses fit better than every mistake by more than 5 cm. Here all are alike, so the answer is
-# *can't tell*, though the poses do fit best. A check needs a drive on which it could fail.
-#
-# > **On a car that drives.** A drive of KITTI, number 0013 at 11 m/s, went through the same checks. We may not ship it;
-# > `semgrid-edu data fetch kitti --drive 2011_09_26_0013` gets it. **Clocks** pass: images come 11 ms after their scans,
-# > positions 18 ms, in which the car moves by 12 and 20 cm. **Borders** pass: best at -0.25°, one step from 0. **Ground**
-# > passes: 0.2° to the left. **Motion** passes: 0.15 m as the poses say, 0.25 m mirrored, since this road isn't quite straight.
+# A grey bar that ends left of the dotted line is too close to the poses' own. Both drives have one, so the answer is *can't
+# tell*, though the poses do fit best. A check needs a drive on which it could fail.
 #
 # ## Where this breaks: which check sees which fault?
 #
-# We damage both drives in six ways, one at a time, and read all checks. `yaw` is the best turn of the borders, `tilt`
-# the rise ahead of the ground. `motion` is the error of the poses minus the smallest error of all motions tried: 0 means
-# that none fits better. "!" is an alarm; "?" marks a best turn at the end of the range, so *can't tell*.
+# We damage both drives in six ways, one at a time, and run all checks with their three answers. `borders` judges yaw,
+# `tilt` the rise ahead of the ground.
 
-# %% jupyter={"source_hidden": true} alt="two tables of readings, no fault and six faults by four checks; beyond the limit a cell is orange with an exclamation mark, and the end of a search has a question mark: on the simulated drive five faults raise an alarm and mirrored poses none; on this drive late images, backwards and mirrored poses raise none"
-LIMITS = {"gaps": 0.5, "yaw": 0.5, "tilt": 1.0, "motion": 0.05}
+# %% jupyter={"source_hidden": true} alt="two tables of verdicts, no fault and six faults by four checks; on both drives lost frames alarm in gaps, a turned camera in borders, a tilted LIDAR in tilt; backwards poses alarm in motion on the simulated drive alone; late images pass the borders on this drive and can't be told on the simulated one; mirrored poses raise no alarm"
 faults = {name: make for name, make in FAULTS.items() if name != "red and blue swapped"}
-readings = {
-    title: {name: geometry_readings(make(of), thin=4, turns=YAWS[::2]) for name, make in faults.items()}
+verdicts = {
+    title: {name: card.geometry_verdicts(make(of), thin=4, turns=YAWS[::2]) for name, make in faults.items()}
     for title, of in (("this drive", frames[:10]), ("simulated", sample_drive()[:10]))
 }
 fig, axes = plt.subplots(1, 2, figsize=(9.6, 2.9), layout="constrained", sharey=True)
-for ax, (title, of) in zip(axes, readings.items(), strict=True):
-    alarms = np.array([[abs(one[check]) > LIMITS[check] for check in LIMITS] for one in of.values()])
-    end = np.array([[check == "yaw" and abs(one[check]) == YAWS.max() for check in LIMITS] for one in of.values()])
-    marks = np.where(end, " ?", np.where(alarms, " !", ""))
-    ax.imshow(alarms & ~end, cmap="Oranges", vmin=0, vmax=1.8, aspect="auto")
+for ax, (title, of) in zip(axes, verdicts.items(), strict=True):
     for i, one in enumerate(of.values()):
-        for j, check in enumerate(LIMITS):
-            ax.text(j, i, f"{one[check]:.2f}" + marks[i][j], ha="center", va="center", fontsize=9)
-    ax.set_title(title)
-    ax.set_xticks(range(len(LIMITS)), ["gaps", "yaw [°]", "tilt [°]", "motion [m]"], fontsize=9)
+        for j, verdict in enumerate(one.values()):
+            word, colour, _ = card.MARKS[verdict]
+            ax.add_patch(plt.Rectangle((j - 0.5, i - 0.5), 1, 1, fc=colour, ec="white", alpha=0.45))
+            ax.text(j, i, word, ha="center", va="center", fontsize=9, weight="bold" if verdict is False else "normal")
+    ax.set(title=title, xlim=(-0.5, 3.5), ylim=(len(of) - 0.5, -0.5))
+    ax.set_xticks(range(4), list(one), fontsize=9)
 axes[0].set_yticks(range(len(faults)), list(faults))
 plt.show()
-raised = {title: {name: {check for check in LIMITS if abs(one[check]) > LIMITS[check]} for name, one in of.items()}
-          for title, of in readings.items()}  # fmt: skip
-assert raised["simulated"]["camera turned"] == raised["simulated"]["images late"] == {"yaw"}
-assert not raised["simulated"]["none"] | raised["simulated"]["poses mirrored"]
-
-# %% jupyter={"source_hidden": true}
-later = geometry_readings(FAULTS["images late"](sample_drive()[6:16]), thin=4, turns=YAWS[::2])
-print(f"simulated, images late, six frames later in the drive: yaw {later['yaw']:.2f}")
-assert abs(later["yaw"]) <= LIMITS["yaw"]
+simulated = verdicts["simulated"]
+assert simulated["camera turned"]["borders"] is False
+assert not any(verdict is False for name in ("none", "poses mirrored") for verdict in simulated[name].values())
 
 # %% [markdown]
-# Right, on a drive with motion: *camera turned* raises an alarm, and so do *images late*. But don't rely on the second: six
-# frames later in the same drive late images raise none. Mirrored poses raise none, because the road is straight. Left,
-# where we stand: late images and backwards poses raise none, either.
-#
-# And on the left the tilted LIDAR alarms with the wrong *sign*. It leans back, so the ground should fall ahead, as it does on
-# the right. Is it the white car that stands in our lane? Take out all returns from what stands, and fit again:
-
-# %%
-for k in (0, 4, 8):
-    tilted, low = FAULTS["LIDAR tilted"](frames)[k], frames[k].points_grid[:, 2] < 0.2
-    with_car, without = (checks.ground_plane(points, 1.73).pitch for points in (tilted.points, tilted.points[low]))
-    print(f"frame {k}: rises by {with_car:+.1f} degrees; without what stands {without:+.1f}")
-if ours:
-    assert with_car > 2 > -2 > without
-
-# %% [markdown]
-# It is. In the first frame the fit throws the car out by itself, in the others it climbs its rear. So a reading names a
-# symptom, and an alarm can be right for a wrong reason.
+# On the simulated drive four faults raise an alarm, each in its own check. Late images leave the borders without a clear
+# peak. Mirrored poses go unnoticed, because the road is straight. On our drive late images *pass*, because nothing moves, and
+# backwards poses can't be told. So *passes* says no more than that this check on this drive saw nothing.
 #
 # ## How good is the map?
 #
@@ -495,10 +482,11 @@ if ours:
 # them counted five times. What should a score be compared with? With maps that never look at the image:
 #
 # - **always road**;
-# - a **table** of $o$: each cell gets the class that is most frequent in its occupancy state, counted on these very
-#   labels;
+# - a **table** of $o$: each cell gets the class that is most frequent in its occupancy state;
 # - the **height rule** of lecture [08](08_fusion.ipynb). How far is a cell's highest return above the lowest one within
 #   $9 \times 9$ cells? Up to 0.25 m it says road, up to 2.2 m car, else building.
+#
+# The first two were chosen on the very labels that score them. This favours them a little.
 #
 # The labels never say *unknown*, so we forbid the network this answer, too: each cell gets the most probable of the ten
 # semantic classes. From here on, "the network" means this map.
@@ -507,7 +495,7 @@ if ours:
 #
 # <details><summary>Answer</summary>
 #
-# 69 %: no more than *always road*.
+# 68 %: about as much as *always road*.
 #
 # </details>
 
@@ -526,7 +514,8 @@ for name, called in maps.items() if labelled else ():
     if name == "always road":
         road = counts
     gains[name] = 100 * np.array(paired_interval(counts, road, accuracy))
-    print(f"{name:<12} {scores[name][0]:.0f} % of cells right, class accuracy {scores[name][1]:.0f}")
+    print(f"{name:<12} {scores[name][0]:.0f} % of cells right, class accuracy {scores[name][1]:.0f};", end=" ")
+    print("against always road {1:+.0f} points ({0:+.0f} to {2:+.0f})".format(*np.round(gains[name]) + 0.0))
 if labelled:
     print(f"{counted.sum()} labels of {counted.any(axis=0).sum()} cells, {counts.shape[1]} pieces")
 if ours:
@@ -551,116 +540,121 @@ plt.show()
 # of all frames in each, and leave out one square at a time. The interval tells how far a number depends on which *part of
 # this street* we saw. It knows nothing of other streets.
 #
-# So in pixel accuracy the network isn't better than calling everything road. (It isn't worthless: it finds sidewalks and
-# bicycles, for which the rules have no word. So it leads the height rule in class accuracy, 49 to 26.) Why?
+# The network's interval reaches from 9 points worse than *always road* to 8 better: this street *can't tell*. (The network
+# isn't worthless: it finds sidewalks and bicycles, for which the rules have no word.) What is wrong with it?
 #
 # ## What is the green blob?
 #
 # Look at the image again. It ends just below the white car's wheels. The road of the blob isn't in it: straight ahead, the
-# ground comes into view at 13 m. In the simulated images it does so at 6 m. So here is a suspect: the network has never
-# had to name road below the image's edge. Another suspect is the light of real images.
+# ground comes into view at 13 m. In the simulated images it does so at 6 m. So here is a suspect: cells so far ahead that have
+# no pixel are new to the network. Another suspect is the light of real images.
 #
-# An explanation is tested by switching off its cause. We make the image taller below by copies of its lowest row, and
-# tell the calibration. For the second suspect we brighten the image. And a network that sees nothing: an image of one
-# grey. Last, on a simulated street, where there is no blob, we switch the cause on, and cut off the lowest 28 % of the
-# image.
+# An explanation is tested by switching off its cause. For the light, we brighten the image. For the edge, we make the image
+# taller by 28 %, and tell the calibration: then the ground is in view from 9 m. What should the new rows show? Copies of
+# the lowest row show road, so they whisper the answer. So we also try black rows, copies of the *top* row, and noise.
 #
-# **Predict before you run.** If the edge is the cause, what do you see in each of the four?
+# **Predict before you run.** Do black rows help as much as copies of the road? And noise?
 #
 # <details><summary>Answer</summary>
 #
-# Taller: no blob. Brighter: the same blob. Simulated and cut: a green blob, on a street where everything else is as in
-# training. If the edge alone were enough, the grey image would have a blob, too. It has none.
+# Black rows do: below the edge 92 % are right, with copies 87. Noise spoils the map.
 #
 # </details>
 
 # %% jupyter={"outputs_hidden": true}
 SHARE = 0.28  # of the image's height
 rows = round(SHARE * frames[0].camera.size[0])
+noise = np.random.default_rng(0).integers(0, 256, (rows, frames[0].camera.size[1], 3))
 changed = {
-    "taller": [with_rows(frame, rows) for frame in mapped],
+    "as it is": mapped,
     "brighter": [brighter(frame, 40) for frame in mapped],
-    "grey": [grey(frame) for frame in mapped],
+    "copies": [with_rows(frame, rows) for frame in mapped],
+    "black": [with_rows(frame, rows, content=0) for frame in mapped],
+    "top row": [with_rows(frame, rows, content=frame.need_image()[0]) for frame in mapped],
+    "noise": [with_rows(frame, rows, content=noise) for frame in mapped],
 }
-after = {"as it is": grids}
-for name, altered in changed.items():
-    after[name] = semantic_grids(net.fusion, fusion_inputs(net, altered, beliefs))
 begins = ground_begins(drive.camera, spec)
 below = np.broadcast_to(spec.centers()[..., 0] < begins, truths.shape)  # cells whose ground is below the image
-for name, those in after.items():
-    is_right = without_unknown(those).argmax(axis=1) == truths
+after, parts = {}, {}
+for name, altered in changed.items():
+    after[name] = semantic_grids(net.fusion, fusion_inputs(net, altered, beliefs))
+    is_right = without_unknown(after[name]).argmax(axis=1) == truths
     if labelled:
-        parts = [100 * is_right[counted & part].mean() for part in (below, ~below, counted)]
-        print(f"{name:<9} right: below the edge {parts[0]:.0f} %, above it {parts[1]:.0f} %, all {parts[2]:.0f} %")
-    if ours and name in ("as it is", "taller"):
-        np.testing.assert_allclose(parts[0], 87 if name == "taller" else 19, atol=2)
+        parts[name] = [100 * is_right[counted & part].mean() for part in (below, ~below, counted)]
+        print("{:<9} right: below the edge {:.0f} %, above {:.0f} %, all {:.0f} %".format(name, *parts[name]))
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true}
-if labelled:
-    wrong = counted & (named.argmax(axis=1) != truths)
-    print(
-        f"below the edge are {100 * below[counted].mean():.0f} % of the cells, {100 * below[wrong].mean():.0f} % of the wrong ones"
-    )
-    above = np.where(below, IGNORE, truths)
-    pair = [street.piece_confusions(above, maps[name], pieces) for name in ("network", "height rule")]
+mended = without_unknown(after["black"]).argmax(axis=1)
+for what, scored in (
+    {"all cells": truths, "above the edge": np.where(below, IGNORE, truths)}.items() if labelled else ()
+):
+    pair = [street.piece_confusions(scored, called, pieces) for called in (mended, maps["height rule"])]
     low, mean, high = 100 * np.array(paired_interval(*pair, accuracy))
-    print(f"above it, network minus height rule: {mean:.1f} points ({low:.1f} to {high:.1f})")
+    print(f"with black rows minus height rule, {what}: {mean:+.0f} points ({low:+.0f} to {high:+.0f})")
+    if ours and what == "all cells":
+        assert low < 0 < high
 if ours:
-    assert abs(below[wrong].mean() - 0.21) < 0.02
-    assert abs(mean + 4.6) < 1
-    assert high < 0
-
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="four maps of the nearest 25 m with a dashed line where the ground comes into view: this street with a green blob below the line; the same with a taller image without the blob; a simulated street without a blob; the same with the image cut below, with a green blob below the line"
-sim = sample_drive()[:3]
-cut = with_rows(sim[-1], -round(SHARE * sim[-1].camera.size[0]))
-belief = occupancy_grids(sim, spec)[-1:]
-street_maps = {
-    "this street": (after["as it is"][-1], drive.camera),
-    "image taller": (after["taller"][-1], changed["taller"][0].camera),
-}
-for name, frame in {"simulated": sim[-1], "simulated, image cut": cut}.items():
-    one = semantic_grids(net.fusion, fusion_inputs(net, [frame], belief))[0]
-    street_maps[name] = one, frame.camera
-fig, axes = plt.subplots(1, 4, figsize=(10, 4.2), layout="constrained", sharey=True)
-shown = {name: grid.argmax(axis=0) for name, (grid, _) in street_maps.items()}
-for ax, (name, (_, camera)) in zip(axes, street_maps.items(), strict=True):
-    plotting.grid_labels(spec, shown[name], KITTI_14, ax=ax, legend=False).set(ylim=(0, 25), xlim=(9, -9))
-    ax.axhline(ground_begins(camera, spec), color="black", linestyle="--", linewidth=1)
-    ax.set_title(name, fontsize=10)
-    ax.set_ylabel("x, forward [m]" if ax is axes[0] else "")
-axes[0].text(5.6, ground_begins(drive.camera, spec) + 0.4, "ground in view from here", fontsize=8, color="white")
-plotting.class_legend(axes[-1], KITTI_14, np.stack([one[-60:] for one in shown.values()]))
-plt.show()
+    np.testing.assert_allclose([parts[name][0] for name in ("as it is", "copies")], [19, 87], atol=2)
+    np.testing.assert_allclose(parts["black"], [92, 76, 77], atol=2)
+    assert parts["brighter"][0] < 30
+    assert parts["noise"][2] < parts["as it is"][2]
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true}
 x, y = np.moveaxis(spec.centers(), -1, 0)
 ahead = (x > 7) & (x < 13) & (y > -1) & (y < 5)
-top = with_rows(sim[-1], -round(SHARE * sim[-1].camera.size[0]), above=True)
-shown |= {name: after[name][-1].argmax(axis=0) for name in ("brighter", "grey")}
-shown["simulated, cut at the top"] = semantic_grids(net.fusion, fusion_inputs(net, [top], belief))[0].argmax(axis=0)
-green = {name: int((one[ahead] == KITTI_14.index("vegetation")).sum()) for name, one in shown.items()}
-seen_from = begins, ground_begins(sim[-1].camera, spec)
-print("the ground comes into view at {:.0f} m here, at {:.0f} m in simulated images".format(*seen_from))
-print("cells called vegetation, of", ahead.sum(), "on the road just ahead:", green)
+sim = sample_drive()[:3]
+belief = occupancy_grids(sim, spec)[-1:]
+blob = {"this street, black rows added": {}, "simulated, rows cut off": {}}
+for title, share in [(title, share) for title in blob for share in (0, 0.1, 0.2, SHARE)]:
+    one, of, sign = (mapped[-1], beliefs[-1:], 1) if "this" in title else (sim[-1], belief, -1)
+    other = with_rows(one, sign * round(share * one.camera.size[0]), content=0) if share else one
+    grid = semantic_grids(net.fusion, fusion_inputs(net, [other], of))[0]
+    green = grid.argmax(axis=0)[ahead] == KITTI_14.index("vegetation")
+    blob[title][ground_begins(other.camera, spec)] = int(green.sum())
+for title, curve in blob.items():
+    print(title, {f"{at:.1f} m": cells for at, cells in curve.items()})
 if ours:
-    assert green["image taller"] == green["simulated"] == green["simulated, cut at the top"] == green["grey"] == 0
-    assert min(green["this street"], green["simulated, image cut"], green["brighter"]) > 70
+    (first, *_, last), cut_off = (list(curve.values()) for curve in blob.values())
+    assert first > 70 > 5 > last
+    assert max(cut_off) > 70 > 5 > min(cut_off)
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, the nearest 25 m of this street with a green blob below the white line where the ground comes into view; middle, the same with black rows added, the line at 9 m and no blob; right, vegetation cells against where the ground comes into view: on both streets zero up to 8 m, about 80 of 144 at 13 m"
+fig, axes = plt.subplots(1, 3, figsize=(10, 3.9), layout="constrained", width_ratios=(1, 1, 1.4))
+shown = {"this street": after["as it is"][-1], "with black rows": after["black"][-1]}
+for ax, (title, grid), frames_of in zip(axes, shown.items(), (mapped, changed["black"]), strict=False):
+    plotting.grid_labels(spec, grid.argmax(axis=0), KITTI_14, ax=ax, legend=False).set(ylim=(0, 25), xlim=(9, -9))
+    ax.axhline(ground_begins(frames_of[-1].camera, spec), color="white", linestyle="--", linewidth=1.5)
+    ax.set_title(title, fontsize=10)
+axes[1].set_ylabel("")
+for (title, curve), look in zip(blob.items(), ("o-", "s--"), strict=True):
+    axes[2].plot(list(curve), list(curve.values()), look, color="k" if look == "o-" else "#d95f02", label=title)
+axes[2].set(
+    xlabel="ground in view from [m]; white line in the maps", ylabel=f"vegetation on the road, of {ahead.sum()} cells"
+)
+axes[2].legend(frameon=False, fontsize=9, loc="upper left")
+axes[2].set_title("the blob", fontsize=10)
+plt.show()
 
 # %% [markdown]
-# The dashed line is where the ground comes into view. Move the edge away, and the blob is gone; cut an edge into a
-# simulated image, and a blob appears. (As much cut off at the top makes none.) Brightness changes nothing. But the edge
-# isn't all: with nothing to see above it there is no blob either. Why the answer is *vegetation*, we don't know.
+# So the network needn't be shown road. It needs pixels there, and they may be black. Even copies of the top row help.
+# Brightness changes next to nothing.
 #
-# Of the cells below the edge 87 % are right with a taller image instead of 19. Copied rows tell the network that there is
-# road, so that is no cure. And the blob is only a fifth of the wrong cells: above the edge the network is still 5 points
-# behind the height rule.
+# Is it enough to be below the edge? Right, we move the edge step by step: on our street we add black rows, and on a
+# simulated street, which has no blob, we cut rows off. With the edge at 10 m, the road before it has no pixels, and yet there
+# is hardly a blob. So the network does without pixels for a few metres, but not for seven. Why its answer then is
+# *vegetation*, we don't know.
 #
-# So camera and network don't fit, and two numbers would have said it beforehand: ground in view from 13 m here, from 6 m
-# where the network learned. The report card gets a line for that.
+# The black rows are also a cure, and they need no label. (Some cells of the blob become *unknown-free*; without this answer
+# they are road.) The map gets 77 % right in place of 68. Against the height rule its interval reaches from 4 points worse
+# to 3 better: *can't tell*.
+#
+# Two numbers would have told us beforehand: ground in view from 13 m here, from 6 m where the network learned. The report
+# card gets a line for that. It alarms when the ground comes into view more than 3 m farther than in training.
 #
 # ## Where does a score mean something?
 #
-# The obvious cure is to let the network learn here. The image network stays frozen; the fusion network takes six steps
+# Another cure needs no idea of the cause: let the network learn here, with the images as they came. The image network stays
+# frozen; the fusion network takes six steps
 # with labels from the **left half** of the map, in the first two frames. We may not score the cells that it learned from.
 # Are later frames enough? As we stand, they show the same places. Or must it be another place, the right half?
 #
@@ -688,8 +682,7 @@ def learn_here(lesson, steps=6, seed=0):
 #
 # <details><summary>Answer</summary>
 #
-# Taught left: 92 and 32 %. Taught right: 73 and 73 %. Each lesson lifts the half that it was about, and neither lifts the
-# other.
+# Taught left: 91 and 32 %. Taught right: 73 and 73 %. Each lesson lifts its own half and harms the other.
 #
 # </details>
 
@@ -704,19 +697,35 @@ for side, cells in sides.items() if labelled else ():
     lesson = torch.from_numpy(np.where(cells, truths, IGNORE)[:n_first].astype(np.int64))
     taught = [semantic_grids(learn_here(lesson, seed=seed), inputs) for seed in range(3)]
     networks[f"taught {side}"] = [without_unknown(one) for one in taught]
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
 judged = {name: [called] for name, called in trivial.items()}
 judged |= {name: [grid.argmax(axis=1) for grid in several] for name, several in networks.items()}
-right_cells = {
-    name: [100 * np.mean([(one == truths)[cells].mean() for one in several]) for cells in where.values()]
+by_seed = {
+    name: [[100 * (one == truths)[cells].mean() for one in several] for cells in where.values()]
     for name, several in (judged.items() if labelled else ())
 }
+right_cells = {name: [np.mean(one) for one in of_sides] for name, of_sides in by_seed.items()}
 for name, shares in right_cells.items():
-    print(f"{name:<12} left {shares[0]:.0f} %, right {shares[1]:.0f} % right")
+    seeds = [f" ({min(one):.0f} to {max(one):.0f})" if len(one) > 1 else "" for one in by_seed[name]]
+    print(f"{name:<12} left {shares[0]:.0f} %{seeds[0]}, right {shares[1]:.0f} %{seeds[1]} right")
 if ours:
     np.testing.assert_allclose(right_cells["untaught"], [81, 37], atol=1)
     np.testing.assert_allclose(right_cells["height rule"], [90, 33], atol=1)
     np.testing.assert_allclose(right_cells["taught left"], [92, 32], atol=1.5)
     np.testing.assert_allclose(right_cells["taught right"], [73, 73], atol=1.5)
+    assert max(by_seed["taught left"][1]) < right_cells["untaught"][1]
+    assert max(by_seed["taught right"][0]) < right_cells["untaught"][0]
+
+# %% jupyter={"source_hidden": true, "outputs_hidden": true}
+if labelled:
+    lesson[torch.isin(lesson, torch.tensor([KITTI_14.index("building"), KITTI_14.index("vegetation")]))] = IGNORE
+    unwalled = [semantic_grids(learn_here(lesson, seed=seed), inputs) for seed in range(3)]
+    called = [without_unknown(one).argmax(axis=1) == truths for one in unwalled]
+    shares = [100 * np.mean([one[cells].mean() for one in called]) for cells in where.values()]
+    print(f"taught right, without building and vegetation: left {shares[0]:.0f} %, right {shares[1]:.0f} % right")
+if ours:
+    np.testing.assert_allclose(shares, [71, 47], atol=2)
 
 # %% jupyter={"source_hidden": true, "outputs_hidden": true}
 if labelled:
@@ -753,43 +762,40 @@ plotting.class_legend(axes[-1], KITTI_14, np.stack([*shown.values()]))
 plt.show()
 
 # %% [markdown]
-# (The seed only draws which of the two frames comes in which step; the numbers are means of three.)
-#
-# The right half can be learned, but not from the left: there was no wall in that lesson, and hardly a hedge. What does the
-# margin cost? Three in ten cells of the right half, and most of its road. Without it the lesson on the left seems to
+# The right half can be learned, but not from the left. Is it because the left half has no wall, and hardly a hedge? We
+# repeated the lesson on the right without its labels of building and vegetation: 47 % in place of 73. So most of what the
+# right half teaches is wall and hedge. What does the margin cost? Three in ten cells of the right half, and most of its road. Without it the lesson on the left seems to
 # help on the right, by 5 points. All of that gain is in the strip beside the border.
 #
-# **The places that you test must differ from those you learned from as much as the places where you will use it.**
+# **Test in places that differ from your lesson as much as the places where you will use the map.**
 #
 # Does the map at least know where it is often wrong? Suppose that ten cells are each called with probability 0.9, and six
 # are right: the probability is too high by 0.3. So sort all cells into eight bins by the probability of the class that is
 # called. In each bin, take the distance between the mean probability and the share of right cells. Their mean, with each
 # bin weighted by its number of cells, is the **expected calibration error** (ECE).
 
-# %% jupyter={"source_hidden": true} alt="reliability diagram, share of right cells against the probability of the class: on the left the untaught network and the one taught left are near the diagonal, on the right both are far below it; the one taught right is nearer to it there"
-fig, ax = plt.subplots(figsize=(5, 3.5), layout="constrained")
-ax.plot([0, 1], [0, 1], color="0.6", lw=1)
+# %% jupyter={"source_hidden": true} alt="two reliability diagrams, share of right cells against the probability of the class: scored on the left the untaught network and the one taught left are near the diagonal and the one taught right is below it; scored on the right the first two are far below the diagonal and the one taught right is near it"
+fig, axes = plt.subplots(1, 2, figsize=(8, 3.5), layout="constrained", sharey=True)
 looks = {
-    "untaught": {"c": "0.4", "ls": ":"},
-    "taught left": {"c": "#1f77b4"},
-    "taught right": {"c": "#d95f02", "ls": "--"},
+    "untaught": {"c": "0.4", "ls": ":", "marker": "o"},
+    "taught left": {"c": "#1f77b4", "marker": "s"},
+    "taught right": {"c": "#d95f02", "ls": "--", "marker": "D"},
 }
 off = {}
 for name, several in networks.items() if labelled else ():
-    for what, mark in (("left", "o"), ("right", "D")):
+    for what, ax in zip(("left", "right"), axes, strict=True):
         scored = np.where(where[what], truths, IGNORE)
         diagrams = [reliability(np.moveaxis(grid, 1, 0), scored, card.BINS) for grid in several]
         off[name, what] = 100 * np.mean([expected_calibration_error(one) for one in diagrams])
         enough, one = diagrams[0].cells > 50, diagrams[0]
-        if (name, what) != ("taught right", "left"):
-            x, y = one.confidence[enough], one.accuracy[enough]
-            ax.plot(x, y, marker=mark, ms=4, label=f"{name}, {what}", **looks[name])
+        ax.plot(one.confidence[enough], one.accuracy[enough], ms=4, label=name, **looks[name])
     print(f"{name:<12} off by {off[name, 'left']:.0f} points on the left, by {off[name, 'right']:.0f} on the right")
-ax.set(
-    xlabel="probability of the class that is called", ylabel="share of cells that are right", xlim=(0, 1), ylim=(0, 1)
-)
+for what, ax in zip(("left", "right"), axes, strict=True):
+    ax.plot([0, 1], [0, 1], color="0.6", lw=1, zorder=0)
+    ax.set(title=f"scored on the {what}", xlim=(0, 1), ylim=(0, 1), xlabel="probability of the class that is called")
+axes[0].set_ylabel("share of cells that are right")
 if labelled:
-    ax.legend(frameon=False, fontsize=8)
+    axes[0].legend(frameon=False, fontsize=9)
 plt.show()
 
 # %% jupyter={"source_hidden": true}
@@ -800,8 +806,7 @@ if ours:
 
 # %% [markdown]
 # Before any lesson the network was off by 2 points on the left and 30 on the right. The lesson on the left changed neither
-# much: the right half was the harder one before, and the network didn't learn to doubt itself there. The lesson on the
-# right mended it.
+# much. The lesson on the right mended the right, but now the left is worse.
 #
 # ## The report card
 #
@@ -823,8 +828,8 @@ if ours:
 
 # %% [markdown]
 # Read it with what you know. *Ground to the left* alarms for a cause that is no fault. *Ground in view* names the fault that
-# we found. The three *can't tell* need another drive: one with all its frames, one whose clocks were kept, and one that
-# moves. The network loses to the height rule.
+# we found. Five lines can't tell. *Gaps* needs the period of the scanner, which is task 1 of the exercise. *Clocks* needs a
+# drive whose clocks were kept, and *motion* one that goes round a bend. The two trivial maps need more streets.
 #
 # Two seconds of one street are no evidence about real streets in general. How far the colours of real images are from
 # simulated ones, and why that distance isn't the damage, is in the companion [the domain gap](deeper/13_domain_gap.ipynb).
@@ -834,12 +839,12 @@ if ours:
 # 1. Check new data before you interpret it. A check has three answers: passes, alarm, can't tell.
 # 2. When a check fails, doubt the check as well as the data. A second check that depends on one suspect alone tells the
 #    causes apart.
-# 3. Put trivial maps beside every score: on this street the network was as good as *always road*, and the height rule
-#    was better.
-# 4. Test an explanation by switching off its cause. The green blob came and went with the image's lower edge, but it was
-#    only a fifth of the wrong cells.
-# 5. A lesson on one half of the street lifted that half and not the other. Test where you haven't learned, and look at the
-#    network before the lesson, too.
+# 3. Put trivial maps beside every score: this street can't tell the network from *always road*, and the height rule was
+#    better.
+# 4. Test an explanation by switching off its cause. The green blob came and went with the image's lower edge, and black
+#    rows mended it.
+# 5. A lesson on one half of the street lifted that half and harmed the other. Test where you haven't learned, and look at
+#    the network before the lesson, too.
 #
 # ## Further reading and exercise
 #

@@ -39,33 +39,30 @@ class LabelWorld:
     vote: str = "majority"
 
 
-def lidar_label_stage(world: LabelWorld | None = None, outline: float | None = None) -> StageGraph:
+def lidar_label_stage(world: LabelWorld | None = None) -> StageGraph:
     """Build the directed model of how one cell gets its label.
 
     Variables are m (what is there: 0 road, 1 car), c (calibration: 0 right, 1 off), for each return x1, x2, ... (the
-    class that it brings: 0 road, 1 car), and y (the label: 0 road, 1 car). With `outline`, the probability that an
-    outline passes through the cell, there is b, too (0 no, 1 yes); then a calibration that is off does harm only there.
+    class that it brings: 0 road, 1 car), and y (the label: 0 road, 1 car).
     """
     world = world or LabelWorld()
     right = 1 - world.alone
     brought = [[[right, 1 - right], [1 - right, right]], [[1 - right, right], [right, 1 - right]]]  # by m, then by c
     votes = tuple(f"x{k}" for k in range(1, world.returns + 1))
-    factors = [binary("m", 0.5), binary("c", world.shared)]
+    factors = [
+        binary("m", 0.5),
+        binary("c", world.shared),
+        *(Factor(("m", "c", x), brought) for x in votes),
+        Factor((*votes, "y"), _voted(world)),
+    ]
     middle = 1.2 * (world.returns - 1) / 2
     places = {x: (1.2 * k, 1.1) for k, x in enumerate(votes)}
-    apart, names = 1.0, {"m": "what is there", "c": "calibration", "y": "label"}
-    if outline is None:
-        factors += [Factor(("m", "c", x), brought) for x in votes]
-    else:
-        harmless = [[row[0], row[0]] for row in brought]
-        factors += [binary("b", outline), *(Factor(("b", "m", "c", x), [harmless, brought]) for x in votes)]
-        apart, names, places["b"] = 1.8, names | {"b": "outline here"}, (middle, 2.2)
     return StageGraph(
         "How one cell gets its label",
-        directed([*factors, Factor((*votes, "y"), _voted(world))]),
-        positions={"m": (middle - apart, 2.2), "c": (middle + apart, 2.2), "y": (middle, 0.0), **places},
+        directed(factors),
+        positions={"m": (middle - 1, 2.2), "c": (middle + 1, 2.2), "y": (middle, 0.0), **places},
         observed=votes,
-        equations=names,
+        equations={"m": "what is there", "c": "calibration", "y": "label"},
         labels={"c": r"$\kappa$"},
         cut=CUT,
     )

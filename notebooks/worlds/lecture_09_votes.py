@@ -18,6 +18,8 @@ MOST = 9
 """Votes of each cell that is looked at; cells with fewer returns are left out."""
 COUNTS = (1, 3, 5, 9)
 """How many of them vote."""
+MARGINS = (0, 2, 4, 6)
+"""Least margins of four bands: how many votes the most frequent class is ahead of the next, of all `MOST`."""
 RATE = 0.1
 """Probability that a return brings a wrong class, each by itself: about as often as with a camera that is off."""
 CAMERA = replace(NO_FLAWS, rotation=TruthFlaws().rotation, translation=TruthFlaws().translation)
@@ -36,11 +38,14 @@ class Votes(NamedTuple):
     changed : (3, len(COUNTS)) float64
         Share of the cells whose majority is another one than without the error, by the number of votes: of cells of one
         class, of cells of several, and of all.
+    by_margin : (len(MARGINS), 2) float64
+        The same share of cells of several classes, with one vote and with all, by the margin without the error.
     """
 
     several: float
     wrong: NDArray[np.float64]
     changed: NDArray[np.float64]
+    by_margin: NDArray[np.float64]
 
 
 Spoil = Callable[[Frame, NDArray, np.random.Generator], NDArray]
@@ -103,10 +108,13 @@ def count_votes(frames: Sequence[Frame], spec: GridSpec, kind: str) -> Votes:
     several = (exact != exact[:, :1]).any(axis=1)
     changed = np.stack([_majority(exact[:, :n]) != _majority(spoilt[:, :n]) for n in COUNTS])
     kinds = ~several, several, np.ones_like(several)
+    most = np.sort(_votes_of_each_class(exact), axis=1)
+    band = np.digitize(most[:, -1] - most[:, -2], MARGINS) - 1
     return Votes(
         float(several.mean()),
         np.array([(exact != spoilt)[kind].mean() for kind in kinds[:2]]),
         np.stack([changed[:, kind].mean(axis=1) for kind in kinds]),
+        np.stack([changed[[0, -1]][:, several & (band == b)].mean(axis=1) for b in range(len(MARGINS))]),
     )
 
 
@@ -140,4 +148,9 @@ def _at(frame: Frame, uvw: NDArray) -> NDArray:
 
 def _majority(classes: NDArray) -> NDArray:
     """Return the most frequent class of each row, the first of equally frequent ones."""
-    return (classes[..., None] == np.arange(KITTI_14.n_semantic)).sum(axis=1).argmax(axis=1)
+    return _votes_of_each_class(classes).argmax(axis=1)
+
+
+def _votes_of_each_class(classes: NDArray) -> NDArray:
+    """Return how many entries of each row are of each class, (N, n_semantic)."""
+    return (classes[..., None] == np.arange(KITTI_14.n_semantic)).sum(axis=1)

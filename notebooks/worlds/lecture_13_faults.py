@@ -54,16 +54,18 @@ def image_mirrored(frame: Frame) -> Frame:
     return replace(frame, image=np.ascontiguousarray(frame.need_image()[:, ::-1]))
 
 
-def lidar_tilted(frame: Frame) -> Frame:
-    """Tilt the LIDAR back by 2 degrees without changing the calibration.
+def lidar_turned(frame: Frame, degrees: ArrayLike = (0, TURN, 0)) -> Frame:
+    """Turn the LIDAR without changing the calibration: tilt it back by 2 degrees, or by another turn.
 
     Parameters
     ----------
     frame : Frame
         A frame.
+    degrees : (3,) float
+        The turn about the LIDAR's axes, ahead, to the left and up: roll, pitch and yaw.
     """
-    tilted = transform_points(_turn([0, TURN, 0]), frame.points[:, :3])
-    return replace(frame, points=np.column_stack([tilted, frame.points[:, 3]]))
+    turned = transform_points(_turn(degrees), frame.points[:, :3])
+    return replace(frame, points=np.column_stack([turned, frame.points[:, 3]]))
 
 
 def _each(change: Callable[[Frame], Frame]) -> Fault:
@@ -85,7 +87,7 @@ FAULTS: dict[str, Fault] = {
     "two frames lost": lambda frames: [*frames[:7], *frames[9:]],
     "camera turned": _each(camera_turned),
     "images late": _images_late,
-    "LIDAR tilted": _each(lidar_tilted),
+    "LIDAR tilted": _each(lidar_turned),
     "poses backwards": _pose_in("backwards"),
     "poses mirrored": _pose_in("left and right swapped"),
     "red and blue swapped": _each(lambda frame: replace(frame, image=frame.need_image()[..., ::-1])),

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from torch import Tensor, nn
 
 from semgrid_edu.camera import Camera, project, transform_points
@@ -113,7 +113,7 @@ def trivial_maps(
     }
 
 
-def with_rows(frame: Frame, rows: int, above: bool = False) -> Frame:
+def with_rows(frame: Frame, rows: int, above: bool = False, content: ArrayLike | None = None) -> Frame:
     """Return a frame whose image is taller or less tall, with a calibration that knows.
 
     Parameters
@@ -124,11 +124,15 @@ def with_rows(frame: Frame, rows: int, above: bool = False) -> Frame:
         How many copies of the outermost row are added below; a negative number cuts rows off.
     above : bool
         Whether this is done above the image, not below.
+    content : (rows, w, 3) int or what broadcasts to it, optional
+        What added rows show, 0..255, in place of copies.
     """
     image, K = frame.need_image(), frame.camera.K.copy()
     if above:
         image, K[1, 2] = image[::-1], K[1, 2] + rows
     image = image[:rows] if rows < 0 else np.concatenate([image, np.repeat(image[-1:], rows, axis=0)])
+    if content is not None and rows > 0:
+        image[-rows:] = content
     image = np.ascontiguousarray(image[::-1]) if above else image
     return replace(frame, image=image, camera=replace(frame.camera, K=K, size=image.shape[:2]))
 
@@ -144,17 +148,6 @@ def brighter(frame: Frame, by: int) -> Frame:
         How much is added to each of red, green and blue, 0..255.
     """
     return replace(frame, image=np.clip(frame.need_image().astype(int) + by, 0, 255).astype(np.uint8))
-
-
-def grey(frame: Frame) -> Frame:
-    """Return a frame whose image shows nothing: one grey everywhere.
-
-    Parameters
-    ----------
-    frame : Frame
-        A frame with an image.
-    """
-    return replace(frame, image=np.full_like(frame.need_image(), 128))
 
 
 def ground_begins(camera: Camera, spec: GridSpec) -> float:

@@ -18,9 +18,10 @@ from worlds import lecture_13_checks as checks
 from worlds.lecture_13_faults import YAWS, image_mirrored
 from worlds.lecture_13_scan_borders import edge_contrast
 
-TURNED, LEANS, SHIFTED, OVERSURE = 0.5, 1.0, 0.05, 0.05
+TURNED, LEANS, SHIFTED, FARTHER, OVERSURE = 0.5, 1.0, 0.05, 3.0, 0.05
 """Limits: a camera turned by more (degrees), ground that leans by more (degrees), a motion that fits worse than another
-by more (metres), probabilities that are further from the shares of right cells."""
+by more (metres), ground that comes into view later by more (metres), probabilities that are further from the shares of
+right cells."""
 
 BINS = 8
 """Number of bins for the expected calibration error."""
@@ -131,6 +132,36 @@ def check_lines(drive: FrameSequence, frames: Sequence[Frame]) -> list[Line]:
     ]
 
 
+def geometry_verdicts(
+    frames: Sequence[Frame], every: int = 4, thin: int = 1, turns: NDArray = YAWS
+) -> dict[str, bool | None]:
+    """Return the verdicts of the checks that need neither network nor labels, by name.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        Successive frames with scans and images, more than five.
+    every : int
+        Images and ground are checked in each frame of this number.
+    thin : int
+        As `axes_errors` takes it.
+    turns : (n,) float
+        Turns of the camera that are tried, degrees.
+    """
+    some = frames[::every]
+    contrast, null = (
+        np.mean([edge_contrast(change(frame), turns) for frame in some], axis=0)
+        for change in (lambda frame: frame, image_mirrored)
+    )
+    tilt = np.mean([checks.ground_plane(frame.points, frame.camera.lidar_height).pitch for frame in some])
+    return {
+        "gaps": False if len(checks.time_gaps([frame.time for frame in frames])) else None,
+        "borders": border_verdict(contrast, turns, null.max()),
+        "tilt": bool(abs(tilt) <= LEANS),
+        "motion": motion_verdict(checks.axes_errors(frames, thin=thin)),
+    }
+
+
 def view_line(begins: float, learned: float) -> Line:
     """Judge whether the camera sees the ground from about where the network's camera saw it.
 
@@ -140,7 +171,7 @@ def view_line(begins: float, learned: float) -> Line:
         How far ahead the ground comes into view, here and where the network learned, metres.
     """
     reading = f"from {begins:.0f} m; learned from {learned:.0f} m"
-    return Line("ground in view", reading, bool(begins <= learned + 1), "other differences of cameras")
+    return Line("ground in view", reading, bool(begins <= learned + FARTHER), "other differences of cameras")
 
 
 def _clock_line(drive: FrameSequence) -> Line:

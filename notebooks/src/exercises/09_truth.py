@@ -202,7 +202,7 @@ _test()
 #
 # ## Task 3: an audit of clean-ups (2 points)
 #
-# In the lecture the clean-up made most labels, and its guesses were worse than votes. You are given finished maps, and want to know which of them break the rules of their own recipe. `votes` is a map of classes, `(H, W)`, with 255 where no
+# In the lecture the clean-up made most labels, and class by class its guesses were worse than votes. You are given finished maps, and want to know which of them break the rules of their own recipe. `votes` is a map of classes, `(H, W)`, with 255 where no
 # return has brought a label. `unseen`, `(H, W)`, is True in cells that the filter has not observed. `made` is the finished map, `(H, W)`: classes 0 to 9 have a meaning, 10 to 13 are the unknown ones.
 #
 # Complete `audit`: it returns three numbers, how many cells break each of these rules.
@@ -409,7 +409,9 @@ def _test():
 _test()
 
 # %% [markdown]
-# When the test has passed, ask your rule: what is its price on `sample_drive()[10]` with a reach of 0, 2 and 4 pixels and a gap of 0.5 m? Is it cheaper than chance? And how many right labels does it leave: would you use it?
+# When the test has passed, ask your rule: what is its price on `sample_drive()[10]` with a reach of 0, 2 and 4 pixels and a gap of 0.5 m? Is it cheaper than chance? And how many right labels does it leave: would you use it? As occupancy take `o = np.zeros((4, *GridSpec.compact().shape)); o[FREE] = 1`; it only names the unknown cells. Why is there no price for a reach of 0?
+#
+# Then try a gap of 2 m with a reach of 2. Which right labels did the narrow gap cost? (How far apart in depth are two rows of far road?)
 #
 # ## Task 6: in your own words (2 points)
 #

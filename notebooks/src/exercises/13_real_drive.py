@@ -238,7 +238,7 @@ _test()
 # the border has been learned with its other half. `truths` (F, H, W) are the true classes, 255 where a cell doesn't count; `called` (F, H, W) are those of the map; `learned` (H, W) is True where
 # labels were learned from, in any frame; `margin` is a whole number of cells.
 #
-# Complete `held_out_score`: it returns the share of right cells among the labelled cells of **all frames together** which are further than `margin` cells from every learned cell, along rows **or** along columns:
+# Complete `held_out_score`: it returns the share of right cells among the labelled cells of **all frames together** that are outside every square with sides of 2 `margin` + 1 cells centred on a learned cell:
 # with a margin of 1, the eight cells around a learned one don't count either. NaN when no cell is left.
 
 
@@ -311,7 +311,7 @@ _test()
 #
 # The open end. The network from simulated streets has about 55 % of the labelled cells of the real street right. Forbid it the four unknown classes, which no label has, and it has 69 %: that is one line, and **where you begin**. Exchange one stage: write
 # a `refine` that makes *that* map better. It gets `log_g` (14, H, W), natural logarithms of the network's probabilities, and `o` (4, H, W), the probabilities of FREE, STATIC, DYNAMIC and UNKNOWN, and returns probabilities (14, H, W) that sum to 1 in each
-# cell. It doesn't see the labels, must work on grids of any size, and leaves its arguments as they are.
+# cell. It sees neither labels nor image (so the lecture's black rows are no way here), must work on grids of any size, and leaves its arguments as they are.
 #
 # What counts as better is fixed before you begin. All gains are measured from the map without unknown classes, over squares of 8 m of the street, in the labelled cells:
 #
@@ -451,5 +451,5 @@ def my_street(folder=None, scene=("2011_09_26", "0013")):
 
 # %% [markdown] nbgrader={"grade": true, "grade_id": "believe-the-map", "locked": false, "points": 2, "schema_version": 3, "solution": true, "task": false}
 # What holds: the network can repeat what it was taught about this very view. The last two seconds show the same street again, so 93 % is the score of a memory, and says nothing of other streets. With her own drive one can hold
-# back a *part of the street*, one side say, with a margin, and score there; in the lecture the taught network had 92 % in its own half and 32 % in the other, no more than before the lesson. Then a second drive, elsewhere, on which nothing was learned, with an interval over pieces of street or, better, over several drives. The
+# back a *part of the street*, one side say, with a margin, and score there; in the lecture the taught network had 91 % in its own half and 32 % in the other, less than before the lesson. Then a second drive, elsewhere, on which nothing was learned, with an interval over pieces of street or, better, over several drives. The
 # check of the motion can't tell while the car stands (nor can late images be noticed): the next drive must move, and go round a bend, or mirrored poses stay unseen. One point for what the score doesn't say and the measurement that would, one for the check and its drive.
