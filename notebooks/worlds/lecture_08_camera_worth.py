@@ -16,6 +16,7 @@ from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.fast import load_net
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, unit_image
+from semgrid_edu.networks.weights import read_architecture
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.provenance import made_by
@@ -104,6 +105,8 @@ def _features(cells: Cells) -> NDArray[np.float32]:
 def with_networks(learned: list[Part], tested: list[Part], cells: tuple[Cells, Cells], run: Path) -> dict[str, NDArray]:
     """Return the maps of a trained network, and of what uses the scores of its image stage, (N, H, W) by name.
 
+    A network that sees the heights of returns is scored alone: there is nothing left to add to it.
+
     Parameters
     ----------
     learned, tested : list of Part
@@ -115,6 +118,8 @@ def with_networks(learned: list[Part], tested: list[Part], cells: tuple[Cells, C
     """
     learned_cells, tested_cells = cells
     maps = network_maps(tested, run / WEIGHTS)
+    if read_architecture(run / WEIGHTS).uses_return_heights:
+        return maps
     seen = [_image_scores(parts, run / IMAGE_STAGE) for parts in (learned, tested)]
     features = [_features(some) for some in cells]
     maps[FOREST_WITH_IMAGE] = forest_grids(
