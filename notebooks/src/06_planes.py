@@ -45,8 +45,8 @@ true_labels = frames.resize_labels(frame.labels.image, camera.size)
 # %% [markdown]
 # ## What is a loss, and what is one step?
 #
-# In this course a network will label the pixels of an image. But the truth that we have is a *map*: the class of each
-# cell, seen from above. Nobody labels the pixels. How can an error on the map correct a pixel?
+# In this course a network will label the pixels of an image. But what has to be right in the end is a *map*: the class of
+# each cell, seen from above. How can an error on the map correct a pixel?
 #
 # First we need to say what *wrong* means, and in which direction *better* is. Take one pixel and one class. Its score $s$
 # is 4, and somebody who knows says that it should be 6. A **loss** is one number that is zero when all is right and grows with
