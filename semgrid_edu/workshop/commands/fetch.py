@@ -74,7 +74,7 @@ def fetch_kitti(folder: str | Path, drive: str, source: str = KITTI_SOURCE) -> K
         recorded, or is damaged.
     """
     folder = Path(folder)
-    named = re.fullmatch(r"(\d{4}_\d\d_\d\d)_(?:drive_)?(\d{4})", drive)
+    named = re.fullmatch(r"(\d{4}_\d\d_\d\d)_(?:drive_)?(\d{4})", drive, re.ASCII)
     if not named:
         raise ArgumentError("drive", "date and number such as 2011_09_26_0013", repr(drive))
     date, number = named.groups()

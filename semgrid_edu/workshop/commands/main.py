@@ -13,7 +13,7 @@ from semgrid_edu import __version__
 from semgrid_edu.errors import ArgumentError, DataError, MissingExtraError
 from semgrid_edu.fast.numba_cache import keep_compiled_functions
 from semgrid_edu.storage.files import CACHE_VARIABLE
-from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, drive_in, tell
+from semgrid_edu.workshop.commands.arguments import Commands, as_typed, check_arguments, chosen_drive, drive_in, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import reproduce
@@ -231,5 +231,7 @@ def run() -> None:
     except (ArgumentError, DataError, MissingExtraError, OSError, RuntimeError) as error:
         if isinstance(error, RuntimeError) and "Symlink loop" not in str(error):
             raise
+        if isinstance(error, ArgumentError):
+            error = as_typed(error)
         where = f"{error.filename}: " if getattr(error, "filename", None) else ""
         sys.exit(f"semgrid-edu: {where}{getattr(error, 'strerror', None) or error}")
