@@ -41,6 +41,7 @@ TABLE1 = "reproduce table1 --runs RUNS --out OUT --plan"
 CHECK = "reproduce check OUT"
 
 CARD = f"{DEMO} --weights weights.safetensors"
+UNPREPARED = "--cache OTHER train --data TINY"
 IN_FILE = "reproduce table1 --runs RUNS --out architecture.json --plan"
 
 Spoil = Callable[[Path], object]
@@ -683,7 +684,7 @@ EXPERIMENTS = (
     Row(
         "half a size", "train --data TINY --out OUT --image-size 640", "--image-size: expected height x width in pixels"
     ),
-    Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "tint: expected a share of at least 0"),
+    Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "--tint: expected a share from 0 to 1"),
     Row("no results to check", "reproduce check TINY", "TINY: expected results such as table1.json, found none"),
     Row("no folder of results", "reproduce check NONE", "NONE: expected results such as table1.json, found none"),
     Row("results without counts", CHECK, "table1_counts.npz: expected a file, found nothing there", a_result()),
@@ -837,7 +838,7 @@ REFUSED_BY_NAME = (
     Row("frames in digits of another script", f"{DEMO} --frames \u0660:\u0662", "--frames: expected FIRST:LAST"),
     Row("a size of 5000 digits", f"{TRAIN} --image-size {'9' * 5000}x2", "--image-size: expected height x width"),
     Row("an image without pixels", f"{TRAIN} --image-size 0x0", "--image-size: expected two whole numbers"),
-    Row("a tint that is no number", f"{TRAIN} --tint nan", "--tint: expected a share of at least 0, found nan"),
+    Row("a tint that is no number", f"{TRAIN} --tint nan", "--tint: expected a share from 0 to 1, found nan"),
     Row("a folder in place of weights", f"{DEMO} --weights TINY", "TINY: expected a safetensors file, found a folder"),
     Row("a folder in place of a reader", "demo TINY --reader RUN", "RUN: expected a Python file.*found a folder"),
     Row("a page below a file", DEMO.replace("OUT", "architecture.json/page"), "expected a folder, found the file"),
@@ -845,6 +846,37 @@ REFUSED_BY_NAME = (
     Row("saved below a file", f"{DEMO} --save architecture.json/saved", "expected a folder, found the file"),
     Row("a page in a link to itself", DEMO.replace("OUT", "loop/page"), "found the link to nowhere", a_loop),
     Row("a page of a long name", DEMO.replace("OUT", "x" * 300), "x: File name too long"),
+    Row("a tint of more than all", f"{TRAIN} --tint 2", "--tint: expected a share from 0 to 1, found 2"),
+    Row("a run below a file", f"{UNPREPARED} --out architecture.json/run", "expected a folder, found the file"),
+    Row("a run in a link to itself", f"{UNPREPARED} --out loop", "found the link to nowhere", a_loop),
+    Row(
+        "a checkpoint of another format",
+        f"{UNPREPARED} --out OUT --resume",
+        "checkpoint.safetensors: expected a safetensors file",
+        text("OUT/checkpoint.safetensors", "my notes"),
+    ),
+    Row(
+        "a folder in place of a checkpoint",
+        f"{UNPREPARED} --out OUT --resume",
+        "checkpoint.safetensors: expected a safetensors file, found a folder",
+        lambda root: (root / "OUT" / "checkpoint.safetensors").mkdir(parents=True),
+    ),
+    Row(
+        "an image stage to start from",
+        f"{UNPREPARED} --out OUT --from image_stage.safetensors",
+        "image_stage.safetensors: expected a whole network",
+    ),
+    Row(
+        "one file for scores and matrices",
+        "evaluate --data TINY --weights weights.safetensors --out a.npz --confusions a.npz",
+        "--confusions: expected another file than --out",
+    ),
+    Row(
+        "a network of other classes",
+        EVALUATE,
+        "weights.safetensors: expected a network for KITTI-14, found one for SYNTHIA-10",
+        header(label_set="SYNTHIA-10"),
+    ),
     Row("saved where the page is", f"{DEMO} --save OUT", "--save: expected a folder of its own"),
     Row("scores in a new folder, of no data", "evaluate --data no --weights no --out a/b.json", "no/dataset.json"),
     Row("curves in a new folder, of no run", "curves none --out a/b.png", "log.csv: expected the log"),

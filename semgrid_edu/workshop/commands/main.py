@@ -157,12 +157,15 @@ def train(
     installs (EfficientNet-Lite0, for both presets). --truth lidar makes labels from image labels and
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
+    from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
     from semgrid_edu.workshop.training_run import chosen_size, chosen_truth, train_network, training_params
 
     kind = {"preset": preset, "uses_return_heights": heights, "image_size": chosen_size(image_size)}
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
+    for path in start or ():
+        tell(weights_doubts(path))
     choices = kind | {"imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
     train_network(data, out, segmenter, params, seed, resume, start=start or (), half=half, **choices)
 
@@ -208,6 +211,8 @@ def evaluate(
     if confusions and confusions.suffix != ".npz":
         raise ArgumentError("--confusions", "a file that ends in .npz", confusions)
     if confusions:
+        if confusions.resolve() == out.resolve():
+            raise ArgumentError("--confusions", "another file than --out", confusions)
         check_ours(confusion_key("network", "true", distance_band_names()[0]), confusions, force=force)
     check_ours(f'"command": "{Commands.asked} ', out, force=force)
     tell(dataset_doubts(data, "train", "test") + weights_doubts(weights))
