@@ -877,6 +877,22 @@ REFUSED_BY_NAME = (
         "weights.safetensors: expected a network for KITTI-14, found one for SYNTHIA-10",
         header(label_set="SYNTHIA-10"),
     ),
+    Row("a month that isn't there", FETCH.replace("_09_", "_13_"), "--drive: expected date and number"),
+    Row(
+        "a drive in digits of another script",
+        FETCH.replace("2011", "\u0662\u0660\u0661\u0661"),
+        "--drive: expected date and number",
+    ),
+    Row(
+        "checksums of another format",
+        FETCH,
+        "registry.txt: expected lines",
+        lambda root: (
+            (root / "OUT/archives").mkdir(parents=True),
+            (root / "OUT/archives/registry.txt").write_bytes(b"\xff"),
+        ),
+    ),
+    Row("a scene by a path", "data index OUT --pandaset TINY --scene ../TINY/002", "--scene: expected the name"),
     Row("saved where the page is", f"{DEMO} --save OUT", "--save: expected a folder of its own"),
     Row("scores in a new folder, of no data", "evaluate --data no --weights no --out a/b.json", "no/dataset.json"),
     Row("curves in a new folder, of no run", "curves none --out a/b.png", "log.csv: expected the log"),

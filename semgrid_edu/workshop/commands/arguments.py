@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # a command that needs no drive starts faster without numpy
 LARGEST = 2**63 - 1
 """The largest integer that a command accepts, because PyTorch's generators accept no larger seed."""
 
-ALIASES = {"view": "camera", "name": "segmenter", "dataset": "data"}
+ALIASES = {"view": "camera", "name": "segmenter", "dataset": "data", "test_cameras": "test"}
 """Arguments of functions that have other names among the options of commands."""
 
 SHOWN_DOUBTS = 20
