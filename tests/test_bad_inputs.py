@@ -162,7 +162,8 @@ def test_a_bad_input_is_named(row, place, request, monkeypatch, capsys):
     before, there = contents(place), states(place).keys()
     says = told(shlex.split(row.command), monkeypatch, capsys)
     assert before.items() <= contents(place).items()  # nothing is lost
-    assert "doubtful" in row.says or states(place).keys() <= there  # nothing is left behind
+    left = {name for name in states(place).keys() - there if "/cache/" not in name}
+    assert "doubtful" in row.says or not left  # arrays in the cache serve the next run
     assert re.search(row.says, says), says
     assert "Traceback" not in says
     assert says.endswith("done") == ("doubtful" in row.says)

@@ -1,5 +1,6 @@
 """Atomic files and folders, checksums, tables beside modules, one writer per folder, shipped and cache folders."""
 
+import errno
 import hashlib
 import json
 import os
@@ -173,7 +174,9 @@ def _is_there(path: Path) -> bool:
     """Return whether something has this name; unlike `Path.exists`, also a link to nowhere."""
     try:
         path.lstat()
-    except (FileNotFoundError, NotADirectoryError):
+    except OSError as error:
+        if error.errno not in (errno.ENOENT, errno.ENOTDIR, errno.ELOOP):
+            raise
         return False
     return True
 
