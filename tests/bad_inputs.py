@@ -40,6 +40,10 @@ FROM_BAG, TOPICS = "data from-bag", "--image /camera --points /points --odometry
 TABLE1 = "reproduce table1 --runs RUNS --out OUT --plan"
 CHECK = "reproduce check OUT"
 
+CARD = f"{DEMO} --weights weights.safetensors"
+UNPREPARED = "--cache OTHER train --data TINY"
+IN_FILE = "reproduce table1 --runs RUNS --out architecture.json --plan"
+
 Spoil = Callable[[Path], object]
 
 
@@ -85,6 +89,11 @@ def shorter(name: str) -> Spoil:
 
 def gone(name: str) -> Spoil:
     return lambda root: (root / name).unlink()
+
+
+def a_loop(root: Path) -> None:
+    """Make a link to itself."""
+    (root / "loop").symlink_to(root / "loop")
 
 
 def pipe(name: str) -> Spoil:
@@ -296,7 +305,9 @@ DRIVES = (
     Row("half a scene's name", "demo --pandaset TINY", "expected both or none"),
     Row("two data sets", f"{DEMO} --pandaset TINY --scene 002", "--kitti, --pandaset: expected one of them"),
     Row("no such scene", "demo --pandaset TINY --scene 002", "TINY/002: expected a scene, found no scene"),
-    Row("a page in place of a file", DEMO.replace("OUT", "architecture.json"), "File exists"),
+    Row(
+        "a page in place of a file", DEMO.replace("OUT", "architecture.json"), "json: expected a folder, found the file"
+    ),
     Row("no file of stages", f"{DEMO} --stages none.py", "none.py: expected a Python file"),
     Row("stages that are a pipe", f"{DEMO} --stages my.py", "my.py: expected a Python file", pipe("my.py")),
     Row(
@@ -345,7 +356,7 @@ INDEXES = (
     Row(
         "no frames to train on",
         TRAIN,
-        "split: expected one of test",
+        "dataset.json: expected the split train, found test",
         index(splits={"test": [{"date": DATE, "drive": "0007", "frame": 2}]}),
     ),
     Row("a frame below 0", TRAIN, "dataset.json: expected a frame like", frames(frame=-1)),
@@ -507,7 +518,7 @@ RUNS = (
     Row("an unknown device", f"{TRAIN} --device abacus", "--device: expected"),
     Row("an unknown preset", f"{TRAIN} --preset huge", "--preset: expected compact or paper"),
     Row("an unknown truth", f"{TRAIN} --truth guessed", "--truth: expected one of true, lidar"),
-    Row("an unknown image network", f"{TRAIN} --segmenter vit", "name: expected one of"),
+    Row("an unknown image network", f"{TRAIN} --segmenter vit", "--segmenter: expected one of"),
     Row("no steps", f"{TRAIN} --iterations 0", "Invalid value for '--iterations'"),
     Row("a seed that is a word", f"{TRAIN} --seed luck", "Invalid value for '--seed'"),
     Row("a seed below 0", f"{TRAIN} --seed=-1", "Invalid value for '--seed'"),
@@ -673,7 +684,7 @@ EXPERIMENTS = (
     Row(
         "half a size", "train --data TINY --out OUT --image-size 640", "--image-size: expected height x width in pixels"
     ),
-    Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "tint: expected a share of at least 0"),
+    Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "--tint: expected a share from 0 to 1"),
     Row("no results to check", "reproduce check TINY", "TINY: expected results such as table1.json, found none"),
     Row("no folder of results", "reproduce check NONE", "NONE: expected results such as table1.json, found none"),
     Row("results without counts", CHECK, "table1_counts.npz: expected a file, found nothing there", a_result()),
@@ -725,6 +736,8 @@ EXPERIMENTS = (
 
 # Results over what isn't ours, and what is refused before any work: every command that writes.
 
+IN_PLACE = "architecture.json: expected a folder, found the file"
+
 PAPERS = ("table1", "all")
 """Of the paper's experiments, which are one command, the first and all."""
 
@@ -736,7 +749,7 @@ def of_paper(name: str) -> tuple[Row, ...]:
     """What an experiment of the paper refuses before the first run starts."""
     command, first = f"reproduce {name} --runs RUNS --out OUT", "table1" if name == "all" else name
     return (
-        Row(f"a file in place of the results of {name}", command.replace("OUT", "architecture.json"), "File exists"),
+        Row(f"a file in place of the results of {name}", command.replace("OUT", "architecture.json"), IN_PLACE),
         Row(f"notes over which {name} would write", command, LOST, text(f"OUT/{first}.md", "my notes")),
         Row(f"a picture over which {name} would write", command, LOST, text(f"OUT/{first}.png", "a picture")),
         Row(f"a folder in place of a file of {name}", command, "found a folder", in_out(f"{first}.json")),
@@ -776,7 +789,7 @@ REFUSED_FIRST = (
         "0001_sync: expected images of image_02, found none",
         lambda root: (root / DRIVE / "image_02").rename(root / DRIVE / "kept"),
     ),
-    Row("a camera of no name", f"{DEMO} --camera image_09", "view: expected image_02 or image_03"),
+    Row("a camera of no name", f"{DEMO} --camera image_09", "--camera: expected image_02 or image_03"),
     Row("scores over one's own JSON", EVALUATE, f"{LOST} without --force", text("scores.json", '{"mine": 1}')),
     Row("scores over the index", EVALUATE.replace("scores.json", "TINY/dataset.json"), LOST),
     Row("matrices over one's own arrays", f"{EVALUATE} --confusions a.npz", LOST, arrays("a.npz")),
@@ -806,4 +819,84 @@ REFUSED_FIRST = (
     Row("an argument to the list of data", "data list all", "unexpected extra argument"),
 )
 
-TABLE = (*DRIVES, *INDEXES, *WEIGHTS, *RUNS, *DATA, *COURSE, *EXPERIMENTS, *REFUSED_FIRST)
+REFUSED_BY_NAME = (
+    Row("a card that is a list", CARD, r"card.json: expected a JSON object, found \[1\]", text("card.json", "[1]")),
+    Row("a card that is a folder", CARD, "card.json: expected a file, found a folder", folder("card.json")),
+    Row(
+        "a card with a number for its drives",
+        CARD,
+        "card.json: expected learned_drives: a list of names of folders, found 3",
+        text("card.json", '{"learned_drives": 3}'),
+    ),
+    Row(
+        "a card with a list for its words",
+        CARD,
+        "card.json: expected other_streets: a text, found",
+        text("card.json", '{"other_streets": [1]}'),
+    ),
+    Row("frames of 5000 digits", f"{DEMO} --frames 0:{'9' * 5000}", "--frames: expected FIRST:LAST"),
+    Row("frames in digits of another script", f"{DEMO} --frames \u0660:\u0662", "--frames: expected FIRST:LAST"),
+    Row("a size of 5000 digits", f"{TRAIN} --image-size {'9' * 5000}x2", "--image-size: expected height x width"),
+    Row("an image without pixels", f"{TRAIN} --image-size 0x0", "--image-size: expected two whole numbers"),
+    Row("a tint that is no number", f"{TRAIN} --tint nan", "--tint: expected a share from 0 to 1, found nan"),
+    Row("a folder in place of weights", f"{DEMO} --weights TINY", "TINY: expected a safetensors file, found a folder"),
+    Row("a folder in place of a reader", "demo TINY --reader RUN", "RUN: expected a Python file.*found a folder"),
+    Row("a page below a file", DEMO.replace("OUT", "architecture.json/page"), "expected a folder, found the file"),
+    Row("results beside a folder to be made", DEMO.replace("OUT", "no/../architecture.json"), "found the file"),
+    Row("saved below a file", f"{DEMO} --save architecture.json/saved", "expected a folder, found the file"),
+    Row("a page in a link to itself", DEMO.replace("OUT", "loop/page"), "found the link to nowhere", a_loop),
+    Row("a page of a long name", DEMO.replace("OUT", "x" * 300), "x/index.html: File name too long"),
+    Row("a tint of more than all", f"{TRAIN} --tint 2", "--tint: expected a share from 0 to 1, found 2"),
+    Row("a run below a file", f"{UNPREPARED} --out architecture.json/run", "expected a folder, found the file"),
+    Row("a run in a link to itself", f"{UNPREPARED} --out loop", "found the link to nowhere", a_loop),
+    Row(
+        "a checkpoint of another format",
+        f"{UNPREPARED} --out OUT --resume",
+        "checkpoint.safetensors: expected a safetensors file",
+        text("OUT/checkpoint.safetensors", "my notes"),
+    ),
+    Row(
+        "a folder in place of a checkpoint",
+        f"{UNPREPARED} --out OUT --resume",
+        "checkpoint.safetensors: expected a safetensors file, found a folder",
+        lambda root: (root / "OUT" / "checkpoint.safetensors").mkdir(parents=True),
+    ),
+    Row(
+        "an image stage to start from",
+        f"{UNPREPARED} --out OUT --from image_stage.safetensors",
+        "image_stage.safetensors: expected a whole network",
+    ),
+    Row(
+        "one file for scores and matrices",
+        "evaluate --data TINY --weights weights.safetensors --out a.npz --confusions a.npz",
+        "--confusions: expected another file than --out",
+    ),
+    Row(
+        "a network of other classes",
+        EVALUATE,
+        "weights.safetensors: expected a network for KITTI-14, found one for SYNTHIA-10",
+        header(label_set="SYNTHIA-10"),
+    ),
+    Row("a month that isn't there", FETCH.replace("_09_", "_13_"), "--drive: expected date and number"),
+    Row(
+        "a drive in digits of another script",
+        FETCH.replace("2011", "\u0662\u0660\u0661\u0661"),
+        "--drive: expected date and number",
+    ),
+    Row(
+        "checksums of another format",
+        FETCH,
+        "registry.txt: expected lines",
+        lambda root: (
+            (root / "OUT/archives").mkdir(parents=True),
+            (root / "OUT/archives/registry.txt").write_bytes(b"\xff"),
+        ),
+    ),
+    Row("a scene by a path", "data index OUT --pandaset TINY --scene ../TINY/002", "--scene: expected the name"),
+    Row("saved where the page is", f"{DEMO} --save OUT", "--save: expected a folder of its own"),
+    Row("scores in a new folder, of no data", "evaluate --data no --weights no --out a/b.json", "no/dataset.json"),
+    Row("curves in a new folder, of no run", "curves none --out a/b.png", "log.csv: expected the log"),
+    Row("runs in a new folder, results over a file", IN_FILE, "architecture.json: expected a folder, found the file"),
+)
+
+TABLE = (*REFUSED_BY_NAME, *DRIVES, *INDEXES, *WEIGHTS, *RUNS, *DATA, *COURSE, *EXPERIMENTS, *REFUSED_FIRST)

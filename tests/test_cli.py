@@ -28,11 +28,14 @@ def test_one_doubt_too_many_is_told_as_such(capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["data", "make", "sample", "FILE"], r"FILE.*: Not a directory"),
-        (["demo", "--out", "FILE"], r"FILE: File exists"),
+        (["data", "make", "sample", "FILE"], r"FILE.*: expected a folder, found the file .*FILE"),
+        (["demo", "--out", "FILE"], r"FILE: expected a folder, found the file .*FILE"),
         (["demo", "--kitti", "FILE"], r"--kitti, --date, --drive: expected all three or none, found only --kitti"),
         (["data", "verify", "FILE"], r"FILE: expected folders of samples"),
-        (["evaluate", "--data", ".", "--weights", ".", "--out", "FILE/scores.json"], r"FILE: File exists"),
+        (
+            ["evaluate", "--data", ".", "--weights", ".", "--out", "FILE/scores.json"],
+            r"FILE: expected a folder, found the file",
+        ),
         (["evaluate", "--data", ".", "--weights", ".", "--out", "FOLDER"], r"FOLDER: expected a file to write"),
     ],
 )

@@ -194,10 +194,12 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
     Raises
     ------
     ArgumentError
-        When there is no such camera, or none is left to train on.
+        When the scene isn't a plain name, there is no such camera, or none is left to train on.
     DataError
         When there is no such scene, its returns have no labels, or there is a dataset.json already.
     """
+    if Path(scene).name != scene:
+        raise ArgumentError("scene", "the name of a folder such as 002", repr(scene))
     path = Path(folder) / INDEX_FILE
     splits = {"train": [], "test": []}
     if path.exists():

@@ -99,9 +99,10 @@ def _cached(
     if not path.exists():
         try:
             check_writable(path)  # before the work, which takes minutes
-        except OSError as error:
+        except (OSError, DataError) as error:
             expected = "a folder that can be written, for what is computed from the data (`semgrid-edu --cache`)"
-            raise DataError(folder, expected, error.strerror) from error
+            found = error.strerror if isinstance(error, OSError) else error.args[2]
+            raise DataError(folder, expected, found) from error
         arrays = make()
         with atomic_path(path) as temporary:
             np.savez(temporary, allow_pickle=False, **arrays)

@@ -1,5 +1,6 @@
 """Atomic files and folders, checksums, tables beside modules, one writer per folder, shipped and cache folders."""
 
+import errno
 import hashlib
 import json
 import os
@@ -89,6 +90,7 @@ def atomic_folder(path: str | Path) -> Iterator[Path]:
     """
     path = Path(path).resolve()
     check_new_folder(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
     try:
         with named_errors(path):
@@ -117,26 +119,66 @@ def named_errors(path: str | Path) -> Iterator[None]:
         raise
 
 
+def kind_of(path: str | Path) -> str:
+    """Return what has a name, as an error says it: "a folder", or "no such file".
+
+    Parameters
+    ----------
+    path : path-like
+        The name.
+    """
+    path = Path(path)
+    if path.is_file():
+        return "a file"
+    if path.is_dir():
+        return "a folder"
+    return "a pipe, a socket or a device" if path.exists() else "no such file"
+
+
 def check_writable(path: str | Path) -> None:
     """Check that a file can be written, before starting long work whose result would otherwise be lost.
 
     Parameters
     ----------
     path : path-like
-        The file; its folder is created when missing.
+        The file. Its folder need not exist, and isn't made: what is refused leaves nothing behind.
 
     Raises
     ------
     DataError
-        If the path is a folder, a pipe or a device.
+        If the path is a folder, a pipe or a device, or can't be in a folder.
     OSError
         When its folder can't be made or written to.
     """
     path = Path(path)
     if path.exists() and not path.is_file():
-        raise DataError(path, "a file to write", "a folder" if path.is_dir() else "a pipe or a device")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    tempfile.TemporaryFile(dir=path.parent).close()
+        raise DataError(path, "a file to write", kind_of(path))
+    _check_takes_files(path.parent)
+
+
+def _check_takes_files(folder: Path) -> None:
+    """Raise an error if a folder can't be written to, or can't be made; it isn't made."""
+    place = Path(os.path.realpath(folder))
+    while not _is_there(place):
+        place = place.parent
+    if not place.is_dir():
+        raise DataError(folder, "a folder", f"the {'file' if place.exists() else 'link to nowhere'} {place}")
+    try:
+        tempfile.TemporaryFile(dir=place).close()
+    except OSError as error:
+        error.filename = str(folder)  # in place of the temporary file's
+        raise
+
+
+def _is_there(path: Path) -> bool:
+    """Return whether something has this name; unlike `Path.exists`, also a link to nowhere."""
+    try:
+        path.lstat()
+    except OSError as error:
+        if error.errno not in (errno.ENOENT, errno.ENOTDIR, errno.ELOOP):
+            raise
+        return False
+    return True
 
 
 def check_new_folder(path: str | Path) -> None:
@@ -145,20 +187,19 @@ def check_new_folder(path: str | Path) -> None:
     Parameters
     ----------
     path : path-like
-        The folder; the one that holds it is created when missing.
+        The folder. Neither it nor the one that holds it is made.
 
     Raises
     ------
     DataError
-        When it is a file, or isn't empty.
+        When it is a file, isn't empty, or can't be in a folder.
     OSError
         When the folder that holds it can't be made or written to.
     """
     place = Path(path).resolve()
     if place.exists() and (not place.is_dir() or any(place.iterdir())):
         raise DataError(path, "a new or an empty folder", "one with files in it" if place.is_dir() else "a file")
-    place.parent.mkdir(parents=True, exist_ok=True)
-    tempfile.TemporaryFile(dir=place.parent).close()
+    _check_takes_files(place.parent)
 
 
 def check_ours(mark: str, *paths: str | Path, force: bool | None = None) -> None:
@@ -295,7 +336,7 @@ def sole_writer(folder: str | Path) -> Iterator[None]:
     Raises
     ------
     DataError
-        When another block, of this process or of another one, writes to the folder.
+        When another block, of this process or of another one, writes to the folder, or it is a file.
     OSError
         When the folder can't be made or written to.
 
@@ -307,6 +348,7 @@ def sole_writer(folder: str | Path) -> Iterator[None]:
     nobody else writes here
     """
     folder = Path(folder)
+    _check_takes_files(folder)
     folder.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder / LOCK)
     try:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from semgrid_edu.errors import DataError
+from semgrid_edu.storage.files import kind_of
 
 PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 """The chunk that ends every PNG. Decoders don't notice when it is missing, so a truncated file would pass."""
@@ -26,7 +27,7 @@ def read_bytes(path: Path) -> bytes:
     """
     try:
         if path.exists() and not path.is_file():
-            raise DataError(path, "a file", "a folder" if path.is_dir() else "a pipe, a socket or a device")
+            raise DataError(path, "a file", kind_of(path))
         content = path.read_bytes()
     except FileNotFoundError:
         raise DataError(path, "a file", "nothing there") from None

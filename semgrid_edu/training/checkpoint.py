@@ -41,10 +41,11 @@ def check_folder(folder: Path, resume: bool) -> None:
         raise DataError(folder, "a folder for the training run alone", f"the {PROVENANCE} of something else")
     if (folder / WEIGHTS).exists():
         raise DataError(folder, "a folder without a trained network, which would be lost", WEIGHTS)
-    if folder.exists():
-        check_ours(HEADER, folder / LOG, folder / IMAGE_STAGE)
-    if (folder / CHECKPOINT).exists() and not resume:
-        raise DataError(folder, "a folder without an interrupted run (--resume continues it)", CHECKPOINT)
+    check_ours(HEADER, folder / LOG, folder / IMAGE_STAGE)
+    if (folder / CHECKPOINT).exists():
+        if not resume:
+            raise DataError(folder, "a folder without an interrupted run (--resume continues it)", CHECKPOINT)
+        read_tensors(folder / CHECKPOINT)  # a damaged one is found before the data are prepared
 
 
 def save_checkpoint(path: Path, run: dict[str, object], net: nn.Module, optimiser: Optimizer, iteration: int) -> None:

@@ -71,7 +71,8 @@ class TrainingParams:
         check_fields(self, "a share from 0 to 1", lambda share: 0 <= share <= 1, "encoder_rate")
         check_fields(self, "a share from 0 to below 1", lambda share: 0 <= share < 1, "momentum")
         check_fields(self, "1 or more", lambda limit: limit >= 1, "weight_limit")
-        check_fields(self, "a share of at least 0", lambda share: 0 <= share < math.inf, "jitter", "tint")
+        check_fields(self, "a share of at least 0", lambda share: 0 <= share < math.inf, "jitter")
+        check_fields(self, "a share from 0 to 1", lambda share: 0 <= share <= 1, "tint")
 
     @property
     def iterations(self) -> int:

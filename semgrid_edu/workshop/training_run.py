@@ -80,7 +80,7 @@ def chosen_size(text: str | None) -> tuple[int, int] | None:
     """
     if text is None:
         return None
-    if not (found := re.fullmatch(r"(\d+)x(\d+)", text)):
+    if not (found := re.fullmatch(r"(\d{1,18})x(\d{1,18})", text, re.ASCII)):
         raise ArgumentError("--image-size", "height x width in pixels, such as 192x640", repr(text))
     return int(found[1]), int(found[2])
 

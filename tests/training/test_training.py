@@ -443,7 +443,7 @@ def test_a_loss_that_is_not_finite_stops_the_run(streets, tmp_path):
         ({"momentum": 1.0}, "momentum: expected a share from 0 to below 1, found 1.0"),
         ({"weight_limit": 0.5}, "weight_limit: expected 1 or more, found 0.5"),
         ({"jitter": -0.1}, "jitter: expected a share of at least 0, found -0.1"),
-        ({"tint": math.nan}, "tint: expected a share of at least 0, found nan"),
+        ({"tint": math.nan}, "tint: expected a share from 0 to 1, found nan"),
     ],
 )
 def test_numbers_that_nothing_is_learnt_with_are_refused(numbers, message):

@@ -19,6 +19,9 @@ if TYPE_CHECKING:  # a command that needs no drive starts faster without numpy
 LARGEST = 2**63 - 1
 """The largest integer that a command accepts, because PyTorch's generators accept no larger seed."""
 
+ALIASES = {"view": "camera", "name": "segmenter", "dataset": "data", "test_cameras": "test"}
+"""Arguments of functions that have other names among the options of commands."""
+
 SHOWN_DOUBTS = 20
 """Largest number of doubts of a kind that are shown one by one."""
 
@@ -86,6 +89,19 @@ def check_arguments(arguments: Sequence[str]) -> None:
         digits = re.fullmatch(r"[+-]?0*(\d*)", value)
         if digits and (len(digits[1]) > 19 or int(digits[1] or 0) > LARGEST):
             raise ArgumentError(name, f"a whole number up to {LARGEST}", value[:60])
+
+
+def as_typed(error: ArgumentError) -> ArgumentError:
+    """Return an error that names the option of the command, such as --image-size, in place of a function's argument.
+
+    Parameters
+    ----------
+    error : ArgumentError
+        The error; it stays as it is if the command has no such option.
+    """
+    argument, expected, found = error.args
+    options = {one.name: one.opts[0] for one in getattr(Commands.command, "params", ()) if one.opts[0].startswith("--")}
+    return ArgumentError(options.get(ALIASES.get(argument, argument), argument), expected, found)
 
 
 def tell(doubts: Iterable[str]) -> None:

@@ -3,7 +3,8 @@
 from pathlib import Path
 
 import semgrid_edu.workshop.paper.datasets  # noqa: F401 (adds the paper's readers to those that dataset.json can name)
-from semgrid_edu.datasets.index import load_index
+from semgrid_edu.datasets.index import INDEX_FILE, load_index
+from semgrid_edu.errors import DataError
 from semgrid_edu.workshop.doubts import drive_doubts
 
 
@@ -23,5 +24,8 @@ def dataset_doubts(dataset_dir: str | Path, *splits: str) -> list[str]:
         One line for each doubt, from `drive_doubts`.
     """
     index = load_index(dataset_dir)
+    for split in splits:
+        if split not in index.splits:
+            raise DataError(Path(dataset_dir) / INDEX_FILE, f"the split {split}", ", ".join(index.splits) or "none")
     drives = [drive for split in splits for drive, _ in index.drives(split)]
     return [doubt for drive in drives for doubt in drive_doubts(drive)]

@@ -74,7 +74,7 @@ def fetch_kitti(folder: str | Path, drive: str, source: str = KITTI_SOURCE) -> K
         recorded, or is damaged.
     """
     folder = Path(folder)
-    named = re.fullmatch(r"(\d{4}_\d\d_\d\d)_(?:drive_)?(\d{4})", drive)
+    named = re.fullmatch(r"(\d{4}_(?:0[1-9]|1[0-2])_(?:0[1-9]|[12]\d|3[01]))_(?:drive_)?(\d{4})", drive, re.ASCII)
     if not named:
         raise ArgumentError("drive", "date and number such as 2011_09_26_0013", repr(drive))
     date, number = named.groups()
@@ -99,7 +99,7 @@ def _known_files(archives: Path, urls: list[str]) -> pooch.Pooch:
     if (archives / REGISTRY).exists():
         try:
             files.load_registry(archives / REGISTRY)
-        except OSError as error:
+        except (OSError, UnicodeDecodeError) as error:
             raise DataError(archives / REGISTRY, "lines `name sha256`", error) from error
     return files
 

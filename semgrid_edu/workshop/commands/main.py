@@ -13,7 +13,7 @@ from semgrid_edu import __version__
 from semgrid_edu.errors import ArgumentError, DataError, MissingExtraError
 from semgrid_edu.fast.numba_cache import keep_compiled_functions
 from semgrid_edu.storage.files import CACHE_VARIABLE
-from semgrid_edu.workshop.commands.arguments import Commands, check_arguments, chosen_drive, drive_in, tell
+from semgrid_edu.workshop.commands.arguments import Commands, as_typed, check_arguments, chosen_drive, drive_in, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import reproduce
@@ -157,12 +157,15 @@ def train(
     installs (EfficientNet-Lite0, for both presets). --truth lidar makes labels from image labels and
     LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
     """
+    from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
     from semgrid_edu.workshop.training_run import chosen_size, chosen_truth, train_network, training_params
 
     kind = {"preset": preset, "uses_return_heights": heights, "image_size": chosen_size(image_size)}
     params = training_params(preset, iterations, not two_stage, from_imagenet=imagenet is not None, tint=tint)
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
+    for path in start or ():
+        tell(weights_doubts(path))
     choices = kind | {"imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
     train_network(data, out, segmenter, params, seed, resume, start=start or (), half=half, **choices)
 
@@ -208,6 +211,8 @@ def evaluate(
     if confusions and confusions.suffix != ".npz":
         raise ArgumentError("--confusions", "a file that ends in .npz", confusions)
     if confusions:
+        if confusions.resolve() == out.resolve():
+            raise ArgumentError("--confusions", "another file than --out", confusions)
         check_ours(confusion_key("network", "true", distance_band_names()[0]), confusions, force=force)
     check_ours(f'"command": "{Commands.asked} ', out, force=force)
     tell(dataset_doubts(data, "train", "test") + weights_doubts(weights))
@@ -231,5 +236,7 @@ def run() -> None:
     except (ArgumentError, DataError, MissingExtraError, OSError, RuntimeError) as error:
         if isinstance(error, RuntimeError) and "Symlink loop" not in str(error):
             raise
+        if isinstance(error, ArgumentError):
+            error = as_typed(error)
         where = f"{error.filename}: " if getattr(error, "filename", None) else ""
         sys.exit(f"semgrid-edu: {where}{getattr(error, 'strerror', None) or error}")

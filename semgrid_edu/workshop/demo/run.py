@@ -72,7 +72,7 @@ class ChosenFrames(NamedTuple):
         >>> ChosenFrames.of(144).shown
         range(0, 144, 4)
         """
-        match = re.fullmatch(r"(\d*):(\d*)(?::(\d*))?", wanted or ":")
+        match = re.fullmatch(r"(\d{0,18}):(\d{0,18})(?::(\d{0,18}))?", wanted or ":", re.ASCII)
         first, last, step = ((int(part) if part else None) for part in match.groups()) if match else (None, 0, None)
         run = range(n_frames)[first:last]
         if not run or step == 0 or (last or 0) > n_frames:
@@ -177,7 +177,7 @@ def write_demo(
     chosen = ChosenFrames.of(len(drive), frames)
     net = load_net(weights, drive.camera)
     card = _card_beside(weights)
-    known = str(card.get("other_streets", ""))
+    known = card.get("other_streets", "")
     page, picture = _check_page(out, force)
     _check_handed_out(out, save, rerun, force)
     first = first_sound(drive.__getitem__, chosen.run if skipped else chosen.run[:1])
@@ -335,7 +335,15 @@ def _handed_out(
 def _card_beside(weights: str | Path) -> dict[str, object]:
     """Return the card beside the weights; empty without one."""
     card = Path(weights).with_name(CARD)
-    return read_json(card) if card.is_file() else {}
+    if not card.exists():
+        return {}
+    content = read_json(card)
+    known, learned = content.get("other_streets", ""), content.get("learned_drives", [])
+    if not isinstance(known, str):
+        raise DataError(card, "other_streets: a text", repr(known)[:200])
+    if not (isinstance(learned, list) and all(isinstance(name, str) for name in learned)):
+        raise DataError(card, "learned_drives: a list of names of folders", repr(learned)[:200])
+    return content
 
 
 def _record_all(results: Iterable[tuple[FrameResult, ...]], record: Record) -> DataError | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.storage.files import atomic_path, check_ours, sole_writer, write_json, write_text
+from semgrid_edu.storage.files import atomic_path, check_ours, check_writable, sole_writer, write_json, write_text
 from semgrid_edu.storage.provenance import versions
 from semgrid_edu.training.devices import choose_device
 from semgrid_edu.workshop.paper.data_runs import frame_counts
@@ -99,9 +99,11 @@ def reproduce(request: Request, echo: Callable[[str], None], plan_only: bool = F
     root = request.runs.resolve()
     if root.exists() and not root.is_dir():
         raise ArgumentError("--runs", "a folder", f"the file {root}")
-    root.mkdir(parents=True, exist_ok=True)
+    scale_named(request.scale)
     for name in request.chosen:
         check_ours(f'"command": "semgrid-edu reproduce {name} ', *result_files(request.out, name))
+    check_writable(root / OUTPUT)
+    root.mkdir(parents=True, exist_ok=True)
     with nullcontext() if plan_only else sole_writer(root):
         plan = request.plan()
         echo("Estimating the time, which takes a few trial steps of each network ...")

@@ -6,8 +6,9 @@ from pathlib import Path
 from numpy.typing import NDArray
 from torch import nn
 
+from semgrid_edu.datasets.index import load_index
 from semgrid_edu.datasets.training_arrays import SEED
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.fast import TrainingSet, load_net
 from semgrid_edu.labels import LabelSet
 from semgrid_edu.metrics import METRICS
@@ -68,6 +69,11 @@ def evaluate(
     image_stage = Path(weights).with_name(IMAGE_STAGE)
     if image_stage.exists() and (found := read_architecture(image_stage).image_size) != size:
         raise ArgumentError(IMAGE_STAGE, f"image size {size}, as {Path(weights).name}", found)
+    index = load_index(dataset_dir)
+    (drive, _), *_ = index.drives("test")
+    if described.label_set != index.label_set.name:  # what can't be scored is found before the data are prepared
+        raise DataError(weights, f"a network for {index.label_set.name}", f"one for {described.label_set}")
+    load_net(weights, drive.camera)
     training, test = (TrainingSet(dataset_dir, split, described.grid, size) for split in ("train", "test"))
     net = load_net(weights, test.camera)
     segmenters = {"end-to-end": net.segmenter}
