@@ -44,7 +44,7 @@ def picture_and_map(
     places : mapping of str to (x, y, z)
         The place of each letter in the grid frame, metres.
     """
-    fig = plt.figure(figsize=(10, 5.2), layout="constrained")
+    fig = plt.figure(figsize=(10, 6.2), layout="constrained")
     axes = fig.subplot_mosaic([["map", "image"], ["map", "legend"]], width_ratios=[1, 2.6], height_ratios=[2, 1.3])
     draw_image(frame.image // 8 * 8, axes["image"]).set_title("what the camera sees", fontsize=10)
     plotting.grid_labels(spec, labels, KITTI_14, ax=axes["map"], legend=False).set_title("the map", fontsize=10)
@@ -125,20 +125,20 @@ def draw_story(
     """
     fig = plt.figure(figsize=(9, 6), layout="constrained")
     axes = fig.subplot_mosaic([["image", "image"], ["states", "answers"]], height_ratios=[1, 0.8])
-    draw_image(frame.image // 8 * 8, axes["image"]).set_title("A  the points of the cell in the image", fontsize=10)
+    draw_image(frame.image // 8 * 8, axes["image"]).set_title("1  the points of the cell in the image", fontsize=10)
     axes["image"].plot(*pixels_of(frame, column).T, "o", color="white", markeredgecolor="#d81b60", markersize=4)
     rows = dict(zip([f"{time:.1f} s" for time in times], states.T, strict=True))
     _bars(axes["states"], rows, STATE_COLOURS)
-    axes["states"].set_title("B  what the filter believes, scan by scan", fontsize=10)
+    axes["states"].set_title("2  what the filter believes", fontsize=10)
     place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2), "fontsize": 9, "columnspacing": 1.0}
     colour_legend(axes["states"], STATE_NAMES, STATE_COLOURS, ncols=4, **place)
     _bars(axes["answers"], answers, KITTI_14.rgb)
-    axes["answers"].set_title("C  what it is called", fontsize=10)
+    axes["answers"].set_title("3  what it is called", fontsize=10)
     for row, p in enumerate(answers.values()):
         axes["answers"].text(
             0.02, row, f"{KITTI_14.names[p.argmax()]} {p.max():.2f}", va="center", fontsize=9
         ).set_bbox({"facecolor": "white", "edgecolor": "none", "pad": 1.5})
-    best = np.where(np.max(list(answers.values()), axis=0) > 0.1, np.arange(len(KITTI_14)), IGNORE)
+    best = np.where(np.max(list(answers.values()), axis=0) > 0.02, np.arange(len(KITTI_14)), IGNORE)
     class_legend(axes["answers"], KITTI_14, best, ncols=4, **place)
     return fig
 

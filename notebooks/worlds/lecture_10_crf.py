@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import softmax
 
 from semgrid_edu.crf import (
     CrfParams,
@@ -44,6 +45,42 @@ def all_free(shape: tuple[int, int]) -> NDArray[np.float64]:
     values = np.zeros((N_STATES, *shape))
     values[State.FREE] = 1
     return values
+
+
+def sampled_marginals(
+    unary: NDArray, prices: NDArray, start: NDArray[np.integer], sweeps: int = 80, seed: int = 0
+) -> NDArray[np.float64]:
+    """Return the marginals of a dense CRF by Gibbs sampling, (C, N), without mean field's assumption.
+
+    Parameters
+    ----------
+    unary : (C, N) float
+        phi_u, the price of each label in each cell.
+    prices : (N, N) float
+        k_ij, zero on the diagonal.
+    start : (N,) int
+        The first labelling.
+    sweeps : int
+        How often each cell draws a label; the first quarter isn't counted.
+    seed : int
+        Seed of the draws.
+    """
+    rng = np.random.default_rng(seed)
+    labels = np.array(start)
+    own = -np.asarray(unary, dtype=np.float64)
+    pull = own + np.stack([prices[:, labels == label].sum(axis=1) for label in range(len(own))])
+    total, counted = np.zeros_like(own), 0
+    for sweep in range(sweeps):
+        for i, noise in enumerate(rng.gumbel(size=own.T.shape)):
+            old, new = labels[i], (pull[:, i] + noise).argmax()  # the Gumbel trick: a draw from softmax(pull)
+            if new != old:
+                pull[old] -= prices[i]
+                pull[new] += prices[i]
+                labels[i] = new
+        if sweep >= sweeps // 4:
+            total += softmax(pull, axis=0)
+            counted += 1
+    return total / counted
 
 
 def crf_stage(coupling: float = 4.0, unary: NDArray | None = None, values: NDArray | None = None) -> StageGraph:
