@@ -14,7 +14,7 @@
 # **Prerequisites.** Lectures [06](06_planes.ipynb) (planes, and the way back to pixels) and
 # [07](07_segmentation.ipynb) (accuracy and class accuracy, soft-max, cross-entropy, SegNet). The chain rule.
 #
-# **Time.** 71 minutes, of which the computer needs less than one.
+# **Time.** 72 minutes, of which the computer needs less than one.
 #
 # **Paper.** Sections 3.4 and 4.1, figures 4 and 5.
 
