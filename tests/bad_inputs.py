@@ -475,7 +475,7 @@ RUNS = (
         "OUT: expected .* interrupted run",
         text("OUT/checkpoint.safetensors", "x"),
     ),
-    Row("too few frames for a batch", TRAIN, "dataset: expected at least one batch of 6", frames()),
+    Row("too few frames for a batch", TRAIN, "--data: expected at least one batch of 6", frames()),
     Row(
         "a checkpoint whose header is a list",
         f"{TRAIN} --resume",
