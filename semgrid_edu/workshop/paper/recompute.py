@@ -27,6 +27,9 @@ TOLERANCE = 1e-9
 NOTHING = "nothing"
 """Shown for a part that is missing."""
 
+MOST_SEEDS = 1000
+"""The largest number of seeds that `semgrid-edu reproduce` takes."""
+
 
 def check_results(folder: Path, echo: Callable[[str], None]) -> bool:
     """Compute all results in a folder again, and name what differs; return whether nothing does.
@@ -69,7 +72,7 @@ def differences_in(folder: Path, name: str) -> Iterator[str]:
     counted = RunCounts(counts)
     experiment = EXPERIMENTS[name]
     size = written.get("scale"), written.get("seeds")
-    if not isinstance(size[0], str) or type(size[1]) is not int or size[1] < 1:
+    if not isinstance(size[0], str) or type(size[1]) is not int or not 1 <= size[1] <= MOST_SEEDS:
         raise DataError(scores, "a result of `semgrid-edu reproduce` with its scale and seeds", f"{size}")
     result = computed_result(name, experiment, scale_named(size[0]), size[1], counted)
     yield from differences(written, json.loads(json.dumps(result)), scores.name)  # as it comes back from its file

@@ -121,7 +121,7 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
     if not sources:
         raise DataError(folder / "src" / "exercises", "the sources of the exercises", "none")
     marker = directory / MARKER
-    before = read_json(marker) if marker.exists() else {}
+    before = _read_marker(marker) if marker.exists() else {}
     lectures = before.get("lectures", "") if lectures is None else lectures
     digests, kept = _write_unless_changed(directory, _course_files(folder, sources, lectures), before.get("files", {}))
     names = [source.stem for source in sources]
@@ -132,6 +132,15 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
         for name in names:
             _release(api, name, directory / "source" / name)
     return BuiltCourse(names, kept)
+
+
+def _read_marker(path: Path) -> dict:
+    """Return what an earlier build wrote down, after checking the types of what the next one reads."""
+    before = read_json(path)
+    for name, kind in (("lectures", str), ("files", dict), ("salt", str)):
+        if not isinstance(before.get(name, kind()), kind):
+            raise DataError(path, f"{name} as `course build` writes it", repr(before[name])[:200])
+    return before
 
 
 def _check_folder(directory: Path) -> None:
