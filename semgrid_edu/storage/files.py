@@ -119,7 +119,7 @@ def named_errors(path: str | Path) -> Iterator[None]:
         raise
 
 
-def kind_of(path: str | Path) -> str:
+def found_at(path: str | Path) -> str:
     """Return what has a name, as an error says it: "a folder", or "no such file".
 
     Parameters
@@ -152,7 +152,7 @@ def check_writable(path: str | Path) -> None:
     """
     path = Path(path)
     if path.exists() and not path.is_file():
-        raise DataError(path, "a file to write", kind_of(path))
+        raise DataError(path, "a file to write", found_at(path))
     _check_takes_files(path.parent)
 
 

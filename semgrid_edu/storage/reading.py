@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage.files import kind_of
+from semgrid_edu.storage.files import found_at
 
 PNG_END = b"\0\0\0\0IEND\xaeB`\x82"
 """The chunk that ends every PNG. Decoders don't notice when it is missing, so a truncated file would pass."""
@@ -27,7 +27,7 @@ def read_bytes(path: Path) -> bytes:
     """
     try:
         if path.exists() and not path.is_file():
-            raise DataError(path, "a file", kind_of(path))
+            raise DataError(path, "a file", found_at(path))
         content = path.read_bytes()
     except FileNotFoundError:
         raise DataError(path, "a file", "nothing there") from None

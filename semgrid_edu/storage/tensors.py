@@ -13,7 +13,7 @@ from safetensors.torch import save
 from torch import Tensor
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage.files import atomic_path, kind_of, write_bytes
+from semgrid_edu.storage.files import atomic_path, found_at, write_bytes
 from semgrid_edu.storage.reading import read_bytes
 
 
@@ -98,7 +98,7 @@ def read_tensors(path: str | Path) -> tuple[dict[str, str], dict[str, Tensor]]:
         Tensors by name, on the CPU.
     """
     if not Path(path).is_file():
-        raise DataError(path, "a safetensors file", kind_of(path))
+        raise DataError(path, "a safetensors file", found_at(path))
     try:
         with safe_open(path, framework="pt") as file:
             return file.metadata() or {}, {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.errors import DataError
-from semgrid_edu.storage.files import kind_of, named_errors, write_text
+from semgrid_edu.storage.files import found_at, named_errors, write_text
 
 LOG = "log.csv"
 """Name of the log's file in the folder of a training run."""
@@ -117,7 +117,7 @@ def read_log(path: str | Path) -> TrainingLog:
     """
     path = Path(path)
     if not path.is_file():
-        raise DataError(path, "the log of a training run", kind_of(path))
+        raise DataError(path, "the log of a training run", found_at(path))
     steps = _steps(path, _lines(path))
     columns = zip(*steps, strict=True) if steps else [()] * len(Step._fields)
     types = (np.int64, np.str_, np.float64, np.float64)

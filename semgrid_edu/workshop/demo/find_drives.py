@@ -13,7 +13,7 @@ from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.errors import DataError
 from semgrid_edu.stages.hints import in_short
-from semgrid_edu.storage.files import kind_of
+from semgrid_edu.storage.files import found_at
 from semgrid_edu.workshop.demo.stages_file import imported
 from semgrid_edu.workshop.paper.datasets.kitti_tracking import KittiTrackingRun
 
@@ -197,7 +197,7 @@ def read_with(reader: str | Path, folder: str | Path) -> FrameSequence:
         raise DataError(
             reader,
             "a Python file with a class derived from FrameSequence",
-            "another file" if reader.is_file() else kind_of(reader),
+            "another file" if reader.is_file() else found_at(reader),
         )
     module = imported(reader)
     classes = [

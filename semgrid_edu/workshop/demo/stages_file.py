@@ -10,7 +10,7 @@ from types import ModuleType
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.stages import REMEMBER, STAGES, Stages
 from semgrid_edu.stages.hints import in_short
-from semgrid_edu.storage.files import kind_of
+from semgrid_edu.storage.files import found_at
 
 MADE_BY = {
     "scores": ("segment",),
@@ -124,7 +124,7 @@ def load_stages(path: str | Path) -> Stages:
     path = Path(path)
     names = ", ".join(STAGES | REMEMBER)
     if path.suffix != ".py" or not path.is_file():
-        found = "another file" if path.is_file() else kind_of(path)
+        found = "another file" if path.is_file() else found_at(path)
         raise DataError(path, f"a Python file with functions named {names}", found)
     module = imported(path)
     found = {name: getattr(module, name) for name in STAGES | REMEMBER if hasattr(module, name)}
