@@ -404,10 +404,9 @@ assert recalls["pedestrian"] == [1, 1]
 # %% [markdown]
 # The map gets 92 % of the labelled cells right. Always saying *road* gets 72 %, so look at such a number only beside
 # its lazy rival. The CRF made the map tidier and worse: half of the sidewalk, a fifth of the cars and most of the
-# bicycle are lost, while no other class loses. It also became surer of itself. And a warning:
-# this network has learned from this very street. It shows what the stages do, not how good they would be on yours.
-# Lecture [12](12_experiments.ipynb) measures on streets that a network hasn't seen, and [13](13_real_drive.ipynb) on
-# your own.
+# bicycle are lost, while no other class loses. It also became surer of itself. And a warning: this network has learned
+# from this very street. It shows what the stages do, not how good they would be on yours. Lecture
+# [12](12_experiments.ipynb) measures on streets that a network hasn't seen, and [13](13_real_drive.ipynb) on your own.
 #
 # So an accuracy is a number about labelled cells. What about the others?
 #
@@ -434,8 +433,7 @@ assert (people & labelled).sum() < 20
 # %% [markdown]
 # All ten are found: a recall of 100 %. But the map calls more than 200 cells *pedestrian*, an area of fifty square
 # metres; after the CRF about 160 are left. Almost all of these cells have no label, so neither pixel accuracy nor
-# recall nor IoU counts them.  **No number over labelled cells can see what a map
-# invents elsewhere.**
+# recall nor IoU counts them. **No number over labelled cells can see what a map invents elsewhere.**
 #
 # Why does the map, before the CRF, invent people? A first suspect is the image: perhaps the few pixels that look like a
 # person are smeared along their rays, like the cars on the planes. Switch that off. Paint every person out: the pixels

@@ -9,7 +9,7 @@
 # - read the shapes of a network, and say how far one pixel sees;
 # - unpool by indices, add a skip and convolve with holes on a few numbers;
 # - test a claim about an architecture with a control, over several seeds;
-# - name the fault that each of three marks can't see, and say when a mark measures memory.
+# - name the fault that each of three metrics can't see, and say when a metric measures memory.
 #
 # **Prerequisites.** Lecture [06](06_planes.ipynb): a loss, one step of descent, bilinear sampling. You need no deep
 # learning.
@@ -551,14 +551,14 @@ def judge(classes):
     """Return in per cent pixel accuracy, class accuracy, mean IoU and pedestrian's IoU, and its calls per true one."""
     counts = metrics.confusion_matrix(truths, classes, 14)
     iou = metrics.class_iou(counts)
-    marks = metrics.pixel_accuracy(counts), metrics.class_accuracy(counts), np.nanmean(iou), iou[PEDESTRIAN]
-    return np.append(100 * np.array(marks), counts[:, PEDESTRIAN].sum() / counts[PEDESTRIAN].sum())
+    found = metrics.pixel_accuracy(counts), metrics.class_accuracy(counts), np.nanmean(iou), iou[PEDESTRIAN]
+    return np.append(100 * np.array(found), counts[:, PEDESTRIAN].sum() / counts[PEDESTRIAN].sum())
 
 
 widths = lecture_07_pictures.widths_across(truths == lecture_07_pictures.SIGNAGE)
 thin_sign, wide_sign = (widths > 0) & (widths < 3), widths > 4
 rows = lecture_07_pictures.class_of_each_row(truths)
-marks = {name: judge(found) for name, found in classes.items()}
+judged = {name: judge(found) for name, found in classes.items()}
 baseline = np.broadcast_to(rows[:, None], truths.shape)
 print("            pixels classes  IoU [%]   signage thin, wide [%]")
 for name, found in (classes | {"baseline": baseline}).items():
@@ -566,7 +566,7 @@ for name, found in (classes | {"baseline": baseline}).items():
     print("{:<12}{:6.0f} {:7.0f} {:4.0f}  {:14.0f} {:7.0f}".format(name, *judge(found)[:3], *recalls))
     assert name == "baseline" or recalls[0] < 33 < 39 < recalls[1]
 print(f"\npedestrian: {np.sum(truths == PEDESTRIAN)} pixels, called per true one:", end="")
-print("".join(f" {name} {marks[name][4]:.1f}" for name in marks))
+print("".join(f" {name} {judged[name][4]:.1f}" for name in judged))
 
 # %% [markdown]
 # Each network misses at least two thirds of thin signage, and finds more of wide signage. This doesn't prove that
@@ -576,7 +576,7 @@ print("".join(f" {name} {marks[name][4]:.1f}" for name in marks))
 # four times, as our poles did. So try the cure of above backwards: take log 4 off the score of *pedestrian*. For
 # comparison, forbid the class altogether: now the network is blind to pedestrians.
 #
-# **Predict before you run.** Which of the three marks rises for the cure and falls for the blindness?
+# **Predict before you run.** Which of the three metrics rises for the cure and falls for the blindness?
 #
 # <details><summary>Answer</summary>
 #
@@ -591,9 +591,9 @@ for name, found in scores.items():
         changed = found.clone()
         changed[:, PEDESTRIAN] -= minus
         after = judge(changed.argmax(dim=1).numpy())
-        gain = after - marks[name]
+        gain = after - judged[name]
         print(f"{name:<11}{change}: pixels {gain[0]:+.1f}, classes {gain[1]:+.1f}, IoU {gain[2]:+.1f}; ", end="")
-        print(f"pedestrian's IoU {marks[name][3]:.0f} -> {after[3]:.0f}")
+        print(f"pedestrian's IoU {judged[name][3]:.0f} -> {after[3]:.0f}")
         assert gain[0] > -0.2 > gain[1]
         assert (gain[2] > 0) == (change == "log 4 off")
 
@@ -615,8 +615,8 @@ assert right.any(axis=(1, 2)).tolist() == [False, False, False, True, True]
 
 # %% [markdown]
 # In pixel accuracy a network that is blind to pedestrians is about as good as a cured one. IoU tells them apart,
-# because it counts what is missed *and* what is called falsely. So before you trust a mark, know what it can't see. And
-# know how little it may rest on: FCN's cured pedestrians are all in two of the five images.
+# because it counts what is missed *and* what is called falsely. So before you trust a metric, know what it can't see,
+# and how little it may rest on: FCN's cured pedestrians are all in two of the five images.
 #
 # Was the weight the cause? Bicycles are rare, too, so the same should help them. It doesn't: their IoU falls to about
 # half, or far lower. So the weight isn't the whole cause.
@@ -648,7 +648,7 @@ _ = interact(show, off=FloatSlider(value=1.4, min=0, max=4, step=0.2))
 # plenty, and go on from there. Here the first task was to name what is on a photograph (*ImageNet*).
 #
 # We gave a pretrained encoder a fresh decoder, and trained both on 24 images of a real street, in 100 steps. Only
-# pixels that the lidar hit have a label. Four of the car's cameras teach, the two others test; three rounds leave out
+# pixels that the LIDAR hit have a label. Four of the car's cameras teach, the two others test; three rounds leave out
 # each camera once. The control has ImageNet's weights *shuffled* within each layer: the same numbers, the same step
 # sizes, but no knowledge.
 

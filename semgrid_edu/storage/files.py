@@ -120,12 +120,17 @@ def named_errors(path: str | Path) -> Iterator[None]:
 
 
 def found_at(path: str | Path) -> str:
-    """Return what has a name, as an error says it: "a folder", or "no such file".
+    """Return what is at a path, in the words of an error.
 
     Parameters
     ----------
     path : path-like
-        The name.
+        The path.
+
+    Returns
+    -------
+    str
+        "a file", "a folder", "a pipe, a socket or a device" or "no such file".
     """
     path = Path(path)
     if path.is_file():

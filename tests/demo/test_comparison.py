@@ -230,7 +230,7 @@ class TestMistakes:
         stages = write(tmp_path, "def refine(log_g, o): return log_g[14]\n")
         with pytest.raises(StageError, match=r"^refine \(my_stages.py, line 2\), frame 0: .* IndexError"):
             write_demo(drive, sample_weights(), tmp_path / "out", stages)
-        assert list((tmp_path / "out").iterdir()) == []
+        assert not (tmp_path / "out").exists()
 
     def test_names_are_escaped(self):
         comparison = Comparison("<b>.py", ("track",))

@@ -73,9 +73,8 @@ def evaluate(
     (drive, _), *_ = index.drives("test")
     if described.label_set != index.label_set.name:  # what can't be scored is found before the data are prepared
         raise DataError(weights, f"a network for {index.label_set.name}", f"one for {described.label_set}")
-    load_net(weights, drive.camera)
+    net = load_net(weights, drive.camera.resized(size))
     training, test = (TrainingSet(dataset_dir, split, described.grid, size) for split in ("train", "test"))
-    net = load_net(weights, test.camera)
     segmenters = {"end-to-end": net.segmenter}
     if image_stage.exists():
         segmenters["image-stage"] = load_net(image_stage, test.camera).segmenter
