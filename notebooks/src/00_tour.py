@@ -635,11 +635,12 @@ assert abs(moved).max() < 0.25  # less than half a cell, so it is the same place
 # So a right word in one cell may be luck. The page that `semgrid-edu demo --open` writes tells this story for each cell
 # at a click.
 #
-# To be fast, the system simplifies. Five times the course also computes the exact answer, on a small world:
+# To be fast, the system simplifies. Six times the course also computes the exact answer, on a small world:
 #
 # - two beams that share an error count as two independent witnesses (lecture [02](02_grids.ipynb));
 # - two things that may have moved into one cell don't know of each other ([03](03_bof.ipynb));
 # - random particles stand for all places and velocities ([04](04_cmcdot.ipynb));
+# - each cell on a pixel's ray believes the pixel as if it were alone ([05](05_pixels.ipynb));
 # - neighbours in the CRF are treated as if they were independent ([10](10_crf.ipynb));
 # - classes are forgotten from one frame to the next ([14](14_memory.ipynb)).
 #

@@ -9,7 +9,7 @@
 # - read in a graph what is independent of what, before and after something has been seen;
 # - say what changes when a graph has no arrows;
 # - choose an order of summation, and say why the filter of lecture 01 is one half of message passing;
-# - read the three graphs on which this course is built.
+# - read the three kinds of graph of which this course is built.
 #
 # **Prerequisites.** Lecture [01](01_bayes.ipynb): predict, update, smoothing. Conditional probability; numpy.
 #

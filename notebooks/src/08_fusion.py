@@ -130,8 +130,10 @@ assert round(scores["always road"][0]) == 49
 assert min(np.subtract(scores["shipped network"], table)) > 10
 
 # %% [markdown]
-# So 79 % accuracy and 50 % class accuracy are the numbers to beat. The shipped network beats them by far. It knows two
-# things that the table doesn't: all planes, not only the ground, and the cells around. Which of the two is it?
+# So 79 % accuracy and 50 % class accuracy are the numbers to beat. The shipped network beats them by far on this one
+# street; lecture [12](12_experiments.ipynb) asks 110 streets, and there a network that learned from worse labels is
+# hardly ahead of a table. Ours knows two things that the table doesn't: all planes, not only the ground, and the cells
+# around. Which of the two is it?
 #
 # ## How do 280 numbers become a few?
 #
@@ -563,7 +565,8 @@ assert abs(accuracy["height rule"][1] - accuracy["network: o, heights"][1]) < 0.
 
 # %% [markdown]
 # The first three learn next to nothing. The **height rule** measures how far the highest return in a cell is above the
-# ground. Up to 25 cm it says road, because a kerb is lower; up to 2.2 m car, because few cars are higher; else building.
+# lowest one nearby. Up to 25 cm it says road, because a kerb is lower; up to 2.2 m car, because few cars are higher;
+# else building.
 # A *forest* is a vote of many decision trees; it looks at one cell. The others are fusion networks. Each learns from
 # what its name says.
 #
@@ -571,8 +574,9 @@ assert abs(accuracy["height rule"][1] - accuracy["network: o, heights"][1]) < 0.
 # heights it adds between nothing and three points. Beside heights we can't tell: both intervals hold zero.
 #
 # And the LIDAR alone is strong. A rule with two thresholds is as accurate as the best network in this list, and the
-# forests are a point or two ahead of both. In class accuracy the rule is behind, because it knows three classes only. Heights add more to a network with only $o$ than the image
-# does, though six cameras at one corner leave wide intervals.
+# forests are a point or two ahead of both. In class accuracy the rule is behind, because it knows three classes only.
+# Heights add more to a network with only $o$ than the image does, though six cameras at one corner leave wide
+# intervals.
 #
 # Why? $o$ says *that* something is there, not how high it is. **$o$ forgets height.** If that is a reason, methods with
 # $o$ alone must take buildings for cars, and with heights this error must go:

@@ -95,38 +95,6 @@ FAULTS: dict[str, Fault] = {
 """Every fault by name."""
 
 
-def geometry_readings(
-    frames: Sequence[Frame], every: int = 4, thin: int = 1, turns: NDArray = YAWS
-) -> dict[str, float]:
-    """Return the readings of the checks that don't judge colours.
-
-    Parameters
-    ----------
-    frames : sequence of Frame
-        Successive frames with scans and images, more than five.
-    every : int
-        Images and ground are checked in each frame of this number.
-    thin : int
-        As `axes_errors` takes it.
-    turns : (n,) float
-        Turns of the camera that are tried, degrees.
-
-    Returns
-    -------
-    dict of str to float
-        "gaps", "yaw", "tilt" and "motion", as `drive_readings` returns them.
-    """
-    some = frames[::every]
-    contrast = np.mean([edge_contrast(frame, turns) for frame in some], axis=0)
-    errors = checks.axes_errors(frames, thin=thin)
-    return {
-        "gaps": float(len(checks.time_gaps([frame.time for frame in frames]))),
-        "yaw": float(turns[contrast.argmax()]),
-        "tilt": float(np.mean([checks.ground_plane(frame.points, frame.camera.lidar_height).pitch for frame in some])),
-        "motion": errors["as the poses say"] - min(errors.values()),
-    }
-
-
 def drive_readings(frames: Sequence[Frame], known: dict[str, NDArray], every: int = 4) -> dict[str, float]:
     """Return the reading of every check on a drive.
 
@@ -148,5 +116,13 @@ def drive_readings(frames: Sequence[Frame], known: dict[str, NDArray], every: in
         variation 0..1.
     """
     frames = checks.with_scan(frames)
-    seen = mean_histograms([frame.need_image() for frame in frames[::every]])
-    return geometry_readings(frames, every) | {"colours": colour_distance(seen, known)}
+    some = frames[::every]
+    contrast = np.mean([edge_contrast(frame, YAWS) for frame in some], axis=0)
+    errors = checks.axes_errors(frames)
+    return {
+        "gaps": float(len(checks.time_gaps([frame.time for frame in frames]))),
+        "yaw": float(YAWS[contrast.argmax()]),
+        "tilt": float(np.mean([checks.ground_plane(frame.points, frame.camera.lidar_height).pitch for frame in some])),
+        "motion": errors["as the poses say"] - min(errors.values()),
+        "colours": colour_distance(mean_histograms([frame.need_image() for frame in some]), known),
+    }

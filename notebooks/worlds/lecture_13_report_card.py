@@ -18,7 +18,7 @@ from worlds import lecture_13_checks as checks
 from worlds.lecture_13_faults import YAWS, image_mirrored
 from worlds.lecture_13_scan_borders import edge_contrast
 
-TURNED, LEANS, SHIFTED, FARTHER, OVERSURE = 0.5, 1.0, 0.05, 3.0, 0.05
+TURNED, LEANS, SHIFTED, FARTHER, OVERSURE = 0.5, 1.0, 0.05, 1.0, 0.05
 """Limits: a camera turned by more (degrees), ground that leans by more (degrees), a motion that fits worse than another
 by more (metres), ground that comes into view later by more (metres), probabilities that are further from the shares of
 right cells."""

@@ -22,6 +22,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.storage.files import shipped_folder
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 from semgrid_edu.workshop.course.street import (
     PIECE,
     best_table,
@@ -108,9 +109,22 @@ def test_the_card_of_the_real_street_and_of_one_with_a_turned_camera():
     assert {check for check in sound if sound[check] != turned[check]} == {"borders"}
 
 
-def test_the_motion_of_the_drive_that_is_not_shipped_was_found_right():
+def test_the_lectures_box_says_what_was_measured_on_the_drive_that_is_not_shipped():
     measured = json.loads((shipped_folder("docs") / "results" / "real_drive.json").read_text(encoding="utf-8"))
-    assert motion_verdict(measured["drives"]["stretch 1"]["axes"]) is True
+    one = measured["drives"]["stretch 1"]
+    speed, late = one["metres"] / one["seconds"], one["delay ms"]["image_02"]
+    assert motion_verdict(one["axes"]) is True
+    numbers = [
+        f"at {speed:.0f} m/s",
+        f"images come {late:.0f} ms",
+        f"moves by {speed * late / 10:.0f} cm",
+        f"best at {measured['faults']['stretch 1']['none']['yaw']:.2f}°",
+        f"{one['axes']['as the poses say']:.2f} m as the poses say",
+        f"{one['axes']['left and right swapped']:.2f} m mirrored",
+    ]
+    source = (NOTEBOOKS / "src" / "13_real_drive.py").read_text(encoding="utf-8")
+    box = " ".join(line.removeprefix("# > ") for line in source.splitlines() if line.startswith("# > "))
+    assert [number for number in numbers if number not in box] == []
 
 
 def test_a_map_that_is_right_beats_trivial_ones_and_one_that_is_wrong_does_not():

@@ -3,9 +3,9 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from worlds.lecture_10_crf import UNDECIDED, all_free, coupled, crf_stage, two_classes
+from worlds.lecture_10_crf import UNDECIDED, all_free, coupled, crf_stage, sampled_marginals, two_classes
 
-from semgrid_edu.crf import CrfParams, crf_model, exact_marginals, mean_field_naive
+from semgrid_edu.crf import CrfParams, crf_model, exact_marginals, mean_field_naive, pair_weights
 from semgrid_edu.graphical import d_separated, mean_field_graph
 
 
@@ -38,3 +38,12 @@ def test_every_pair_has_a_line_of_its_own(shape):
     assert len({tuple(np.round(place, 6)) for place in stage.positions.values()}) == len(stage.positions)
     assert not d_separated(stage.model, "x1", "x2", given=[f"x{k}" for k in range(3, cells + 1)])
     plt.close(stage.draw().figure)
+
+
+def test_gibbs_sampling_tends_to_the_exact_marginals():
+    rng = np.random.default_rng(1)
+    unary, values = rng.normal(size=(3, 2, 2)), rng.dirichlet(np.ones(4), (2, 2)).transpose(2, 0, 1)
+    params = CrfParams(w_bilateral=1.0, w_spatial=0.5)
+    prices = pair_weights(values, params)
+    drawn = sampled_marginals(unary.reshape(3, 4), prices, np.zeros(4, dtype=int), sweeps=6000)
+    np.testing.assert_allclose(drawn.reshape(3, 2, 2), exact_marginals(unary, values, params), atol=0.015)

@@ -27,6 +27,8 @@ def test_the_lectures_numbers_are_those_of_the_results(measured):
         others = measured["scores"][name]["pixel accuracy"]
         assert [round(100 * others[key]) for key in ("mean", "low", "high")] == [*reached[:3]]
         assert round(100 * measured[imagenet.OWN][name]) == reached.own
+    longer = [measured["scores"][Run(FRESH, 24, steps, False).name]["pixel accuracy"]["mean"] for steps in (100, 300)]
+    assert tuple(round(100 * mean) for mean in longer) == pretrained.LONGER
     rows = measured["scores"]["the most frequent class of each row"]["pixel accuracy"]["mean"]
     assert round(100 * rows) == pretrained.ROWS
     added = measured["scores"][Run(IMAGENET, 24, 100, True).name]["above fresh weights"]["pixel accuracy"]

@@ -33,6 +33,12 @@ def test_what_is_shared_is_outvoted_less(found):
     assert shared[-1] / shared[0] > own[-1] / own[0]
 
 
+def test_a_wide_margin_is_changed_less_and_one_vote_alone_doesnt_see_it(found):
+    one_vote, all_votes = found["each return by itself"].by_margin.T
+    assert all_votes[-1] < 0.1 * all_votes[0]
+    assert one_vote.mean() == pytest.approx(RATE, abs=0.02)
+
+
 def test_all_cells_are_those_of_one_class_and_of_several(found):
     for votes in found.values():
         one, several, of_all = votes.changed
