@@ -57,13 +57,13 @@ assert (table1["seeds"], frames, drives) == (5, 110, 110)
 # Most crosses are far outside our bars: the paper's streets, labels and networks are others, and a bar doesn't cover
 # that.
 #
-# The paper ranks its networks by such crosses: SegNet has 81.1 % pixel accuracy, FCN 79.8 %. Would another training run
-# give the same order? Would other streets? A cross can't answer that. A bar can, if it is made well.
+# The paper ranks its networks by such crosses. Would another training run give the same order? Would other streets? A
+# cross can't answer that. A bar can, if it is made well.
 #
 # ## What makes two measurements of one method differ?
 #
 # A training run starts from random weights and sees its frames in random order: the **seed** decides. Some streets are
-# harder than others: the **drive** decides. Each frame of a drive adds its own small difference. As a graphical model:
+# harder than others: the **drive** decides. Each frame adds its own small difference. As a graphical model:
 
 # %% tags=["graph"] jupyter={"source_hidden": true} alt="a directed graph with overlapping plates: the seed's quality u in a plate of S seeds and the drive's difficulty d in a plate of V drives both point to y, which lies in both plates and in a third one of F frames"
 coin = [0.5, 0.5]
@@ -113,7 +113,7 @@ assert not d_separated(toy, "y11", "y21")  # the seed isn't known: the first fra
 
 # %% [markdown]
 # If one frame is right, its drive is probably easy. So frames of one drive repeat each other. Frames of two drives
-# don't if we know the run. If we don't, the third line shows that they share one more cause, the seed.
+# don't if we know the run. If we don't, they share one more cause, the seed.
 #
 # ## What do we count: cells, frames or drives?
 #
@@ -417,18 +417,17 @@ balancing = ahead["effect of balancing"]
 assert [round(100 * balancing[m]["mean"]) for m in ("pixel accuracy", "class accuracy")] == [-2, 15]
 
 # %% [markdown]
-# **By true labels and over all cells, SegNet's pixel accuracy can't be told from a lookup table's.** In class accuracy
-# SegNet is ahead.
+# **By true labels and over all cells, SegNet's pixel accuracy can't be told from a lookup table's.**
 #
 # Where does its lead in class accuracy come from? We suspect the balanced loss of lecture [08](08_fusion.ipynb), which
 # gives rare classes more weight. So switch it off. In the third row SegNet learned without balancing, with three seeds.
 # The lead in class accuracy is gone, and SegNet is ahead by a point of pixel accuracy. The last row is the effect of
-# balancing alone: it brings 15 points of class accuracy and costs two of pixel accuracy. A table could be balanced,
-# too; that fair rival we haven't tried.
+# balancing alone: it brings 15 points of class accuracy and costs two of pixel accuracy. A balanced table we haven't
+# tried.
 #
-# Over cells with a *semantic* class, such as road or car, SegNet's pixel accuracy is 2.4 points above the lookup
-# table's, and 1.7 above the table's of place. (In lecture 08 a network was 14 points ahead of a table. It had learned
-# from true labels, and for longer, and one street was scored. Which of these matters, we haven't tried.) By the imperfect labels that the LIDAR made, it is five points ahead of
+# Over cells with a *semantic* class, SegNet's pixel accuracy is 2.4 points above the lookup table's, and 1.7 above the
+# table's of place. (In lecture 08 a network was 14 points ahead of a table: on one street, after
+# more steps on true labels. What matters, we haven't tried.) By the imperfect labels that the LIDAR made, it is five points ahead of
 # the lookup table, but only 1.4 ahead of the table of *place*. So a score needs the best baseline for the same labels
 # and cells.
 #
@@ -534,8 +533,7 @@ plt.show()
 # %% [markdown]
 # Reproduced: all twelve intervals are on the claimed side. But these networks learned from labels that the LIDAR made.
 # For SegNet that learned from true labels, the rule can't tell: judged by true labels, its pixel accuracy changes by
-# -0.2 to 0.6. No statement tests *slightly*. And all streets here are simulated: on the real one of lecture 00 the CRF
-# lowers pixel accuracy, too.
+# -0.2 to 0.6. No statement tests *slightly*. And on the real street of lecture 00 the CRF lowers pixel accuracy, too.
 #
 # **Claim 5: closer objects are estimated better than distant ones.** Of the cells with a semantic class, a larger share
 # should be called right *near* (up to 20 m) than *farther* (up to 40 m), and there than *beyond*. Both are

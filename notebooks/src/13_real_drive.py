@@ -329,9 +329,8 @@ draw(diagnosis, ax, observed=("R", "W"), labels=names, positions=places)
 plt.show()
 
 # %% [markdown]
-# The numbers in the cell are made up, the arrows aren't: a sloping street doesn't make walls lean. A leaning LIDAR leaves the
-# ground level in 5 % of cases, a sloping street in 20 %, both together in 1 %, as if each acted by itself (a **noisy
-# or**). With no cause it rises in 2 %.
+# The numbers in the cell are made up, the arrows aren't: a sloping street doesn't make walls lean. Each cause may leave
+# the ground level, as if it acted by itself (a **noisy or**).
 #
 # With the ground rising, the four combinations of (L, S) weigh 0.95 · 0.7 · 0.02 = 0.0133 (neither), 0.0333 (L alone),
 # 0.2291 (S alone) and 0.0149 (both). So P(L | R) = (0.0333 + 0.0149) / 0.2906 = 0.17, and P(S | R) = 0.84.
@@ -768,8 +767,8 @@ plt.show()
 
 # %% [markdown]
 # The right half can be learned, but not from the left. Is it because the left half has no wall, and hardly a hedge? We
-# repeated the lesson on the right without its labels of building and vegetation: 47 % in place of 73. So most of what the
-# right half teaches is wall and hedge. Without the margin, the lesson on the left seems to help on the right, by 5 points.
+# repeated the lesson on the right without its labels of building and vegetation: 47 % in place of 73. So most of it is
+# wall and hedge. Without the margin, the lesson on the left seems to help on the right, by 5 points.
 # All of that gain is in the strip beside the border.
 #
 # **Test in places that differ from your lesson as much as the places where you will use the map.**
