@@ -9,7 +9,9 @@ import json
 import os
 import shutil
 import socket
+import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
@@ -64,6 +66,13 @@ def a_class(root: Path) -> None:
     """Make what looks like a course with one exercise, and without a gradebook."""
     text("CLASS/semgrid_course.json", "{}")(root)
     (root / "CLASS" / "source" / "01_bayes").mkdir(parents=True)
+
+
+def a_foreign_database(path: Path) -> None:
+    """Make a database of another program."""
+    with closing(sqlite3.connect(path)) as database:
+        database.execute("CREATE TABLE birds (name TEXT)")
+        database.commit()
 
 
 def change(name: str, old: str, new: str) -> Spoil:
@@ -666,6 +675,12 @@ COURSE = (
         "gradebook.db: expected nbgrader's gradebook, .* found another file",
         lambda root: (a_class(root), text("CLASS/gradebook.db", "a,b\n")(root)),
     ),
+    Row(
+        "a gradebook that is another program's",
+        "course grade CLASS",
+        "gradebook.db: expected nbgrader's gradebook, .* found another file",
+        lambda root: (a_class(root), a_foreign_database(root / "CLASS" / "gradebook.db")),
+    ),
 )
 
 EXPERIMENTS = (
@@ -729,6 +744,15 @@ EXPERIMENTS = (
         TABLE1,
         "ended.json: expected the record",
         text("RUNS/data-quickkitti/ended.json", '{"seconds": "long", "date": "x"}'),
+    ),
+    *(
+        Row(
+            f"a run's record with {seconds} seconds",
+            TABLE1,
+            f"ended.json: expected the record .* found {seconds.lower()}",
+            text("RUNS/data-quickkitti/ended.json", f'{{"seconds": {seconds}, "date": "x"}}'),
+        )
+        for seconds in ("-1.0", "NaN")
     ),
     Row("1000 workers for runs", TABLE1.replace(" --plan", " --workers 1000"), "--workers: expected .*, found 1000"),
     Row("no seeds", f"{TABLE1} --seeds 0", "Invalid value for '--seeds'"),
@@ -815,6 +839,7 @@ REFUSED_FIRST = (
     Row(
         "ImageNet weights for U-Net", f"{TRAIN} --segmenter unet --imagenet a", "segmenter: expected one with published"
     ),
+    Row("an index in its scene", "data index TINY/002 --pandaset TINY --scene 002", "expected a folder outside"),
     Row("an index over another", "data index TINY --pandaset NONE", "dataset.json: expected no data set yet"),
     Row("an argument to the list of data", "data list all", "unexpected extra argument"),
 )

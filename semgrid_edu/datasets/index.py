@@ -196,7 +196,8 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
     ArgumentError
         When the scene isn't a plain name, there is no such camera, or none is left to train on.
     DataError
-        When there is no such scene, its returns have no labels, or there is a dataset.json already.
+        When there is no such scene, its returns have no labels, the folder is inside the scene, or there is a
+        dataset.json already.
     """
     if Path(scene).name != scene:
         raise ArgumentError("scene", "the name of a folder such as 002", repr(scene))
@@ -204,6 +205,8 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
     splits = {"train": [], "test": []}
     if path.exists():
         raise DataError(path, "no data set yet", "one that would be lost")
+    if (Path(root) / scene).resolve() in (Path(folder).resolve(), *Path(folder).resolve().parents):
+        raise DataError(folder, f"a folder outside the scene {scene}", "one inside it")
     there = [camera for camera in CAMERAS if (Path(root) / scene / "camera" / camera).is_dir()] or CAMERAS
     for camera in dict.fromkeys([*there, *test_cameras]):
         drive = PandasetScene(root, scene, camera)

@@ -1,6 +1,7 @@
 """One unit of an experiment's work, done once in its own folder, and plans made of such units."""
 
 import json
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import MISSING, dataclass, fields, is_dataclass
@@ -120,9 +121,12 @@ def checked_record(path: str | Path, record: object) -> dict:
         When it is something else.
     """
     try:
-        return record | {"seconds": float(record["seconds"]), "date": str(record.get("date", "unknown"))}
+        checked = record | {"seconds": float(record["seconds"]), "date": str(record.get("date", "unknown"))}
     except (ValueError, KeyError, TypeError, OverflowError, AttributeError) as error:
         raise DataError(path, "the record of a run that has ended", error) from error
+    if not 0 <= checked["seconds"] < math.inf:
+        raise DataError(path, "the record of a run that has ended", f"{checked['seconds']} seconds")
+    return checked
 
 
 def _unusual(thing: object) -> object:

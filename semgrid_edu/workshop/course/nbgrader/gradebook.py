@@ -4,8 +4,9 @@ import codecs
 import csv
 import io
 import shutil
+import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
@@ -260,9 +261,15 @@ def open_gradebook(course: Path) -> Gradebook:
         When it is another kind of file.
     """
     path = course / "gradebook.db"
-    with path.open("rb") as file:
-        if file.read(15) != b"SQLite format 3":
-            raise DataError(path, "nbgrader's gradebook, as `semgrid-edu course build` writes it", "another file")
+    path.open("rb").close()  # the plain error, if there is none
+    # nbgrader adds its tables to whatever it opens, so look first; "immutable" waits for no lock.
+    with closing(sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)) as database:
+        try:
+            tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master")}
+        except sqlite3.DatabaseError:
+            tables = set()
+    if "submitted_notebook" not in tables:
+        raise DataError(path, "nbgrader's gradebook, as `semgrid-edu course build` writes it", "another file")
     return Gradebook(f"sqlite:///{path}")
 
 
