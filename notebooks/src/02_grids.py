@@ -10,7 +10,8 @@
 # - choose a clamp, and predict the smear behind a moving car;
 # - test an explanation by switching off its cause.
 #
-# **Prerequisites.** Lecture [01](01_bayes.ipynb): Bayes' rule, and when two scans are independent. Logarithms.
+# **Prerequisites.** Lectures [01](01_bayes.ipynb), Bayes' rule, and [01b](01b_graphical_models.ipynb), how to read a
+# graph. Logarithms.
 #
 # **Time.** 75 minutes, of which the computer needs less than one.
 #

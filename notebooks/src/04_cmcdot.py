@@ -526,7 +526,7 @@ print(f"bias {error.bias:.3f}; sampling error with 10 particles {error.to_bof[0]
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, the street after 2 s in two runs with 3,000 particles: in both the front of the car is orange; the person is half orange in one and mostly dark in the other; right, dots for 24 seeds and their mean: of the car 42, 83, 92 per cent are DYNAMIC at 300, 3,000 and 30,000 particles, of the person 17, 49, 80; with 3,000 the dots of the person spread from 5 to 86"
+# %% jupyter={"source_hidden": true, "outputs_hidden": true} alt="left, the street after 2 s in two runs with 3,000 particles: in both the front of the car is orange; the person is half orange in one and mostly dark in the other; right, dots for 24 seeds and their mean: of the car 42, 83, 92 per cent are DYNAMIC at 300, 3,000 and 30,000 particles, of the person 18, 50, 81; with 3,000 the dots of the person spread from 5 to 86"
 luck = lecture_04_crossing.luck()
 fig, axes = plt.subplots(1, 3, figsize=(9.6, 4.1), layout="constrained", width_ratios=(1, 1, 1.5))
 for ax, seed in zip(axes, (0, 3), strict=False):

@@ -6,7 +6,7 @@
 #
 # | task | about | points |
 # |---|---|---|
-# | 1 | three cells and one beam, exactly; the price of the cut | 2 + 1 + 2 |
+# | 1 | three cells and one beam, exactly; what it costs to take cells as independent | 2 + 1 + 2 |
 # | 2 | the prior counts once | 2 + 1 |
 # | 3 | a clamp for a given smear | 2 |
 # | 4 | one beam through a grid | 3 + 1 |
@@ -123,7 +123,7 @@ _test()
 #
 # $$ \tfrac12 \sum_m |P(m \mid z) - q(m)|. $$
 #
-# It is 0 when the cut costs nothing, and never more than 1.
+# It is 0 when the cells really are independent, and never more than 1.
 
 
 # %% nbgrader={"grade": false, "grade_id": "price", "locked": false, "schema_version": 3, "solution": true, "task": false}
@@ -152,7 +152,7 @@ def _test():
     # By hand: the marginals are 5/9, so q of "both free" is 16/81; all four differ by 16/81.
     assert np.isclose(got, 32 / 81, atol=1e-4), f"by hand 0.5 * 4 * 16/81 = 0.395, got {got:.3f}"
     apart = np.array([0.7, 0.3])[:, None, None] * np.array([0.4, 0.6])[:, None] * np.array([0.9, 0.1])
-    assert np.isclose(price(apart), 0, atol=1e-9), "three independent cells: cutting what isn't there costs nothing"
+    assert np.isclose(price(apart), 0, atol=1e-9), "three independent cells: their product is the posterior, so it is 0"
     ### BEGIN HIDDEN TESTS
     from semgrid_instructor import grids
 
