@@ -2,7 +2,7 @@
 # # Exercise 02: occupancy grids
 #
 # First you do exactly what a grid does only roughly: three cells and one beam. Then you build a grid of your own, piece by piece, and let it drive down two
-# streets. About 90 minutes. The lecture is [02: occupancy grids](../02_grids.ipynb).
+# streets. About 120 minutes. The lecture is [02: occupancy grids](../02_grids.ipynb).
 #
 # | task | about | points |
 # |---|---|---|
