@@ -393,7 +393,7 @@ plt.show()
 # too far.
 #
 # So a thing is drawn in its place only on the plane of its own height. That is why equation (1) has several planes. A
-# network has to find out which one is right for a cell; lecture [08](08_fusion.ipynb) measures how much it gains.
+# network has to find out which one is right for a cell; lecture [08](08_fusion.ipynb) measures whether that pays.
 #
 # ## What does the image say of hidden cells?
 #

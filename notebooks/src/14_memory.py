@@ -499,7 +499,7 @@ plt.show()
 # P(something there) = P(STATIC) + P(DYNAMIC) + P(UNKNOWN) / 2.
 #
 # The package takes $a$ = 0.7 near the vehicle and half of that far away. Near it, 0.2 would be better by 0.01 nats
-# ([memory.json](../docs/results/memory.json)).
+# ([memory.json](../docs/results/memory.json)). It stays 0.7 here, because all results were measured with it.
 
 # %% jupyter={"source_hidden": true}
 assert measured["worth"]["best"][:4] == [0.2] * 4

@@ -213,8 +213,8 @@ def mean_field(
         Stop as soon as an update changes no probability by more than this.
     pad : int
         Number of cells by which the border is padded (with its own values) before the CRF; cut off afterwards. This
-        asserts that what is at the border goes on outside: a sidewalk of which the grid holds two columns is outvoted
-        by the road as any thin strip is, and kept with a pad of 8 (lecture 10).
+        asserts that what is at the border goes on outside: a sidewalk of which the grid holds two columns, and which
+        the road outvotes as it does any thin strip, becomes wider (lecture 10).
 
     Returns
     -------

@@ -135,8 +135,7 @@ for near, far in ((6, 20), (20, 40), (40, 71)):
     print(f"{near:>2} to {far} m ahead: {band.sum()} cells look into {len(different)} different pixels")
 
 # %% [markdown]
-# So beyond 40 m about eight cells share one pixel. Lecture [06](../06_planes.ipynb) says what it
-# costs when cells that share a pixel count as independent.
+# So beyond 40 m about eight cells share one pixel, and with it its error. They are one witness, not eight.
 #
 # ## A road that climbs, a road that falls
 #

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 05: from grid to pixel
 #
-# Five tasks with small functions around equation (1), and one question to answer in words. About 70 minutes.
+# Five tasks with small functions around equation (1), and one question to answer in words. About 100 minutes.
 # The lecture is [05: from grid to pixel](../05_pixels.ipynb).
 #
 # | task | about | points |

@@ -1,7 +1,7 @@
 # %% [markdown]
 # # Exercise 06: sampling that learns
 #
-# Six small functions: equation (2), two black boxes, a camera that learns, a sparse matrix; and one question in words. About 75 minutes. The lecture is [06: sampling that learns](../06_planes.ipynb).
+# Six small functions: equation (2), two black boxes, a camera that learns, a sparse matrix; and one question in words. About 90 minutes. The lecture is [06: sampling that learns](../06_planes.ipynb).
 #
 # | task | about | points |
 # |---|---|---|

@@ -613,6 +613,7 @@ def _image():
     return np.log(odds), np.array([[0, 0], [255, 1]])
 
 
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "loss-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _LOSS_SLIPS = {
     0.866: "you divide by all four pixels: one isn't labelled, so divide by three",
     3.466: "that is the sum: take the mean over the labelled pixels",

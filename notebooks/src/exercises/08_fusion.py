@@ -268,6 +268,7 @@ def _cells():
     return logits, np.array([[0, 1, IGNORE]]), np.array([1.0, 3.0])
 
 
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "loss-back-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 _BACK_SLIPS = {  # of class 0 in the second cell, by hand 3 * (3/4 - 0) / (1 + 3) = 0.5625
     1.125: "you divide by the number of cells: divide by the sum of their weights",
     0.75: "you divide by the number of cells, unlabelled ones too, or leave the weights out and don't divide",

@@ -264,6 +264,7 @@ def _two_frames():
     return truths, called, learned
 
 
+# %% jupyter={"source_hidden": true} nbgrader={"grade": false, "grade_id": "held-out-hints", "locked": true, "schema_version": 3, "solution": false, "task": false}
 def _held_out_slips(margin):
     """Return the right share, and the shares that slips give, by hint."""
     truths, called, learned = _two_frames()
