@@ -38,8 +38,16 @@ def test_the_camera_beside_rules_without_one():
     above = picked["network, unknown forbidden"]
     assert per_cent(above["pixel accuracy above the height rule"]["mean"]) in page
     assert interval(above["class accuracy above the height rule"]) in page
-    for quoted in (picked["network"]["pixel accuracy"], later["network"]["pixel accuracy"]):
-        assert f"{per_cent(quoted['mean'])} %" in page
+    assert f"{per_cent(picked['network']['pixel accuracy']['mean'])} %" in page
+    sure, unsure, rule, forest = (
+        per_cent(later[name]["pixel accuracy"]["mean"])
+        for name in ("network, unknown forbidden", "network", "height rule", "forest on heights and o")
+    )
+    assert f"it gets {sure} %, or {unsure} if it may answer *unknown*; the rule gets {rule}, and a forest" in page
+    assert f"no image either, {forest}." in page
+    gains = later["network, unknown forbidden"]
+    assert f"{interval(gains['pixel accuracy above the height rule']).replace(' (', ' points (')} in cells" in page
+    assert f"by {interval(gains['class accuracy above the height rule'])} in class accuracy" in page
 
 
 def test_memory():
