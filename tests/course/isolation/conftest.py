@@ -25,7 +25,7 @@ def session(prepared):
 @pytest.fixture(scope="module")
 def harmless(prepared):
     """A notebook for all tests of a module that neither end its process nor change how it works."""
-    session = Session(lambda: StudentProcess(Limits(memory=1000, written=10), prepared), timeout=5)
+    session = Session(lambda: StudentProcess(Limits(memory=1000, written=10), prepared), timeout=60)
     session.left_in_all = 600
     yield session
     session.stop()
