@@ -75,7 +75,8 @@ def stage(folder: Path) -> None:
         f"{index.read_text(encoding='utf-8')}\n```{{toctree}}\n:hidden:\n{contents}\n```\n", encoding="utf-8"
     )
     shutil.copytree(HERE / "pages", folder, dirs_exist_ok=True)
-    shutil.copy(HERE / "conf.py", folder)
+    for name in ("conf.py", "scorer.js"):
+        shutil.copy(HERE / name, folder)
     (folder / "static").mkdir()
     for name in ("site.css", "moving.js", "tex-svg.js"):
         shutil.copy(HERE / name, folder / "static")
