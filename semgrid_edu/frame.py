@@ -168,6 +168,6 @@ def resize_image(image: NDArray[np.uint8], size: tuple[int, int]) -> NDArray[np.
 
     Returns
     -------
-    (*size, 3) uint8
+    (size[0], size[1], 3) uint8
     """
     return np.asarray(Image.fromarray(image).resize(size[::-1], Image.Resampling.BOX))

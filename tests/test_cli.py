@@ -92,6 +92,14 @@ def test_the_version_is_told_everywhere(monkeypatch, capsys):
     )
 
 
+@pytest.mark.parametrize("group", ["", "data", "course", "reproduce"])
+def test_help_says_whole_sentences_and_no_type_of_a_flag(monkeypatch, capsys, group):
+    monkeypatch.setenv("COLUMNS", "80")
+    usage, *lines = said(monkeypatch, capsys, *group.split(), "--help").splitlines()
+    assert usage.startswith("Usage: ")
+    assert [line for line in lines if line.endswith("...") or "bool" in line] == []
+
+
 @pytest.mark.parametrize(("typed", "completed"), [("data m", "make"), ("dem", "demo"), ("data make no", "")])
 def test_shells_complete_commands(typed, completed):
     typing = {"COMP_WORDS": f"semgrid-edu {typed}", "COMP_CWORD": str(len(typed.split()))}

@@ -2,6 +2,7 @@
 
 import json
 import re
+from importlib.util import find_spec
 
 import ipywidgets
 import nbformat
@@ -10,7 +11,7 @@ from check import problems
 from glossary import definition, glossary_page
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 from PIL import Image
-from stage import CLONE, relinked, translated, with_moving_widget
+from stage import CLONE, MODULES, pages, relinked, translated, with_moving_widget
 from widgets import MOST_BYTES, RECORDED, notebooks, values_of
 
 
@@ -95,6 +96,7 @@ def test_the_glossary_quotes_the_sentence_with_the_term():
 def test_every_term_is_in_its_lecture():
     page = glossary_page()
     assert page.count("](notebooks/") > 60
+    assert page.count("](") == page.count("](notebooks/")
 
 
 @pytest.mark.parametrize(
@@ -135,3 +137,23 @@ def test_the_animation_of_the_readme_moves_is_small_and_has_words():
         assert moving.n_frames == 10
     assert (CLONE / "docs" / "street.png").stat().st_size <= 600_000
     assert re.search(r"!\[[^\]]{40,}\]\(docs/street\.png\)", (CLONE / "README.md").read_text(encoding="utf-8"))
+
+
+def test_each_module_of_the_reference_can_be_imported():
+    assert [name for name in MODULES if find_spec(f"semgrid_edu.{name}") is None] == []
+
+
+def test_contents_name_pages_and_links_lead_to_headings():
+    named = {str(path.relative_to(CLONE).with_suffix("")) for path in pages()}
+    contents = "".join(path.read_text(encoding="utf-8") for path in (CLONE / "docs" / "site" / "pages").glob("*.md"))
+    assert set(re.findall(r"<((?:docs|benchmarks|data_samples|notebooks)/[^>]*)>$", contents, re.MULTILINE)) <= named
+    texts = {path: path.read_text(encoding="utf-8") for path in pages() if path.suffix == ".md"}
+    anchors = {path: set(map(anchor, re.findall(r"^#+ (.*)$", text, re.MULTILINE))) for path, text in texts.items()}
+    for path, text in texts.items():
+        for file, heading in re.findall(r"\]\(([^():#\s]*\.md)?#([^()\s]+)\)", text):
+            assert heading in anchors[(path.parent / file).resolve() if file else path], (path, heading)
+
+
+def anchor(heading: str) -> str:
+    """What follows # in a link to a heading."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")

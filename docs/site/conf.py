@@ -1,5 +1,7 @@
 """Settings of Sphinx for the course site; `stage.py` copies this file to the sources that it lays out."""
 
+from pathlib import Path
+
 import semgrid_edu
 
 project = "semgrid_edu"
@@ -42,6 +44,7 @@ html_css_files = ["site.css"]
 html_js_files = [("moving.js", {"defer": "defer"})]
 # Summaries would be fetched, which a browser refuses for files.
 html_show_search_summary = False
+html_search_scorer = str(Path(__file__).with_name("scorer.js"))
 html_show_sourcelink = html_copy_source = False
 # MathJax 4 fetches its fonts from elsewhere; this file of version 3.2.2 needs nothing else.
 mathjax_path = "tex-svg.js"

@@ -22,6 +22,7 @@ def glossary_page() -> str:
     ]
     for term, name, number in sorted(entries, key=lambda entry: entry[0].lower()):
         words = definition(texts(name), term, number).rstrip(" ;:,").replace("|", "\\|")
+        words = words.replace("](", "](notebooks/")  # a lecture's links are to its neighbours
         parts.append(f"| {term} | {words} | {link(name)} |")
     return "\n".join(parts) + "\n"
 

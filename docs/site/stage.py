@@ -28,7 +28,7 @@ CLONE = HERE.parents[1]
 PAGES = (
     "*.md",
     "docs/*.md",
-    "docs/results/*/*.md",
+    "docs/results/**/*.md",
     "benchmarks/*.md",
     "data_samples/**/README.md",
     "notebooks/README.md",
@@ -41,7 +41,7 @@ PAGES = (
 SECTIONS = ("lectures", "companions", "exercises", "graphs", "glossary", "results", "api", "gallery", "guides")
 """The pages of the site's bar."""
 MODULES = (
-    *("answers", "camera", "crf", "datasets", "errors", "frame", "graphical", "grid", "labels", "memory", "metrics"),
+    *("camera", "crf", "datasets", "errors", "frame", "graphical", "grid", "labels", "memory", "metrics"),
     *("networks", "occupancy", "pipeline", "planes", "plotting", "storage", "training"),
 )
 """The modules and rooms of the book, each a page of the reference."""
@@ -75,7 +75,8 @@ def stage(folder: Path) -> None:
         f"{index.read_text(encoding='utf-8')}\n```{{toctree}}\n:hidden:\n{contents}\n```\n", encoding="utf-8"
     )
     shutil.copytree(HERE / "pages", folder, dirs_exist_ok=True)
-    shutil.copy(HERE / "conf.py", folder)
+    for name in ("conf.py", "scorer.js"):
+        shutil.copy(HERE / name, folder)
     (folder / "static").mkdir()
     for name in ("site.css", "moving.js", "tex-svg.js"):
         shutil.copy(HERE / name, folder / "static")

@@ -4,8 +4,11 @@
 # **In one sentence.** A LIDAR knows *where* something is and a camera knows *what* it looks like; in five stages you
 # turn both into one map, and then you find a crowd of pedestrians in it that isn't there.
 #
-# **You will be able to** - name the five stages, what goes into each and what comes out; - do each of them by hand on a
-# toy; - read the function that runs them, five calls long; - say why a map with a high accuracy can still be wrong.
+# **You will be able to**
+# - name the five stages, what goes into each and what comes out;
+# - do each of them by hand on a toy;
+# - read the function that runs them, five calls long;
+# - say why a map with a high accuracy can still be wrong.
 #
 # **Prerequisites.** Python with numpy; conditional probability. No deep learning.
 #

@@ -89,8 +89,8 @@ class Walls:
     def keeps_pace(self, velocity: NDArray, car_velocity: NDArray, cell: float) -> NDArray[np.bool_]:
         """Return which things move at the car's own speed, (N,).
 
-        |v - v_car| <= |v_car|: relative to the car they are no faster than a standing thing. And they are fast enough
-        to have left their cells within `second_look`. Nothing keeps pace with a car that stands.
+        ``|v - v_car| <= |v_car|``: relative to the car they are no faster than a standing thing. And they are fast
+        enough to have left their cells within `second_look`. Nothing keeps pace with a car that stands.
 
         Parameters
         ----------

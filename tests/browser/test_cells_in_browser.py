@@ -191,9 +191,9 @@ class TestChosenCells:
 
     def test_what_was_unfolded_stays_so(self, shipped):
         page = shipped(f"#{FRAME}/100/24")
-        page.locator("#telling summary").click()
+        page.locator("#telling summary", has_text="and not").click()
         click(page, "grid", (101, 24))
-        assert page.locator("#telling details").evaluate("(details) => details.open")
+        assert page.locator("#telling details").evaluate_all("(all) => all.map((one) => one.open)") == [False, True]
 
 
 @pytest.mark.parametrize("name", ["car", "mistake", "unseen"])
@@ -235,7 +235,7 @@ class TestStory:
     def test_its_four_states_sum_to_one_after_each_step(self, shipped, cells, stories, name):
         page, story = shipped(f"#{FRAME}"), stories[name]
         click(page, "refined", cells[name])
-        page.locator("#telling summary").click()
+        page.locator("#telling summary").first.click()
         shown = rows(page, "#telling > table >> nth=0")
         words = {
             "moved": "move",
@@ -251,7 +251,7 @@ class TestStory:
         width = "[...band.children].reduce((sum, part) => sum + parseFloat(part.style.width), 0)"
         bands = page.locator("#telling .band").evaluate_all(f"(all) => all.map((band) => {width})")
         assert bands == pytest.approx([100] * len(bands), abs=0.01)
-        past = list(rows(page, "#telling details table").values())
+        past = list(rows(page, "#telling details >> nth=0").values())
         np.testing.assert_allclose(past, 100 * story.history.T, atol=1.01)
 
     def test_the_parts_of_the_score_add_up(self, shipped, cells, stories, name):

@@ -1,6 +1,7 @@
 """How the demo's page looks in a browser: on a phone, in the dark, and to those who need contrast."""
 
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from read_page import decode
 from tiny_drive import DATE, write_tiny_drive
 
 from semgrid_edu.datasets import KittiRawDrive
+from semgrid_edu.datasets.samples import sample_drive, sample_weights
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net, save_net
 from semgrid_edu.workshop import demo
@@ -58,6 +60,15 @@ def tiny_page(browser, tmp_path_factory):
         return demo.write_demo(drive, root / "net.safetensors", root / "out", stages=example_stages.__file__)
 
 
+@pytest.fixture(scope="module")
+def unlabelled_page(browser, tmp_path_factory):
+    """Eight of the shipped frames, without their labels."""
+    root = tmp_path_factory.mktemp("unlabelled")
+    shipped = sample_drive().date_folder
+    shutil.copytree(shipped, root / shipped.name, ignore=shutil.ignore_patterns("labels"))
+    return demo.write_demo(KittiRawDrive(root, shipped.name, "0001"), sample_weights(), root / "out", frames="0:8")
+
+
 @pytest.fixture(params=["shipped", "tiny"])
 def phone(request, open_page):
     """Either page on a phone, with a cell's story."""
@@ -70,7 +81,8 @@ class TestPhone:
     def test_nothing_reaches_over_the_side(self, phone):
         sizes = "[document.documentElement.scrollWidth, innerWidth, visualViewport.scale]"
         assert phone.evaluate(sizes) == [390, 390, 1]
-        phone.locator("#telling summary").click()
+        for folded in phone.locator("#telling summary").all():
+            folded.click()
         phone.locator("#zoom").select_option("4")
         assert phone.evaluate(sizes) == [390, 390, 1]
         assert phone.locator(".tables > *").evaluate_all(
@@ -260,11 +272,28 @@ def test_errors_are_offered_only_where_the_truth_is_known(open_page, tiny_page, 
     assert open_page(unlabelled).locator("#errors").is_hidden()
 
 
-@pytest.mark.parametrize(("width", "height", "highest"), [(1500, 1000, 620), (1100, 900, 1300), (390, 844, 1300)])
+@pytest.mark.parametrize(("width", "height", "highest"), [(1500, 1000, 620), (1100, 900, 800), (390, 844, 1300)])
 def test_maps_come_first_and_the_inset_of_a_phone_is_on_phones_alone(open_page, shipped_page, width, height, highest):
     page = open_page(shipped_page, CELL, viewport={"width": width, "height": height})
     page.locator("#telling h3").first.wait_for()
     assert page.locator("#inset").evaluate("(one) => getComputedStyle(one).display") == (
         "block" if width == 390 else "none"
     )
-    assert page.locator(".grids figure").first.evaluate("(one) => one.getBoundingClientRect().top + scrollY") < highest
+    tops = page.locator(".grids figure").evaluate_all(
+        "(all) => all.map((one) => one.getBoundingClientRect().top + scrollY)"
+    )
+    assert tops[0] < highest
+    assert len(set(tops)) == (2 if width == 390 else 1)
+
+
+@pytest.mark.parametrize("width", [1100, 1500])
+def test_three_maps_fill_the_width_and_the_first_cell_is_a_near_one_that_moves(open_page, unlabelled_page, width):
+    page = open_page(unlabelled_page, viewport={"width": width, "height": 1000})
+    page.locator("#telling", has_text="Nobody labelled this frame.").wait_for()
+    shown = page.locator("#telling > table").first.locator("tbody tr").last.locator("td").all_inner_texts()
+    assert int(shown[2].removesuffix(" %")) > 50
+    right = "(all) => Math.max(...all.map((one) => one.getBoundingClientRect().right))"
+    assert page.locator(".grids figure").count() == 3
+    assert page.locator(".grids figure").evaluate_all(right) == pytest.approx(
+        page.locator(".grids").evaluate("(one) => one.getBoundingClientRect().right"), abs=1
+    )

@@ -85,9 +85,9 @@ class TestKeys:
 
     def test_space_plays_and_pauses_but_opens_what_can_be_unfolded(self, shipped):
         page = shipped("#5/100/30", by_hand=True)
-        page.locator("#telling summary").focus()
+        page.locator("#telling summary").first.focus()
         page.keyboard.press("Space")
-        assert page.locator("#telling details").evaluate("(details) => details.open")
+        assert page.locator("#telling details").first.evaluate("(details) => details.open")
         assert page.locator("#play").inner_text() == "▶ Play"
         page.locator("body").focus()
         page.evaluate("document.activeElement.blur()")

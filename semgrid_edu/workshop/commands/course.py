@@ -25,7 +25,7 @@ def needs_tools() -> None:
 def notebooks(
     names: Annotated[list[str] | None, typer.Argument(help="Such as 00_tour; all by default.")] = None,
 ) -> None:
-    """Execute lectures and companions and write the students' exercises, from their sources."""
+    """Build lectures, companions and exercises from their sources."""
     from semgrid_edu.workshop.course.nbgrader.build import build_exercise, exercise_sources
     from semgrid_edu.workshop.course.notebooks import build as lectures
 
@@ -37,7 +37,10 @@ def notebooks(
 
 @course.command()
 def minutes(names: Annotated[list[str] | None, typer.Argument(help="Such as 00_tour; all by default.")] = None) -> None:
-    """Show how many minutes each notebook takes a student, and what takes them; one notebook section by section."""
+    """Show how many minutes each notebook takes a student.
+
+    It also says what takes them, and for one notebook section by section.
+    """
     from semgrid_edu.workshop.course.notebooks.build import companion_sources, lecture_sources, named
     from semgrid_edu.workshop.course.notebooks.minutes import minutes_table
 
@@ -46,7 +49,7 @@ def minutes(names: Annotated[list[str] | None, typer.Argument(help="Such as 00_t
 
 @course.command()
 def check() -> None:
-    """Check that every notebook agrees with its source, has run, and is fit to be shown."""
+    """Check that notebooks are run, and agree with their sources."""
     from semgrid_edu.workshop.course.checks import course_problems
 
     report(course_problems(), "every notebook agrees with its source")
@@ -77,7 +80,10 @@ def grade(
     memory: Annotated[int, typer.Option(min=100, help="Megabytes of memory for a student's code.")] = 4000,
     seed_by_student: Annotated[bool, typer.Option("--seed-by-student", help="Draw hidden inputs per student.")] = False,
 ) -> None:
-    """Grade a class with nbgrader: students' code runs in separate processes, apart from tests and gradebook."""
+    """Grade a class with nbgrader.
+
+    Students' code runs in separate processes, apart from tests and gradebook.
+    """
     from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, UngradedError
     from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course, missing_limits
     from semgrid_edu.workshop.course.nbgrader.gradebook import misplaced, write_graded

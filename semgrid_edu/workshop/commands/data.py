@@ -33,9 +33,9 @@ def make(
     seed: Annotated[int, typer.Option(help="Seed for the drives; the same seed gives the same bytes.")] = 0,
     workers: Annotated[int, typer.Option(help="Number of processes that share the work.")] = 2,
 ) -> None:
-    """Simulate a data set in KITTI's raw layout; "all" makes minikitti, minichroma and minisynthia.
+    """Simulate a data set in KITTI's raw layout.
 
-    The same command continues after an interruption.
+    "all" makes minikitti, minichroma and minisynthia. The same command continues after an interruption.
     """
     from semgrid_edu.workshop.simulation.datasets import DATA_SETS, make_dataset
 
@@ -96,7 +96,7 @@ def index(
     scene: Annotated[str, typer.Option(help="Number of the scene, such as 002.")] = "002",
     test: Annotated[list[str] | None, typer.Option(help="A camera to keep for testing; again for another.")] = None,
 ) -> None:
-    """Make a data set of a labelled scene of PandaSet, for `train` and `evaluate`."""
+    """Make a data set to train with of a labelled PandaSet scene."""
     from semgrid_edu.datasets.index import write_pandaset_index
 
     typer.echo(f"written to {write_pandaset_index(folder, pandaset, scene, test or ())}")
@@ -106,7 +106,7 @@ def index(
 def verify(
     folder: Annotated[Path | None, typer.Argument(help="A folder of samples; the shipped ones by default.")] = None,
 ) -> None:
-    """Check the samples against the checksums in their provenance files."""
+    """Check the shipped samples against their checksums."""
     from semgrid_edu.datasets.samples import samples_problems
 
     report(samples_problems(folder), "every sample is as it was made")

@@ -21,7 +21,7 @@ Runs = Annotated[Path, typer.Option(help="Takes one folder per run; the same com
 def check(
     folder: Annotated[Path, typer.Argument(help="Results of the paper's experiments, such as docs/results/reduced.")],
 ) -> None:
-    """Compute the paper's tables, claims and ablations again from the counts beside them, and name what differs."""
+    """Compute results again from their counts; say what differs."""
     from semgrid_edu.workshop.paper.recompute import check_results
 
     if not check_results(folder, typer.echo):

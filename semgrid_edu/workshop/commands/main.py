@@ -18,7 +18,7 @@ from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import reproduce
 
-app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False)
+app = typer.Typer(cls=Commands, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None)
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with a run that was interrupted, if there is one.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that this command hasn't written, too.")]
 
@@ -83,11 +83,12 @@ def demo(
     force: Force = False,
     show: Annotated[bool, typer.Option("--open", help="Show the page in a browser.")] = False,
 ) -> None:
-    """Run every stage over a drive, and write a page that shows it; without a drive, over the two shipped ones.
+    """Run every stage over a drive, and write a page that shows it.
 
     PATH is a drive of KITTI raw, KITTI tracking, SemanticKITTI or PandaSet, or a recording that a class in --reader
-    reads. The shipped drives are a real street, and in the folder simulated/ a simulated one. Without --frames all
-    frames are run. A file for --stages defines some of track, segment, sample, fuse, refine and remember.
+    reads. Without PATH the two shipped drives are shown: a real street, and in the folder simulated/ a simulated one.
+    Without --frames all frames are run. A file for --stages defines some of track, segment, sample, fuse, refine and
+    remember.
     """
     from semgrid_edu.datasets.samples import real_weights
     from semgrid_edu.networks.weights import weights_doubts
@@ -151,11 +152,12 @@ def train(
     resume: Resume = False,
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
 ) -> None:
-    """Train a network: first its image network, then all of it on grids. torchrun runs it in several processes.
+    """Train a network: first its image network, then all of it.
 
-    ImageNet weights are a safetensors file (VGG16 or ResNet-101, for --preset paper), or those that the extra imagenet
-    installs (EfficientNet-Lite0, for both presets). --truth lidar makes labels from image labels and
-    LIDAR, with the errors of real data; other ways of making them, such as no-cleanup, have names of their own.
+    torchrun runs it in several processes. ImageNet weights are a safetensors file (VGG16 or ResNet-101, for
+    --preset paper), or those that the extra imagenet installs (EfficientNet-Lite0, for both presets). --truth lidar
+    makes labels from image labels and LIDAR, with the errors of real data; other ways of making them, such as
+    no-cleanup, have names of their own.
     """
     from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts

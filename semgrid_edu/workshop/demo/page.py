@@ -32,8 +32,11 @@ REMEMBERED = (
 LEARNED = " on frames from which it has learned"
 """Added to the heading of the metrics if they aren't those of new frames."""
 
-CRF_COSTS = "The CRF makes this map worse: {:.1f} % class accuracy over semantic cells without it, {:.1f} % with it."
-"""Said above the metrics if the refined map is worse."""
+CRF_COSTS = {
+    True: "The CRF makes this map worse",
+    False: "The CRF makes more cells right than wrong here, but costs rare classes",
+}
+"""Said above the metrics if the refined map has less class accuracy, by whether it has less pixel accuracy, too."""
 
 GAPS = " White cells are left out: they are in view, but nobody labelled what is there."
 """Added to the caption of the truth if its labels have gaps."""
@@ -230,16 +233,22 @@ def _metrics(record: Record, learned: bool) -> str:
     cells = {row: [f"<td>{100 * values[row]:.1f}</td>" for values in metrics.values()] for row in metrics["FmIoU"]}
     rows = "".join(f"<tr><th>{_breakable(row)}</th>{''.join(values)}</tr>" for row, values in cells.items())
     compared = (COMPARED if record.comparison else "") + (REMEMBERED if "remember" in record.stages else "")
-    crf = _crf_costs(metrics["class accuracy"])
+    crf = _crf_costs(metrics)
     return _filled(
         "metrics.html", where=where, crf=crf, labelled=record.labelled, compared=compared, head=head, rows=rows
     )
 
 
-def _crf_costs(class_accuracy: dict[str, float]) -> str:
-    """Return a sentence if the CRF makes the package's map worse, else nothing."""
-    without, refined = (class_accuracy.get(f"semantic cells, {row}") for row in ("network", "network + CRF"))
-    return CRF_COSTS.format(100 * without, 100 * refined) if refined is not None and refined < without else ""
+def _crf_costs(metrics: dict[str, dict[str, float]]) -> str:
+    """Return a sentence if the CRF costs the package's map class accuracy, else nothing."""
+    rows = [f"semantic cells, {row}" for row in ("network", "network + CRF")]
+    if not all(row in metrics["class accuracy"] for row in rows):
+        return ""
+    pixels, classes = ([metrics[name][row] for row in rows] for name in ("pixel accuracy", "class accuracy"))
+    if classes[1] >= classes[0]:
+        return ""
+    scores = "class accuracy over semantic cells is {:.1f} % without it and {:.1f} % with it"
+    return f"{CRF_COSTS[pixels[1] < pixels[0]]}: {scores.format(*(100 * one for one in classes))}."
 
 
 def _times(record: Record) -> str:

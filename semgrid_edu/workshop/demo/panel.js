@@ -70,11 +70,11 @@ async function tell(k) {
   if (mine !== turn) return;
   const pulls = timer === null ? strongest(story, read, cell) : null; // too restless while the drive plays
   const [label, rival, refined] = read("classes", cell);
-  const unfolded = telling.querySelector("details")?.open ?? false;
+  const unfolded = [...telling.querySelectorAll("details")].map((one) => one.open);
   where.textContent = `${place(centre(story.grid, cell))}: ${story.names[refined]}.`;
   const said = frames[k].scanned ? scanStory(cell, read, everywhere) : "<p>This frame has no scan, so the filter only predicts.</p>";
   telling.innerHTML = [heading(cell, read), said, stateStory(cell, read, past), partStory(cell, read, label, rival), crfStory(cell, read, pulls, [label, rival, refined])].join("");
-  telling.querySelector("details").open = unfolded;
+  telling.querySelectorAll("details").forEach((one, i) => { one.open = unfolded[i] ?? false; });
   brief.innerHTML = [...telling.querySelectorAll(":scope > p")].slice(0, 2).map((one) => one.outerHTML).join("");
   if (pulls) drawPulls(cell, pulls);
 }
@@ -128,12 +128,12 @@ function partStory(cell, read, label, rival) {
   const often = of.times > 1e6 ? "more than a million" : of.times.toLocaleString("en");
   const byClass = order.slice(0, 8);
   const before = read("classes", cell)[2] === label ? "Why" : "Before the CRF: why";
-  return `<h3>${before} ${escaped(story.names[label])} and not ${escaped(story.names[rival])}?</h3>
+  return `<details><summary><h3>${before} ${escaped(story.names[label])} and not ${escaped(story.names[rival])}?</h3></summary>
 <p>In the semantic grid ${swatch(label)} is about ${often} times as probable as ${swatch(rival)}: its fused score is higher by ${score.toFixed(1)}. Gradient times input splits this difference:</p>
 ${bars(["image, on the planes", "occupancy", story.uses_return_heights ? "constants and heights" : "constants", "sum"], of.totals)}
 <p>The constants are biases and normalisations that the open ReLUs let pass: no input has a share in them.${story.uses_return_heights ? " The part of the returns' heights is in the same row." : ""} Image and occupancy count in all cells around that the network looks at. A part isn't what would change if its input were missing, and parts that cancel may be much larger than their sum. Below, each table has its own scale.</p>
 <div class="two"><div><h4>Image, by class of its scores</h4>${bars(byClass.map((i) => escaped(story.names[i])), byClass.map((i) => of.scores[i]))}<h4>Occupancy, by state</h4>${bars(stateNames, of.occupancy)}</div>
-<div><h4>Image, by height of the plane</h4>${bars([...heights].reverse(), [...of.planes].reverse())}</div></div>`;
+<div><h4>Image, by height of the plane</h4>${bars([...heights].reverse(), [...of.planes].reverse())}</div></div></details>`;
 }
 
 // A table of numbers with bars to both sides of zero.
@@ -335,14 +335,16 @@ function followCell() {
   const { rows, cols } = story.grid, [, row, col] = location.hash.slice(1).split("/").map((part) => parseInt(part, 10));
   if (row >= 0 && row < rows && col >= 0 && col < cols) choose(row * cols + col);
 }
-// Without an address, begin with the frame in which most moves, and in it with the nearest cell, from 5 m on, in which a stage went wrong and the camera sees all points.
+// Without an address, begin with the frame in which most moves, and in it with the nearest cell, from 5 m on, whose points the camera sees all and in which a stage went wrong, or else, where no truth tells that, something moves.
 async function begin() {
   const read = await readerOf(shown());
   if (read === null || anchor !== null) return;
   const far = (cell) => Math.hypot(...centre(story.grid, cell)), right = ["none", "mended"].map((name) => story.faults.indexOf(name));
-  const cells = Array.from({ length: story.grid.rows * story.grid.cols }, (_, cell) => cell).filter((cell) => far(cell) >= 5);
-  const wrong = cells.filter((cell) => !right.includes(read("fault", cell)[0]) && !read("called", cell).includes(255));
-  if (wrong.length) choose(wrong.reduce((one, other) => (far(other) < far(one) ? other : one)));
+  const cells = Array.from({ length: story.grid.rows * story.grid.cols }, (_, cell) => cell);
+  const seen = cells.filter((cell) => far(cell) >= 5 && !read("called", cell).includes(255));
+  const wrong = seen.filter((cell) => !right.includes(read("fault", cell)[0]));
+  const first = wrong.length ? wrong : seen.filter((cell) => states(story, read, "shown", cell)[2] > 0.5);
+  if (first.length) choose(first.reduce((one, other) => (far(other) < far(one) ? other : one)));
 }
 window.addEventListener("hashchange", followCell);
 followCell();
