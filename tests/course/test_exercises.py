@@ -159,7 +159,7 @@ def test_no_link_of_a_released_exercise_is_dead():
 
 
 def test_without_exercises_nothing_is_written(tmp_path):
-    with pytest.raises(DataError, match="sources of the exercises"):
+    with pytest.raises(DataError, match="exercises of a clone"):
         build_course(tmp_path / "course", tmp_path / "nothing")
     assert not (tmp_path / "course").exists()
 

@@ -119,7 +119,9 @@ def build_course(directory: str | Path, folder: Path = NOTEBOOKS, lectures: str 
     _check_folder(directory)
     sources = exercise_sources(folder)
     if not sources:
-        raise DataError(folder / "src" / "exercises", "the sources of the exercises", "none")
+        raise DataError(
+            folder / "src" / "exercises", "the exercises of a clone of semgrid_edu", "none: a wheel has none"
+        )
     marker = directory / MARKER
     before = _read_marker(marker) if marker.exists() else {}
     lectures = before.get("lectures", "") if lectures is None else lectures

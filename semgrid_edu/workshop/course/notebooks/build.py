@@ -21,7 +21,7 @@ from semgrid_edu.storage.files import shipped_folder, write_text
 from semgrid_edu.workshop.course.notebooks.figures import finish_figures
 
 NOTEBOOKS = shipped_folder("notebooks")
-"""The lectures and exercises. A wheel holds the sources of the exercises and the instructor's part alone."""
+"""The lectures and exercises of a clone. A wheel has none: students install it, and graded code can read it."""
 
 METADATA = {
     "kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"},
