@@ -33,7 +33,7 @@ def test_what_is_said_beside_costs_nothing(forked):
     assert graded(forked, "noisy", noisy, GradeSettings(timeout=60)).score == 13
 
 
-HALVES = """
+HALVES = r"""
 import numpy as np
 from IPython.display import display
 display({"text/plain": "half of a pair: \ud800"}, raw=True)
@@ -41,7 +41,7 @@ display({"text/plain": "half of a pair: \ud800"}, raw=True)
 
 
 def test_a_text_that_no_file_can_hold_costs_its_task_alone(forked):
-    answers = inside("predict", "return np.array(['\ud800'])")
+    answers = inside("predict", r"return np.array(['\ud800'])")
     assert graded(forked, "halves", handed_in(answers, first=HALVES)).score == 10
 
 

@@ -91,6 +91,10 @@ def check_impossible(posterior: Callable) -> None:
             assert not possible, "a tiny weight isn't zero: what is very improbable can still happen"
         else:
             assert possible, "no ValueError where reports exclude each other"
+    weights = np.arange(1.0, 9.0).reshape(2, 2, 2)
+    got, again = (answer_array(posterior((names, weights), "z", {"m1": [0, 1]})) for _ in range(2))
+    assert np.array_equal(got, again), "another answer to the same question"
+    assert np.ptp(got) > 0, "the same for every state, although they are not equally probable"
 
 
 def _random_graph(rng: np.random.Generator, size: int) -> dict[str, tuple[str, ...]]:
