@@ -197,8 +197,8 @@ def second_when_in_doubt(log_g, o):
     """Give unsure cells their second class, whatever the occupancy says."""
     g = np.exp(log_g)
     g[10:] = 0
-    best = g.argmax(axis=0)[None]
-    np.put_along_axis(g, best, np.where(g.max(axis=0) < 0.78, 1e-6, g.max(axis=0))[None], axis=0)
+    best, sure = g.argmax(axis=0)[None], g.max(axis=0)[None]
+    np.put_along_axis(g, best, np.where((sure > 0.5) & (sure < 0.78), 1e-6, sure), axis=0)
     return (g + 1e-12) / (g + 1e-12).sum(axis=0)
 
 
