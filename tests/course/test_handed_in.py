@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import time
+import warnings
 import zipfile
 
 import nbformat
@@ -109,6 +110,15 @@ def test_a_byte_order_mark_costs_nothing(course, right):
     path.write_text(path.read_text(encoding="utf-8"), encoding="utf-8-sig")
     result = grade_one(course, TINY, "marked", GradeSettings(timeout=5))
     assert (result.score, result.note) == (2, "")
+
+
+def test_copied_cells_that_kept_their_id_cost_nothing_and_are_not_named_one_by_one(course, right):
+    path = place(course, "submitted", "copied", TINY)
+    write_notebook(right, path)
+    path.write_text(re.sub(r'"id": "[^"]*"', '"id": "same"', path.read_text()))
+    with warnings.catch_warnings(record=True) as said:
+        result = grade_one(course, TINY, "copied", GradeSettings(timeout=5))
+    assert (result.score, said) == (2, [])
 
 
 @pytest.mark.parametrize("kind", UNFIT)

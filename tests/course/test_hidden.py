@@ -2,6 +2,7 @@
 
 import ast
 import copy
+import importlib
 import re
 import sys
 
@@ -190,6 +191,50 @@ def test_two_made_up_answers_that_agree_earn_nothing():
     from semgrid_instructor import experiments
 
     assert experiments.check_paired(made_up, made_up) != ""
+
+
+def second_when_in_doubt(log_g, o):
+    """Give unsure cells their second class, whatever the occupancy says."""
+    g = np.exp(log_g)
+    g[10:] = 0
+    best, sure = g.argmax(axis=0)[None], g.max(axis=0)[None]
+    np.put_along_axis(g, best, np.where((sure > 0.5) & (sure < 0.78), 1e-6, sure), axis=0)
+    return (g + 1e-12) / (g + 1e-12).sum(axis=0)
+
+
+def prices_from_the_lowest(Q, phi, k, mu):
+    """Subtract each cell's lowest price, and stop there."""
+    return np.minimum(phi - phi.min(axis=0), 9) + (Q * k[0, 1]).sum()
+
+
+def mean_price_alone(Q, phi, k, mu):
+    """Leave the pairs out, and take the largest probability for entropy."""
+    return (Q[Q > 0] * phi[Q > 0]).sum() + Q.max()
+
+
+def two_reports_exclude_each_other(factor, wanted, heard):
+    """Tell what is impossible by the number of reports."""
+    if len(heard) == 2:
+        raise ValueError
+    return [0.3, 0.7]
+
+
+SOLVES_NOTHING = {
+    "real_drive.check_refine": second_when_in_doubt,
+    "real_drive.check_better_map": second_when_in_doubt,
+    "crf.check_update_limits": prices_from_the_lowest,
+    "crf.check_free_energy_limits": mean_price_alone,
+    "graphical_models.check_impossible": two_reports_exclude_each_other,
+}
+"""Answers that know how a hidden test makes its inputs, or what it compares, but not the task."""
+
+
+@pytest.mark.parametrize("check", SOLVES_NOTHING)
+def test_who_knows_the_hidden_test_and_not_the_task_earns_nothing(check):
+    use_instructor(NOTEBOOKS / "instructor")
+    module, _, name = check.partition(".")
+    judge = getattr(importlib.import_module(f"semgrid_instructor.{module}"), name)
+    assert judge(SOLVES_NOTHING[check]) != ""
 
 
 def test_no_answer_can_change_what_a_function_that_it_gets_relies_on():

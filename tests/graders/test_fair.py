@@ -33,6 +33,18 @@ def test_what_is_said_beside_costs_nothing(forked):
     assert graded(forked, "noisy", noisy, GradeSettings(timeout=60)).score == 13
 
 
+HALVES = r"""
+import numpy as np
+from IPython.display import display
+display({"text/plain": "half of a pair: \ud800"}, raw=True)
+"""
+
+
+def test_a_text_that_no_file_can_hold_costs_its_task_alone(forked):
+    answers = inside("predict", r"return np.array(['\ud800'])")
+    assert graded(forked, "halves", handed_in(answers, first=HALVES)).score == 10
+
+
 def twin(cell):
     return new_code_cell(cell.source, metadata=copy.deepcopy(cell.metadata))
 

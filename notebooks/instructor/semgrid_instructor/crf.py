@@ -149,6 +149,11 @@ def check_update_limits(update: Callable) -> None:
     assert not close(other, wanted), "the same, whatever classes cost"
     alone = answer_array(update(Q.copy(), small, 0 * k, _potts(3)))
     assert not close(alone, wanted), "the same, whatever other cells say"
+    rise = rng.uniform(0.5, 2, (3, 6))
+    dearer = answer_array(update(Q.copy(), small + rise, k.copy(), _potts(3)))
+    factor = dearer / np.maximum(wanted, 1e-99) * np.exp(rise)
+    possible = np.isfinite(small).all(axis=0)
+    assert close(factor[:, possible], factor[[1, 2, 0]][:, possible]), "what costs 1 more isn't e times less probable"
     assert close(got, wanted, atol=2e-3), "not the same when all prices are 3000 higher"
 
 
@@ -182,9 +187,12 @@ def check_free_energy_limits(free_energy: Callable) -> None:
     assert not close(F([[0.5, 0.5], [0.5, 0.5]], np.zeros((2, 2))), F([[1, 1], [0, 0]], np.zeros((2, 2)))), (
         "unsure cells and sure ones have the same free energy where all prices are 0"
     )
+    none, little, less = (F([[q, 0], [1 - q, 1]], np.zeros((2, 2))) for q in (0, 1e-3, 1e-6))
+    rise, step = abs(little - none), abs(less - none)
+    assert 300 * step < rise < 800 * step, "a small probability q adds q log q, not a multiple of q"
     tiny = [[eps, 0], [1 - eps, 1]]
-    rise = F(tiny, [[1e12, 0], [0, 0]]) - F(tiny, [[0, 0], [0, 0]])
-    assert abs(rise) > 0.1, "a tiny probability isn't 0: times a large price it counts"
+    paid = F(tiny, [[1e12, 0], [0, 0]]) - F(tiny, [[0, 0], [0, 0]])
+    assert abs(paid) > 0.1, "a tiny probability isn't 0: times a large price it counts"
 
 
 @hidden

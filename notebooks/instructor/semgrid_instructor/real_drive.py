@@ -89,17 +89,20 @@ def check_held_out(held_out_score: Callable) -> None:
 def _street(seed: int) -> tuple[NDArray, NDArray, NDArray]:
     """Return map, occupancy and truth of a street that nobody knows, whose map fails as that of the real one does.
 
-    It fails in whole blocks, so that no blur helps.
+    It fails in whole blocks, so that no blur helps. Right or wrong, a cell has a second class, so that neither its
+    doubt nor the pair of classes tells what is true: `o` does.
     """
     rng = generator(seed)
     flat = np.add.outer(np.arange(18), np.arange(8)) % 2 == 0
     blocks = np.where(flat, rng.choice([0, 0, 1], flat.shape), rng.choice([2, 3, 6, 8], flat.shape))
     fails = np.where(flat, rng.integers(2, 4, blocks.shape), rng.integers(10, 14, blocks.shape))
-    said = np.where(rng.permutation(blocks.size).reshape(blocks.shape) < 0.4 * blocks.size, fails, blocks)
-    truth, said = (np.kron(one, np.ones((8, 8), int))[:142, :62] for one in (blocks, said))
+    failing = rng.permutation(blocks.size).reshape(blocks.shape) < 0.4 * blocks.size
+    decoys = np.where(np.isin(blocks, (2, 3)), rng.integers(0, 2, blocks.shape), fails)
+    said, second = np.where(failing, (fails, blocks), (blocks, decoys))
+    truth, said, second = (np.kron(one, np.ones((8, 8), int))[:142, :62] for one in (blocks, said, second))
     state = np.where(truth < 2, 0, rng.integers(1, 3, truth.shape))
     o = 0.1 * rng.dirichlet(np.ones(4), truth.shape) + 0.9 * np.eye(4)[state]
-    g = 0.6 * np.eye(14)[said] + 0.25 * np.eye(14)[truth] + 0.15 * rng.dirichlet(np.ones(14), truth.shape)
+    g = 0.6 * np.eye(14)[said] + 0.25 * np.eye(14)[second] + 0.15 * rng.dirichlet(np.ones(14), truth.shape)
     return np.moveaxis(g, -1, 0), np.moveaxis(o, -1, 0), np.where(rng.random(truth.shape) < 0.3, 255, truth)
 
 

@@ -145,6 +145,41 @@ def test_processes_are_limited_for_the_superuser_too(session):
     assert "60.25" not in subprocess.run(["ps", "ax"], capture_output=True, text=True, check=True).stdout
 
 
+def test_busy_processes_are_limited_and_idle_ones_are_not(session):
+    session.run("pass")
+    if not session.process.namespace:
+        pytest.skip("this system can't tell a student's processes from others")
+    idle = "import subprocess, time\nidle = [subprocess.Popen(['sleep', '9']) for _ in range(40)]\ntime.sleep(1.5)"
+    session.timeout = 30
+    assert "error" not in session.run(idle)
+    busy = "import os, time\nfor _ in range(40):\n    if os.fork() == 0:\n        while True: pass\ntime.sleep(20)"
+    assert session.run(busy)["error"]["kind"] == "AnswerEndedError"
+
+
+def test_sockets_and_pipes_hold_little_because_nobody_counts_what_is_in_them(session):
+    """A pair of sockets with large buffers holds megabytes, and a process could have thousands of pairs."""
+    fill = """
+import os, socket
+held, pairs = 0, []
+try:
+    while len(pairs) < 300:
+        pairs.append(socket.socketpair())
+        for one in pairs[-1]:
+            one.setblocking(False)
+            try: one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 400_000)
+            except PermissionError: pass
+            try:
+                while True: held += one.send(bytes(60_000))
+            except BlockingIOError: pass
+except OSError: pass
+"""
+    session.timeout = 60
+    session.run(fill)
+    if "modes and dates of files" in session.process.unlimited:
+        pytest.skip("this system has no seccomp")
+    assert session.names(["held"], session)["held"] < 60e6
+
+
 TOGETHER = {
     "files": "for k in range(100): open(f'{k}', 'wb').write(bytes(2_000_000))",
     "many files": "for k in range(30_000): open(f'{k}', 'w')",

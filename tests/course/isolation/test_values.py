@@ -114,6 +114,10 @@ def test_records_of_the_package_pass():
     np.testing.assert_array_equal(got_frame.camera.K, frame.camera.K)
 
 
+def test_a_text_that_no_file_can_hold_gets_a_question_mark():
+    assert decode(encode({"a\ud800": ["\udcff"]})) == {"a?": ["?"]}
+
+
 def test_functions_pass_as_numbers():
     functions = []
     data = encode({"f": abs, "g": [len]}, functions)

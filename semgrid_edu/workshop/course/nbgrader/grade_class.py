@@ -1,6 +1,7 @@
 """A whole class: every collected submission, graded by nbgrader on several cores."""
 
 import tempfile
+import warnings
 from collections.abc import Generator, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import nbformat
 from nbformat.v4 import new_markdown_cell
+from nbformat.warnings import DuplicateCellId
 from tqdm import tqdm
 
 from semgrid_edu.workshop.course.nbgrader import gradebook as book
@@ -171,7 +173,9 @@ def grade_one(course: Path, assignment: str, student: str, settings: GradeSettin
         note = f"{CRASHED}nbgrader takes * ? [ in a student's name for a pattern: rename the folder"
         return Graded(student, assignment, 0, 0, 0, note)
     try:
-        with book.unfinished(course, assignment, student):
+        # A cell that was copied may keep its id, which is said once a cell.
+        with book.unfinished(course, assignment, student), warnings.catch_warnings():
+            warnings.simplefilter("ignore", DuplicateCellId)
             path = place(course, "submitted", student, assignment)
             book.check_time(path)
             try:

@@ -14,6 +14,9 @@ from semgrid_edu.workshop.course.sandbox.resources import MEGABYTE
 PARTS = ("memory", "written files", "processes", "files", "modes and dates of files", "network", "signals")
 """Everything that is limited here; the grader's process limits time."""
 
+MAX_OPEN = 256
+"""How many files, pipes and sockets a process may have open: what lies in them is the kernel's memory."""
+
 SYSTEM: tuple[str, ...] = table_beside(__file__)["system"]
 """The parts of a Linux system that programs need."""
 
@@ -68,6 +71,7 @@ def _limit_resources(limits: Limits) -> list[str]:
         "written files": (resource.RLIMIT_FSIZE, limits.written * MEGABYTE),
     }
     _set(resource.RLIMIT_CORE, 0)
+    _set(resource.RLIMIT_NOFILE, MAX_OPEN)
     # The superuser is exempt from this one.
     if os.getuid():
         kinds["processes"] = resource.RLIMIT_NPROC, limits.processes

@@ -22,6 +22,7 @@ from PIL import Image
 
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.session import AnswerEndedError, AnswerTimeoutError, NoProcessError, Session
+from semgrid_edu.workshop.course.sandbox.values import writable
 
 MAX_PRINTED = 2000
 """How many characters are kept of what an answer printed during a test."""
@@ -297,5 +298,5 @@ def _shortened(outputs: list[NotebookNode], room: int) -> tuple[list[NotebookNod
 
 def _error(kind: str, message: str, lines: Sequence[str] = ()) -> NotebookNode:
     """Return an error as an output of a notebook."""
-    texts = [text[:MAX_ERROR_TEXT] for text in (kind, message, *(lines or [f"{kind}: {message}"]))]
+    texts = [writable(text[:MAX_ERROR_TEXT]) for text in (kind, message, *(lines or [f"{kind}: {message}"]))]
     return new_output("error", ename=texts[0], evalue=texts[1], traceback=texts[2:])

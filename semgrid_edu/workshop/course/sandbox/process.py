@@ -23,6 +23,7 @@ from semgrid_edu.workshop.course.sandbox.limits import PARTS, Limits
 from semgrid_edu.workshop.course.sandbox.resources import (
     MEGABYTE,
     PeakMemory,
+    busy_threads,
     delete_folder,
     deleted_bytes,
     exceeds_disk_limits,
@@ -48,6 +49,9 @@ START_TIMEOUT = 60.0
 
 END_TIMEOUT = 5.0
 """How many seconds the system may take to end a process."""
+
+MAX_BUSY = 10
+"""How many threads may work at the same time: more would take the processors from other students."""
 
 MAX_REPLY = 2 * MAX_BYTES
 """Limit for a message without changed arguments, bytes: results, and arguments of callbacks, are shorter."""
@@ -158,9 +162,9 @@ class StudentProcess:
             time.sleep(WATCH_INTERVAL)
 
     def _uses_too_much(self, limits: Limits, memory: int) -> bool:
-        """Return whether there are too many processes or files, or they are too large together."""
+        """Return whether there are too many processes, busy threads or files, or they are too large together."""
         running = processes_in(self.namespace)
-        if threads_of(running) > limits.processes or memory_held(running) > memory:
+        if threads_of(running) > limits.processes or busy_threads(running) > MAX_BUSY or memory_held(running) > memory:
             return True
         each = limits.written * MEGABYTE
         return exceeds_disk_limits(self.folder, 3 * each - deleted_bytes(running, each))

@@ -76,8 +76,13 @@ def has_ended(process: Path) -> bool:
         `/proc/PID`.
     """
     with suppress(OSError):
-        return (process / "stat").read_text().rpartition(")")[2].split()[0] in "ZX" and threads_of([process]) < 2
+        return _state(process) in "ZX" and threads_of([process]) < 2
     return True
+
+
+def _state(place: Path) -> str:
+    """Return the letter that tells what a process or thread does."""
+    return (place / "stat").read_text().rpartition(")")[2].split()[0]
 
 
 def processes_below(pid: int) -> list[Path]:
@@ -110,6 +115,21 @@ def threads_of(processes: Iterable[Path], owner: int | None = None) -> int:
     for tasks in (place / "task" for place in processes):
         with suppress(OSError):
             found += sum(1 for _ in tasks.iterdir()) if owner in (None, tasks.stat().st_uid) else 0
+    return found
+
+
+def busy_threads(processes: Iterable[Path]) -> int:
+    """Return how many threads of some processes run, or wait for a processor.
+
+    Parameters
+    ----------
+    processes : iterable of Path
+        `/proc/PID` of each.
+    """
+    found = 0
+    for task in (task for place in processes for task in place.glob("task/*")):
+        with suppress(OSError):
+            found += _state(task) == "R"
     return found
 
 

@@ -197,6 +197,8 @@ def _value(tree: Any, arrays: dict[int, NDArray], callback: Callable[[int], Call
     """Return the value that a tree of JSON describes."""
     if isinstance(tree, list):
         return [_value(one, arrays, callback) for one in tree]
+    if isinstance(tree, str):
+        return writable(tree)
     if not isinstance(tree, dict):
         return tree
     kind, content = next(iter(tree.items()))
@@ -211,6 +213,17 @@ def _value(tree: Any, arrays: dict[int, NDArray], callback: Callable[[int], Call
         raise ValueError(f"a {kind} of {len(inner)} entries")
     makers = {"tuple": tuple, "set": set, "frozenset": frozenset, "dict": dict, "scalar": lambda array: array[()]}
     return np.array(inner, dtype=object) if kind == "objects" else makers[kind](inner)
+
+
+def writable(text: str) -> str:
+    """Return a text with a question mark for each half of a surrogate pair, since no file can hold one.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+    """
+    return text.encode("utf-8", "replace").decode()
 
 
 def _record(path: str, values: list) -> Any:

@@ -17,7 +17,7 @@ from IPython.utils.capture import RichOutput, capture_output
 from traitlets.config import Config
 
 from semgrid_edu.workshop.course.sandbox.limits import Limits, limit_this_process
-from semgrid_edu.workshop.course.sandbox.values import MAX_INPUT, NotPlainError, Wire, decode, encode
+from semgrid_edu.workshop.course.sandbox.values import MAX_INPUT, NotPlainError, Wire, decode, encode, writable
 
 MAX_TEXT = 20_000
 """How many characters of a text are kept."""
@@ -200,7 +200,7 @@ def _streams(captured: Any) -> dict[str, str]:
 
 def _text(text: str) -> str:
     """Return the beginning of a text, with question marks for characters that can't be encoded."""
-    return text[:MAX_TEXT].encode("utf-8", "replace").decode()
+    return writable(text[:MAX_TEXT])
 
 
 def _shown(outputs: list[RichOutput]) -> list[dict[str, str]]:
