@@ -22,9 +22,9 @@ SEEDS = (0, 1, 2)
 
 
 @cache
-def street(name: str, seed: int = 0, frames: int = 2) -> SimulatedDrive:
+def street(name: str) -> SimulatedDrive:
     """A street that several tests share and none of them changes."""
-    return simulate(seed, frames, name)
+    return simulate(0, 2, name)
 
 
 def convoy_pairs(moving) -> list[tuple[int, int]]:
@@ -138,9 +138,10 @@ def test_cars_cross_in_both_directions():
     assert ways == {seed: {-1, 1} for seed in SEEDS}
 
 
+@pytest.mark.usefixtures("no_scenery")
 def test_seed_and_name_decide_the_street():
-    drives = street("mesh"), simulate(0, 2, "mesh"), street("mesh", 1), street("glass")
-    one, again, other, elsewhere = (drive.scan(1).points for drive in drives)
+    streets = (0, "mesh"), (0, "mesh"), (1, "mesh"), (0, "glass")
+    one, again, other, elsewhere = (simulate(seed, 2, name).scan(1).points for seed, name in streets)
     assert np.array_equal(one, again)
     assert one.shape != other.shape or not np.array_equal(one, other)
     assert one.shape != elsewhere.shape or not np.array_equal(one, elsewhere)
@@ -181,6 +182,7 @@ def test_an_unknown_street_raises_an_error():
         simulate(0, 36, "alley")
 
 
+@pytest.mark.usefixtures("no_scenery")
 def test_the_overturned_car_is_a_few_metres_ahead():
     for seed in SEEDS:
         objects = SimulatedDrive(seed, 3, Wishes(cast=overturned_car)).objects(2 * PERIOD)
