@@ -75,7 +75,7 @@ def test_the_car_passes_a_border_at_12_to_14_metres_a_second():
 
 def test_the_porous_materials_of_a_street():
     porous = {Material.WIRE, Material.TWIGS, Material.PANE}
-    expected = {name: set() for name in (*FENCED, "convoy")}
+    expected = {name: set() for name in FENCED}
     expected |= {"mesh": {Material.WIRE}, "mesh and hedge": {Material.WIRE, Material.TWIGS}}
     expected |= {"hedge": {Material.TWIGS}, "glass": {Material.PANE}}
     assert {name: materials(street(name)) & porous for name in expected} == expected
@@ -157,9 +157,9 @@ def test_poses_come_from_packets_up_to_5_ms_away():
 
 def test_returns_of_a_border_are_where_the_truth_has_an_object():
     """Beams that pass through mesh and hedge get longer ranges, but still end on something in the truth."""
-    drive = simulate(0, 12, "mesh and hedge")
-    points = drive.scan(11).points_grid
-    kinds = drive.birdseye(1.1)[0]
+    drive = street("mesh and hedge")
+    points = drive.scan(1).points_grid
+    kinds = drive.birdseye(PERIOD)[0]
     right = (points[:, 1] < -3) & (points[:, 0] > 2) & (points[:, 0] < 40) & (points[:, 2] > 0.7) & (points[:, 2] < 1.6)
     rows, cols, inside = LABEL_GRID.cells(points[right])
     ground = np.isin(kinds[rows[inside], cols[inside]], [Kind.ROAD, Kind.LANE, Kind.SIDEWALK, Kind.GRASS])
