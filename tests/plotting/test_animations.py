@@ -64,12 +64,12 @@ CHANGES = {
     "data": lambda ax: ax.lines[0].set_data([0, 1], [1, 0]),
     "picture": lambda ax: ax.images[0].set_data(1 - ax.images[0].get_array()),
     "title": lambda ax: ax.set_title("after"),
-    "limits": lambda ax: ax.set_xlim(0, 9),
     "text": lambda ax: ax.texts[0].set(position=(0.8, 0.8)),
-    "new": lambda ax: ax.scatter([0.2], [0.7], color="black"),
+    "new": lambda ax: ax.scatter([0.2], [0.7], color="red"),
     "legend": lambda ax: ax.legend(["line"]),
     "gone": lambda ax: ax.lines[0].remove(),
     "figure": lambda ax: ax.figure.suptitle("above"),
+    "limits": lambda ax: ax.set_xlim(0, 9),
     "cleared": lambda ax: ax.clear(),
 }
 """What may happen to a figure between two frames, one after the other."""

@@ -108,9 +108,7 @@ def test_every_way_is_scored_and_a_run_that_has_ended_is_not_repeated(small, roo
     monkeypatch.setattr(real_streets, "WAYS", {"once": real_streets.WAYS["once"]})
     monkeypatch.setitem(real_streets.TABLE, "later", ["once"])
     for split, again in compare_real(root, SCENE, "simulated", tmp_path)["scores"].items():
-        assert again == {
-            method: result["scores"][split][method] for method in (STATE_TABLE, "once", "once + CRF") if method in again
-        }
+        assert again.items() <= result["scores"][split].items()
     assert [run.stat().st_mtime_ns for run in runs] == written
     json.dumps(result)
 
