@@ -118,7 +118,8 @@ def undescribed(module: str) -> list[str]:
 
 
 def test_no_module_has_more_than_250_lines_of_code():
-    lengths = {module: len(code_lines(str(PACKAGE / module))) for module in SOURCES}
+    long = [module for module, source in SOURCES.items() if source.count("\n") > 250]
+    lengths = {module: len(code_lines(str(PACKAGE / module))) for module in long}
     assert {module: length for module, length in lengths.items() if length > 250} == {}
 
 

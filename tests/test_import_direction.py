@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -23,6 +24,7 @@ def dotted(path: Path) -> str:
     return ".".join(parts).removesuffix(".py").removesuffix("__init__").removesuffix(".")
 
 
+@cache
 def house() -> list[str]:
     """The rooms of the map, in its order: modules of the top, and folders."""
     rows = re.findall(r"^\| (`.*?) \|", MAP.read_text(encoding="utf-8"), flags=re.MULTILINE)
@@ -30,11 +32,13 @@ def house() -> list[str]:
     return [name.replace("/", ".") for name in names]
 
 
+@cache
 def room_of(name: str) -> str:
     """The room of the map that a module lies in."""
     return next((room for room in house() if f"{name}.".startswith(f"{room}.")), "")
 
 
+@cache
 def imported(path: Path) -> set[str]:
     """What a module imports of the package, at the top or inside functions: modules and folders, by their names."""
     nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))

@@ -61,7 +61,7 @@ EVERY = [*MARGINALS.values(), most_likely, log_partition, distance_of_free_energ
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize(
     "change",
-    [{"sigma_alpha": 1e-6, "sigma_gamma": 1e-6}, {"sigma_alpha": 1e-300, "sigma_gamma": 1e-300}, {"w_bilateral": 0}],
+    [{"sigma_alpha": 1e-300, "sigma_gamma": 1e-300}, {"w_bilateral": 0}],
 )
 @NORMALIZATIONS
 def test_kernels_without_width_or_weight_leave_each_cell_its_own_distribution(infer, shape, change, normalization):

@@ -60,21 +60,26 @@ def scene(root):
     return PandasetScene(root, SCENE)
 
 
+@pytest.fixture(scope="module")
+def frames(scene):
+    return list(scene)
+
+
 def class_at(grid, x, y):
     rows, cols, inside = SPEC.cells(np.array([[x, y]]))
     assert inside.all()
     return grid[rows[0], cols[0]]
 
 
-def test_there_is_a_frame_for_each_image(scene, root):
+def test_there_is_a_frame_for_each_image(scene, frames, root):
     assert (len(scene), scene.numbers, scene.gaps, scene.problems()) == (3, NUMBERS, (), [])
-    assert [frame.time for frame in scene] == pytest.approx([0.0, 0.2, 0.4])
+    assert [frame.time for frame in frames] == pytest.approx([0.0, 0.2, 0.4])
     side = PandasetScene(root, SCENE, camera="left_camera")
     assert (len(side), side.numbers, side.gaps) == (2, (0, 4), ())
 
 
-def test_the_grid_lies_on_the_ground_below_the_lidar_along_the_cameras_heading(scene):
-    for frame, number in zip(scene, NUMBERS, strict=True):
+def test_the_grid_lies_on_the_ground_below_the_lidar_along_the_cameras_heading(frames):
+    for frame, number in zip(frames, NUMBERS, strict=True):
         assert frame.camera.lidar_height == pytest.approx(LIDAR[2] - GROUND)
         np.testing.assert_allclose(frame.T_world_from_lidar[:3, 3], np.add(LIDAR, (0, STEP * number, 0)), atol=1e-9)
         np.testing.assert_allclose(frame.T_world_from_lidar[:3, 0], [0, 1, 0], atol=1e-9)  # ahead
@@ -90,10 +95,10 @@ def test_each_camera_has_a_grid_of_its_own(root):
     assert frame.points[:, 1].min() == pytest.approx(-WALL, abs=1e-5)
 
 
-def test_the_filter_gets_the_turning_lidar_alone(scene):
+def test_the_filter_gets_the_turning_lidar_alone(scene, frames):
     scan = scene._scan(0)
     assert (scan.lidars == 1).sum() == 1
-    assert len(scene[0].points) == len(scan.points) - 1
+    assert len(frames[0].points) == len(scan.points) - 1
     assert len(scan.labelled.points) == len(scan.points) - 1  # the reflection isn't labelled
 
 
@@ -113,8 +118,8 @@ def test_the_vehicles_own_returns_are_those_on_its_roof_whichever_way_the_grid_l
     assert not np.isin(roof[2] - GROUND, prepare_scan(frame.points_grid, SensorModel(ground=None))[:, 2])
 
 
-def test_the_kept_rows_of_an_image_have_the_camera_that_took_them(scene):
-    frame = scene[0]
+def test_the_kept_rows_of_an_image_have_the_camera_that_took_them(frames):
+    frame = frames[0]
     assert frame.image.shape == (580, 1920, 3)
     assert frame.image[0, 0].tolist() == pytest.approx([216 // 8] * 3, abs=2)
     wall = np.array([[WALL, 2.0, 1.0 - LIDAR[2] + GROUND]])  # 2 m to the left, 1 m above the ground
@@ -172,7 +177,7 @@ def test_what_the_camera_sees_is_told_from_what_only_a_lidar_sees(scene):
 
 
 @pytest.mark.parametrize("size", [(580, 1920), (96, 320)])
-def test_pixels_take_the_class_of_what_the_camera_sees(scene, size):
+def test_pixels_take_the_class_of_what_the_camera_sees(scene, frames, size):
     labels, camera = scene.image_labels(0, size), scene.camera.resized(size)
     places = {BUILDING: (WALL, -1.0, 3.0), CAR: (PARKED[1] - 2.0, -PARKED[0], 0.75), ROAD: (9.1, 0.0, 0.0)}
     for number, (x, y, z) in places.items():
@@ -181,7 +186,7 @@ def test_pixels_take_the_class_of_what_the_camera_sees(scene, size):
         reach = size[0] // 60
         around = labels[v - reach : v + reach + 1, u - reach : u + reach + 1]
         assert set(around[around != IGNORE]) == {number}, KITTI_14.names[number]
-    found = scene[0].labels
+    found = frames[0].labels
     assert (labels != IGNORE).mean() > (0.005 if size[0] == 580 else 0.15)
     if size == scene.camera.size:
         np.testing.assert_array_equal(found.image, labels)
@@ -263,13 +268,13 @@ def test_a_return_is_in_the_box_that_holds_it(n_boxes):
 
 
 @pytest.mark.parametrize("name", ["annotations/semseg/00.pkl.gz", "lidar/00.pkl.gz"])
-def test_classes_follow_the_names_of_the_rows_not_their_order(copy, scene, name):
+def test_classes_follow_the_names_of_the_rows_not_their_order(copy, scene, frames, name):
     path = copy / SCENE / name
     table = DataFrame(read_pickled_table(path).columns)
     table.sample(frac=1, random_state=0).to_pickle(path)
     shuffled = PandasetScene(copy, SCENE)
     np.testing.assert_array_equal(shuffled.truth(0, SPEC), scene.truth(0, SPEC))
-    np.testing.assert_array_equal(shuffled[0].labels.image, scene[0].labels.image)
+    np.testing.assert_array_equal(shuffled[0].labels.image, frames[0].labels.image)
 
 
 def test_rows_of_other_names_are_refused(copy):
@@ -368,11 +373,10 @@ def test_bad_inputs_are_named(copy, kind):
     assert scene.problems()
 
 
-@pytest.mark.parametrize("k", [0, 1, 2])
-def test_a_missing_scan_is_a_gap(copy, k):
+@pytest.mark.parametrize("k", [0, 2])
+def test_a_missing_scan_is_a_gap(copy, frames, k):
     """The frame keeps its image, time and pose; the height above the road comes from the first scan that is there."""
-    whole = PandasetScene(copy, SCENE)
-    frame = whole[k]
+    frame = frames[k]
     (copy / SCENE / f"lidar/{NUMBERS[k]:02d}.pkl.gz").unlink()
     scene = PandasetScene(copy, SCENE)
     assert (scene.gaps, scene.problems(), len(scene)) == ((k,), [], 3)
@@ -382,7 +386,7 @@ def test_a_missing_scan_is_a_gap(copy, k):
     np.testing.assert_array_equal(gap.image, frame.image)
     np.testing.assert_array_equal(gap.T_world_from_lidar, frame.T_world_from_lidar)
     other = (k + 1) % 3
-    np.testing.assert_array_equal(scene[other].points, whole[other].points)
+    np.testing.assert_array_equal(scene[other].points, frames[other].points)
     assert any("pkl.gz: expected a scan, found none" in doubt for doubt in drive_doubts(scene))
 
 
@@ -394,12 +398,11 @@ def test_returns_that_cannot_be_in_the_grid_are_not_missed(scene, before, after,
         np.testing.assert_array_equal(scene.truth(k, SPEC, before, after), truth)
 
 
-def test_images_may_be_png(copy):
-    before = PandasetScene(copy, SCENE)[1].image
+def test_images_may_be_png(copy, frames):
     path = copy / SCENE / "camera/front_camera/02.jpg"
     Image.open(path).save(path.with_suffix(".png"))
     path.unlink()
-    np.testing.assert_array_equal(PandasetScene(copy, SCENE)[1].image, before)
+    np.testing.assert_array_equal(PandasetScene(copy, SCENE)[1].image, frames[1].image)
 
 
 def test_a_missing_image_is_doubtful(copy):

@@ -21,7 +21,7 @@ def free_energy(model, q):
     return total
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.sampled_from([random_directed, random_undirected]), st.integers(0, 10**6), st.sampled_from([None, 1]))
 def test_the_free_energy_never_rises_and_bounds_log_z(make, seed, start):
     model = make(seed, variables=5)
@@ -32,7 +32,7 @@ def test_the_free_energy_never_rises_and_bounds_log_z(make, seed, start):
     assert beliefs.free_energy[-1] == pytest.approx(free_energy(model, beliefs.marginals), abs=1e-10)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.sampled_from([random_directed, random_undirected]), st.integers(0, 10**6), st.sampled_from([None, 1]))
 def test_with_forbidden_combinations_it_stays_at_what_is_allowed(make, seed, start):
     """Infinite while Q allows what a factor forbids; once finite, it stays finite and falls."""

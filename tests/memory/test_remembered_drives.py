@@ -113,7 +113,7 @@ def test_the_number_of_classes_cant_change():
         class_memory.advance(grid[1:], all_free(), PlanarMotion(), 0.1)
 
 
-def test_two_thousand_steps_keep_sums_and_limits():
+def test_five_hundred_steps_keep_sums_and_limits():
     """Along a road without end, with a turn now and then and things that move: nothing drifts, nothing grows."""
     spec, rng = GridSpec(0, 6, -2, 2, 0.5), np.random.default_rng(0)
     class_memory = ClassMemory(spec, MemoryParams(movable=(1,)))
@@ -121,11 +121,11 @@ def test_two_thousand_steps_keep_sums_and_limits():
     o = np.moveaxis(rng.dirichlet(np.full(4, 0.3), spec.shape), -1, 0).astype(np.float32)
     belief = Belief(o, rng.normal(0, 5, (2, *spec.shape)).astype(np.float32), nothing)
     g = np.moveaxis(rng.dirichlet(np.full(S + 4, 0.3), spec.shape), -1, 0).astype(np.float32)
-    for k in range(2000):
+    for k in range(500):
         motion = PlanarMotion(0.8, 0.0, 0.01 if k % 100 < 50 else -0.01)
         remembered = class_memory.advance(np.roll(g, k, axis=1), belief, motion, 0.1)
-        if k % 200 == 199:
-            np.testing.assert_allclose(remembered.sum(axis=0), 1, atol=1e-4)
+        if k % 100 == 99:
+            np.testing.assert_allclose(remembered.sum(axis=0), 1, atol=2e-5)
             assert np.isfinite(class_memory.state.evidence).all()
             assert class_memory.state.weight.max() <= class_memory.params.max_weight + 1e-5
             assert class_memory.state.seen.max() <= 1 + 1e-6

@@ -23,17 +23,16 @@ def _images(*shape, dtype=torch.float32):
     return torch.rand(*shape, generator=torch.Generator().manual_seed(0), dtype=dtype)
 
 
-@pytest.mark.parametrize("size", [(16, 16), (33, 47), (94, 311), (96, 320)])
+@pytest.mark.parametrize("size", [(16, 16), (94, 311)])
 def test_scores_are_at_image_resolution(name, size):
     scores = build_segmenter(name, N_CLASSES).eval()(_images(1, 3, *size))
     assert scores.shape == (1, N_CLASSES, *size)
     assert scores.dtype == torch.float32
 
 
-@pytest.mark.parametrize("preset", ["compact", "paper"])
-def test_kitti_images_fit_though_no_multiple_of_32(name, preset):
+def test_kitti_images_fit_though_no_multiple_of_32(name):
     with torch.device("meta"):
-        net = build_segmenter(name, 14, preset)
+        net = build_segmenter(name, 14, "paper")
         assert net(torch.empty(1, 3, 375, 1242)).shape == (1, 14, 375, 1242)
 
 
@@ -72,10 +71,9 @@ def test_images_of_a_batch_do_not_touch(name):
     torch.testing.assert_close(net(images), alone)
 
 
-@pytest.mark.parametrize("size", [(32, 40), (45, 37)])
-def test_the_gradient_reaches_every_weight(name, size):
+def test_the_gradient_reaches_every_weight(name):
     net = build_segmenter(name, N_CLASSES)
-    net(_images(2, 3, *size)).square().mean().backward()
+    net(_images(2, 3, 45, 37)).square().mean().backward()
     for parameter in net.parameters():
         assert torch.isfinite(parameter.grad).all()
     first = next(m for m in net.modules() if isinstance(m, nn.Conv2d))

@@ -112,7 +112,7 @@ def crossed(scan: Scan, spec: GridSpec, cell: tuple[int, int]) -> bool:
     return bool(((ends.min(axis=1) < distance + radius) & (ends.max(axis=1) >= distance - radius)).any())
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=4, deadline=None)
 @example([(13.0, -2.75, 4.0, 1.25), (17.0, -1.25, 1.0, 0.5)])  # differs in 3 x 3 cells
 @given(
     st.lists(st.tuples(st.floats(4, 30), st.floats(-9, 7), st.floats(0.3, 4), st.floats(0.3, 4)), max_size=6),

@@ -16,7 +16,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.storage.files import sha256, sole_writer
 from semgrid_edu.storage.provenance import provenance_problems
-from semgrid_edu.workshop.simulation import datasets, writer
+from semgrid_edu.workshop.simulation import datasets
 from semgrid_edu.workshop.simulation.datasets import RECIPES, DatasetRecipe, Route, make_dataset, make_from_recipe
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.simulation.street.plan import Wishes
@@ -24,8 +24,7 @@ from semgrid_edu.workshop.simulation.writer import DATE
 
 QUIET = Wishes(density=0.2, layout="straight", styles=("park", "park"))
 TINY = DatasetRecipe("tiny", "KITTI-14", (Route("train", 2, 2, QUIET), Route("test", 1, 1, QUIET)), rig=Rig())
-LONG = DatasetRecipe("long", "KITTI-14", (Route("train", 50, 50, QUIET),) * 2, rig=Rig())
-DENSE = DatasetRecipe("dense", "SYNTHIA-10", (Route("train", 1, 1, QUIET),), dense=True)
+DENSE = DatasetRecipe("dense", "SYNTHIA-10", (Route("train", 1, 1, QUIET),), dense=True, rig=Rig())
 
 
 def contents(root: Path) -> dict[str, str]:
@@ -33,54 +32,45 @@ def contents(root: Path) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory):
-    return make_from_recipe(TINY, tmp_path_factory.mktemp("alone"), seed=3, workers=1)
+def made(tmp_path_factory):
+    return make_from_recipe(TINY, tmp_path_factory.mktemp("made"), seed=3, workers=2)
 
 
-def test_two_workers_write_the_same_bytes_as_one(alone, tmp_path):
-    assert contents(make_from_recipe(TINY, tmp_path, seed=3, workers=2)) == contents(alone)
+def test_another_seed_gives_another_world(made, tmp_path):
+    datasets._make_drive(TINY, tmp_path, 4, "0002")
+    image = f"{DATE}/{DATE}_drive_0002_sync/image_02/data/0000000000.png"
+    assert contents(tmp_path)[image] != contents(made)[image]
 
 
-def test_another_seed_gives_another_world(alone, tmp_path):
-    other = contents(make_from_recipe(DatasetRecipe("tiny", "KITTI-14", TINY.routes[:1]), tmp_path, seed=4, workers=1))
-    image = f"{DATE}/{DATE}_drive_0001_sync/image_02/data/0000000000.png"
-    assert other[image] != contents(alone)[image]
+def unfinished(made, folder):
+    """Return a copy as a killed run leaves it: no dataset.json."""
+    root = shutil.copytree(made, folder / "tiny")
+    (root / "dataset.json").unlink()
+    (root / "provenance.json").unlink()
+    return root
 
 
-def test_an_interrupted_run_resumes_to_the_same_bytes(alone, tmp_path, monkeypatch):
-    """A killed run leaves a complete drive, a partial one in a hidden folder, and no dataset.json."""
-    write_drive = writer.write_drive
-
-    def killed_in_the_second(root, drive, simulated, labelled, *rest):
-        if drive == "0002":
-            partial = drive_folder(root, DATE, drive).with_name(f".{DATE}_drive_0002_sync.partial")
-            (partial / "image_02" / "data").mkdir(parents=True)
-            (partial / "image_02" / "data" / "0000000007.png").write_bytes(b"half")
-            raise KeyboardInterrupt
-        return write_drive(root, drive, simulated, labelled, *rest)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(writer, "write_drive", killed_in_the_second)
-        with pytest.raises(KeyboardInterrupt):
-            make_from_recipe(TINY, tmp_path, seed=3, workers=1)
-    assert not (tmp_path / "tiny" / "dataset.json").exists()
-    first = drive_folder(tmp_path / "tiny", DATE, "0001") / "oxts" / "data" / "0000000000.txt"
+def test_an_interrupted_run_resumes_to_the_same_bytes_with_any_number_of_workers(made, tmp_path):
+    """A killed run leaves a complete drive and a partial one in a hidden folder; here two workers made the data set."""
+    root = unfinished(made, tmp_path)
+    second = drive_folder(root, DATE, "0002")
+    partial = second.rename(second.with_name(f".{DATE}_drive_0002_sync.partial"))
+    (partial / "image_02" / "data" / "0000000007.png").write_bytes(b"half")
+    first = drive_folder(root, DATE, "0001") / "oxts" / "data" / "0000000000.txt"
     written = first.stat().st_mtime_ns
     resumed = make_from_recipe(TINY, tmp_path, seed=3, workers=1)
-    assert contents(resumed) == contents(alone)
+    assert contents(resumed) == contents(made)
     assert first.stat().st_mtime_ns == written
 
 
-def test_only_one_process_writes_a_data_set(alone, tmp_path):
+def test_only_one_process_writes_a_data_set(made, tmp_path):
     with sole_writer(tmp_path / "tiny"), pytest.raises(DataError, match="a folder that no other process writes to"):
         make_from_recipe(TINY, tmp_path, seed=3, workers=1)
     assert list((tmp_path / "tiny").iterdir()) == []
 
 
-def test_a_drive_with_missing_files_is_an_error_before_provenance_is_written(alone, tmp_path):
-    root = shutil.copytree(alone, tmp_path / "tiny")
-    (root / "dataset.json").unlink()
-    (root / "provenance.json").unlink()
+def test_a_drive_with_missing_files_is_an_error_before_provenance_is_written(made, tmp_path):
+    root = unfinished(made, tmp_path)
     (drive_folder(root, DATE, "0001") / "velodyne_points" / "data" / "0000000001.bin").unlink()
     with pytest.raises(DataError, match=r"drive_0001_sync: expected all .* 1 missing, such as .*0000000001\.bin"):
         make_from_recipe(TINY, tmp_path, seed=3, workers=1)
@@ -88,14 +78,14 @@ def test_a_drive_with_missing_files_is_an_error_before_provenance_is_written(alo
     assert not (root / "provenance.json").exists()
 
 
-def test_the_drive_of_the_faster_worker_stays_and_the_other_one_is_removed(alone, tmp_path):
+def test_the_drive_of_the_faster_worker_stays_and_the_other_one_is_removed(made, tmp_path):
     """A worker of a killed command finishes late: its drive is removed."""
-    root = shutil.copytree(alone, tmp_path / "tiny")
+    root = shutil.copytree(made, tmp_path / "tiny")
     before = contents(root)
-    (root / DATE / f".{DATE}_drive_0001_sync-abcd.partial").mkdir()
-    partial = root / DATE / f".{DATE}_drive_0001_sync-abcd.partial" / "0000000000.png"
+    (root / DATE / f".{DATE}_drive_0002_sync-abcd.partial").mkdir()
+    partial = root / DATE / f".{DATE}_drive_0002_sync-abcd.partial" / "0000000000.png"
     partial.write_bytes(b"half")
-    datasets._make_drive(TINY, root, 3, "0001")
+    datasets._make_drive(TINY, root, 3, "0002")
     assert partial.read_bytes() == b"half"
     assert provenance_problems(root) == []
     partial.unlink()
@@ -104,19 +94,23 @@ def test_the_drive_of_the_faster_worker_stays_and_the_other_one_is_removed(alone
 
 def test_workers_end_when_their_parent_is_killed(tmp_path):
     code = """
-import sys
+import time
 from pathlib import Path
-from test_simulated_datasets import LONG, make_from_recipe
+from semgrid_edu.workshop.workplace import workplace
+
+def work(name):
+    Path(name).touch()
+    time.sleep(600)
+
 if __name__ == "__main__":
-    make_from_recipe(LONG, Path(sys.argv[1]), seed=3, workers=2)
+    with workplace(2) as place:
+        list(place.executor.map(work, ["one", "other"]))
 """
     script = tmp_path / "run.py"
     script.write_text(code)
-    command, paths = [sys.executable, script, tmp_path], os.pathsep.join([str(Path(__file__).parent), *sys.path])
-    variables = os.environ | {"PYTHONPATH": paths}
-    process = subprocess.Popen(command, env=variables, stderr=subprocess.DEVNULL, start_new_session=True)
-    day = tmp_path / "long" / DATE
-    while not list(day.glob(".*.partial/image_02/data/*.png")):
+    variables = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    process = subprocess.Popen([sys.executable, script], cwd=tmp_path, env=variables, start_new_session=True)
+    while not ((tmp_path / "one").exists() and (tmp_path / "other").exists()):
         assert process.poll() is None
         time.sleep(0.05)
     process.kill()
@@ -138,14 +132,14 @@ def group_alive(group: int) -> bool:
     return True
 
 
-def test_the_index_lists_the_labelled_frames(alone):
-    index = load_index(alone)
+def test_the_index_lists_the_labelled_frames(made):
+    index = load_index(made)
     assert (index.name, index.label_set) == ("tiny", KITTI_14)
     assert [(f.drive, f.frame) for f in index.splits["train"]] == [(("2026_01_01", "0001"), 1)]
     assert [(f.drive, f.frame) for f in index.splits["test"]] == [(("2026_01_01", "0002"), 0)]
     for frames in index.splits.values():
         for labelled in frames:
-            assert KittiRawDrive(alone, *labelled.drive)[labelled.frame].labels is not None
+            assert KittiRawDrive(made, *labelled.drive)[labelled.frame].labels is not None
 
 
 def test_dense_points_are_on_the_depth_image(tmp_path):
@@ -160,9 +154,9 @@ def test_dense_points_are_on_the_depth_image(tmp_path):
     assert frame.labels.image.max() <= 9
 
 
-def test_a_folder_with_other_files_is_an_error(alone, tmp_path):
+def test_a_folder_with_other_files_is_an_error(made, tmp_path):
     with pytest.raises(DataError, match=r"simulation\.json.*'seed': 5.*'seed': 3"):
-        make_from_recipe(TINY, alone.parent, seed=5, workers=1)
+        make_from_recipe(TINY, made.parent, seed=5, workers=1)
     (tmp_path / "tiny").mkdir()
     (tmp_path / "tiny" / "thesis.txt").write_text("precious")
     with pytest.raises(DataError, match="other files"):

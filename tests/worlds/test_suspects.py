@@ -14,15 +14,11 @@ from semgrid_edu.workshop.simulation import simulate
 from semgrid_edu.workshop.simulation.things.materials import Kind
 
 
-def points_of(change, street="mesh"):
-    drive = simulate(0, 1, street)
-    if change:
-        change(drive)
-    return drive, drive.scan(0).points
-
-
 def test_an_opaque_fence_stops_beams_that_the_mesh_lets_through():
-    (_, through), (drive, stopped) = points_of(None), points_of(opaque)
+    drive = simulate(0, 1, "mesh")
+    through = drive.scan(0).points
+    opaque(drive)
+    stopped = drive.scan(0).points
     assert drive.porous.opacity.min() > 1e5
     far = [np.sum(np.hypot(*points[:, :2].T) > 20) for points in (through, stopped)]
     assert far[1] < far[0]
