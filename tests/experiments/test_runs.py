@@ -67,9 +67,14 @@ def test_a_run_that_fails_stops_only_those_that_need_it_and_is_tried_again(tmp_p
 
 def test_a_process_that_dies_ends_the_plan_with_advice(tmp_path):
     """It dies before it has loaded what a run needs, which takes seconds."""
-    with pytest.raises(ChildProcessError, match="memory ran out"), workplace(1) as place:
-        dies = SimpleNamespace(submit=lambda *_: place.executor.submit(os._exit, 1))
-        execute_plan([A], tmp_path, replace(place, executor=dies))
+
+    def plan_of_one_that_dies():
+        with workplace(1) as place:
+            dies = SimpleNamespace(submit=lambda *_: place.executor.submit(os._exit, 1))
+            execute_plan([A], tmp_path, replace(place, executor=dies))
+
+    with pytest.raises(ChildProcessError, match="memory ran out"):
+        plan_of_one_that_dies()
 
 
 def test_the_folder_of_another_run_is_refused(tmp_path):
