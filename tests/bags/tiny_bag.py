@@ -4,6 +4,7 @@ Everything is computed from its definition, with none of the package's readers o
 """
 
 from dataclasses import dataclass, field
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 
@@ -78,16 +79,26 @@ class Recipe:
     info_size: tuple = SIZE
 
 
+@cache
+def known_types(is_ros1: bool):
+    """The types of messages, whose code is made once for all bags."""
+    if not is_ros1:
+        return get_typestore(Stores.ROS2_HUMBLE)
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
+    return store
+
+
 def write_bag(path: Path, kind: str = "mcap", **changes) -> Path:
     """Write a bag of the kind ros1, sqlite3 or mcap; return its file or folder."""
     recipe = Recipe(**changes)
+    store = known_types(kind == "ros1")
     if kind == "ros1":
         path = path.with_suffix(".bag")
-        store, writer = get_typestore(Stores.ROS1_NOETIC), Writer1(path)
-        store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
+        writer = Writer1(path)
     else:
         plugin = {"sqlite3": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}[kind]
-        store, writer = get_typestore(Stores.ROS2_HUMBLE), Writer2(path, version=9, storage_plugin=plugin)
+        writer = Writer2(path, version=9, storage_plugin=plugin)
     serialize = store.serialize_ros1 if kind == "ros1" else store.serialize_cdr
     messages = [one for one in Messages(store, kind == "ros1", recipe).all() if one[0] != recipe.without]
     with writer:

@@ -6,6 +6,7 @@ import bench_occupancy
 import bench_planes
 import numpy as np
 import torch
+from tiny_streets import CAMERA, SMALL, tiny_streets
 
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.grid import GridSpec
@@ -36,7 +37,8 @@ def test_all_ways_to_sample_planes_give_the_same(monkeypatch):
 def test_each_step_of_both_stages_is_timed(monkeypatch):
     monkeypatch.setattr(bench_networks, "STEPS", 3)
     monkeypatch.setattr(bench_networks, "WARM_UP", 1)
-    image, grid = bench_networks.step_times(build_net(Architecture(), sample_drive().camera))
+    monkeypatch.setattr(bench_networks, "sample_frames", lambda: tiny_streets(2))
+    image, grid = bench_networks.step_times(build_net(SMALL, CAMERA))
     assert len(image) == len(grid) == 1  # without warming up and the last, which ends with what comes after it
     assert min(*image, *grid) > 0
 

@@ -104,68 +104,71 @@ class TestExample:
         assert (yours.belief.probability[State.DYNAMIC] < 0.5).all()  # one scan doesn't tell what moves
 
 
-class TestPage:
-    def test_shows_the_packages_picture_and_yours_side_by_side(self, page, frames, results):
-        assert [a.get("class") for a in page.all("div")].count("pair") == 3
-        assert len(page.all("figure")) == len(page.all("figcaption")) == 9
-        for frame, (package, yours) in zip(frames, results, strict=True):
-            for name in ("grid", "refined"):
-                ours, theirs = (np.array(decode(frame["images"][prefix + name])) for prefix in ("", "your_"))
-                np.testing.assert_array_equal(ours, getattr(package, name).argmax(axis=0))
-                np.testing.assert_array_equal(theirs, getattr(yours, name).argmax(axis=0))
-            assert frame["images"]["occupancy"] != frame["images"]["your_occupancy"]
-            assert "your_scores" not in frame["images"]  # the same network made them
+def test_the_page_shows_the_packages_picture_and_yours_side_by_side(page, frames, results):
+    assert [a.get("class") for a in page.all("div")].count("pair") == 3
+    assert len(page.all("figure")) == len(page.all("figcaption")) == 9
+    for frame, (package, yours) in zip(frames, results, strict=True):
+        for name in ("grid", "refined"):
+            ours, theirs = (np.array(decode(frame["images"][prefix + name])) for prefix in ("", "your_"))
+            np.testing.assert_array_equal(ours, getattr(package, name).argmax(axis=0))
+            np.testing.assert_array_equal(theirs, getattr(yours, name).argmax(axis=0))
+        assert frame["images"]["occupancy"] != frame["images"]["your_occupancy"]
+        assert "your_scores" not in frame["images"]  # the same network made them
 
-    def test_every_picture_has_its_words_and_yours_say_so(self, words, frames):
-        for frame in frames:
-            assert set(frame["texts"]) == set(frame["images"]) - {"photo"}
-            for name, text in frame["texts"].items():
-                assert text.startswith("my_stages.py: ") == name.startswith("your_")
-        assert words.count("Made with track of my_stages.py") == 2
-        assert words.count("Made with track and refine of my_stages.py") == 1
 
-    def test_each_occupancy_grid_has_its_arrows(self, page, frames):
-        arrows = [a["data-arrows"] for _, a in page.elements if "data-arrows" in a]
-        assert arrows == ["occupancy", "your_occupancy"] == list(frames[0]["arrows"])
+def test_every_picture_has_its_words_and_yours_say_so(words, frames):
+    for frame in frames:
+        assert set(frame["texts"]) == set(frame["images"]) - {"photo"}
+        for name, text in frame["texts"].items():
+            assert text.startswith("my_stages.py: ") == name.startswith("your_")
+    assert words.count("Made with track of my_stages.py") == 2
+    assert words.count("Made with track and refine of my_stages.py") == 1
 
-    def test_opens_with_whose_stages_they_are(self, words):
-        assert (
-            "In the second, track (l → o) and refine (g → g) come from my_stages.py, and the other stages are" in words
-        )
 
-    def test_tables_hold_both(self, out, results):
-        html = (out / "index.html").read_text(encoding="utf-8").replace("<wbr>", "")
-        rows = re.findall(r"<tr><th>(?:all|semantic) cells, (.*?)</th>", html)
-        names = [
-            f"{grid}, {whose}"
-            for whose in ("the package&#x27;s", "my_stages.py")
-            for grid in ("semantic grid", "refined grid")
-        ]
-        assert rows == 2 * names
-        times = re.findall(r'<tr class="stage">.*?</tr>', html)
-        assert len(times) == 5
-        assert all(len(re.findall(r"<td>[\d.]+</td>", row)) == 2 for row in times)
-        assert ["replaced by" in row for row in times] == [True, False, False, False, True]
+def test_each_occupancy_grid_has_its_arrows(page, frames):
+    arrows = [a["data-arrows"] for _, a in page.elements if "data-arrows" in a]
+    assert arrows == ["occupancy", "your_occupancy"] == list(frames[0]["arrows"])
 
-    def test_yours_are_scored_against_the_truth_of_the_packages_filter(self, out, results):
-        html = (out / "index.html").read_text(encoding="utf-8").replace("<wbr>", "")
-        right = [
-            yours.refined.argmax(axis=0)
-            == grid_truth(package.frame.labels, package.belief.probability, GridSpec.compact())
-            for package, yours in results[1:]
-        ]
-        row = re.search(r"<tr><th>all cells, refined grid, my_stages.py</th><td>([\d.]+)</td>", html)
-        assert float(row[1]) == pytest.approx(100 * np.mean(right), abs=0.051)
 
-    def test_the_package_alone_gives_the_same_pictures(self, frames, alone):
-        alone = Page((alone / "index.html").read_text(encoding="utf-8"))
-        for both, one in zip(frames, json.loads(alone.text["frames"]), strict=True):
-            assert both["images"].items() >= one["images"].items()
+def test_the_page_opens_with_whose_stages_they_are(words):
+    assert "In the second, track (l → o) and refine (g → g) come from my_stages.py, and the other stages are" in words
 
-    def test_overview_has_a_second_row(self, out, alone):
-        with Image.open(out / "overview.png") as both, Image.open(alone / "overview.png") as one:
-            assert both.width == one.width
-            assert both.height > 1.5 * one.height
+
+def test_tables_hold_both(out, results):
+    html = (out / "index.html").read_text(encoding="utf-8").replace("<wbr>", "")
+    rows = re.findall(r"<tr><th>(?:all|semantic) cells, (.*?)</th>", html)
+    names = [
+        f"{grid}, {whose}"
+        for whose in ("the package&#x27;s", "my_stages.py")
+        for grid in ("semantic grid", "refined grid")
+    ]
+    assert rows == 2 * names
+    times = re.findall(r'<tr class="stage">.*?</tr>', html)
+    assert len(times) == 5
+    assert all(len(re.findall(r"<td>[\d.]+</td>", row)) == 2 for row in times)
+    assert ["replaced by" in row for row in times] == [True, False, False, False, True]
+
+
+def test_yours_are_scored_against_the_truth_of_the_packages_filter(out, results):
+    html = (out / "index.html").read_text(encoding="utf-8").replace("<wbr>", "")
+    right = [
+        yours.refined.argmax(axis=0) == grid_truth(package.frame.labels, package.belief.probability, GridSpec.compact())
+        for package, yours in results[1:]
+    ]
+    row = re.search(r"<tr><th>all cells, refined grid, my_stages.py</th><td>([\d.]+)</td>", html)
+    assert float(row[1]) == pytest.approx(100 * np.mean(right), abs=0.051)
+
+
+def test_the_package_alone_gives_the_same_pictures(frames, alone):
+    alone = Page((alone / "index.html").read_text(encoding="utf-8"))
+    for both, one in zip(frames, json.loads(alone.text["frames"]), strict=True):
+        assert both["images"].items() >= one["images"].items()
+
+
+def test_the_overview_has_a_second_row(out, alone):
+    with Image.open(out / "overview.png") as both, Image.open(alone / "overview.png") as one:
+        assert both.width == one.width
+        assert both.height > 1.5 * one.height
 
 
 class TestComparison:
@@ -190,6 +193,7 @@ def write(folder, text):
     return path
 
 
+@pytest.mark.usefixtures("no_overview")
 def test_an_image_network_of_ones_own_is_shown_too_and_its_classes_are_in_the_legend(drive, tmp_path):
     signage = KITTI_14.index("signage")
     scores = f"np.eye(14)[np.full((96, 320), {signage})].transpose(2, 0, 1)"
@@ -201,6 +205,7 @@ def test_an_image_network_of_ones_own_is_shown_too_and_its_classes_are_in_the_le
     assert re.search(r'<b>Classes</b>.*?">signage</span>', html)
 
 
+@pytest.mark.usefixtures("no_overview")
 def test_a_memory_of_ones_own_is_shown_beside_the_packages(drive, tmp_path):
     stages = write(
         tmp_path, "def remember(views, spec):\n    for view in views: yield np.full_like(view.grid, 1 / 14)\n"
@@ -216,8 +221,9 @@ def test_a_memory_of_ones_own_is_shown_beside_the_packages(drive, tmp_path):
     assert len(re.findall(r'<tr class="stage">', html)) == 6
 
 
+@pytest.mark.usefixtures("no_overview")
 def test_without_truth_both_are_shown_and_neither_is_scored(tmp_path):
-    write_tiny_drive(tmp_path, n_frames=2, labelled=())
+    write_tiny_drive(tmp_path, n_frames=1, labelled=())
     page = write_demo(KittiRawDrive(tmp_path, DATE, "0001"), sample_weights(), tmp_path / "out", EXAMPLE)
     html = page.read_text(encoding="utf-8")
     assert "Expect poor semantics" in html

@@ -8,6 +8,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from safetensors.torch import load_file
@@ -64,16 +65,16 @@ def test_a_run_that_fails_stops_only_those_that_need_it_and_is_tried_again(tmp_p
     assert started(tmp_path) == {f"note-{name}": 1 + (name == "weak") for name in ("a", "b", "c", "d", "weak", "after")}
 
 
-class Dies(Note):
-    """A run that takes its process with it."""
-
-    def work(self, root, device):
-        os._exit(1)
-
-
 def test_a_process_that_dies_ends_the_plan_with_advice(tmp_path):
-    with pytest.raises(ChildProcessError, match="memory ran out"), workplace(1) as place:
-        execute_plan([Dies("dies")], tmp_path, place)
+    """It dies before it has loaded what a run needs, which takes seconds."""
+
+    def plan_of_one_that_dies():
+        with workplace(1) as place:
+            dies = SimpleNamespace(submit=lambda *_: place.executor.submit(os._exit, 1))
+            execute_plan([A], tmp_path, replace(place, executor=dies))
+
+    with pytest.raises(ChildProcessError, match="memory ran out"):
+        plan_of_one_that_dies()
 
 
 def test_the_folder_of_another_run_is_refused(tmp_path):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import optimize, stats
+from scipy import optimize, special
 
 from semgrid_edu.errors import ArgumentError
 
@@ -59,7 +59,7 @@ class EstimatedMean(NamedTuple):
         """
         variances = np.array(self.variances)
         freedom = [max(n - 1, 1) for n in self.sizes]
-        t = stats.t.ppf((1 + level) / 2, freedom)
+        t = special.stdtrit(freedom, (1 + level) / 2)  # quantiles of Student's distribution
         return float((t * variances).sum() / np.sqrt(variances.sum())) if variances.any() else 0.0
 
     def p_value(self, limit: float, above: bool) -> float:
