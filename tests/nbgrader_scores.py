@@ -6,7 +6,9 @@ from functools import cache
 import nbformat
 import nbgrader.api
 import pytest
+from alembic.script import ScriptDirectory
 from nbconvert.filters import strip_ansi
+from nbgrader.dbutil import ALEMBIC_DIR
 from nbgrader.utils import is_grade, is_solution
 
 from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, autograde_one, place
@@ -16,12 +18,12 @@ from semgrid_edu.workshop.course.notebooks.build import read_percent, write_note
 
 @pytest.fixture(scope="session", autouse=True)
 def alembic_asked_once():
-    """Let nbgrader ask for the version of its tables once: it starts alembic, for three seconds, for each gradebook.
+    """Let nbgrader find the version of its tables here and once: it starts alembic, for seconds, for each gradebook.
 
     Nor does it compile its queries anew each of the twelve times that it opens a gradebook to grade one notebook.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(nbgrader.api, "get_alembic_version", cache(nbgrader.api.get_alembic_version))
+        patch.setattr(nbgrader.api, "get_alembic_version", cache(ScriptDirectory(ALEMBIC_DIR).get_current_head))
         patch.setattr(nbgrader.api, "create_engine", cache(nbgrader.api.create_engine))
         yield
 

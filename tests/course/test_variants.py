@@ -1,35 +1,12 @@
-"""Hidden tests draw other inputs for each variant: reference solutions must pass with all of them."""
+"""A private variant of an exercise, as the guide describes it; `test_catalogue` grades references with other inputs."""
 
 import re
 import shutil
 import sys
 
-import pytest
 from nbgrader.utils import is_grade
 
-from semgrid_edu.workshop.course.nbgrader.build import exercise_sources
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
-
-
-@pytest.fixture
-def choose_variant(monkeypatch):
-    """The instructor's function that chooses the inputs of hidden tests."""
-    monkeypatch.syspath_prepend(str(NOTEBOOKS / "instructor"))
-    import semgrid_instructor
-
-    yield semgrid_instructor.choose_variant
-    for name in [name for name in sys.modules if name.split(".")[0] == "semgrid_instructor"]:
-        del sys.modules[name]
-
-
-@pytest.mark.parametrize("source", exercise_sources(), ids=lambda source: source.stem)
-def test_reference_passes_another_variant(source, choose_variant):
-    """The published inputs are tried with the exercise's catalogue."""
-    choose_variant(2027)
-    names = {"__name__": "__main__"}
-    for cell in read_percent(source).cells:
-        if cell.cell_type == "code":
-            exec(cell.source, names)
 
 
 def changed(text, diff):

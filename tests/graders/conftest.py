@@ -73,9 +73,9 @@ def nursery():
 
 
 @pytest.fixture(scope="module")
-def start(nursery, course):
+def start(nursery):
     """A function that forks a process for a student of exercise 01 from one that is ready."""
-    with warm_processes(nursery, SOURCE, course / "prepared" / NAME) as start:
+    with warm_processes(nursery, SOURCE) as start:
         yield start
 
 

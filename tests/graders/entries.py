@@ -70,14 +70,21 @@ def entry(task: str, title: str, *row: str | float) -> Entry:
     return Entry(title, task, tuple(text), loses, says)
 
 
-def pack(entries) -> list[dict[str, Entry]]:
-    """Share entries out to students: each answers every task with at most one entry, so that few runs try them all."""
-    students: list[dict[str, Entry]] = []
-    for one in entries:
-        free = next((own for own in students if one.task not in own and kind(own) == one.kind), None)
-        if free is None:
-            students.append(free := {})
-        free[one.task] = one
+def pack(entries: list[Entry]) -> list[dict[str, Entry]]:
+    """Share entries out to students: each answers a task with at most one entry, so that few runs try them all.
+
+    Each task begins with another student, so that right ways stand beside mistakes in other tasks.
+    """
+    students = []
+    for wanted in ("answer", "endless loop"):
+        tasks: dict[str, list[Entry]] = {}
+        for one in (one for one in entries if one.kind == wanted):
+            tasks.setdefault(one.task, []).append(one)
+        some: list[dict[str, Entry]] = [{} for _ in range(max(map(len, tasks.values()), default=0))]
+        for first, (task, own) in enumerate(tasks.items()):
+            for k, one in enumerate(own, start=first):
+                some[k % len(some)][task] = one
+        students += some
     return students
 
 

@@ -1,22 +1,20 @@
 """Every exercise is graded with its catalogue of answers (`entries`); one test class per exercise.
 
-The catalogue is graded in a warm session (`warm`), because nbgrader would need minutes; `test_warm` shows that both
-give the same points and messages. nbgrader grades the reference and the stub.
+Everything is graded in a warm session (`warm`), because nbgrader would need minutes; `test_class` shows that both give
+the same points and messages. nbgrader's part knows cells, points and errors, nothing of what an exercise is about.
 """
 
 import re
-from itertools import chain, repeat
-from unittest import mock
 
 import pytest
 from answers_in_disguise import HONEST, POINTLESS, disguise
 from entries import Entry, entries_of, exercises, kind, pack, source_of
-from nbgrader_scores import autograde, tasks
-from submissions import reference_answers, submission
-from warm import grade_warm, passed_unseen, warm_processes
+from nbgrader_scores import tasks
+from submissions import reference_answers
+from warm import grade_disguised, grade_warm, warm_processes
 
-from semgrid_edu.workshop.course.nbgrader import preprocessors
-from semgrid_edu.workshop.course.sandbox.process import StudentProcess
+from semgrid_edu.workshop.course.nbgrader.preprocessors import use_instructor
+from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 
 TIMEOUT = {"answer": 30, "endless loop": 1}
 """Seconds that a cell may take: plenty for an answer on a busy machine, little for a loop that uses all of it."""
@@ -50,56 +48,30 @@ class Checks:
 
     @pytest.fixture(scope="class")
     @classmethod
-    def students(cls, reference):
-        """The answers of the students that have entries."""
-        return [reference | {task: entry.code(reference) for task, entry in pack.items()} for pack in cls.packs]
+    def start(cls, nursery, source, disguised):
+        """A function that starts a warm process.
 
-    @pytest.fixture(scope="class")
-    @classmethod
-    def course(cls, new_course):
-        return new_course(cls.exercise)
-
-    @pytest.fixture(scope="class")
-    @classmethod
-    def start(cls, nursery, source, course):
-        """A function that starts a warm process."""
-        with warm_processes(nursery, source, course / "prepared" / cls.exercise) as start:
+        A student comes first whose functions overwrite their arguments, which must not affect anyone after her.
+        """
+        with warm_processes(nursery, source) as start:
+            grade_warm(source, disguised, start, TIMEOUT["answer"], first="_kind = 'spoil'")
             yield start
 
     @pytest.fixture(scope="class")
     @classmethod
-    def graded(cls, source, students, disguised, start):
-        """(score, points, message) of each student and task, from one warm session.
-
-        A student comes first whose functions overwrite their arguments, which must not affect anyone after her. To
-        save time, only the tests of a student's entries run, but for one student, for whom all run.
-        """
-        grade_warm(source, disguised, start, TIMEOUT["answer"], first="_kind = 'spoil'")
-        tested = [None if n == cls.incomplete() else pack for n, pack in enumerate(cls.packs)]
+    def graded(cls, source, reference, start):
+        """(score, points, message) of each student and task; only the tests of a student's entries run."""
+        answers = [reference | {task: entry.code(reference) for task, entry in pack.items()} for pack in cls.packs]
         return [
-            cls.by_task(source, grade_warm(source, answers, start, TIMEOUT[kind(pack)], tasks_of_pack))
-            for answers, pack, tasks_of_pack in zip(students, cls.packs, tested, strict=True)
+            cls.by_task(source, grade_warm(source, own, start, TIMEOUT[kind(pack)], pack))
+            for own, pack in zip(answers, cls.packs, strict=True)
         ]
-
-    @classmethod
-    def incomplete(cls):
-        """Return the first student who has the reference's answer to some task, and no endless loop."""
-        everything = {entry.task for entry in cls.entries}
-        return next(n for n, pack in enumerate(cls.packs) if pack.keys() < everything and kind(pack) == "answer")
 
     @pytest.fixture(scope="class")
     @classmethod
-    def graded_by_nbgrader(cls, source, reference, course, start):
-        """The same for the reference and the stub, graded by nbgrader.
-
-        The first process is a fresh one, as in a class, with what `start` has compiled; the others are forked.
-        """
-        (course / "prepared" / f"{cls.exercise}.passed").touch()
-        processes = chain([StudentProcess], repeat(lambda *_, **__: start()))
-        notebooks = {"reference": submission(source, reference), "stub": submission(source, {})}
-        with mock.patch.object(preprocessors, "StudentProcess", side_effect=lambda *a, **k: next(processes)(*a, **k)):
-            scores = autograde(course, cls.exercise, notebooks, TIMEOUT["answer"])
-        return {student: cls.by_task(source, cells) for student, cells in scores.items()}
+    def errors(cls, source, disguised, start):
+        """The errors of the right answers in disguise, by kind and test cell."""
+        return grade_disguised(source, disguised, HONEST, POINTLESS, start, TIMEOUT["answer"])
 
     @staticmethod
     def by_task(source, cells):
@@ -114,13 +86,18 @@ class Checks:
             if all(name in cells and cells[name].score is not None for name in names)
         }
 
-    def test_reference_earns_full_marks(self, graded_by_nbgrader):
-        for task, (score, points, message) in graded_by_nbgrader["reference"].items():
-            assert score == points, f"{task}: {message}"
+    def test_reference_earns_full_marks_with_another_variant(self, source, reference, start):
+        """With other hidden inputs than the published ones, on which the catalogue is graded."""
+        use_instructor(NOTEBOOKS / "instructor", 2027)
+        try:
+            scores = self.by_task(source, grade_warm(source, reference, start, TIMEOUT["answer"]))
+        finally:
+            use_instructor(NOTEBOOKS / "instructor")
+        assert {task: message for task, (score, points, message) in scores.items() if score < points} == {}
 
-    def test_untouched_stub_earns_nothing(self, graded_by_nbgrader, source):
-        scores = {task: score for task, (score, _, _) in graded_by_nbgrader["stub"].items()}
-        assert scores == dict.fromkeys(tasks(source), 0)
+    def test_untouched_stub_earns_nothing(self, source, start):
+        scores = self.by_task(source, grade_warm(source, {}, start, TIMEOUT["answer"]))
+        assert {task: score for task, (score, _, _) in scores.items()} == dict.fromkeys(tasks(source), 0)
 
     def test_entry(self, graded, entry):
         student = next(n for n, pack in enumerate(self.packs) if pack.get(entry.task) is entry)
@@ -128,25 +105,14 @@ class Checks:
         assert points - score == entry.loses, message or "no test noticed"
         assert re.sub(r"\s+", " ", entry.says) in re.sub(r"\s+", " ", message)
 
-    def test_other_tasks_keep_their_points(self, graded):
-        student = self.incomplete()
-        others = {task: result for task, result in graded[student].items() if task not in self.packs[student]}
-        assert others
-        assert {task: message for task, (score, points, message) in others.items() if score < points} == {}
-
-    def test_known_inputs_alone_earn_nothing(self, source, disguised, start):
-        """And no answer that spoils its arguments affects the next one."""
-        passed = passed_unseen(source, disguised, ("spoil", *POINTLESS, "right"), start, TIMEOUT["answer"])
-        del passed["spoil"]
+    def test_known_inputs_alone_earn_nothing(self, source, errors):
         coded = {name for task, names in tasks(source).items() for name in names if name != task}
-        assert set(passed.pop("right")) == coded
-        assert passed == {kind: [] for kind in POINTLESS}
+        for guess in POINTLESS:
+            assert {name for name in coded if not errors[guess][name]} == set(), guess
 
     @pytest.mark.parametrize("kind", HONEST)
-    def test_other_types_of_numbers_cost_nothing(self, source, disguised, start, kind):
-        cells = grade_warm(source, disguised, start, TIMEOUT["answer"], first=f"_kind = {kind!r}")
-        scores = self.by_task(source, cells)
-        assert {task: message for task, (score, points, message) in scores.items() if score < points} == {}
+    def test_other_types_of_numbers_cost_nothing(self, errors, kind):
+        assert {name: found for name, found in errors[kind].items() if found} == {}
 
     def test_catalogue_is_complete(self, source):
         """Each task of code has another right way, a mistake for its visible tests and one for its hidden ones.
@@ -163,6 +129,11 @@ class Checks:
             assert {False, True} == {*hidden}, f"{task}: a mistake that visible tests find, and one for hidden ones"
             assert len(hidden) <= 5, f"{task}: at most five mistakes"
 
+    def test_a_right_way_stands_beside_mistakes_in_other_tasks(self):
+        """So `test_entry` shows that a mistake costs nothing in other tasks."""
+        for own in self.packs:
+            assert any(entry.loses for entry in own.values()), [entry.title for entry in own.values()]
+
 
 for exercise in exercises():
     globals()[f"Test_{exercise}"] = type(
@@ -174,6 +145,6 @@ for exercise in exercises():
 
 def test_a_wrong_jackknife_costs_nothing_in_task_4():
     """A right answer to task 4 of exercise 12 that builds on task 3 is graded beside a wrong answer to task 3."""
-    packs = [own for own in pack(entries_of("12_experiments")) if "paired" in own]  # the last ones lack some tasks
+    packs = [own for own in pack(entries_of("12_experiments")) if {"towns", "paired"} <= own.keys()]
     beside = [own for own in packs if "jackknife that is wrong" in own["paired"].title]
     assert [own["towns"].loses > 0 for own in beside] == [True]

@@ -26,10 +26,10 @@ from semgrid_edu.fast.numba_cache import PACKAGE
 from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells, use_instructor
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.limits import Limits
-from semgrid_edu.workshop.course.sandbox.notebook import TestCells, _prepare, _run_seen, cell_name, run_submission
+from semgrid_edu.workshop.course.sandbox.notebook import TestCells, _prepare, cell_name, run_submission
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.session import Session
-from semgrid_edu.workshop.course.sandbox.surroundings import PREPARED, keep_compiled, worker_environment
+from semgrid_edu.workshop.course.sandbox.surroundings import PREPARED, worker_environment
 
 SERVER = Path(__file__).with_name("warm_server.py")
 
@@ -67,31 +67,34 @@ def is_test(cell):
     return is_grade(cell) and not is_solution(cell)
 
 
-def passed_unseen(source, answers, kinds, start, timeout):
-    """Return which hidden tests pass with each kind of disguise (`answers_in_disguise`), on visible tests with none.
+def grade_disguised(source, answers, honest, pointless, start, timeout):
+    """Return the errors of each kind of disguise (`answers_in_disguise`) by test cell.
 
-    One process runs the hidden tests of all kinds, and another one the visible tests once.
+    Visible tests run with the honest kinds, hidden ones with all, one kind after the other in the same two processes.
     """
-    notebook, passed = restored(source, submission(source, answers)), {kind: [] for kind in kinds}
+    notebook, errors = restored(source, submission(source, answers)), {kind: {} for kind in (*honest, *pointless)}
     seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
     tests = TestCells(seen, unseen)
     try:
         _prepare(notebook, _trusted(source), tests)
-        _run_seen(notebook, _trusted(source), tests)
-        seen.stop()
         for cell in (cell for cell in notebook.cells if cell.cell_type == "code"):
             if not is_test(cell):
+                seen.run(cell.source)
                 unseen.run_later(cell.source)
                 continue
-            checks = tests.postponed[cell_name(cell)]
-            for kind in kinds:
+            name = cell_name(cell)
+            for kind in honest:
+                seen.run(f"_kind = {kind!r}")
+                errors[kind][name] = tests.test(cell.source, name)
+            checks = tests.postponed[name]
+            for kind in errors:
                 unseen.run_later(f"_kind = {kind!r}")
-                tests.postponed[cell_name(cell)] = checks
-                passed[kind] += [] if tests.judge(cell_name(cell)) else [cell_name(cell)]
+                tests.postponed[name] = checks
+                errors[kind][name] = errors[kind].get(name, []) + tests.judge(name)
     finally:
         seen.stop()
         unseen.stop()
-    return passed
+    return errors
 
 
 @cache
@@ -106,7 +109,7 @@ def _score(cell):
 
 @contextmanager
 def open_nursery():
-    """Load the large libraries in a process; give its folder of what is compiled, and a socket that takes exercises."""
+    """Load the large libraries in a process that knows what is compiled; give a socket that takes exercises."""
     with tempfile.TemporaryDirectory() as folder:
         for file in PACKAGE.rglob("__pycache__/*.nb[ic]"):
             # Where a process looks that keeps in a folder of its own what numba compiles.
@@ -119,27 +122,24 @@ def open_nursery():
         environment = worker_environment(Path(folder)) | {"NUMBA_THREADING_LAYER": "workqueue"}
         with subprocess.Popen(command, cwd=folder, env=environment, pass_fds=[theirs.fileno()]), ours:
             theirs.close()
-            yield Path(folder, PREPARED), ours
+            yield ours
 
 
 @contextmanager
-def warm_processes(nursery, source, prepared):
+def warm_processes(nursery, source):
     """Start a server for an exercise; give a function that returns a new process.
 
-    `nursery` is what `open_nursery` gives; the folder `prepared` takes what is compiled there.
+    `nursery` is what `open_nursery` gives.
     """
     use_instructor(NOTEBOOKS / "instructor")
-    prepared.mkdir(parents=True, exist_ok=True)
     if not hasattr(os, "pidfd_open"):
-        yield lambda: StudentProcess(Limits(), prepared)
+        yield lambda: StudentProcess(Limits())
         return
-    compiled, exercises = nursery
     ours, theirs = socket.socketpair()
     with ours:
-        socket.send_fds(exercises, [str(source).encode()], [theirs.fileno()])
+        socket.send_fds(nursery, [str(source).encode()], [theirs.fileno()])
         theirs.close()
         assert ours.recv(1), "the exercise has run"
-        keep_compiled(compiled, prepared)
         yield lambda: ForkedProcess(ours)
 
 
