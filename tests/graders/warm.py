@@ -71,6 +71,7 @@ def grade_disguised(source, answers, honest, pointless, start, timeout):
     """Return the errors of each kind of disguise (`answers_in_disguise`) by test cell.
 
     Visible tests run with the honest kinds, hidden ones with all, one kind after the other in the same two processes.
+    Before a cell's hidden tests, answers that spoil their arguments run, which must not affect those after them.
     """
     notebook, errors = restored(source, submission(source, answers)), {kind: {} for kind in (*honest, *pointless)}
     seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
@@ -87,10 +88,12 @@ def grade_disguised(source, answers, honest, pointless, start, timeout):
                 seen.run(f"_kind = {kind!r}")
                 errors[kind][name] = tests.test(cell.source, name)
             checks = tests.postponed[name]
-            for kind in errors:
+            for kind in ("spoil", *errors):
                 unseen.run_later(f"_kind = {kind!r}")
                 tests.postponed[name] = checks
-                errors[kind][name] = errors[kind].get(name, []) + tests.judge(name)
+                found = tests.judge(name)
+                if kind in errors:
+                    errors[kind][name] = errors[kind].get(name, []) + found
     finally:
         seen.stop()
         unseen.stop()
