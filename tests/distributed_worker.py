@@ -1,7 +1,4 @@
-"""Two processes, started as torchrun starts them, for test_distributed.py: `distributed_worker.py FOLDER TASK...`.
-
-They are forked from one that has imported everything, because importing takes longer than their work.
-"""
+"""What each of two processes does in test_distributed.py, by torchrun: `distributed_worker.py FOLDER TASK...`."""
 
 import sys
 import time
@@ -12,7 +9,6 @@ import torch
 from lightning_fabric import Fabric
 from tiny_streets import CAMERA, SMALL, tiny_streets
 from torch import nn
-from torch.distributed.launcher.api import LaunchConfig, elastic_launch
 
 from semgrid_edu.networks import build_net
 from semgrid_edu.training import TrainingParams, train
@@ -127,16 +123,10 @@ def fail(folder, fabric):
     train(build_net(SMALL, CAMERA), data, folder / "fails", TrainingParams(10, 10, 2), fabric=fabric)
 
 
-def work(folder, tasks):
-    """What one of the processes does."""
+if __name__ == "__main__":
     warnings.simplefilter("error")
     torch.set_num_threads(1)
     fabric = open_fabric("cpu")
     assert fabric.world_size == 2
-    for task in tasks:
-        globals()[task](folder, fabric)
-
-
-if __name__ == "__main__":
-    config = LaunchConfig(1, 1, 2, rdzv_backend="c10d", rdzv_endpoint="localhost:0", start_method="fork")
-    elastic_launch(config, work)(Path(sys.argv[1]), sys.argv[2:])
+    for task in sys.argv[2:]:
+        globals()[task](Path(sys.argv[1]), fabric)

@@ -1,4 +1,4 @@
-"""Two processes, started as torchrun starts them, against one that does the same alone."""
+"""Two processes, started by torchrun, against one that does the same alone."""
 
 import os
 import subprocess
@@ -15,9 +15,10 @@ from semgrid_edu.training.log import read_log
 
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory):
-    """All that two processes do together, in one start, since starting takes longer than the work."""
+    """All that two processes do together, in one start of torchrun, since starting takes longer than the work."""
     folder = tmp_path_factory.mktemp("together")
-    command = [sys.executable, worker.__file__, str(folder), "share", "refuse", "learn_streets", "fail"]
+    torchrun = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
+    command = [*torchrun, worker.__file__, str(folder), "share", "refuse", "learn_streets", "fail"]
     environment = os.environ | {"OMP_NUM_THREADS": "1"}
     return folder, subprocess.run(command, capture_output=True, text=True, env=environment, timeout=240, check=False)
 
