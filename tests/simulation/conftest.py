@@ -22,8 +22,8 @@ def junction_drive_again() -> SimulatedDrive:
 
 @pytest.fixture(scope="session")
 def crowded_drives() -> list[SimulatedDrive]:
-    """Two drives through crowded towns."""
-    return [SimulatedDrive(seed, 10, Wishes(density=1.0, styles=("town", "town"))) for seed in range(2)]
+    """Three drives through crowded towns."""
+    return [SimulatedDrive(seed, 10, Wishes(density=1.0, styles=("town", "town"))) for seed in range(3)]
 
 
 @pytest.fixture(scope="session")

@@ -34,7 +34,7 @@ LEARNED = " on frames from which it has learned"
 
 CRF_COSTS = {
     True: "The CRF makes this map worse",
-    False: "The CRF makes more cells right than wrong here, but costs rare classes",
+    False: "Here the CRF costs class accuracy, though not pixel accuracy",
 }
 """Said above the metrics if the refined map has less class accuracy, by whether it has less pixel accuracy, too."""
 
@@ -247,8 +247,9 @@ def _crf_costs(metrics: dict[str, dict[str, float]]) -> str:
     pixels, classes = ([metrics[name][row] for row in rows] for name in ("pixel accuracy", "class accuracy"))
     if classes[1] >= classes[0]:
         return ""
-    scores = "class accuracy over semantic cells is {:.1f} % without it and {:.1f} % with it"
-    return f"{CRF_COSTS[pixels[1] < pixels[0]]}: {scores.format(*(100 * one for one in classes))}."
+    without, refined = (100 * one for one in classes)
+    said = CRF_COSTS[pixels[1] < pixels[0]]
+    return f"{said}: class accuracy over semantic cells is {without:.1f} % without it and {refined:.1f} % with it."
 
 
 def _times(record: Record) -> str:

@@ -261,7 +261,7 @@ def open_gradebook(course: Path) -> Gradebook:
         When it is another kind of file.
     """
     path = course / "gradebook.db"
-    path.open("rb").close()  # the plain error, if there is none
+    path.open("rb").close()  # FileNotFoundError in place of an SQLite error
     # nbgrader adds its tables to whatever it opens, so look first; "immutable" waits for no lock.
     with closing(sqlite3.connect(f"{path.resolve().as_uri()}?immutable=1", uri=True)) as database:
         try:
