@@ -492,7 +492,7 @@ for votes, finished, there in plain:
         wrong[source] += np.bincount(finished[here & (finished != there)], minlength=N_SEMANTIC)
         all_road += (here & (there != ROAD)).sum() if source == "clean-up" else 0
 
-# %% jupyter={"source_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 n_vote, n_guess = labelled.values()
 with np.errstate(invalid="ignore"):
     vote_rate, guess_rate = (100 * wrong[source] / n for source, n in labelled.items())
@@ -645,7 +645,7 @@ assert at_sign[0] > 0.9 * at_sign[1], at_sign
 #
 # Now the four letters. What makes each?
 
-# %% tags=["letters"] jupyter={"source_hidden": true}
+# %% tags=["nbval-ignore-output", "letters"] jupyter={"source_hidden": true}
 there, (ours, votes) = frame.labels.birdseye_on(spec), make_truth(frame, o, spec)
 no_hidden_map, _ = make_truth(without_hidden(frame), o, spec)
 far_off = (truth == ROAD) & (ours >= N_SEMANTIC) & (spec.centers()[..., 0] > 38)

@@ -502,7 +502,7 @@ assert not any(verdict is False for name in ("none", "poses mirrored") for verdi
 #
 # </details>
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true, "outputs_hidden": true}
 pieces, accuracy = street.street_pieces(mapped, spec), METRICS["pixel accuracy"]
 truths = (
     street.semantic_truths(drive, every_belief, spec)[half] if labelled else np.full((len(mapped), *spec.shape), IGNORE)
@@ -564,7 +564,7 @@ plt.show()
 #
 # </details>
 
-# %% jupyter={"outputs_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"outputs_hidden": true}
 SHARE = 0.28  # of the image's height
 rows = round(SHARE * frames[0].camera.size[0])
 noise = np.random.default_rng(0).integers(0, 256, (rows, frames[0].camera.size[1], 3))
@@ -602,7 +602,7 @@ if ours:
     assert parts["brighter"][0] < 30
     assert parts["noise"][2] < parts["as it is"][2]
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true, "outputs_hidden": true}
 x, y = np.moveaxis(spec.centers(), -1, 0)
 ahead = (x > 7) & (x < 13) & (y > -1) & (y < 5)
 sim = sample_drive()[:3]
@@ -702,7 +702,7 @@ for side, cells in sides.items() if labelled else ():
     taught = [semantic_grids(learn_here(lesson, seed=seed), inputs) for seed in range(3)]
     networks[f"taught {side}"] = [without_unknown(one) for one in taught]
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true, "outputs_hidden": true}
 judged = {name: [called] for name, called in trivial.items()}
 judged |= {name: [grid.argmax(axis=1) for grid in several] for name, several in networks.items()}
 by_seed = {
@@ -721,7 +721,7 @@ if ours:
     assert max(by_seed["taught left"][1]) < right_cells["untaught"][1]
     assert max(by_seed["taught right"][0]) < right_cells["untaught"][0]
 
-# %% jupyter={"source_hidden": true, "outputs_hidden": true}
+# %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true, "outputs_hidden": true}
 if labelled:
     lesson[torch.isin(lesson, torch.tensor([KITTI_14.index("building"), KITTI_14.index("vegetation")]))] = IGNORE
     unwalled = [semantic_grids(learn_here(lesson, seed=seed), inputs) for seed in range(3)]
