@@ -12,7 +12,7 @@ from torch import nn
 from semgrid_edu.crf import CrfParams, damping, gram_matrix, mean_field_naive, pair_weights, unary_from_probability
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.fast import track_drive
+from semgrid_edu.fast import track_drive, with_fast_sampler
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture, build_net
@@ -127,7 +127,7 @@ class TestContributions:
 
     def test_of_a_network_with_heights_leave_the_part_of_the_heights_in_the_rest(self, last_labelled, make_net):
         """Gradient times input by a backward pass; without a scan it takes every score on the ground."""
-        net = make_net(last_labelled.camera, uses_return_heights=True)
+        net = with_fast_sampler(make_net(last_labelled.camera, uses_return_heights=True))
         (result,) = run_pipeline(last_labelled[:1], Stages.fast(net, PARAMS))
         told = frame_story(result, net)
         heights = cell_heights(result.frame.points_grid, SPEC)
