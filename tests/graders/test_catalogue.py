@@ -21,7 +21,7 @@ TIMEOUT = {"answer": 30, "endless loop": 1}
 
 
 class Checks:
-    """The reference gets full marks, the stub none, and each entry loses its points in its own task only."""
+    """Right answers get full marks, the stub none, and each entry loses its points in its own task only."""
 
     exercise: str
     entries: list[Entry]
@@ -70,8 +70,15 @@ class Checks:
     @pytest.fixture(scope="class")
     @classmethod
     def errors(cls, source, disguised, start):
-        """The errors of the right answers in disguise, by kind and test cell."""
-        return grade_disguised(source, disguised, HONEST, POINTLESS, start, TIMEOUT["answer"])
+        """The errors of the right answers in disguise, by kind and test cell.
+
+        The hidden inputs are others than the published ones, on which the catalogue is graded.
+        """
+        use_instructor(NOTEBOOKS / "instructor", 2027)
+        try:
+            return grade_disguised(source, disguised, HONEST, POINTLESS, start, TIMEOUT["answer"])
+        finally:
+            use_instructor(NOTEBOOKS / "instructor")
 
     @staticmethod
     def by_task(source, cells):
@@ -85,15 +92,6 @@ class Checks:
             for task, names in tasks(source).items()
             if all(name in cells and cells[name].score is not None for name in names)
         }
-
-    def test_reference_earns_full_marks_with_another_variant(self, source, reference, start):
-        """With other hidden inputs than the published ones, on which the catalogue is graded."""
-        use_instructor(NOTEBOOKS / "instructor", 2027)
-        try:
-            scores = self.by_task(source, grade_warm(source, reference, start, TIMEOUT["answer"]))
-        finally:
-            use_instructor(NOTEBOOKS / "instructor")
-        assert {task: message for task, (score, points, message) in scores.items() if score < points} == {}
 
     def test_untouched_stub_earns_nothing(self, source, start):
         scores = self.by_task(source, grade_warm(source, {}, start, TIMEOUT["answer"]))
@@ -111,7 +109,7 @@ class Checks:
             assert {name for name in coded if not errors[guess][name]} == set(), guess
 
     @pytest.mark.parametrize("kind", HONEST)
-    def test_other_types_of_numbers_cost_nothing(self, errors, kind):
+    def test_right_answers_in_other_types_cost_nothing(self, errors, kind):
         assert {name: found for name, found in errors[kind].items() if found} == {}
 
     def test_catalogue_is_complete(self, source):
@@ -127,7 +125,7 @@ class Checks:
             hidden = ["on inputs you haven't seen" in entry.says for entry in entries if entry.loses]
             assert 1 <= len(entries) - len(hidden) <= 2, f"{task}: one or two other right ways"
             assert {False, True} == {*hidden}, f"{task}: a mistake that visible tests find, and one for hidden ones"
-            assert len(hidden) <= 5, f"{task}: at most five mistakes"
+            assert len(hidden) <= 4, f"{task}: at most four mistakes"
 
     def test_a_right_way_stands_beside_mistakes_in_other_tasks(self):
         """So `test_entry` shows that a mistake costs nothing in other tasks."""
