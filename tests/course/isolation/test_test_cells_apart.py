@@ -97,6 +97,25 @@ def test_a_hidden_part_waits_until_the_seen_process_has_ended(prepared):
     assert (len(started), alive) == (2, [])
 
 
+def test_a_cell_of_the_exercise_may_take_longer_than_an_answer(prepared):
+    slow = "import time\ntime.sleep(1.5)"
+    marked = {
+        "grade_id": "setup",
+        "grade": False,
+        "solution": False,
+        "locked": True,
+        "schema_version": 3,
+        "task": False,
+    }
+    notebook = new_notebook(cells=[new_code_cell(slow, metadata={"nbgrader": marked}), new_code_cell(slow)])
+    ended = run_submission(notebook, {"setup": slow}, lambda: StudentProcess(Limits(memory=1000), prepared), 1)
+    exercises, hers = notebook.cells
+    assert exercises.outputs == []
+    assert [output.ename for output in hers.outputs] == ["AnswerTimeoutError"]
+    assert ended.keys() == {""}
+    assert ended[""].startswith("no reply before timeout, 1 s")
+
+
 def test_no_hidden_part_reaches_the_process_that_the_student_sees(session):
     session.run("def f(x):\n    return x")
     f = session.names(["f"], session)["f"]

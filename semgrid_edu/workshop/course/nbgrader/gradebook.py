@@ -29,6 +29,9 @@ MAX_PARTS = 1000
 GRADED = "graded.csv"
 """The file with one line for each submission."""
 
+FORMULAS = ("=", "+", "-", "@", "\t", "\r")
+"""With what a text begins that a spreadsheet takes for a formula."""
+
 UNFINISHED = "unfinished"
 """The folder with an empty file for each submission whose grading has begun and not ended, even if it was killed."""
 
@@ -286,6 +289,22 @@ def write_graded(course: Path) -> Path:
     table.writerow(column.name for column in fields(Graded))
     with open_gradebook(course) as gradebook:
         for one in sorted({*submissions(course)} - {*ungraded(course)}):
-            table.writerow(astuple(result_of(gradebook, *one)))
+            table.writerow(map(as_cell, astuple(result_of(gradebook, *one))))
     write_text(course / GRADED, text.getvalue())
     return course / GRADED
+
+
+def as_cell(value: object) -> object:
+    """Return what a table shows for a value: a text that a spreadsheet would compute gets an apostrophe before it.
+
+    Parameters
+    ----------
+    value : object
+        Text or number.
+
+    Examples
+    --------
+    >>> as_cell("=1+1"), as_cell(-1.5)
+    ("'=1+1", -1.5)
+    """
+    return f"'{value}" if isinstance(value, str) and value.startswith(FORMULAS) else value

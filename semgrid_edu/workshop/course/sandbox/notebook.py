@@ -24,6 +24,9 @@ from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.session import AnswerEndedError, AnswerTimeoutError, NoProcessError, Session
 from semgrid_edu.workshop.course.sandbox.values import writable
 
+INSTRUCTORS_TIME = 4
+"""How many times as long as an answer a cell of the exercise may take: on a busy machine it isn't her fault."""
+
 MAX_PRINTED = 2000
 """How many characters are kept of what an answer printed during a test."""
 
@@ -82,7 +85,7 @@ def run_submission(
         ended = _run_seen(notebook, trusted, tests)
         # Hidden inputs are sent only after the process whose output the student sees has ended.
         seen.stop()
-        _run_unseen(notebook, tests)
+        _run_unseen(notebook, trusted, tests)
         return ended
     except NoProcessError as error:
         raise ChildProcessError(str(error)) from error
@@ -229,13 +232,13 @@ def _run_seen(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCel
     return ended
 
 
-def _run_unseen(notebook: NotebookNode, tests: TestCells) -> None:
+def _run_unseen(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -> None:
     """Run the hidden parts of tests in their order, each after the cells above it."""
     for cell in (c for c in notebook.cells if c.cell_type == "code"):
         if is_grade(cell) and not is_solution(cell):
             cell.outputs += tests.judge(cell_name(cell))
         else:
-            tests.unseen.run_later(cell.source)
+            tests.unseen.run_later(cell.source, _times(cell, trusted))
 
 
 def _prepare(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -> None:
@@ -253,7 +256,12 @@ def _outputs(cell: NotebookNode, trusted: Mapping[str, str], tests: TestCells) -
             return tests.test(cell.source, cell_name(cell))
         # Without an error nbgrader would give full points.
         return [_error("ValueError", "not the course's test")]
-    return _as_outputs(tests.seen.run(cell.source))
+    return _as_outputs(tests.seen.run(cell.source, _times(cell, trusted)))
+
+
+def _times(cell: NotebookNode, trusted: Mapping[str, str]) -> float:
+    """Return how many times as long as an answer a cell may take."""
+    return INSTRUCTORS_TIME if trusted.get(cell_name(cell)) == cell.source else 1
 
 
 def _as_outputs(reply: dict) -> list[NotebookNode]:

@@ -71,51 +71,57 @@ class Session:
     def __init__(self, start: Callable[[], StudentProcess], timeout: float, secret: bool = False) -> None:
         self.start, self.timeout, self.secret = start, timeout, secret
         self.process: StudentProcess | None = None
-        self.cells: list[str] = []
-        self.waiting: list[str] = []
+        self.cells: list[tuple[str, float]] = []
+        self.waiting: list[tuple[str, float]] = []
         self.printed = ""
         self.postponed: list[Callable[[], str]] = []
         self.stopped = False
         self.left_in_all = TOTAL_TIME * timeout
         self.begin()
 
-    def begin(self) -> None:
-        """Start the time of a cell."""
-        self.left, self.ended = self.timeout, ""
-        # Not even compiled code that a callback or a test runs here for an answer's sake goes on for ever.
-        faulthandler.dump_traceback_later(self.timeout + GRADERS_TIME, exit=True, file=NOWHERE)
+    def begin(self, times: float = 1) -> None:
+        """Start the time of a cell.
 
-    def run(self, code: str) -> dict[str, Any]:
+        Parameters
+        ----------
+        times : float
+            How many times as long as others it may take.
+        """
+        self.left = self.allowed = times * self.timeout
+        self.ended = ""
+        # Not even compiled code that a callback or a test runs here for an answer's sake goes on for ever.
+        faulthandler.dump_traceback_later(self.left + GRADERS_TIME, exit=True, file=NOWHERE)
+
+    def run(self, code: str, times: float = 1) -> dict[str, Any]:
         """Run a cell; one that ends the process, or doesn't end, isn't run again.
 
         Parameters
         ----------
         code : str
             The cell.
+        times : float
+            How many times as long as others it may take.
 
         Returns
         -------
         dict
             "streams", "shown" and, if the cell failed, "error", as in `Worker.run`.
         """
-        self.begin()
+        self.begin(times)
         try:
             reply = self._ask({"do": "run", "code": code})
         except (AnswerTimeoutError, AnswerEndedError) as error:
             report = {"kind": type(error).__name__, "message": str(error), "line": "", "traceback": []}
             return {"streams": {}, "shown": [], "error": report}
-        self.cells.append(code)
+        self.cells.append((code, times))
         return reply
 
-    def run_later(self, code: str) -> None:
+    def run_later(self, code: str, times: float = 1) -> None:
         """Run a cell before the next call of a function, and not at all if there is none.
 
-        Parameters
-        ----------
-        code : str
-            The cell.
+        Parameters are those of `Session.run`.
         """
-        self.waiting.append(code)
+        self.waiting.append((code, times))
 
     def names(self, wanted: list[str], unseen: "Session") -> dict[str, Any]:
         """Return functions to call and plain values for the names that the student's notebook defines.
@@ -173,20 +179,20 @@ class Session:
     def _as_error(self, error: dict[str, Any]) -> Exception:
         """Return the error that an answer raised; with secret inputs, only its line."""
         if self.secret:
-            lines = min(MAX_LINE, max((cell.count("\n") + 1 for cell in self.cells), default=0))
+            lines = min(MAX_LINE, max((cell.count("\n") + 1 for cell, _ in self.cells), default=0))
             message = f"an error in line {error['number']}" if error["number"] in range(1, lines + 1) else "an error"
             found = _standard_error(error | {"kind": "", "message": message, "line": ""})
             found.secret = message
             return found
         # A line number outside all cells was forged to smuggle out a value.
-        known = any(error["line"] in cell for cell in self.cells)
+        known = any(error["line"] in cell for cell, _ in self.cells)
         return _standard_error(error | {"line": error["line"] if known else ""})
 
     def _catch_up(self) -> None:
         """Run the cells that are waiting."""
         if self.waiting:
             while self.waiting:
-                self.run(self.waiting.pop(0))
+                self.run(*self.waiting.pop(0))
             self.begin()
 
     def _ask(self, message: dict, callbacks: list[Callable] | None = None) -> dict[str, Any]:
@@ -198,7 +204,7 @@ class Session:
         try:
             return process.ask(message, began + self.left, callbacks)
         except TimeoutError:
-            self.process, self.ended = None, f"no reply before timeout, {self.timeout:g} s: does a loop never end?"
+            self.process, self.ended = None, f"no reply before timeout, {self.allowed:g} s: does a loop never end?"
             raise AnswerTimeoutError(self.ended) from None
         except ProcessEndedError:
             self.process, self.ended = None, "Python itself ended here: by exit(), a crash, or for want of memory?"
@@ -223,10 +229,11 @@ class Session:
         except Exception as error:
             raise NoProcessError(f"no process could be started for students' code: {error}") from error
         self.left_in_all -= time.monotonic() - began
+        times = self.allowed / self.timeout
         cells, self.cells = self.cells, []
-        for code in cells:
-            self.run(code)
-        self.begin()
+        for earlier in cells:
+            self.run(*earlier)
+        self.begin(times)
 
     def stop(self) -> None:
         """End the process for good."""
