@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import pytest
+
 DOCS = Path(__file__).parents[1] / "docs"
 
 
@@ -48,6 +50,17 @@ def test_the_camera_beside_rules_without_one():
     gains = later["network, unknown forbidden"]
     assert f"{interval(gains['pixel accuracy above the height rule']).replace(' (', ' points (')} in cells" in page
     assert f"by {interval(gains['class accuracy above the height rule'])} in class accuracy" in page
+
+
+def test_cars_on_their_tops():
+    found = json.loads((DOCS / "results" / "overturned.json").read_text(encoding="utf-8"))
+    top, wheels = (interval(found["called car"][way]) for way in ("on its top", "on its wheels"))
+    page = " ".join((DOCS / "results.md").read_text(encoding="utf-8").split())
+    top, high = top.replace(" (", " % (", 1), interval(found["difference"])
+    assert f"{top} of the cells of cars on their tops *car*, and {wheels} on their wheels: {high}" in page
+    for way, counts in found["counts"].items():
+        share = sum(counts["called car"]) / sum(counts["cells"])
+        assert share == pytest.approx(found["called car"][way]["mean"])
 
 
 def test_memory():
