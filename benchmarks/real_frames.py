@@ -21,7 +21,7 @@ from semgrid_edu.fast import load_net
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import confusion_matrix
-from semgrid_edu.pipeline import FrameResult, Stages, run_pipeline
+from semgrid_edu.pipeline import FrameResult, Stages, network_image, run_pipeline
 from semgrid_edu.plotting.colours import colour_patches
 from semgrid_edu.plotting.images import blend_labels, draw_image
 
@@ -53,9 +53,8 @@ def main() -> None:
 
 def draw_frame(axes: NDArray, name: str, result: FrameResult, labels: NDArray) -> None:
     """Draw a frame into a row of four axes."""
-    image, called = result.frame.image, result.grid.argmax(axis=0)
-    size = result.scores.shape[1:]
-    small = image[:: image.shape[0] // size[0], :: image.shape[1] // size[1]][: size[0], : size[1]]
+    called = result.grid.argmax(axis=0)
+    small = np.rint(255 * network_image(result.frame, result.scores.shape[1:]).transpose(1, 2, 0)).astype(np.uint8)
     draw_image(blend_labels(small, result.scores.argmax(axis=0), KITTI_14, 0.5), axes[0]).set_title(name, fontsize=9)
     plotting.occupancy(SPEC, result.belief.probability, axes[1], legend=False)
     plotting.grid_labels(SPEC, called, KITTI_14, axes[2], legend=False)
